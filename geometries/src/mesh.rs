@@ -1,0 +1,246 @@
+//! A closed triangulated surface whose facets share numbered vertices.
+//!
+//! Invariants of a finished mesh, executed by [`Mesh::fault`]:
+//! - every edge belongs to exactly two facets, which run along it in opposite directions (watertight
+//!   and consistently wound);
+//! - no facet repeats a vertex or has no area, as f32 sees it.
+//!
+//! Positions stay f64 until the facets are handed out, so that each vertex is rounded to f32 once and
+//! all its facets get the same bits.
+
+use std::collections::HashMap;
+use std::fmt;
+
+use crate::Facet;
+pub(crate) use edges::EdgeHasher;
+use edges::halves;
+
+mod edges;
+
+/// A surface of triangles over numbered vertices, wound so that its normals point outward.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    pub(crate) vertices: Vec<[f64; 3]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+/// The first broken invariant of a mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MeshFault {
+    /// The facet has no area once its vertices are f32, or is not finite.
+    FacetWithoutArea {
+        /// Index of the facet.
+        facet: usize,
+    },
+    /// The directed edge is not matched by exactly one in the opposite direction.
+    EdgeUnmatched {
+        /// Vertex numbers, from and to.
+        edge: [u32; 2],
+    },
+}
+
+impl fmt::Display for MeshFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FacetWithoutArea { facet } => write!(f, "facet {facet} has no area as f32"),
+            Self::EdgeUnmatched { edge: [a, b] } => {
+                write!(f, "the edge from vertex {a} to {b} has no single opposite")
+            }
+        }
+    }
+}
+
+impl Mesh {
+    /// Adds a vertex and gives its number.
+    pub(crate) fn add_vertex(&mut self, position: [f64; 3]) -> u32 {
+        let number = u32::try_from(self.vertices.len()).expect("facets are limited to 2^31");
+        self.vertices.push(position);
+        number
+    }
+
+    /// Adds the two triangles of a quadrilateral given in the order of its corners.
+    pub(crate) fn add_quad(&mut self, [a, b, c, d]: [u32; 4]) {
+        self.triangles.push([a, b, c]);
+        self.triangles.push([a, c, d]);
+    }
+
+    /// Adds all of another mesh.
+    pub(crate) fn append(&mut self, other: &Mesh) {
+        let first = u32::try_from(self.vertices.len()).expect("facets are limited to 2^31");
+        self.vertices.extend(&other.vertices);
+        self.triangles
+            .extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+
+    /// Turns the surface inside out.
+    pub(crate) fn flip(&mut self) {
+        self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+
+    pub(crate) fn translate(&mut self, by: [f64; 3]) {
+        for vertex in &mut self.vertices {
+            *vertex = std::array::from_fn(|a| vertex[a] + by[a]);
+        }
+    }
+
+    /// The surface as facet soup.
+    pub fn facets(&self) -> Vec<Facet> {
+        self.triangles.iter().map(|&t| self.facet(t)).collect()
+    }
+
+    fn facet(&self, triangle: [u32; 3]) -> Facet {
+        triangle.map(|v| self.vertices[v as usize].map(|x| x as f32))
+    }
+
+    /// The volume enclosed, negative if the surface is inside out.
+    pub fn volume(&self) -> f64 {
+        let six_fold: f64 = self
+            .triangles
+            .iter()
+            .map(|t| {
+                let [p, q, r] = t.map(|v| self.vertices[v as usize]);
+                p[0] * (q[1] * r[2] - q[2] * r[1])
+                    + p[1] * (q[2] * r[0] - q[0] * r[2])
+                    + p[2] * (q[0] * r[1] - q[1] * r[0])
+            })
+            .sum();
+        six_fold / 6.0
+    }
+
+    /// Splits the longest edges at their middles, two facets more each time, until there are `facets`
+    /// of them (one less if that is odd). Passes over the mesh touch a facet once each, so that what is
+    /// longest is judged again before a facet is split a second time.
+    pub(crate) fn split_edges_until(&mut self, facets: usize) {
+        while self.triangles.len() + 1 < facets {
+            let wanted = (facets - self.triangles.len()) / 2;
+            self.split_longest(wanted);
+        }
+    }
+
+    /// Splits at most `wanted` edges, no two of which share a facet; at least one.
+    fn split_longest(&mut self, wanted: usize) {
+        let chosen = edges::longest(self, wanted.saturating_mul(3));
+        // An edge is known by its facet that runs upward along it; look up the one that runs downward.
+        let slots: HashMap<u64, usize, EdgeHasher> = chosen
+            .iter()
+            .enumerate()
+            .map(|(slot, edge)| (edge.key, slot))
+            .collect();
+        let mut down = vec![usize::MAX; chosen.len()];
+        for (facet, half) in halves(&self.triangles) {
+            if half.is_down()
+                && let Some(&slot) = slots.get(&half.key())
+            {
+                down[slot] = facet;
+            }
+        }
+        let mut touched = vec![false; self.triangles.len()];
+        let mut split = 0;
+        for (edge, facet_down) in chosen.iter().zip(down) {
+            if split < wanted && !touched[edge.facet_up] && !touched[facet_down] {
+                touched[edge.facet_up] = true;
+                touched[facet_down] = true;
+                self.split(edge.ends(), [edge.facet_up, facet_down]);
+                split += 1;
+            }
+        }
+    }
+
+    /// Splits one edge and the two facets on it.
+    fn split(&mut self, ends: [u32; 2], facets: [usize; 2]) {
+        let [p, q] = ends.map(|v| self.vertices[v as usize]);
+        let middle = self.add_vertex(std::array::from_fn(|a| (p[a] + q[a]) * 0.5));
+        for facet in facets {
+            let whole = self.triangles[facet];
+            let part = |keep: u32| {
+                whole.map(|v| {
+                    if v != keep && ends.contains(&v) {
+                        middle
+                    } else {
+                        v
+                    }
+                })
+            };
+            self.triangles[facet] = part(ends[0]);
+            self.triangles.push(part(ends[1]));
+        }
+    }
+
+    /// The first facet that has no area once its vertices are f32, or no finite one.
+    pub(crate) fn fault_of_area(&self) -> Option<MeshFault> {
+        let has_area = |t: &[u32; 3]| {
+            let [p, q, r] = self.facet(*t).map(|p| p.map(f64::from));
+            let u: [f64; 3] = std::array::from_fn(|a| q[a] - p[a]);
+            let v: [f64; 3] = std::array::from_fn(|a| r[a] - p[a]);
+            let is_finite = u.into_iter().chain(v).all(f64::is_finite);
+            is_finite && (0..3).any(|a| u[a] * v[(a + 1) % 3] != u[(a + 1) % 3] * v[a])
+        };
+        let facet = self.triangles.iter().position(|t| !has_area(t))?;
+        Some(MeshFault::FacetWithoutArea { facet })
+    }
+
+    /// The first broken invariant, if any.
+    pub fn fault(&self) -> Option<MeshFault> {
+        self.fault_of_area()
+            .or_else(|| edges::fault(&self.triangles))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tetrahedron() -> Mesh {
+        Mesh {
+            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        }
+    }
+
+    #[test]
+    fn splitting_edges_keeps_the_surface_and_meets_the_number() {
+        for facets in [4, 5, 6, 8, 50, 51, 1000] {
+            let mut mesh = tetrahedron();
+            mesh.split_edges_until(facets);
+            assert_eq!(mesh.triangles.len(), facets & !1);
+            assert_eq!(mesh.fault(), None);
+            assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn faults_are_found() {
+        let mut open = tetrahedron();
+        open.triangles.pop();
+        assert!(matches!(
+            open.fault(),
+            Some(MeshFault::EdgeUnmatched { .. })
+        ));
+
+        let mut flipped = tetrahedron();
+        flipped.triangles[2].swap(0, 1);
+        assert!(matches!(
+            flipped.fault(),
+            Some(MeshFault::EdgeUnmatched { .. })
+        ));
+
+        let mut doubled = tetrahedron();
+        doubled.triangles.extend(doubled.triangles.clone());
+        assert!(matches!(
+            doubled.fault(),
+            Some(MeshFault::EdgeUnmatched { .. })
+        ));
+
+        let mut flat = tetrahedron();
+        flat.vertices[3] = [1e-60, 1e-60, 1e-60];
+        assert_eq!(flat.fault(), Some(MeshFault::FacetWithoutArea { facet: 1 }));
+    }
+
+    #[test]
+    fn inside_out_has_negative_volume() {
+        let mut mesh = tetrahedron();
+        mesh.flip();
+        assert!(mesh.volume() < 0.0);
+        assert_eq!(mesh.fault(), None);
+    }
+}

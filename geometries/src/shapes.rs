@@ -1,0 +1,66 @@
+//! One module per shape, and the table of what each can be asked.
+
+use crate::{Generator, GeneratorError, Mesh, Shape};
+
+mod fighter;
+mod implicit;
+mod pipe;
+mod slab;
+mod solids;
+mod sphere;
+mod torus;
+mod uav;
+
+/// The size keys that a shape has.
+pub(crate) fn sizes(shape: Shape) -> &'static [&'static str] {
+    match shape {
+        Shape::Cube => &["edge"],
+        Shape::Sphere => &["radius"],
+        Shape::Torus => &["radius", "radius_tube"],
+        Shape::NestedSpheres => &["radius", "radius_inner"],
+        Shape::Plate => &["length", "width", "thickness"],
+        Shape::Pipe => &["radius", "radius_bend", "angle", "length"],
+        Shape::Uav | Shape::Fighter => &["length"],
+    }
+}
+
+/// The fewest facets that still draw the shape.
+pub(crate) fn facets_least(shape: Shape) -> usize {
+    match shape {
+        Shape::Cube | Shape::Plate => 12,
+        Shape::Sphere => 20,
+        Shape::NestedSpheres => 40,
+        Shape::Torus => 18,
+        Shape::Pipe => 60,
+        Shape::Uav | Shape::Fighter => 2_000,
+    }
+}
+
+/// Draws the shape about its own origin in at most the facets asked for, and not far below.
+pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
+    match of.shape {
+        Shape::Cube => slab::cube(of),
+        Shape::Plate => slab::plate(of),
+        Shape::Sphere => sphere::sphere(of),
+        Shape::NestedSpheres => sphere::nested_spheres(of),
+        Shape::Torus => torus::torus(of),
+        Shape::Pipe => pipe::pipe(of),
+        Shape::Uav => implicit::draw::<uav::Uav>(of),
+        Shape::Fighter => implicit::draw::<fighter::Fighter>(of),
+    }
+}
+
+/// The least pitch, at most `longest`, at which `count` does not exceed `facets`. `count` falls with the
+/// pitch, in steps; closing in by halving finds the step.
+fn pitch_finest(longest: f64, facets: usize, count: impl Fn(f64) -> usize) -> f64 {
+    let (mut fine, mut coarse) = (longest / (facets as f64 + 1.0), longest);
+    for _ in 0..100 {
+        let middle = (fine + coarse) * 0.5;
+        if count(middle) > facets {
+            fine = middle
+        } else {
+            coarse = middle
+        }
+    }
+    coarse
+}

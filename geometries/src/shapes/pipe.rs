@@ -1,0 +1,157 @@
+//! A curved pipe with closed flat caps, for internal flow: a straight, a bend, a straight.
+//!
+//! The bore's centre line comes along +x to the origin, where the bend starts towards +y.
+
+use std::f64::consts::TAU;
+
+use super::pitch_finest;
+use crate::{Generator, GeneratorError, Mesh};
+
+/// The pipe, its bend starting at the origin.
+pub(super) fn pipe(of: &Generator) -> Result<Mesh, GeneratorError> {
+    let line = CentreLine::of(of)?;
+    let facets_at = |pitch| line.divisions(pitch).facets();
+    let pitch = pitch_finest(line.total(), of.facets, facets_at);
+    Ok(draw(&line, &line.divisions(pitch)))
+}
+
+/// The pipe's sizes.
+struct CentreLine {
+    radius: f64,
+    radius_bend: f64,
+    /// In radians.
+    angle: f64,
+    straight: f64,
+}
+
+impl CentreLine {
+    fn of(of: &Generator) -> Result<Self, GeneratorError> {
+        let radius = of.size("radius", of.radius, 0.1)?;
+        let radius_bend = of.size("radius_bend", of.radius_bend, radius * 3.0)?;
+        let angle = of.size("angle", of.angle, 90.0)?;
+        let straight = of.size("length", of.length, radius * 5.0)?;
+        let wrong = |key, value, want| Err(GeneratorError::SizeWrong { key, value, want });
+        if radius_bend <= radius {
+            return wrong(
+                "radius_bend",
+                radius_bend,
+                format!("must exceed radius = {radius}"),
+            );
+        }
+        if angle > 180.0 {
+            return wrong(
+                "angle",
+                angle,
+                "must be at most 180, or the straights may meet".into(),
+            );
+        }
+        Ok(Self {
+            radius,
+            radius_bend,
+            angle: angle * (TAU / 360.0),
+            straight,
+        })
+    }
+
+    fn bend(&self) -> f64 {
+        self.radius_bend * self.angle
+    }
+
+    fn total(&self) -> f64 {
+        2.0 * self.straight + self.bend()
+    }
+
+    fn divisions(&self, pitch: f64) -> Divisions {
+        let at = |length: f64, least: usize| ((length / pitch) as usize).max(least);
+        Divisions {
+            around: at(TAU * self.radius, 6),
+            straight: at(self.straight, 1),
+            bend: at(self.bend(), 2),
+            cap: at(self.radius, 1),
+        }
+    }
+
+    /// A point of the centre line and the direction, in the xy plane, that points away from the bend's
+    /// centre there. `step` counts divisions from the inlet.
+    fn frame(&self, divisions: &Divisions, step: usize) -> ([f64; 2], [f64; 2]) {
+        let bend_end = divisions.straight + divisions.bend;
+        let turned = match step {
+            _ if step <= divisions.straight => 0.0,
+            _ if step >= bend_end => self.angle,
+            _ => self.angle * (step - divisions.straight) as f64 / divisions.bend as f64,
+        };
+        let (sin, cos) = libm::sincos(turned);
+        let r = self.radius_bend;
+        let from_bend = if step < divisions.straight {
+            -self.straight * (divisions.straight - step) as f64 / divisions.straight as f64
+        } else {
+            self.straight * step.saturating_sub(bend_end) as f64 / divisions.straight as f64
+        };
+        let point = [r * sin + from_bend * cos, r * (1.0 - cos) + from_bend * sin];
+        (point, [sin, -cos])
+    }
+}
+
+/// Into how many pieces each part is cut.
+struct Divisions {
+    around: usize,
+    straight: usize,
+    bend: usize,
+    cap: usize,
+}
+
+impl Divisions {
+    fn along(&self) -> usize {
+        2 * self.straight + self.bend
+    }
+
+    /// Walls in two facets a quadrilateral; each cap in rings around a fan.
+    fn facets(&self) -> usize {
+        2 * self.around * (self.along() + 2 * self.cap - 1)
+    }
+}
+
+fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
+    let mut mesh = Mesh::default();
+    let last = divisions.along();
+    // The surface as rings of vertices: up the inlet's cap, along the wall, down the outlet's cap.
+    let inlet = (1..divisions.cap).map(|i| (0, i));
+    let wall = (0..=last).map(|step| (step, divisions.cap));
+    let outlet = (1..divisions.cap).rev().map(|i| (last, i));
+    let mut rings = 0;
+    for (step, out) in inlet.chain(wall).chain(outlet) {
+        let reach = line.radius * out as f64 / divisions.cap as f64;
+        let ([x, y], [away_x, away_y]) = line.frame(divisions, step);
+        for i in 0..divisions.around {
+            let (sin, cos) = libm::sincos(TAU * i as f64 / divisions.around as f64);
+            mesh.add_vertex([
+                x + reach * cos * away_x,
+                y + reach * cos * away_y,
+                reach * sin,
+            ]);
+        }
+        rings += 1;
+    }
+    let number = |ring: usize, i: usize| (ring * divisions.around + i % divisions.around) as u32;
+    for ring in 1..rings {
+        for i in 0..divisions.around {
+            let (before, at) = (ring - 1, ring);
+            mesh.add_quad([
+                number(before, i),
+                number(at, i),
+                number(at, i + 1),
+                number(before, i + 1),
+            ]);
+        }
+    }
+    let [inlet, outlet] = [0, last].map(|step| {
+        let ([x, y], _) = line.frame(divisions, step);
+        mesh.add_vertex([x, y, 0.0])
+    });
+    for i in 0..divisions.around {
+        mesh.triangles.push([inlet, number(0, i), number(0, i + 1)]);
+        mesh.triangles
+            .push([outlet, number(rings - 1, i + 1), number(rings - 1, i)]);
+    }
+    mesh
+}

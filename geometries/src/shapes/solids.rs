@@ -1,0 +1,262 @@
+//! Solids as distance functions, from which aircraft are put together.
+//!
+//! Invariant of everything here: between two points a function differs by no more than the points are
+//! apart (its Lipschitz constant is at most 1), and it is negative inside. That is what lets
+//! [`super::implicit`] skip space that cannot hold surface.
+
+/// A point or direction.
+pub(super) type Vec3 = [f64; 3];
+
+fn sub(p: Vec3, q: Vec3) -> Vec3 {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+fn dot(p: Vec3, q: Vec3) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+fn mix(at: f64, from: f64, to: f64) -> f64 {
+    from + (to - from) * at
+}
+
+/// The hull of two balls.
+pub(super) struct RoundCone {
+    from: Vec3,
+    along: Vec3,
+    radius: [f64; 2],
+    /// Square of the length, and of the length of the tangent cone's side.
+    square: f64,
+    square_side: f64,
+}
+
+impl RoundCone {
+    /// Neither ball may contain the other.
+    pub(super) fn new(from: Vec3, radius_from: f64, to: Vec3, radius_to: f64) -> Self {
+        let along = sub(to, from);
+        let square = dot(along, along);
+        let shrink = radius_from - radius_to;
+        let square_side = square - shrink * shrink;
+        assert!(
+            square_side > 0.0,
+            "one end of a round cone swallows the other"
+        );
+        Self {
+            from,
+            along,
+            radius: [radius_from, radius_to],
+            square,
+            square_side,
+        }
+    }
+
+    /// After Inigo Quilez's exact distance to a round cone.
+    pub(super) fn distance(&self, p: Vec3) -> f64 {
+        let [from, to] = self.radius;
+        let (square, shrink) = (self.square, from - to);
+        let q = sub(p, self.from);
+        let y = dot(q, self.along);
+        let z = y - square;
+        let x2 = (dot(q, q) * square - y * y).max(0.0) * square;
+        let k = shrink * shrink.abs() * x2;
+        if z * z.abs() * square * self.square_side > k {
+            return (x2 + z * z * square).sqrt() / square - to;
+        }
+        if y * y.abs() * square * self.square_side < k {
+            return (x2 + y * y * square).sqrt() / square - from;
+        }
+        ((x2 * self.square_side / square).sqrt() + y * shrink) / square - from
+    }
+}
+
+/// A box with rounded edges; `half` includes the rounding.
+pub(super) fn rounded_box(p: Vec3, centre: Vec3, half: Vec3, rounding: f64) -> f64 {
+    let q: Vec3 = std::array::from_fn(|a| (p[a] - centre[a]).abs() - half[a] + rounding);
+    let out = q.map(|x| x.max(0.0));
+    dot(out, out).sqrt() + q[0].max(q[1]).max(q[2]).min(0.0) - rounding
+}
+
+/// A wing's cross section at one end: where it begins and ends along x, and half its thickness.
+#[derive(Clone, Copy)]
+pub(super) struct Section {
+    pub(super) leading: f64,
+    pub(super) trailing: f64,
+    pub(super) thickness_half: f64,
+}
+
+/// A tapered wing, tail or pylon that reaches from a root along a direction normal to x.
+pub(super) struct Panel {
+    root: [f64; 2],
+    along: [f64; 2],
+    span: f64,
+    sections: [Section; 2],
+    /// Nothing is thinner than this radius, or a grid would miss it.
+    radius_least: f64,
+    /// What taper and sweep add to the slope is taken out again.
+    shrink: f64,
+}
+
+impl Panel {
+    /// From `root` (y, z) in the direction `along` (y, z; a unit vector), `span` long.
+    pub(super) fn new(
+        root: [f64; 2],
+        along: [f64; 2],
+        span: f64,
+        sections: [Section; 2],
+        radius_least: f64,
+    ) -> Self {
+        let [from, to] = sections;
+        let slope = (to.leading - from.leading)
+            .abs()
+            .max((to.trailing - from.trailing).abs())
+            + (to.thickness_half - from.thickness_half).abs();
+        let slope = slope / span;
+        let shrink = 1.0 / (1.0 + slope * slope).sqrt();
+        Self {
+            root,
+            along,
+            span,
+            sections,
+            radius_least,
+            shrink,
+        }
+    }
+
+    pub(super) fn distance(&self, p: Vec3) -> f64 {
+        let (y, z) = (p[1] - self.root[0], p[2] - self.root[1]);
+        let reach = y * self.along[0] + z * self.along[1];
+        let off = (z * self.along[0] - y * self.along[1]).abs();
+        let at = (reach / self.span).clamp(0.0, 1.0);
+        let beyond = (reach - self.span).max(-reach).max(0.0);
+        let [from, to] = &self.sections;
+        let leading = mix(at, from.leading, to.leading);
+        let trailing = mix(at, from.trailing, to.trailing);
+        let thick = mix(at, from.thickness_half, to.thickness_half).max(self.radius_least);
+        let section = self.section(p[0], off, leading, trailing, thick);
+        let rounded = if beyond > 0.0 {
+            let side = (section + thick).max(0.0);
+            (side * side + beyond * beyond).sqrt() - thick
+        } else {
+            section
+        };
+        rounded * self.shrink
+    }
+
+    /// An aerofoil: hulls of a nose circle, a thick circle at 35 % of the chord and a thin one aft.
+    fn section(&self, x: f64, off: f64, leading: f64, trailing: f64, thick: f64) -> f64 {
+        let [nose, tail] = [0.45, 0.12].map(|part| (thick * part).max(self.radius_least));
+        let middle = mix(0.35, leading, trailing);
+        let fore = hull_of_circles([x, off], [leading + nose, middle], [nose, thick]);
+        let aft = hull_of_circles([x, off], [middle, trailing - tail], [thick, tail]);
+        fore.min(aft)
+    }
+}
+
+/// The hull of two circles that are centred on the axis `off = 0`, `off` being at least 0.
+fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) -> f64 {
+    let length = centres[1] - centres[0];
+    let circle = |i: usize, radius: f64| {
+        let q = x - centres[i];
+        (q * q + off * off).sqrt() - radius
+    };
+    if length <= (from - to).abs() {
+        return if from > to {
+            circle(0, from)
+        } else {
+            circle(1, to)
+        };
+    }
+    let sin = (from - to) / length;
+    let cos = (1.0 - sin * sin).sqrt();
+    let q = x - centres[0];
+    let reach = q * cos - off * sin;
+    if reach < 0.0 {
+        circle(0, from)
+    } else if reach > cos * length {
+        circle(1, to)
+    } else {
+        off * cos + q * sin - from
+    }
+}
+
+/// The union of two solids with a fillet of about the size `fillet` where they meet.
+pub(super) fn blend(a: f64, b: f64, fillet: f64) -> f64 {
+    let h = (fillet - (a - b).abs()).max(0.0);
+    a.min(b) - h * h / (4.0 * fillet)
+}
+
+/// The first solid without the second.
+pub(super) fn carve(a: f64, b: f64) -> f64 {
+    a.max(-b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on a grid around a unit-sized solid, and one a step away from each in some direction.
+    fn steepest(distance: impl Fn(Vec3) -> f64) -> f64 {
+        let mut steepest = 0.0_f64;
+        for i in 0..20_000_u64 {
+            let noise = |salt: u64| {
+                let x = (i * 7 + salt).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                ((x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64
+                    / (1_u64 << 53) as f64
+            };
+            let p = [noise(0), noise(1), noise(2)].map(|x| 3.0 * x - 1.5);
+            let step = [noise(3), noise(4), noise(5)].map(|x| 1e-3 * (x - 0.5));
+            let q = [p[0] + step[0], p[1] + step[1], p[2] + step[2]];
+            steepest = steepest.max((distance(p) - distance(q)).abs() / dot(step, step).sqrt());
+        }
+        steepest
+    }
+
+    #[test]
+    fn no_distance_is_steeper_than_one() {
+        let cone = RoundCone::new([-0.5, 0.1, 0.0], 0.3, [0.6, 0.0, 0.2], 0.1);
+        let root = Section {
+            leading: -0.6,
+            trailing: 0.6,
+            thickness_half: 0.1,
+        };
+        let tip = Section {
+            leading: 0.4,
+            trailing: 0.7,
+            thickness_half: 0.02,
+        };
+        let panel = Panel::new([0.0, 0.1], [0.6, 0.8], 1.0, [root, tip], 0.01);
+        let chunk = |p| rounded_box(p, [0.1; 3], [0.5, 0.3, 0.2], 0.1);
+        assert!(steepest(|p| cone.distance(p)) < 1.0 + 1e-9);
+        assert!(steepest(|p| panel.distance(p)) < 1.0 + 1e-9);
+        assert!(steepest(chunk) < 1.0 + 1e-9);
+        let all = |p| carve(blend(cone.distance(p), panel.distance(p), 0.2), chunk(p));
+        let steep = steepest(all);
+        assert!(steep > 0.9 && steep < 1.0 + 1e-9, "{steep}");
+    }
+
+    #[test]
+    fn a_round_cone_is_as_far_as_its_balls() {
+        let cone = RoundCone::new([0.0; 3], 0.5, [2.0, 0.0, 0.0], 0.25);
+        assert_eq!(cone.distance([-1.5, 0.0, 0.0]), 1.0);
+        assert_eq!(cone.distance([3.25, 0.0, 0.0]), 1.0);
+        assert!(cone.distance([1.0, 0.3, 0.0]) < 0.0);
+        // The side touches both circles: at 7/64 of its length less than the radius of the first.
+        let sin = 0.125;
+        let p = [0.5 * sin, 0.5 * (1.0_f64 - sin * sin).sqrt(), 0.0];
+        assert!(cone.distance(p).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_panel_ends_where_it_says() {
+        let section = Section {
+            leading: 0.0,
+            trailing: 1.0,
+            thickness_half: 0.05,
+        };
+        let panel = Panel::new([0.0; 2], [1.0, 0.0], 2.0, [section; 2], 0.001);
+        assert!(panel.distance([0.0, 1.0, 0.0]).abs() < 1e-12);
+        assert!(panel.distance([1.0, 1.0, 0.0]).abs() < 1e-12);
+        assert!(panel.distance([0.35, 1.0, 0.05]).abs() < 1e-12);
+        assert!(panel.distance([0.5, 2.5, 0.0]) > 0.4);
+        assert!(panel.distance([0.5, 1.0, 0.0]) < 0.0);
+    }
+}

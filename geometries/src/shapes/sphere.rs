@@ -1,0 +1,133 @@
+//! Geodesic spheres: an icosahedron whose edges are divided evenly, thrown onto the sphere.
+
+use std::collections::HashMap;
+
+use crate::{Generator, GeneratorError, Mesh};
+
+/// A sphere about the origin.
+pub(super) fn sphere(of: &Generator) -> Result<Mesh, GeneratorError> {
+    let radius = of.size("radius", of.radius, 0.5)?;
+    Ok(geodesic(radius, of.facets))
+}
+
+/// A shell: the inner sphere is wound towards the centre, which is outside of what the shell encloses.
+pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
+    let radius = of.size("radius", of.radius, 0.5)?;
+    let radius_inner = of.size("radius_inner", of.radius_inner, radius * 0.5)?;
+    if radius_inner >= radius {
+        let (value, want) = (radius_inner, format!("must be less than radius = {radius}"));
+        return Err(GeneratorError::SizeWrong {
+            key: "radius_inner",
+            value,
+            want,
+        });
+    }
+    // Facets of about one size on both.
+    let (outer, inner) = (radius * radius, radius_inner * radius_inner);
+    let facets_inner = ((of.facets as f64 * (inner / (outer + inner))) as usize).max(20);
+    let mut inside = geodesic(radius_inner, facets_inner);
+    inside.flip();
+    let mut mesh = geodesic(radius, of.facets - inside.triangles.len());
+    mesh.append(&inside);
+    Ok(mesh)
+}
+
+/// The finest geodesic sphere of at most so many facets: 20 for each square of the frequency.
+fn geodesic(radius: f64, facets: usize) -> Mesh {
+    let frequency = (facets / 20).isqrt().max(1);
+    let mut drawing = Drawing {
+        radius,
+        frequency,
+        mesh: Mesh::default(),
+        numbers: HashMap::new(),
+    };
+    for corners in ICOSAHEDRON {
+        drawing.face(corners);
+    }
+    drawing.mesh
+}
+
+/// Facets of the icosahedron, counter-clockwise seen from outside.
+const ICOSAHEDRON: [[usize; 3]; 20] = [
+    [0, 11, 5],
+    [0, 5, 1],
+    [0, 1, 7],
+    [0, 7, 10],
+    [0, 10, 11],
+    [1, 5, 9],
+    [5, 11, 4],
+    [11, 10, 2],
+    [10, 7, 6],
+    [7, 1, 8],
+    [3, 9, 4],
+    [3, 4, 2],
+    [3, 2, 6],
+    [3, 6, 8],
+    [3, 8, 9],
+    [4, 9, 5],
+    [2, 4, 11],
+    [6, 2, 10],
+    [8, 6, 7],
+    [9, 8, 1],
+];
+
+/// Corner `i` of the icosahedron, not normalised: the cyclic permutations of (0, 1, golden ratio).
+fn corner(i: usize) -> [f64; 3] {
+    let golden = (1.0 + 5.0_f64.sqrt()) * 0.5;
+    let first = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
+    let second = if i % 4 < 2 { golden } else { -golden };
+    match i / 4 {
+        0 => [first, second, 0.0],
+        1 => [0.0, first, second],
+        _ => [second, 0.0, first],
+    }
+}
+
+struct Drawing {
+    radius: f64,
+    frequency: usize,
+    mesh: Mesh,
+    /// Vertices by their weights at the corners of the icosahedron, which facets agree upon.
+    numbers: HashMap<[(usize, usize); 3], u32>,
+}
+
+impl Drawing {
+    fn face(&mut self, corners: [usize; 3]) {
+        let f = self.frequency;
+        for j in 0..f {
+            for i in 0..f - j {
+                let mut at = |i: usize, j: usize| self.vertex(corners, [f - i - j, i, j]);
+                let (p, q, r) = (at(i, j), at(i + 1, j), at(i, j + 1));
+                let opposite = (i + j + 1 < f).then(|| at(i + 1, j + 1));
+                self.mesh.triangles.push([p, q, r]);
+                if let Some(s) = opposite {
+                    self.mesh.triangles.push([q, s, r]);
+                }
+            }
+        }
+    }
+
+    fn vertex(&mut self, corners: [usize; 3], weights: [usize; 3]) -> u32 {
+        let mut key = [0, 1, 2].map(|c| {
+            if weights[c] == 0 {
+                (0, 0)
+            } else {
+                (corners[c], weights[c])
+            }
+        });
+        key.sort_unstable();
+        if let Some(&number) = self.numbers.get(&key) {
+            return number;
+        }
+        // Summed in the order of the key, so that the position does not depend on the facet either.
+        let mut p = [0.0; 3];
+        for (c, weight) in key {
+            let q = corner(c);
+            p = std::array::from_fn(|a| p[a] + q[a] * weight as f64);
+        }
+        let scale = self.radius / (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        let number = self.mesh.add_vertex(p.map(|x| x * scale));
+        self.numbers.insert(key, number);
+        number
+    }
+}

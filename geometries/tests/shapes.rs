@@ -1,0 +1,303 @@
+//! What every generated shape promises, judged on the facets as an STL reader would see them: vertices
+//! are one only where their bits are.
+
+use std::collections::HashMap;
+use std::f64::consts::{PI, TAU};
+
+use geometries::{Facet, Generator, Shape};
+
+const SHAPES: [Shape; 8] = [
+    Shape::Cube,
+    Shape::Sphere,
+    Shape::Torus,
+    Shape::NestedSpheres,
+    Shape::Plate,
+    Shape::Pipe,
+    Shape::Uav,
+    Shape::Fighter,
+];
+
+fn facets(shape: Shape, count: usize) -> Vec<Facet> {
+    Generator::new(shape, count).facets().unwrap()
+}
+
+/// The generator of a `[generator]` table.
+fn table(text: &str) -> Generator {
+    toml::from_str(text).unwrap()
+}
+
+/// Vertices numbered by their bits.
+fn weld(facets: &[Facet]) -> (usize, Vec<[usize; 3]>) {
+    let mut numbers = HashMap::new();
+    let triangles = facets
+        .iter()
+        .map(|facet| {
+            facet.map(|vertex| {
+                let next = numbers.len();
+                // Adding zero makes one of the two zeros, which are equal but not the same bits.
+                *numbers
+                    .entry(vertex.map(|x| (x + 0.0).to_bits()))
+                    .or_insert(next)
+            })
+        })
+        .collect();
+    (numbers.len(), triangles)
+}
+
+/// How often each directed edge occurs.
+fn directed_edges(triangles: &[[usize; 3]]) -> HashMap<(usize, usize), usize> {
+    let mut edges = HashMap::new();
+    for t in triangles {
+        for i in 0..3 {
+            *edges.entry((t[i], t[(i + 1) % 3])).or_insert(0) += 1;
+        }
+    }
+    edges
+}
+
+fn area_vector([p, q, r]: &Facet) -> [f64; 3] {
+    let at = |v: &[f32; 3], a: usize| f64::from(v[a]) - f64::from(p[a]);
+    [(1, 2), (2, 0), (0, 1)].map(|(b, c)| at(q, b) * at(r, c) - at(q, c) * at(r, b))
+}
+
+fn volume(facets: &[Facet]) -> f64 {
+    let six_fold = |facet: &Facet| {
+        let n = area_vector(facet);
+        (0..3).map(|a| n[a] * f64::from(facet[0][a])).sum::<f64>()
+    };
+    facets.iter().map(six_fold).sum::<f64>() / 6.0
+}
+
+/// FNV-1a over the bits of all vertices in their order.
+fn fingerprint(facets: &[Facet]) -> u64 {
+    facets
+        .iter()
+        .flatten()
+        .flatten()
+        .flat_map(|x| x.to_bits().to_le_bytes())
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        })
+}
+
+fn assert_closed(facets: &[Facet], what: &str) -> i64 {
+    let (vertices, triangles) = weld(facets);
+    for (i, facet) in facets.iter().enumerate() {
+        assert!(
+            area_vector(facet) != [0.0; 3],
+            "{what}: facet {i} has no area: {facet:?}"
+        );
+    }
+    let edges = directed_edges(&triangles);
+    for (&(a, b), &times) in &edges {
+        assert_eq!(
+            times, 1,
+            "{what}: an edge is run along twice in one direction"
+        );
+        assert!(
+            edges.contains_key(&(b, a)),
+            "{what}: an edge has one facet only"
+        );
+    }
+    assert!(volume(facets) > 0.0, "{what}: inside out");
+    vertices as i64 - edges.len() as i64 / 2 + triangles.len() as i64
+}
+
+#[test]
+fn every_shape_is_closed_outward_and_of_the_right_genus() {
+    for shape in SHAPES {
+        for count in [2_000, 2_500, 3_333, 5_000, 12_345, 20_000, 60_000] {
+            let what = format!("{shape:?} {count}");
+            let facets = facets(shape, count);
+            assert_eq!(facets.len(), count & !1, "{what}");
+            let euler = assert_closed(&facets, &what);
+            let expected = match shape {
+                Shape::Torus => 0,
+                Shape::NestedSpheres => 4,
+                _ => 2,
+            };
+            assert_eq!(euler, expected, "{what}: Euler number");
+        }
+    }
+}
+
+#[test]
+fn few_facets_are_enough() {
+    let least = [12, 20, 18, 40, 12, 60, 2_000, 2_000];
+    for (shape, least) in SHAPES.into_iter().zip(least) {
+        let drawn = facets(shape, least);
+        assert_eq!(drawn.len(), least);
+        assert_closed(&drawn, &format!("{shape:?}"));
+        let error = Generator::new(shape, least - 1)
+            .facets()
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(&format!("at least {least}")), "{error}");
+        for more in [least + 1, least + 2, 2 * least, 3 * least + 8] {
+            let drawn = facets(shape, more);
+            assert_eq!(drawn.len(), more & !1, "{shape:?}");
+            assert_closed(&drawn, &format!("{shape:?} {more}"));
+        }
+    }
+}
+
+#[test]
+fn volumes_are_those_of_the_textbook() {
+    let cases = [
+        ("shape = 'cube'\nfacets = 1000\nedge = 2", 8.0, 1e-12),
+        (
+            "shape = 'plate'\nfacets = 1000\nlength = 2\nwidth = 1\nthickness = 0.25",
+            0.5,
+            1e-12,
+        ),
+        (
+            "shape = 'sphere'\nfacets = 20000\nradius = 2",
+            4.0 / 3.0 * PI * 8.0,
+            1e-3,
+        ),
+        (
+            "shape = 'torus'\nfacets = 20000\nradius = 2\nradius_tube = 0.5",
+            TAU * 2.0 * PI * 0.25,
+            3e-3,
+        ),
+        (
+            "shape = 'nested_spheres'\nfacets = 20000\nradius = 2\nradius_inner = 1",
+            4.0 / 3.0 * PI * 7.0,
+            1e-3,
+        ),
+        (
+            "shape = 'pipe'\nfacets = 20000\nradius = 0.5\nradius_bend = 2\nangle = 120\nlength = 3",
+            PI * 0.25 * (6.0 + 2.0 * TAU / 3.0),
+            3e-3,
+        ),
+    ];
+    for (text, expected, tolerance) in cases {
+        let found = volume(&table(text).facets().unwrap());
+        assert!(
+            (found / expected - 1.0).abs() < tolerance,
+            "{text}: {found}, not {expected}"
+        );
+    }
+}
+
+/// Lowest and highest coordinate along each axis.
+fn bounds(facets: &[Facet]) -> [[f32; 2]; 3] {
+    std::array::from_fn(|a| {
+        let along = facets.iter().flatten().map(|v| v[a]);
+        along.fold([f32::MAX, f32::MIN], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
+    })
+}
+
+#[test]
+fn a_cube_lies_exactly_in_its_planes() {
+    let drawn = table("shape = 'cube'\nfacets = 1234\nedge = 0.5\ncentre = [1.0, -2.0, 0.25]");
+    let drawn = drawn.facets().unwrap();
+    let planes = [[0.75, 1.25], [-2.25, -1.75], [0.0, 0.5]];
+    assert_eq!(bounds(&drawn), planes);
+    for facet in &drawn {
+        let lies = |a: usize| planes[a].iter().any(|&x| facet.iter().all(|v| v[a] == x));
+        assert!((0..3).any(lies), "{facet:?}");
+    }
+}
+
+#[test]
+fn aircraft_are_as_long_as_asked_and_converge_with_the_number_of_facets() {
+    for (shape, axis) in [(Shape::Uav, 1), (Shape::Fighter, 0)] {
+        let mut generator = Generator::new(shape, 40_000);
+        generator.length = Some(3.0);
+        let [low, high] = bounds(&generator.facets().unwrap())[axis];
+        assert!((high - low - 3.0).abs() < 1e-6);
+        let [coarse, fine, finer] = [10_000, 100_000, 400_000].map(|n| volume(&facets(shape, n)));
+        assert!(
+            coarse > fine && fine > finer,
+            "coarser is stouter: {coarse} {fine} {finer}"
+        );
+        assert!(fine / finer < 1.25, "{fine} {finer}");
+    }
+}
+
+/// The same vertices in the same order on every machine: a change of any of these is a change of every
+/// case that uses the shape.
+#[test]
+fn vertices_are_the_same_everywhere() {
+    let found =
+        SHAPES.map(|shape| format!("{shape:?} {:016x}", fingerprint(&facets(shape, 5_000))));
+    let expected = [
+        "Cube 4227310de9dabf4d",
+        "Sphere 914f3fca52f626bd",
+        "Torus d8e786b07c704db6",
+        "NestedSpheres 7fed22e94e96d6cb",
+        "Plate ab2156a40181d6f1",
+        "Pipe e619cd95ecd928a7",
+        "Uav 2bc1f4513287d24d",
+        "Fighter c8c5ca71f8b4b867",
+    ];
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn wrong_tables_are_refused_with_the_reason() {
+    let refused = |text: &str| match toml::from_str::<Generator>(text) {
+        Ok(generator) => generator.facets().unwrap_err().to_string(),
+        Err(error) => error.to_string(),
+    };
+    for (text, reason) in [
+        (
+            "shape = 'sphere'\nfacets = 100\nradios = 1",
+            "unknown field `radios`",
+        ),
+        (
+            "shape = 'sphere'\nfacets = 100\nthickness = 1",
+            "no size `thickness`; it has radius",
+        ),
+        ("shape = 'ball'\nfacets = 100", "unknown variant `ball`"),
+        ("shape = 'sphere'", "missing field `facets`"),
+        ("shape = 'sphere'\nfacets = -1", "invalid value"),
+        (
+            "shape = 'sphere'\nfacets = 100\nradius = -1",
+            "must be positive and finite",
+        ),
+        (
+            "shape = 'sphere'\nfacets = 100\nradius = nan",
+            "must be positive and finite",
+        ),
+        (
+            "shape = 'sphere'\nfacets = 100\nradius = inf",
+            "must be positive and finite",
+        ),
+        (
+            "shape = 'sphere'\nfacets = 100\ncentre = [0, inf, 0]",
+            "must be finite",
+        ),
+        (
+            "shape = 'torus'\nfacets = 100\nradius_tube = 1",
+            "less than radius",
+        ),
+        (
+            "shape = 'nested_spheres'\nfacets = 100\nradius_inner = 0.5",
+            "less than radius",
+        ),
+        (
+            "shape = 'pipe'\nfacets = 100\nradius_bend = 0.1",
+            "must exceed radius",
+        ),
+        ("shape = 'pipe'\nfacets = 100\nangle = 200", "at most 180"),
+        (
+            "shape = 'sphere'\nfacets = 99999999999999",
+            "at most 2147483648",
+        ),
+        (
+            "shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]",
+            "has no area as f32",
+        ),
+        (
+            "shape = 'sphere'\nfacets = 100\nradius = 1e300",
+            "has no area as f32",
+        ),
+    ] {
+        let message = refused(text);
+        assert!(message.contains(reason), "{text}\n{message}");
+    }
+}

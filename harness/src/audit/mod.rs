@@ -1,0 +1,123 @@
+//! Every check that needs nothing but a leaf-set directory, at any size.
+//!
+//! One pass over the part files, merged as they are read, feeds the tally, the order check and the
+//! tree; leaves are not kept. The tree stores equal subtrees once, so that memory grows with the
+//! variety of a mesh and not with its size; how far it may grow is an option. Against the manifest's own
+//! terms, and without T0, facets or another mesh: what that misses, each check says.
+
+use std::fmt;
+use std::path::Path;
+use std::time::Instant;
+
+use crate::check::{self, CheckResult, Terms};
+use crate::leafset;
+use crate::manifest::{Keep, Manifest, Tree as Kind};
+
+mod merge;
+mod pass;
+
+use pass::Pass;
+
+/// How an audit is run.
+#[derive(Clone, Debug)]
+pub struct AuditOptions {
+    /// Distinct nodes that may be kept in memory. Each takes up to 120 bytes while the tables grow.
+    pub nodes_max: usize,
+}
+
+impl Default for AuditOptions {
+    fn default() -> Self {
+        Self { nodes_max: 32_000_000 }
+    }
+}
+
+/// What an audit found.
+#[derive(Clone, Debug)]
+pub struct AuditReport {
+    /// One per check.
+    pub checks: Vec<CheckResult>,
+    /// Leaves read.
+    pub leaves: u64,
+    /// Distinct nodes that they came down to.
+    pub nodes: u64,
+    /// Time for reading, merging, counting and building the tree.
+    pub time_read_s: f64,
+    /// Time for all.
+    pub time_wall_s: f64,
+}
+
+impl AuditReport {
+    /// Whether every check holds.
+    pub fn holds(&self) -> bool {
+        self.checks.iter().all(CheckResult::holds)
+    }
+}
+
+impl fmt::Display for AuditReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for check in &self.checks {
+            writeln!(f, "{check}")?;
+        }
+        let Self { leaves, nodes, time_read_s, time_wall_s, .. } = self;
+        let rate = *leaves as f64 / time_wall_s.max(1e-9) / 1e6;
+        write!(
+            f,
+            "{leaves} leaves ({nodes} distinct octants) in {time_wall_s:.2} s, of which reading \
+             {time_read_s:.2} s: {rate:.1} M leaves/s"
+        )
+    }
+}
+
+/// Name of the check that the tree fits the memory allowed.
+pub const CAPACITY: &str = "capacity";
+
+/// Audits a directory. What cannot be read as a leaf set at all is a finding of `files`.
+pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
+    let start = Instant::now();
+    let mut report =
+        AuditReport { checks: Vec::new(), leaves: 0, nodes: 0, time_read_s: 0.0, time_wall_s: 0.0 };
+    let pass = leafset::open(dir).and_then(|set| Pass::over(&set, options).map(|pass| (set, pass)));
+    report.time_read_s = start.elapsed().as_secs_f64();
+    match pass {
+        Ok((set, pass)) => {
+            (report.leaves, report.nodes) = (pass.tally.leaves, pass.nodes() as u64);
+            report.checks = checks(&set.manifest, pass);
+        }
+        Err(e) => report.checks.push(CheckResult::unreadable(&e)),
+    }
+    report.time_wall_s = start.elapsed().as_secs_f64();
+    report
+}
+
+fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
+    let (terms, leaves) = (Terms::of_manifest(manifest), pass.tally.leaves);
+    let mut files = CheckResult::new(check::FILES);
+    files.examined = manifest.parts.len() as u64;
+    let mut checks = vec![files, check::manifest::check_leaves(manifest, &pass.tally, &pass.parts)];
+    checks.push(pass.linear);
+    let Some(tree) = pass.tree else {
+        checks.extend(pass.capacity);
+        return checks;
+    };
+    let mut of_tree = match manifest.tree {
+        Kind::Final => vec![
+            check::complete::check_holes(&tree, &terms),
+            check::spacing::check_tree(&tree, &terms),
+            check::sides::check_tree(&tree, &terms),
+            check::balance::check_tree(&tree, &terms.root),
+            check::layer::check_tree(&tree, &terms),
+        ],
+        // Deletion and gradation make the final mesh; of T0 neither is promised.
+        Kind::Base => {
+            let everything = Terms { keep: Keep::All, keep_crossing: true, ..terms };
+            vec![
+                check::complete::check_holes(&tree, &everything),
+                check::spacing::check_tree(&tree, &everything),
+                check::sides::check_tree(&tree, &everything),
+            ]
+        }
+    };
+    of_tree.iter_mut().for_each(|c| c.examined = leaves);
+    checks.extend(of_tree);
+    checks
+}

@@ -1,0 +1,287 @@
+//! Case files: what a mesh is made from, as the harness reads them (reference/DEFINITION.md, section 10).
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::lattice::{FacetLattice, Root};
+use crate::manifest::{ExtentBox, Keep};
+use crate::stl::{self, StlError};
+
+pub use geometries::Facet;
+
+/// A case, ready for checks: everything on the lattice.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// The file's name without extension.
+    pub name: String,
+    /// The body as it was given.
+    pub facets: Vec<Facet>,
+    /// The body on the lattice.
+    pub facets_lattice: Vec<FacetLattice>,
+    /// The root cube.
+    pub root: Root,
+    /// D: the level that crossing leaves have.
+    pub level_surface: u8,
+    /// n: minimum thickness of a layer, in cells.
+    pub layer_cells_min: u32,
+    /// Which side stays.
+    pub keep: Keep,
+    /// Whether crossing leaves stay.
+    pub keep_crossing: bool,
+    /// Extent boxes on the lattice.
+    pub boxes: Vec<ExtentBox>,
+}
+
+/// What is wrong with a case.
+#[derive(Debug, thiserror::Error)]
+pub enum CaseError {
+    /// The case file could not be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The case file.
+        path: PathBuf,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// Not TOML, or not a case.
+    #[error("{path}: {why}")]
+    Content {
+        /// The case file.
+        path: PathBuf,
+        /// What is wrong, in a sentence.
+        why: String,
+    },
+    /// The body could not be read.
+    #[error("{path} {source}")]
+    Stl {
+        /// The geometry's file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: StlError,
+    },
+}
+
+/// The file as it stands.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CaseFile {
+    geometry: Option<PathBuf>,
+    generator: Option<geometries::Generator>,
+    spacing_min: f64,
+    #[serde(default = "layer_cells_min_default")]
+    layer_cells_min: u32,
+    #[serde(default)]
+    keep: Keep,
+    #[serde(default = "keep_crossing_default")]
+    keep_crossing: bool,
+    root_scale: Option<f64>,
+    root: Option<Root>,
+    #[serde(default, rename = "box")]
+    boxes: Vec<BoxFile>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxFile {
+    min: [f64; 3],
+    max: [f64; 3],
+    spacing: f64,
+}
+
+const ROOT_SCALE_DEFAULT: f64 = 10.0;
+
+fn layer_cells_min_default() -> u32 {
+    4
+}
+
+fn keep_crossing_default() -> bool {
+    true
+}
+
+impl Case {
+    /// Reads a case file and the body it names.
+    pub fn read(path: &Path) -> Result<Self, CaseError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| CaseError::Io { path: path.to_owned(), source })?;
+        let wrong = |why: String| CaseError::Content { path: path.to_owned(), why };
+        let file: CaseFile = toml::from_str(&text).map_err(|e| wrong(explain(&e)))?;
+        let facets = facets(path, &file)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Self::build(name, &file, facets).map_err(wrong)
+    }
+
+    /// A case from text and a body in memory, for tests: `text` is a case file without geometry.
+    pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
+        let file: CaseFile = toml::from_str(text).map_err(|e| explain(&e))?;
+        Self::build("in-memory".to_owned(), &file, facets)
+    }
+
+    fn build(name: String, file: &CaseFile, facets: Vec<Facet>) -> Result<Self, String> {
+        let root = root(file, &facets)?;
+        positive("spacing_min", file.spacing_min)?;
+        if file.layer_cells_min == 0 {
+            return Err("layer_cells_min is 0; a layer has at least one cell".to_owned());
+        }
+        let level = |what: &str, spacing| {
+            let deep = || format!("{what} = {spacing} asks for a level deeper than 19");
+            root.level_for(spacing).ok_or_else(deep)
+        };
+        let level_surface = level("spacing_min", file.spacing_min)?;
+        let mut boxes = Vec::new();
+        for (i, b) in file.boxes.iter().enumerate() {
+            positive("box spacing", b.spacing)?;
+            let ordered = |a: usize| b.min[a] < b.max[a] && b.min[a].is_finite() && b.max[a].is_finite();
+            if !(0..3).all(ordered) {
+                return Err(format!("box {i}: min must be below max in every axis, and finite"));
+            }
+            let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
+            boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
+        }
+        Ok(Self {
+            name,
+            facets_lattice: on_lattice(&root, &facets)?,
+            facets,
+            root,
+            level_surface,
+            layer_cells_min: file.layer_cells_min,
+            keep: file.keep,
+            keep_crossing: file.keep_crossing,
+            boxes,
+        })
+    }
+
+    /// Deepest level that anything in the case asks for.
+    pub fn level_deepest(&self) -> u8 {
+        self.boxes.iter().map(|b| b.level).fold(self.level_surface, u8::max)
+    }
+}
+
+/// The body: from the file named, or generated.
+fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
+    let wrong = |why: String| CaseError::Content { path: case.to_owned(), why };
+    match (&file.geometry, &file.generator) {
+        (Some(stl), None) => {
+            let path = case.parent().unwrap_or(Path::new("")).join(stl);
+            stl::read(&path).map_err(|source| CaseError::Stl { path, source })
+        }
+        (None, Some(generator)) => generator.facets().map_err(|e| wrong(e.to_string())),
+        _ => Err(wrong("exactly one of `geometry` and `[generator]` is wanted".to_owned())),
+    }
+}
+
+/// The root cube, as given or around the body. The order of operations is part of the definition.
+fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
+    if let Some(root) = file.root {
+        if file.root_scale.is_some() {
+            return Err("root_scale and [root] exclude each other".to_owned());
+        }
+        positive("root edge", root.edge)?;
+        let finite = root.origin.iter().all(|c| c.is_finite());
+        return if finite { Ok(root) } else { Err("the root's origin is not finite".to_owned()) };
+    }
+    let scale = file.root_scale.unwrap_or(ROOT_SCALE_DEFAULT);
+    positive("root_scale", scale)?;
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for (i, facet) in facets.iter().enumerate() {
+        for vertex in facet {
+            if !vertex.iter().all(|c| c.is_finite()) {
+                return Err(format!("facet {i} has a vertex that is not finite"));
+            }
+            for a in 0..3 {
+                low[a] = low[a].min(f64::from(vertex[a]));
+                high[a] = high[a].max(f64::from(vertex[a]));
+            }
+        }
+    }
+    let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::NEG_INFINITY, f64::max);
+    if longest <= 0.0 {
+        return Err("the body has no extent to scale a root from; give a [root]".to_owned());
+    }
+    let edge = scale * longest;
+    let origin = std::array::from_fn(|a| (low[a] + high[a]) * 0.5 - edge * 0.5);
+    Ok(Root { origin, edge })
+}
+
+fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String> {
+    let mut all = Vec::with_capacity(facets.len());
+    for (i, facet) in facets.iter().enumerate() {
+        let mut on = [[0; 3]; 3];
+        for (q, vertex) in on.iter_mut().zip(facet) {
+            let far = || format!("facet {i} is not finite or lies more than one root edge outside");
+            *q = root.quantise(vertex.map(f64::from)).ok_or_else(far)?;
+        }
+        all.push(on);
+    }
+    Ok(all)
+}
+
+fn positive(what: &str, value: f64) -> Result<(), String> {
+    let good = value.is_finite() && value > 0.0;
+    if good { Ok(()) } else { Err(format!("{what} = {value}: it must be finite and above zero")) }
+}
+
+/// A TOML error in one line, with the nearest known key where a key is unknown.
+fn explain(error: &toml::de::Error) -> String {
+    let message = error.message();
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    match (message.starts_with("unknown field"), quoted.next()) {
+        (true, Some(key)) => match quoted.min_by_key(|known| distance(key, known)) {
+            Some(near) => format!("unknown key `{key}`; did you mean `{near}`?"),
+            None => format!("unknown key `{key}`"),
+        },
+        _ => message.replace('\n', " "),
+    }
+}
+
+/// Edits between two words (Levenshtein).
+fn distance(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, y) in b.chars().enumerate() {
+            let best = (diagonal + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
+            diagonal = std::mem::replace(&mut row[j + 1], best);
+        }
+    }
+    *row.last().expect("at least one entry")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNIT: Facet = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn defaults_and_root_are_those_of_the_definition() {
+        let case = Case::from_parts("spacing_min = 0.5", vec![UNIT]).unwrap();
+        assert_eq!((case.layer_cells_min, case.keep, case.keep_crossing), (4, Keep::Outside, true));
+        assert_eq!(case.root, Root { origin: [-9.0, -9.5, -10.0], edge: 20.0 });
+        assert_eq!(case.level_surface, 6);
+    }
+
+    #[test]
+    fn boxes_are_clamped_and_have_their_own_level() {
+        let text = "spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n\
+                    [[box]]\nmin = [-4.0, 1.0, 2.0]\nmax = [4.0, 99.0, 3.0]\nspacing = 0.3";
+        let case = Case::from_parts(text, vec![]).unwrap();
+        let unit = 1 << 24;
+        let want = ExtentBox { min: [0, unit, 2 * unit], max: [4 * unit, 8 * unit, 3 * unit], level: 5 };
+        assert_eq!(case.boxes, [want]);
+        assert_eq!(case.level_deepest(), 5);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
+        assert!(why("spacing_mim = 1.0").contains("did you mean `spacing_min`"));
+        assert!(why("spacing_min = -1.0").contains("spacing_min"));
+        assert!(why("spacing_min = 1e-9").contains("deeper"));
+        assert!(why("spacing_min = 1.0\nlayer_cells_min = 0").contains("layer_cells_min"));
+        assert!(why("spacing_min = 1.0\nroot_scale = 2.0\n[root]\norigin=[0.0,0.0,0.0]\nedge=1.0").contains("exclude"));
+        assert!(Case::from_parts("spacing_min = 1.0", vec![]).unwrap_err().contains("extent"));
+        let far = "spacing_min = 1.0\n[root]\norigin = [9.0, 9.0, 9.0]\nedge = 2.0";
+        assert!(why(far).contains("facet 0"));
+    }
+}

@@ -1,0 +1,61 @@
+//! harness: verifies meshes and the programs that make them. `harness --help` says how.
+
+mod cli;
+mod cli_selftest;
+mod cli_verify;
+
+use clap::Parser;
+use cli::{Arguments, Command};
+use harness::audit::{self, AuditOptions};
+use harness::diff;
+use harness::engine::interrupt;
+use harness::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use std::path::Path;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    interrupt::install();
+    let code = match arguments.command {
+        Command::Verify(arguments) => cli_verify::run(*arguments),
+        Command::Selftest(arguments) => cli_selftest::run(&arguments),
+        Command::Audit { mesh, nodes_max } => run_audit(&mesh, nodes_max),
+        Command::Diff { a, b } => run_diff(&a, &b),
+    };
+    ExitCode::from(code)
+}
+
+fn run_audit(mesh: &Path, nodes_max: Option<usize>) -> u8 {
+    if !mesh.is_dir() {
+        eprintln!("harness: {} is no directory", mesh.display());
+        return EXIT_INPUT;
+    }
+    let default = AuditOptions::default();
+    let options = AuditOptions {
+        nodes_max: nodes_max.unwrap_or(default.nodes_max),
+    };
+    let report = audit::audit(mesh, &options);
+    println!("{report}");
+    if report.holds() {
+        EXIT_HOLDS
+    } else {
+        EXIT_FAILED
+    }
+}
+
+fn run_diff(a: &Path, b: &Path) -> u8 {
+    match diff::diff(a, b) {
+        Ok(report) => {
+            println!("{report}");
+            if report.same_leaves() {
+                EXIT_HOLDS
+            } else {
+                EXIT_FAILED
+            }
+        }
+        Err(error) => {
+            eprintln!("harness: {error}");
+            EXIT_INPUT
+        }
+    }
+}

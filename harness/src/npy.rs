@@ -1,0 +1,181 @@
+//! Part files: one-dimensional NumPy arrays of `<u8`, and nothing else.
+
+use std::fs::File;
+use std::io::{Cursor, Read, Write};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+use npyz::{DType, NpyHeader};
+
+/// More than any header of ours takes, so that one read gets it whole.
+const HEADER_BYTES_MAX: u64 = 1 << 16;
+
+/// A part file, header checked, that can be read from anywhere.
+#[derive(Debug)]
+pub struct PartFile {
+    path: PathBuf,
+    file: File,
+    offset: u64,
+    len: u64,
+}
+
+/// Why a file is not a part file: one sentence, without the file's name.
+#[derive(Debug, thiserror::Error)]
+pub enum NpyError {
+    /// The file could not be read at all.
+    #[error("cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    /// Not an npy header.
+    #[error("has no npy header: {0}")]
+    Header(std::io::Error),
+    /// Another type than little-endian u64.
+    #[error("holds {0}, not '<u8'")]
+    Type(String),
+    /// Not one-dimensional.
+    #[error("has shape {0:?}; one dimension is wanted")]
+    Shape(Vec<u64>),
+    /// The header and the size of the file contradict each other.
+    #[error("is {found} bytes long, but its header promises {wanted} ({leaves} leaves)")]
+    Length {
+        /// Bytes there are.
+        found: u64,
+        /// Bytes there should be.
+        wanted: u128,
+        /// Leaves the header promises.
+        leaves: u64,
+    },
+}
+
+impl PartFile {
+    /// Opens a part file and checks that header and length agree.
+    pub fn open(path: &Path) -> Result<Self, NpyError> {
+        let file = File::open(path)?;
+        let mut head = Vec::new();
+        (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head)?;
+        let mut cursor = Cursor::new(head);
+        let header = NpyHeader::from_reader(&mut cursor).map_err(NpyError::Header)?;
+        match header.dtype() {
+            DType::Plain(t) if t.to_string() == "<u8" => {}
+            other => return Err(NpyError::Type(other.descr())),
+        }
+        let &[len] = header.shape() else {
+            return Err(NpyError::Shape(header.shape().to_vec()));
+        };
+        let (offset, found) = (cursor.position(), file.metadata()?.len());
+        let wanted = u128::from(offset) + 8 * u128::from(len);
+        if u128::from(found) != wanted {
+            return Err(NpyError::Length { found, wanted, leaves: len });
+        }
+        Ok(Self { path: path.to_owned(), file, offset, len })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Words in it.
+    pub fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Whether there are none: an empty part is allowed.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Reads the words from `first` on into the whole of `words`.
+    pub fn read_at(&self, first: u64, words: &mut [u64]) -> std::io::Result<()> {
+        let mut bytes = vec![0; words.len() * 8];
+        self.file.read_exact_at(&mut bytes, self.offset + 8 * first)?;
+        for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(8)) {
+            *word = u64::from_le_bytes(chunk.try_into().expect("chunks of eight"));
+        }
+        Ok(())
+    }
+
+    /// All words.
+    pub fn read_all(&self) -> std::io::Result<Vec<u64>> {
+        let mut words = vec![0; usize::try_from(self.len).expect("a part fits the address space")];
+        self.read_at(0, &mut words)?;
+        Ok(words)
+    }
+
+    /// Index of the first word not below `word`, the file being sorted.
+    pub fn lower_bound(&self, word: u64) -> std::io::Result<u64> {
+        let (mut low, mut high) = (0, self.len);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            let mut at = [0];
+            self.read_at(middle, &mut at)?;
+            if at[0] < word {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        Ok(low)
+    }
+}
+
+/// Writes words as a part file.
+pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
+    let shape = format!("({},)", words.len());
+    let mut bytes = header("<u8", &shape);
+    words.iter().for_each(|w| bytes.extend(w.to_le_bytes()));
+    File::create(path)?.write_all(&bytes)
+}
+
+/// An npy header, version 1.0, padded to 64 bytes as NumPy does.
+pub fn header(descr: &str, shape: &str) -> Vec<u8> {
+    let mut text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
+    let padding = (64 - (10 + text.len() + 1) % 64) % 64;
+    text.push_str(&" ".repeat(padding));
+    text.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((text.len() as u16).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(bytes).unwrap();
+        file
+    }
+
+    #[test]
+    fn words_read_back_and_are_found() {
+        let file = file_of(b"");
+        let words: Vec<u64> = (0..100).map(|i| i * i).collect();
+        write(file.path(), &words).unwrap();
+        let part = PartFile::open(file.path()).unwrap();
+        assert_eq!(part.read_all().unwrap(), words);
+        for probe in [0, 1, 2, 5000, 9801, 9802] {
+            let want = words.partition_point(|&w| w < probe) as u64;
+            assert_eq!(part.lower_bound(probe).unwrap(), want);
+        }
+    }
+
+    #[test]
+    fn other_arrays_are_refused() {
+        let data = [0; 16];
+        let refused = |descr, shape, bytes: usize| {
+            let file = file_of(&[&header(descr, shape)[..], &data[..bytes]].concat());
+            PartFile::open(file.path()).unwrap_err()
+        };
+        assert!(matches!(refused("<i8", "(2,)", 16), NpyError::Type(_)));
+        assert!(matches!(refused(">u8", "(2,)", 16), NpyError::Type(_)));
+        assert!(matches!(refused("<u4", "(4,)", 16), NpyError::Type(_)));
+        assert!(matches!(refused("<u8", "(1, 2)", 16), NpyError::Shape(_)));
+        assert!(matches!(refused("<u8", "()", 8), NpyError::Shape(_)));
+        assert!(matches!(refused("<u8", "(2,)", 15), NpyError::Length { .. }));
+        assert!(matches!(refused("<u8", "(1,)", 16), NpyError::Length { .. }));
+        let headless = file_of(b"not an array");
+        assert!(matches!(PartFile::open(headless.path()), Err(NpyError::Header(_))));
+    }
+}

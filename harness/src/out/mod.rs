@@ -1,0 +1,6 @@
+//! A verification's report, printed: a file per format.
+
+pub mod json;
+pub mod junit;
+pub mod markdown;
+pub mod table;

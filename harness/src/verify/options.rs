@@ -1,0 +1,102 @@
+//! What was asked of a verification.
+
+use crate::engine::mesher::Layout;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How large the catalogue's cases are to be.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// Seconds each; every leaf of the base tree is put to the oracles.
+    Small,
+    /// Up to some millions of cells.
+    Medium,
+    /// Tens of millions of cells and more: for the tables of speed and memory.
+    Large,
+}
+
+/// Something that a verification needs and a machine may lack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum Need {
+    /// `mpirun`, and a mesher that was built with MPI.
+    Mpi,
+    /// Python with the packages of all three oracles.
+    Oracles,
+    /// The p4est engine.
+    P4est,
+    /// The geometries that are fetched, not kept in the repository.
+    Geometries,
+}
+
+impl fmt::Display for Need {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Mpi => "mpi",
+            Self::Oracles => "oracles",
+            Self::P4est => "p4est",
+            Self::Geometries => "geometries",
+        })
+    }
+}
+
+/// What was asked.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Names in the catalogue or paths of case files; none means all of the catalogue's of `size`.
+    pub cases: Vec<String>,
+    /// Sizes of the catalogue's cases, where `cases` names none.
+    pub sizes: Vec<Size>,
+    /// Rank counts of the runs on MPI.
+    pub ranks: Vec<usize>,
+    /// Partitioners, each tried at each rank count.
+    pub partitioners: Vec<String>,
+    /// Base depths, each tried with each partitioner.
+    pub level_bases: Vec<String>,
+    /// Directory for results and reports; a temporary one, removed at the end, if none is given.
+    pub out: Option<PathBuf>,
+    /// Keep every result, not only those of failing cases.
+    pub keep: bool,
+    /// Time limit of every single run.
+    pub limit: Duration,
+    /// Run on MPI.
+    pub mpi: bool,
+    /// Ask the oracles.
+    pub oracles: bool,
+    /// Compare with p4est.
+    pub p4est: bool,
+    /// What must not be missing.
+    pub require: Vec<Need>,
+    /// Most points that are put to the oracles on a case that is not small.
+    pub oracle_points: usize,
+    /// Chooses those points.
+    pub seed: u64,
+    /// Cases of more cells are only measured: the checks hold a mesh in memory.
+    pub cells_max: u64,
+    /// The reference is run on cases of up to so many cells; beyond, it would take hours.
+    pub reference_cells_max: u64,
+}
+
+impl Options {
+    /// Every layout of a run on MPI, in the order of rank counts.
+    pub fn layouts(&self) -> Vec<Layout> {
+        let mut layouts = Vec::new();
+        for &ranks in &self.ranks {
+            for partitioner in &self.partitioners {
+                for level_base in &self.level_bases {
+                    let (partitioner, level_base) = (partitioner.clone(), level_base.clone());
+                    layouts.push(Layout {
+                        ranks,
+                        partitioner,
+                        level_base,
+                    });
+                }
+            }
+        }
+        layouts
+    }
+}

@@ -1,0 +1,340 @@
+//! What a verification found: the one model that every output format prints.
+//!
+//! Invariant: everything asked for appears in it. What was not done is a check that was left out, with
+//! the reason; nothing is silently absent.
+
+use crate::engine::mesher::Layout;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version of the JSON form; changes when a field's meaning does or a field goes.
+pub const SCHEMA: &str = "octree-verify/1";
+
+/// The paper's speed on one core, in cells per second.
+pub const PAPER_CELLS_PER_S: f64 = 38_000.0;
+
+/// How a check came out.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "outcome", content = "why")]
+pub enum Outcome {
+    /// It holds.
+    Pass,
+    /// It does not; why, in a sentence or more.
+    Fail(String),
+    /// It was not done; because of what.
+    LeftOut(String),
+}
+
+/// One check of one result.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Check {
+    /// What was checked: `serial`, `base tree`, `p4est` or the layout of a run on MPI.
+    pub subject: String,
+    /// Ranks of the run on MPI that was checked.
+    pub ranks: Option<usize>,
+    /// The check's name.
+    pub name: String,
+    /// How it came out.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// Time that the check itself took, in seconds.
+    pub time_s: f64,
+    /// What it has to say even where it holds, such as where the oracles disagreed.
+    pub notes: Vec<String>,
+    /// Its own figures, in its own words.
+    pub figures: Option<String>,
+    /// What it counted.
+    pub counts: BTreeMap<String, u64>,
+}
+
+impl Check {
+    /// A check that has nothing to add to its outcome.
+    pub fn new(subject: impl Into<String>, name: impl Into<String>, outcome: Outcome) -> Self {
+        let (subject, name) = (subject.into(), name.into());
+        Self {
+            subject,
+            ranks: None,
+            name,
+            outcome,
+            time_s: 0.0,
+            notes: Vec::new(),
+            figures: None,
+            counts: BTreeMap::new(),
+        }
+    }
+
+    /// A check of one run on MPI.
+    pub fn of_layout(layout: &Layout, name: impl Into<String>, outcome: Outcome) -> Self {
+        Self {
+            ranks: Some(layout.ranks),
+            ..Self::new(layout.to_string(), name, outcome)
+        }
+    }
+
+    /// Whether it failed.
+    pub fn failed(&self) -> bool {
+        matches!(self.outcome, Outcome::Fail(_))
+    }
+}
+
+/// Numbers of checks by outcome.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Passed.
+    pub pass: usize,
+    /// Failed.
+    pub fail: usize,
+    /// Left out.
+    pub left_out: usize,
+}
+
+impl<'a> FromIterator<&'a Check> for Tally {
+    fn from_iter<I: IntoIterator<Item = &'a Check>>(checks: I) -> Self {
+        let mut tally = Self::default();
+        for check in checks {
+            match check.outcome {
+                Outcome::Pass => tally.pass += 1,
+                Outcome::Fail(_) => tally.fail += 1,
+                Outcome::LeftOut(_) => tally.left_out += 1,
+            }
+        }
+        tally
+    }
+}
+
+/// One run of mesher or reference.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Run {
+    /// `mesher` or `reference`.
+    pub program: String,
+    /// How it was spread over ranks; none for a serial run.
+    pub layout: Option<Layout>,
+    /// Cells of the final mesh.
+    pub cells: u64,
+    /// By the program's own clock, in seconds, without writing files where that was measured apart.
+    pub time_wall_s: f64,
+    /// By the harness's clock, start and end of the processes included.
+    pub time_process_s: f64,
+    /// Peak resident memory of all ranks together.
+    pub peak_rss_bytes: u64,
+}
+
+impl Run {
+    /// Cells per second of wall time.
+    pub fn cells_per_s(&self) -> f64 {
+        self.cells as f64 / self.time_wall_s.max(1e-9)
+    }
+
+    /// Peak memory per cell.
+    pub fn bytes_per_cell(&self) -> f64 {
+        self.peak_rss_bytes as f64 / (self.cells.max(1)) as f64
+    }
+
+    /// How many times faster than the paper's one core.
+    pub fn speedup_over_paper(&self) -> f64 {
+        self.cells_per_s() / PAPER_CELLS_PER_S
+    }
+}
+
+/// One case.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct CaseReport {
+    /// Its name in the catalogue, or its path.
+    pub name: String,
+    /// Number of facets.
+    pub facets: u64,
+    /// Leaves of the base tree.
+    pub leaves_base: u64,
+    /// Cells of the final mesh.
+    pub cells: u64,
+    /// The runs whose time and memory are of interest.
+    pub runs: Vec<Run>,
+    /// All checks.
+    pub checks: Vec<Check>,
+    /// The user's input is at fault: the sentence that the programs said.
+    pub input_error: Option<String>,
+    /// Where the results are, if they were kept.
+    pub kept: Option<String>,
+    /// A command that repeats the first failure.
+    pub repeat_with: Option<String>,
+    /// Wall time of the whole case, in seconds.
+    pub time_s: f64,
+}
+
+impl CaseReport {
+    /// All its checks, counted.
+    pub fn tally(&self) -> Tally {
+        self.checks.iter().collect()
+    }
+
+    /// Whether any check failed.
+    pub fn failed(&self) -> bool {
+        self.checks.iter().any(Check::failed)
+    }
+}
+
+/// Something that was asked for by `--require` or by name, and is not there.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Missing {
+    /// `mpi`, `oracles`, `p4est` or `geometries`.
+    pub what: String,
+    /// Why.
+    pub why: String,
+    /// Whether `--require` named it.
+    pub required: bool,
+}
+
+/// The whole verification.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Name and version of the harness.
+    pub program: String,
+    /// Cores of the machine it ran on.
+    pub cores: usize,
+    /// What was not there, and so was left out of every case.
+    pub missing: Vec<Missing>,
+    /// One report for each case.
+    pub cases: Vec<CaseReport>,
+    /// The user ended it before its end.
+    pub interrupted: bool,
+    /// Wall time, in seconds.
+    pub time_s: f64,
+}
+
+/// Exit code: all checks hold.
+pub const EXIT_HOLDS: u8 = 0;
+/// Exit code: at least one check failed.
+pub const EXIT_FAILED: u8 = 1;
+/// Exit code: the user's input is at fault.
+pub const EXIT_INPUT: u8 = 2;
+/// Exit code: something that was asked for is missing.
+pub const EXIT_MISSING: u8 = 3;
+/// Exit code: ended by the user.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
+impl Report {
+    /// The exit code: the user's end before all, then a failed check, the user's input, what is missing.
+    pub fn exit_code(&self) -> u8 {
+        if self.interrupted {
+            EXIT_INTERRUPTED
+        } else if self.cases.iter().any(CaseReport::failed) {
+            EXIT_FAILED
+        } else if self.cases.iter().any(|case| case.input_error.is_some()) {
+            EXIT_INPUT
+        } else if self.missing.iter().any(|missing| missing.required) {
+            EXIT_MISSING
+        } else {
+            EXIT_HOLDS
+        }
+    }
+
+    /// One sentence on the whole.
+    pub fn verdict(&self) -> String {
+        let all = self.cases.iter().flat_map(|case| &case.checks);
+        let Tally {
+            pass,
+            fail,
+            left_out,
+        } = all.collect();
+        let cases = self.cases.len();
+        let counts = format!("{cases} cases: {pass} checks hold, {fail} fail, {left_out} left out");
+        let end = match self.exit_code() {
+            EXIT_HOLDS => "all hold",
+            EXIT_FAILED => "FAILED",
+            EXIT_INPUT => "the input is at fault",
+            EXIT_MISSING => "something required is missing",
+            _ => "interrupted",
+        };
+        format!("{counts}, in {:.1} s: {end}", self.time_s)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A report with one of everything, for the tests of the output formats too.
+    pub(crate) fn sample() -> Report {
+        let layout = Layout {
+            ranks: 4,
+            partitioner: "metis".into(),
+            level_base: "auto".into(),
+        };
+        let run = Run {
+            program: "mesher".into(),
+            layout: None,
+            cells: 7600,
+            time_wall_s: 0.1,
+            time_process_s: 0.2,
+            peak_rss_bytes: 76_000,
+        };
+        let on_ranks = Run {
+            layout: Some(layout.clone()),
+            time_wall_s: 0.05,
+            ..run.clone()
+        };
+        let mut sides = Check::new("serial", "oracles", Outcome::Pass);
+        sides.notes.push("open3d was wrong at 1 point".into());
+        let case = CaseReport {
+            name: "cube_small".into(),
+            facets: 12,
+            leaves_base: 5000,
+            cells: 7600,
+            runs: vec![run, on_ranks],
+            checks: vec![
+                sides,
+                Check::of_layout(
+                    &layout,
+                    "same leaves",
+                    Outcome::Fail("first difference <at> root".into()),
+                ),
+                Check::new(
+                    "p4est",
+                    "balance",
+                    Outcome::LeftOut("the engine is not built".into()),
+                ),
+            ],
+            kept: Some("out/cube_small".into()),
+            repeat_with: Some("harness verify cube_small --ranks 4".into()),
+            time_s: 1.5,
+            ..CaseReport::default()
+        };
+        let missing = Missing {
+            what: "p4est".into(),
+            why: "the engine is not built".into(),
+            required: false,
+        };
+        Report {
+            schema: SCHEMA.into(),
+            program: "harness 0".into(),
+            cores: 2,
+            missing: vec![missing],
+            cases: vec![case],
+            interrupted: false,
+            time_s: 2.0,
+        }
+    }
+
+    #[test]
+    fn exit_codes_in_order_of_weight() {
+        let mut report = sample();
+        assert_eq!(report.exit_code(), EXIT_FAILED);
+        report.cases[0].checks.remove(1);
+        assert_eq!(report.exit_code(), EXIT_HOLDS);
+        report.missing[0].required = true;
+        assert_eq!(report.exit_code(), EXIT_MISSING);
+        report.cases[0].input_error = Some("spacing_min is negative".into());
+        assert_eq!(report.exit_code(), EXIT_INPUT);
+        report.interrupted = true;
+        assert_eq!(report.exit_code(), EXIT_INTERRUPTED);
+    }
+
+    #[test]
+    fn speeds_are_those_of_the_paper_s_table() {
+        let run = &sample().cases[0].runs[0];
+        assert_eq!((run.cells_per_s(), run.bytes_per_cell()), (76_000.0, 10.0));
+        assert_eq!(run.speedup_over_paper(), 2.0);
+    }
+}

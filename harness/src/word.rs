@@ -1,0 +1,197 @@
+//! The leaf word: one leaf in one `u64` (reference/DEFINITION.md, section 8).
+//!
+//! `morton57 << 7 | level << 2 | side`, the Morton code interleaving x (lowest bit), y and z of the
+//! minimum corner in level-19 cells. Ascending words are in Morton order.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+
+/// Morton code of one past the last level-19 cell.
+pub const KEY_END: u64 = 1 << 57;
+
+/// Where a leaf lies with respect to the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Outside of the body.
+    Outside = 0,
+    /// Inside of the body.
+    Inside = 1,
+    /// The leaf contains part of the surface.
+    Crossing = 2,
+}
+
+impl Side {
+    /// All of them, in the order of their codes.
+    pub const ALL: [Self; 3] = [Self::Outside, Self::Inside, Self::Crossing];
+}
+
+impl fmt::Display for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Outside => "outside",
+            Self::Inside => "inside",
+            Self::Crossing => "crossing",
+        })
+    }
+}
+
+/// One leaf, unpacked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Leaf {
+    /// Where and how large.
+    pub octant: Octant,
+    /// On which side.
+    pub side: Side,
+}
+
+/// Why a word is not a leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WordError {
+    /// The level field is above 19.
+    LevelTooDeep(u8),
+    /// The side field is 3.
+    SideUnknown,
+    /// The corner is not a multiple of the leaf's edge.
+    Misaligned,
+}
+
+impl fmt::Display for WordError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LevelTooDeep(level) => write!(f, "level {level} is deeper than {LEVEL_MAX}"),
+            Self::SideUnknown => f.write_str("side 3 does not exist"),
+            Self::Misaligned => f.write_str("the corner is not a multiple of the leaf's edge"),
+        }
+    }
+}
+
+/// Spreads the low 19 bits of `v` so that two zero bits follow each.
+fn spread(v: u32) -> u64 {
+    let mut x = u64::from(v);
+    x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// The reverse of [`spread`].
+fn gather(v: u64) -> u32 {
+    let mut x = v & 0x1249_2492_4924_9249;
+    x = (x | x >> 2) & 0x10c3_0c30_c30c_30c3;
+    x = (x | x >> 4) & 0x100f_00f0_0f00_f00f;
+    x = (x | x >> 8) & 0x001f_0000_ff00_00ff;
+    x = (x | x >> 16) & 0x001f_0000_0000_ffff;
+    ((x | x >> 32) & 0x001f_ffff) as u32
+}
+
+/// Morton code of a level-19 cell.
+pub fn key_of(corner: [u32; 3]) -> u64 {
+    debug_assert!(corner.iter().all(|&c| c < CELLS_PER_EDGE));
+    spread(corner[0]) | spread(corner[1]) << 1 | spread(corner[2]) << 2
+}
+
+/// The level-19 cell with this Morton code.
+pub fn corner_of(key: u64) -> [u32; 3] {
+    [gather(key), gather(key >> 1), gather(key >> 2)]
+}
+
+/// Level-19 cells in an octant of this level.
+pub fn span(level: u8) -> u64 {
+    1 << (3 * (LEVEL_MAX - level))
+}
+
+/// The Morton code in a word.
+pub fn key(word: u64) -> u64 {
+    word >> 7
+}
+
+/// The level field of a word, whatever its value (0 to 31).
+pub fn level(word: u64) -> u8 {
+    (word >> 2 & 31) as u8
+}
+
+/// Why this word is not a leaf, or nothing.
+pub fn fault(word: u64) -> Option<WordError> {
+    let level = level(word);
+    if level > LEVEL_MAX {
+        Some(WordError::LevelTooDeep(level))
+    } else if word & 3 == 3 {
+        Some(WordError::SideUnknown)
+    } else if key(word) & (span(level) - 1) != 0 {
+        Some(WordError::Misaligned)
+    } else {
+        None
+    }
+}
+
+/// Packs a leaf.
+pub fn encode(leaf: &Leaf) -> u64 {
+    key_of(leaf.octant.corner) << 7 | u64::from(leaf.octant.level) << 2 | leaf.side as u64
+}
+
+/// Unpacks a word.
+pub fn decode(word: u64) -> Result<Leaf, WordError> {
+    match fault(word) {
+        Some(why) => Err(why),
+        None => Ok(Leaf { octant: octant(word), side: side(word) }),
+    }
+}
+
+/// The octant of a word without [`fault`].
+pub fn octant(word: u64) -> Octant {
+    Octant { corner: corner_of(key(word)), level: level(word) }
+}
+
+/// The side of a word without [`fault`].
+pub fn side(word: u64) -> Side {
+    Side::ALL[(word & 3) as usize]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn axes_interleave_with_x_lowest() {
+        assert_eq!(key_of([1, 0, 0]), 1);
+        assert_eq!(key_of([0, 1, 0]), 2);
+        assert_eq!(key_of([0, 0, 1]), 4);
+        assert_eq!(key_of([CELLS_PER_EDGE - 1; 3]), KEY_END - 1);
+    }
+
+    proptest! {
+        #[test]
+        fn words_read_back(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE,
+                           level in 0..=LEVEL_MAX, side in 0usize..3) {
+            let octant = Octant { corner: [x, y, z], level: LEVEL_MAX }.ancestor(level);
+            let leaf = Leaf { octant, side: Side::ALL[side] };
+            prop_assert_eq!(decode(encode(&leaf)), Ok(leaf));
+        }
+
+        #[test]
+        fn interleaving_is_bit_by_bit(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE) {
+            let mut want = 0u64;
+            for bit in 0..19 {
+                for (a, c) in [x, y, z].into_iter().enumerate() {
+                    want |= u64::from(c >> bit & 1) << (3 * bit + a);
+                }
+            }
+            prop_assert_eq!(key_of([x, y, z]), want);
+            prop_assert_eq!(corner_of(want), [x, y, z]);
+        }
+    }
+
+    #[test]
+    fn faults_are_told_apart() {
+        assert_eq!(fault(20 << 2), Some(WordError::LevelTooDeep(20)));
+        assert_eq!(fault(3), Some(WordError::SideUnknown));
+        assert_eq!(fault(1 << 7), Some(WordError::Misaligned));
+        assert_eq!(fault(1 << 7 | 19 << 2), None);
+    }
+}

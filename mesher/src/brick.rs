@@ -1,0 +1,200 @@
+//! Bricks: 4 x 4 x 4 octants of one level as the 64 bits of a word.
+//!
+//! Invariants:
+//! - the brick `key` of level `l` holds the octants with Morton codes `key << 6 | bit`; so the bits
+//!   of a brick are in Morton order too, and its key is the code of an octant of level `l - 2`;
+//! - one byte of a brick is one group of eight siblings: byte `j` of brick `key` holds the children
+//!   of the octant of level `l - 1` with code `key << 3 | j`;
+//! - levels 0 and 1 have a single brick of key 0, of which 1 and 8 bits are in use.
+
+use crate::octant::Level;
+use bytemuck::{Pod, Zeroable};
+
+/// A brick's key and its 64 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
+pub struct Brick {
+    /// Code of the octant of two levels up that the brick fills.
+    pub key: u64,
+    /// One bit per octant, in Morton order.
+    pub bits: u64,
+}
+
+/// Bits whose x position in the brick is 0, 1, 2, 3; [`Y`] and [`Z`] likewise.
+pub const X: [u64; 4] = axis_masks(0);
+/// Bits by y position.
+pub const Y: [u64; 4] = axis_masks(1);
+/// Bits by z position.
+pub const Z: [u64; 4] = axis_masks(2);
+/// The three families of masks by axis.
+pub const AXES: [[u64; 4]; 3] = [X, Y, Z];
+
+const fn axis_masks(axis: u32) -> [u64; 4] {
+    let mut masks = [0; 4];
+    let mut bit = 0;
+    while bit < 64u32 {
+        let at = (bit >> axis & 1) | (bit >> (axis + 3) & 1) << 1;
+        masks[at as usize] |= 1 << bit;
+        bit += 1;
+    }
+    masks
+}
+
+/// The bits that octants of level `l` can have: fewer than 64 only above level 2.
+#[inline]
+pub const fn valid(l: Level) -> u64 {
+    match l {
+        0 => 1,
+        1 => 0xff,
+        _ => u64::MAX,
+    }
+}
+
+/// One bit per byte of `bits` that is not zero: the parents of the octants in the brick.
+#[inline]
+pub const fn parents(bits: u64) -> u8 {
+    let v = bits | bits >> 4;
+    let v = v | v >> 2;
+    let v = (v | v >> 1) & 0x0101_0101_0101_0101;
+    (v.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
+}
+
+/// All children of the octants in `byte`: byte `j` of the result is 0xff where bit `j` is set.
+#[inline]
+pub const fn children(byte: u8) -> u64 {
+    let v = (byte as u64).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
+    let ones = ((v.wrapping_add(0x7f7f_7f7f_7f7f_7f7f) | v) >> 7) & 0x0101_0101_0101_0101;
+    ones.wrapping_mul(0xff)
+}
+
+/// Byte `j` of `bits`.
+#[inline]
+pub const fn byte(bits: u64, j: u64) -> u8 {
+    (bits >> (8 * j)) as u8
+}
+
+/// The neighbours inside the brick over faces of all octants in `w`, and `w` itself.
+#[inline]
+pub const fn spread_faces(w: u64) -> u64 {
+    const fn along(w: u64, m: [u64; 4], unit: u32, gap: u32) -> u64 {
+        let low = m[0] | m[2];
+        ((w & low) << unit) | (w >> unit & low) | ((w & m[1]) << gap) | (w >> gap & m[1])
+    }
+    w | along(w, X, 1, 7) | along(w, Y, 2, 14) | along(w, Z, 4, 28)
+}
+
+/// The octants of `within` that are connected over faces inside the brick to those of `seed`.
+#[inline]
+pub const fn flood(seed: u64, within: u64) -> u64 {
+    let mut w = seed & within;
+    loop {
+        let next = spread_faces(w) & within;
+        if next == w {
+            return w;
+        }
+        w = next;
+    }
+}
+
+/// Where the octants of `w` on the brick's face reach across it: bits of the brick next door
+/// along `axis`, up or down.
+#[inline]
+pub const fn across(w: u64, axis: usize, up: bool) -> u64 {
+    let shift = 9 << axis;
+    if up { (w & AXES[axis][3]) >> shift } else { (w & AXES[axis][0]) << shift }
+}
+
+/// A brick's bits with x fastest, then y, then z, instead of Morton order.
+#[inline]
+pub const fn to_rows(w: u64) -> u64 {
+    // Index bits from the highest: z1 y1 x1 z0 y0 x0 -> z1 z0 y1 y0 x1 x0, by swaps of two of them.
+    let w = swap::<3, 1>(w); // z1 y1 y0 z0 x1 x0
+    let w = swap::<4, 2>(w); // z1 z0 y0 y1 x1 x0
+    swap::<3, 2>(w) // z1 z0 y1 y0 x1 x0
+}
+
+/// Inverse of [`to_rows`].
+#[inline]
+pub const fn from_rows(w: u64) -> u64 {
+    let w = swap::<3, 2>(w);
+    let w = swap::<4, 2>(w);
+    swap::<3, 1>(w)
+}
+
+/// Exchanges bits `A > B` of every bit's index.
+#[inline]
+const fn swap<const A: u32, const B: u32>(w: u64) -> u64 {
+    let distance = (1 << A) - (1 << B);
+    let t = (w ^ w >> distance) & const { moved_up(A, B) };
+    w ^ t ^ t << distance
+}
+
+/// The bits that [`swap`] moves up: those whose index has bit `a` clear and bit `b` set.
+const fn moved_up(a: u32, b: u32) -> u64 {
+    let mut moved = 0;
+    let mut i = 0;
+    while i < 64u32 {
+        if i >> a & 1 == 0 && i >> b & 1 == 1 {
+            moved |= 1 << i;
+        }
+        i += 1;
+    }
+    moved
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::octant::{morton, position};
+
+    #[test]
+    fn parents_and_children_agree_for_every_byte() {
+        for b in 0..=255u8 {
+            assert_eq!(parents(children(b)), b);
+            assert_eq!(children(b).count_ones(), 8 * b.count_ones());
+            for bit in 0..8 {
+                assert_eq!(byte(children(b), bit), if b >> bit & 1 == 1 { 0xff } else { 0 });
+                assert_eq!(parents(1 << (8 * bit + u64::from(b & 7))), 1 << bit);
+            }
+        }
+    }
+
+    #[test]
+    fn every_bit_moves_to_its_row_and_back() {
+        for bit in 0..64 {
+            let [x, y, z] = position(bit);
+            assert_eq!(to_rows(1 << bit), 1 << (x + 4 * y + 16 * z));
+            assert_eq!(from_rows(to_rows(1 << bit)), 1 << bit);
+        }
+    }
+
+    #[test]
+    fn faces_reach_exactly_the_six_neighbours() {
+        for bit in 0..64u64 {
+            let p = position(bit);
+            let mut want = 1u64 << bit;
+            for axis in 0..3 {
+                for up in [false, true] {
+                    let mut q = p.map(i64::from);
+                    q[axis] += if up { 1 } else { -1 };
+                    let inside = (0..4).contains(&q[axis]);
+                    let wrapped = q.map(|v| v.rem_euclid(4) as u32);
+                    let there = if inside { 0 } else { 1 << morton(wrapped) };
+                    assert_eq!(across(1 << bit, axis, up), there);
+                    if inside {
+                        want |= 1 << morton(wrapped);
+                    }
+                }
+            }
+            assert_eq!(spread_faces(1 << bit), want);
+        }
+    }
+
+    #[test]
+    fn floods_stop_at_walls() {
+        let wall = !X[1];
+        assert_eq!(flood(1, wall), X[0]);
+        assert_eq!(flood(1 << 63, wall), X[2] | X[3]);
+        assert_eq!(flood(X[1], wall), 0);
+    }
+}

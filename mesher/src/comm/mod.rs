@@ -1,0 +1,153 @@
+//! What ranks say to each other: three implementations of one small trait, so that nothing else in
+//! the mesher names MPI.
+//!
+//! [`Solo`] is a single rank and needs nothing installed. `Mpi` (feature `mpi`) is the real thing.
+//! [`sim::run`] runs any number of ranks in one process, one at a time, in an order drawn from a seed.
+//!
+//! Every call is collective: all ranks make the same calls in the same order. Payloads are `u64`
+//! words.
+
+#[cfg(feature = "mpi")]
+pub mod mpi;
+pub mod sim;
+
+use crate::error::Error;
+use std::cell::Cell;
+
+/// Messages and bytes that a rank has sent so far, to others only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Messages, one per receiver.
+    pub messages: u64,
+    /// Payload.
+    pub bytes: u64,
+}
+
+/// A group of ranks.
+pub trait Comm {
+    /// This rank, from 0.
+    fn rank(&self) -> usize;
+
+    /// Number of ranks.
+    fn size(&self) -> usize;
+
+    /// Everyone's words, by rank. Collective.
+    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>>;
+
+    /// Sends words to some ranks and returns what others sent here, with the sender, in no
+    /// particular order. At most one entry per receiver; empty ones are not sent. Collective.
+    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)>;
+
+    /// What this rank has sent.
+    fn traffic(&self) -> Traffic;
+
+    /// The sum over the ranks, modulo 2^64. Collective.
+    fn sum(&self, v: u64) -> u64 {
+        self.all_gather(&[v]).iter().fold(0, |s, w| s.wrapping_add(w[0]))
+    }
+
+    /// The greatest value of any rank. Collective.
+    fn max(&self, v: u64) -> u64 {
+        self.all_gather(&[v]).iter().map(|w| w[0]).max().unwrap_or(v)
+    }
+
+    /// Makes one rank's error every rank's: all return the error of the lowest rank that has one.
+    /// Collective.
+    fn agree(&self, mine: Result<(), Error>) -> Result<(), Error> {
+        let packed = match &mine {
+            Ok(()) => Vec::new(),
+            Err(e) => pack(e),
+        };
+        match self.all_gather(&packed).iter().find(|w| !w.is_empty()) {
+            None => Ok(()),
+            Some(words) => Err(unpack(words)),
+        }
+    }
+}
+
+/// [`Comm::agree`] for a result with a value.
+pub fn agree<T>(comm: &dyn Comm, mine: Result<T, Error>) -> Result<T, Error> {
+    let (value, error) = match mine {
+        Ok(v) => (Some(v), Ok(())),
+        Err(e) => (None, Err(e)),
+    };
+    comm.agree(error)?;
+    Ok(value.expect("agreed that no rank has an error"))
+}
+
+fn pack(e: &Error) -> Vec<u64> {
+    let text = match e {
+        Error::Interrupted => String::new(),
+        Error::Input(t) | Error::Output(t) => t.clone(),
+    };
+    let head = [e.exit_code() as u64, text.len() as u64];
+    let body = text.as_bytes().chunks(8).map(|c| {
+        let mut word = [0; 8];
+        word[..c.len()].copy_from_slice(c);
+        u64::from_le_bytes(word)
+    });
+    head.into_iter().chain(body).collect()
+}
+
+fn unpack(words: &[u64]) -> Error {
+    let bytes: Vec<u8> = words[2..].iter().flat_map(|w| w.to_le_bytes()).take(words[1] as usize).collect();
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    match words[0] {
+        2 => Error::Input(text),
+        4 => Error::Output(text),
+        _ => Error::Interrupted,
+    }
+}
+
+/// Counts what an implementation sends.
+#[derive(Debug, Default)]
+pub(crate) struct Meter(Cell<Traffic>);
+
+impl Meter {
+    pub(crate) fn count(&self, messages: u64, words: u64) {
+        let t = self.0.get();
+        self.0.set(Traffic { messages: t.messages + messages, bytes: t.bytes + 8 * words });
+    }
+
+    pub(crate) fn get(&self) -> Traffic {
+        self.0.get()
+    }
+}
+
+/// A single rank.
+#[derive(Debug, Default)]
+pub struct Solo;
+
+impl Comm for Solo {
+    fn rank(&self) -> usize {
+        0
+    }
+
+    fn size(&self) -> usize {
+        1
+    }
+
+    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
+        vec![mine.to_vec()]
+    }
+
+    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+        to.into_iter().filter(|(_, words)| !words.is_empty()).collect()
+    }
+
+    fn traffic(&self) -> Traffic {
+        Traffic::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_survive_the_journey() {
+        for e in [Error::input("häßlich: 'x'"), Error::output("no space"), Error::Interrupted, Error::input("12345678")] {
+            assert_eq!(unpack(&pack(&e)), e);
+        }
+    }
+}

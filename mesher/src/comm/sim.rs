@@ -1,0 +1,254 @@
+//! Many ranks in one process, for tests and projections.
+//!
+//! Each rank is a thread, but only the one that holds the token runs; it hands the token on when it
+//! has to wait for others. Who gets it next, and in which order messages arrive, is drawn from a seed: a
+//! failure is replayed by its seed, and a rank's CPU time is not disturbed by the others.
+
+use super::{Comm, Meter, Traffic};
+use std::any::Any;
+use std::cell::Cell;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+
+/// One rank of a simulated group.
+pub struct Sim {
+    rank: usize,
+    world: Arc<World>,
+    meter: Meter,
+    /// Number of collective calls made, to notice ranks that do not make the same ones.
+    calls: Cell<u64>,
+}
+
+struct World {
+    size: usize,
+    state: Mutex<State>,
+    turn: Condvar,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Doing {
+    Ready,
+    Waiting,
+    Done,
+}
+
+struct State {
+    running: usize,
+    doing: Vec<Doing>,
+    /// What each rank has put into the call under way: its number, kind, and words by receiver.
+    posted: Vec<Option<Post>>,
+    /// What each rank takes out of it.
+    inbox: Vec<Option<Vec<(usize, Vec<u64>)>>>,
+    random: u64,
+    broken: bool,
+}
+
+struct Post {
+    call: u64,
+    gather: bool,
+    words: Vec<(usize, Vec<u64>)>,
+}
+
+/// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
+///
+/// # Panics
+/// With the panic of the first rank that panics; the others are ended.
+pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> Vec<T> {
+    assert!(size > 0, "a group has at least one rank");
+    let world = Arc::new(World {
+        size,
+        state: Mutex::new(State {
+            running: 0,
+            doing: vec![Doing::Ready; size],
+            posted: (0..size).map(|_| None).collect(),
+            inbox: (0..size).map(|_| None).collect(),
+            random: seed ^ 0x9e37_79b9_7f4a_7c15,
+            broken: false,
+        }),
+        turn: Condvar::new(),
+    });
+    let results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..size)
+            .map(|rank| {
+                let (world, body) = (world.clone(), &body);
+                std::thread::Builder::new()
+                    .stack_size(16 << 20)
+                    .spawn_scoped(scope, move || {
+                        let sim = Sim { rank, world: world.clone(), meter: Meter::default(), calls: Cell::new(0) };
+                        sim.wait_for_turn();
+                        let guard = Leaving(&sim);
+                        let result = body(&sim);
+                        drop(guard);
+                        result
+                    })
+                    .expect("a thread per simulated rank")
+            })
+            .collect();
+        threads.into_iter().map(|t| t.join()).collect()
+    });
+    let told = |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == ENDED);
+    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !told(p))) {
+        let panic = results.into_iter().nth(at).and_then(Result::err);
+        std::panic::resume_unwind(panic.expect("position found an error"));
+    }
+    results.into_iter().map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
+}
+
+const ENDED: &str = "ended because another simulated rank panicked";
+
+/// Hands the token on when a rank ends, in good order or by a panic.
+struct Leaving<'a>(&'a Sim);
+
+impl Drop for Leaving<'_> {
+    fn drop(&mut self) {
+        let mut state = self.0.lock();
+        state.doing[self.0.rank] = Doing::Done;
+        state.broken |= std::thread::panicking();
+        self.0.hand_on(&mut state);
+    }
+}
+
+impl State {
+    /// splitmix64.
+    fn draw(&mut self, below: usize) -> usize {
+        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.random ^ self.random >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) % below as u64) as usize
+    }
+
+    /// Delivers the call under way once everyone has posted.
+    fn deliver(&mut self) {
+        if !self.posted.iter().all(Option::is_some) {
+            return;
+        }
+        let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
+        let same = posts.iter().all(|p| p.call == posts[0].call && p.gather == posts[0].gather);
+        assert!(same, "ranks must make the same collective calls in the same order");
+        let mut inbox: Vec<Vec<(usize, Vec<u64>)>> = vec![Vec::new(); posts.len()];
+        for (from, post) in posts.into_iter().enumerate() {
+            for (to, words) in post.words {
+                inbox[to].push((from, words));
+            }
+        }
+        for messages in &mut inbox {
+            for i in (1..messages.len()).rev() {
+                let j = self.draw(i + 1);
+                messages.swap(i, j);
+            }
+        }
+        self.inbox = inbox.into_iter().map(Some).collect();
+        self.doing.iter_mut().for_each(|d| *d = Doing::Ready);
+    }
+}
+
+impl Sim {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A poisoned lock means that another rank panicked; `broken` tells the same.
+        self.world.state.lock().unwrap_or_else(|p| p.into_inner())
+    }
+
+    /// Draws the rank that runs next.
+    fn hand_on(&self, state: &mut State) {
+        let ready: Vec<usize> = (0..self.world.size).filter(|&r| state.doing[r] == Doing::Ready).collect();
+        if !ready.is_empty() {
+            state.running = ready[state.draw(ready.len())];
+        } else if state.doing.contains(&Doing::Waiting) {
+            // Some wait for a call that those who are done will never make.
+            state.broken = true;
+        }
+        self.world.turn.notify_all();
+    }
+
+    fn wait_for_turn(&self) {
+        let mut state = self.lock();
+        while !(state.broken || state.running == self.rank && state.doing[self.rank] == Doing::Ready) {
+            state = self.world.turn.wait(state).unwrap_or_else(|p| p.into_inner());
+        }
+        if state.broken {
+            drop(state);
+            std::panic::panic_any(ENDED);
+        }
+    }
+
+    fn call(&self, gather: bool, words: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+        let call = self.calls.replace(self.calls.get() + 1);
+        let sent = words.iter().filter(|m| m.0 != self.rank);
+        sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
+        let mut state = self.lock();
+        state.posted[self.rank] = Some(Post { call, gather, words });
+        state.doing[self.rank] = Doing::Waiting;
+        state.deliver();
+        self.hand_on(&mut state);
+        drop(state);
+        self.wait_for_turn();
+        self.lock().inbox[self.rank].take().expect("a delivered call has an inbox for every rank")
+    }
+}
+
+impl Comm for Sim {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.world.size
+    }
+
+    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
+        let mut all = self.call(true, (0..self.size()).map(|to| (to, mine.to_vec())).collect());
+        all.sort_unstable_by_key(|m| m.0);
+        all.into_iter().map(|m| m.1).collect()
+    }
+
+    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+        self.call(false, to.into_iter().filter(|m| !m.1.is_empty()).collect())
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.meter.get()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everyone_hears_everyone_whatever_the_seed() {
+        for seed in 0..20 {
+            let sums = run(7, seed, |c| {
+                let to = (0..c.size()).filter(|r| r % 2 == 0).map(|r| (r, vec![c.rank() as u64; 2])).collect();
+                let heard: u64 = c.exchange(to).iter().map(|m| m.1[0]).sum();
+                (c.sum(c.rank() as u64), heard)
+            });
+            for (rank, (sum, heard)) in sums.into_iter().enumerate() {
+                assert_eq!(sum, 21);
+                assert_eq!(heard, if rank % 2 == 0 { 21 } else { 0 });
+            }
+        }
+    }
+
+    #[test]
+    fn orders_differ_by_seed_and_repeat_by_seed() {
+        let order = |seed| {
+            run(6, seed, |c| c.exchange(vec![(0, vec![1])]).iter().map(|m| m.0).collect::<Vec<_>>()).swap_remove(0)
+        };
+        assert_eq!(order(3), order(3));
+        assert!((0..10).any(|s| order(s) != order(3)));
+    }
+
+    #[test]
+    #[should_panic(expected = "rank two fails")]
+    fn a_panic_on_one_rank_ends_all() {
+        run(4, 1, |c| {
+            assert!(c.rank() != 2, "rank two fails");
+            c.sum(1)
+        });
+    }
+
+    #[test]
+    #[should_panic(expected = "another simulated rank")]
+    fn a_rank_that_leaves_early_does_not_hang_the_rest() {
+        run(3, 1, |c| if c.rank() == 0 { 0 } else { c.sum(1) });
+    }
+}

@@ -1,0 +1,329 @@
+//! Chebyshev dilation of a set of octants: the paper's enlarged extent boxes, 64 octants to the word.
+//!
+//! The boxes of all sources together are a dilation by a cube, which is separable: along x, then y,
+//! then z, by shifts and ors. It is done in *tiles* of 32 x 32 x 32 octants, dense in memory, one
+//! machine word for a row along x: the tile's own octants are the word's middle 32 bits, which
+//! leaves a margin of 16 for what reaches into the tiles beside it. So the cost per octant is that of a few
+//! word operations, whatever the radius.
+//!
+//! Two identities keep radii small. Dilations add up: by `a` and then by `b` is by `a + b`. And a
+//! dilation by `2k` followed by [coarsening](BrickSet::coarsen) is coarsening followed by a
+//! dilation by `k`, as both reach from octant `2p` and from `2p + 1` exactly the parents
+//! `p - k ..= p + k`.
+
+use crate::brick::{self, Brick};
+use crate::brickset::BrickSet;
+use crate::octant::{Level, morton, position};
+use std::collections::HashMap;
+
+/// Octants along a tile's edge.
+const TILE: usize = 32;
+/// Bits of a row on each side of the tile's own: the most that one pass can dilate by.
+const MARGIN: usize = 16;
+/// Bricks along a tile's edge, as a power of two; three of these per key.
+const TILE_BRICKS_LOG2: u32 = 3;
+
+/// Words that were dilated, counting every row of every tile.
+pub type Words = u64;
+
+/// The parents, at level `l - 1`, of all octants of level `l` within `radius` of a source, octants
+/// outside the root left out. Sources come in Morton order.
+pub fn dilate_to_parents(l: Level, sources: impl Iterator<Item = Brick>, radius: u32, words: &mut Words) -> BrickSet {
+    let odd = dilate_tiles(l, sources, (radius & 1) as usize, true, words);
+    dilate(l - 1, odd, radius / 2, words)
+}
+
+/// All octants of level `l` within `radius` of one in the set, octants outside the root left out.
+pub fn dilate(l: Level, mut set: BrickSet, radius: u32, words: &mut Words) -> BrickSet {
+    // Further than the root is wide, nothing more is reached.
+    let mut left = radius.min(1 << l) as usize;
+    while left > 0 && !set.is_empty() {
+        let step = left.min(MARGIN);
+        set = dilate_tiles(l, set.bricks().iter().copied(), step, false, words);
+        left -= step;
+    }
+    set
+}
+
+/// One pass over the tiles; the result is of level `l - 1` if `to_parents`.
+fn dilate_tiles(l: Level, sources: impl Iterator<Item = Brick>, radius: usize, to_parents: bool, words: &mut Words) -> BrickSet {
+    let mut out = Gathered::new(if to_parents { l - 1 } else { l });
+    let mut tile = Tile::new(radius);
+    let mut now = None;
+    for b in sources {
+        let key = b.key >> (3 * TILE_BRICKS_LOG2);
+        if now.is_some_and(|n| n != key) {
+            tile.dilate(words);
+            tile.give(now.unwrap_or_default(), to_parents, &mut out);
+        }
+        now = Some(key);
+        tile.put(b);
+    }
+    if let Some(key) = now {
+        tile.dilate(words);
+        tile.give(key, to_parents, &mut out);
+    }
+    out.into_set()
+}
+
+/// A tile and its margin, one word per row.
+struct Tile {
+    radius: usize,
+    /// Rows before and behind the tile's own along y and z: the radius, up to whole parent bricks.
+    margin: usize,
+    /// Rows along y and along z.
+    side: usize,
+    rows: Vec<u64>,
+}
+
+impl Tile {
+    fn new(radius: usize) -> Self {
+        assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
+        let margin = radius.next_multiple_of(8);
+        let side = TILE + 2 * margin;
+        Self { radius, margin, side, rows: vec![0; side * side] }
+    }
+
+    /// Adds a source brick.
+    fn put(&mut self, b: Brick) {
+        let [x, y, z] = position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
+        let rows = brick::to_rows(b.bits);
+        let shift = MARGIN + x;
+        for dz in 0..4 {
+            let base = (self.margin + z + dz) * self.side + self.margin + y;
+            let four = rows >> (16 * dz);
+            for (dy, row) in self.rows[base..base + 4].iter_mut().enumerate() {
+                *row |= (four >> (4 * dy) & 15) << shift;
+            }
+        }
+    }
+
+    /// Dilates what was put in, along x, then y, then z.
+    fn dilate(&mut self, words: &mut Words) {
+        *words += self.rows.len() as u64;
+        let (r, side) = (self.radius, self.side);
+        if r == 0 {
+            return;
+        }
+        for row in &mut self.rows {
+            *row = dilate_row(*row, r);
+        }
+        // Sources are in the middle: the first and last `margin` rows are still empty, and results
+        // stay within them.
+        let mut spread = vec![0u64; self.rows.len()];
+        for s in 0..=2 * r {
+            let from = r - r.min(s);
+            let to = s.saturating_sub(r);
+            let n = self.rows.len() - from.max(to);
+            or_into(&mut spread[to..to + n], &self.rows[from..from + n]);
+        }
+        self.rows.fill(0);
+        for s in 0..=2 * r {
+            let from = (r - r.min(s)) * side;
+            let to = s.saturating_sub(r) * side;
+            let n = spread.len() - from.max(to);
+            or_into(&mut self.rows[to..to + n], &spread[from..from + n]);
+        }
+    }
+
+    /// Hands over the result and empties the tile.
+    fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
+        let scale = if to_parents { 2 } else { 1 };
+        let rows: Vec<u64> = if to_parents { self.halved() } else { self.rows.clone() };
+        self.rows.fill(0);
+        let side = self.side / scale;
+        // The first brick of the padded tile, in bricks of the result's level.
+        let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
+        let first = [MARGIN / scale / 4, self.margin / scale / 4, self.margin / scale / 4];
+        for bz in 0..side / 4 {
+            for by in 0..side / 4 {
+                let at = |dy: usize, dz: usize| rows[(4 * bz + dz) * side + 4 * by + dy];
+                let any = (0..16).fold(0, |any, i| any | at(i & 3, i >> 2));
+                if any == 0 {
+                    continue;
+                }
+                for bx in 0..16 / scale {
+                    if any >> (4 * bx) & 15 == 0 {
+                        continue;
+                    }
+                    let bits = (0..16).fold(0, |w, i| w | (at(i & 3, i >> 2) >> (4 * bx) & 15) << (4 * i));
+                    let b = [bx, by, bz];
+                    let p = std::array::from_fn(|a| origin[a] + b[a] as i64 - first[a] as i64);
+                    out.add(p, brick::from_rows(bits));
+                }
+            }
+        }
+    }
+
+    /// Rows of the parents: pairs along all three axes ored together.
+    fn halved(&self) -> Vec<u64> {
+        let half = self.side / 2;
+        let mut out = vec![0; half * half];
+        for z in 0..half {
+            for y in 0..half {
+                let at = |dy: usize, dz: usize| self.rows[(2 * z + dz) * self.side + 2 * y + dy];
+                out[z * half + y] = pairs(at(0, 0) | at(1, 0) | at(0, 1) | at(1, 1));
+            }
+        }
+        out
+    }
+}
+
+/// `to |= from`, word by word.
+#[inline]
+fn or_into(to: &mut [u64], from: &[u64]) {
+    for (t, f) in to.iter_mut().zip(from) {
+        *t |= f;
+    }
+}
+
+/// A row with every bit spread by `r` to both sides, by doubling.
+#[inline]
+fn dilate_row(row: u64, r: usize) -> u64 {
+    // After a step the run to the right of each bit is `run` long.
+    let mut wide = row;
+    let mut run = 1;
+    while run < 2 * r + 1 {
+        let step = run.min(2 * r + 1 - run);
+        wide |= wide << step;
+        run += step;
+    }
+    wide >> r
+}
+
+/// Bit `i` of the result is set where bit `2i` or `2i + 1` of `row` is.
+#[inline]
+fn pairs(row: u64) -> u64 {
+    let v = (row | row >> 1) & 0x5555_5555_5555_5555;
+    let v = (v | v >> 1) & 0x3333_3333_3333_3333;
+    let v = (v | v >> 2) & 0x0f0f_0f0f_0f0f_0f0f;
+    let v = (v | v >> 4) & 0x00ff_00ff_00ff_00ff;
+    let v = (v | v >> 8) & 0x0000_ffff_0000_ffff;
+    (v | v >> 16) & 0xffff_ffff
+}
+
+/// Bricks gathered from overlapping tiles, 64 to a block.
+struct Gathered {
+    /// Bricks along the root's edge.
+    extent: i64,
+    /// Bits that exist at this level.
+    valid: u64,
+    blocks: HashMap<u64, u32, Spread>,
+    words: Vec<[u64; 64]>,
+    last: Option<(u64, u32)>,
+}
+
+impl Gathered {
+    fn new(l: Level) -> Self {
+        Self {
+            extent: if l < 2 { 1 } else { 1 << (l - 2) },
+            valid: brick::valid(l),
+            blocks: HashMap::default(),
+            words: Vec::new(),
+            last: None,
+        }
+    }
+
+    /// Ors bits into the brick at a position; outside the root they are dropped.
+    fn add(&mut self, p: [i64; 3], bits: u64) {
+        if p.iter().any(|c| !(0..self.extent).contains(c)) {
+            return;
+        }
+        let key = morton(p.map(|c| c as u32));
+        let block = match self.last {
+            Some((k, i)) if k == key >> 6 => i,
+            _ => *self.blocks.entry(key >> 6).or_insert_with(|| {
+                self.words.push([0; 64]);
+                (self.words.len() - 1) as u32
+            }),
+        };
+        self.last = Some((key >> 6, block));
+        self.words[block as usize][(key & 63) as usize] |= bits & self.valid;
+    }
+
+    fn into_set(self) -> BrickSet {
+        let mut order: Vec<(u64, u32)> = self.blocks.into_iter().collect();
+        order.sort_unstable();
+        let mut set = BrickSet::default();
+        for (block, i) in order {
+            for (k, &bits) in (0..).zip(&self.words[i as usize]) {
+                set.push(block << 6 | k, bits);
+            }
+        }
+        set
+    }
+}
+
+/// Hashing of Morton codes: a multiplication spreads them well enough.
+#[derive(Clone, Copy, Default)]
+struct Spread(u64);
+
+impl std::hash::BuildHasher for Spread {
+    type Hasher = Self;
+    fn build_hasher(&self) -> Self {
+        Self(0)
+    }
+}
+
+impl std::hash::Hasher for Spread {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+    fn write(&mut self, bytes: &[u8]) {
+        for &b in bytes {
+            self.write_u64(u64::from(b));
+        }
+    }
+    fn write_u64(&mut self, v: u64) {
+        self.0 = (self.0 ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn set(codes: &BTreeSet<u64>) -> BrickSet {
+        BrickSet::from_unsorted(codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect())
+    }
+
+    fn naive(l: Level, codes: &BTreeSet<u64>, r: i64) -> BTreeSet<u64> {
+        let n = 1i64 << l;
+        let mut out = BTreeSet::new();
+        for p in codes.iter().map(|c| position(*c).map(i64::from)) {
+            let span = |c: i64| (c - r).max(0)..=(c + r).min(n - 1);
+            for z in span(p[2]) {
+                for y in span(p[1]) {
+                    out.extend(span(p[0]).map(|x| morton([x as u32, y as u32, z as u32])));
+                }
+            }
+        }
+        out
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        #[test]
+        fn equals_one_box_per_octant(l in 1u32..8, seeds in prop::collection::vec(any::<u64>(), 0..12), r in 0u32..21) {
+            let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
+            let mut words = 0;
+            let grown = naive(l, &codes, i64::from(r));
+            let got = dilate(l, set(&codes), r, &mut words);
+            prop_assert!(got.codes().eq(grown.iter().copied()));
+            let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
+            let got = dilate_to_parents(l, set(&codes).bricks().iter().copied(), r, &mut words);
+            prop_assert!(got.codes().eq(parents.iter().copied()));
+        }
+    }
+
+    #[test]
+    fn rows_spread_both_ways() {
+        for r in 0..=16 {
+            let want = (32 - r..=32 + r).fold(0u64, |w, b| w | 1 << b);
+            assert_eq!(dilate_row(1 << 32, r), want);
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! Errors of the user's; bugs panic instead.
+//!
+//! Exit codes: 0 done, 2 unusable input, 4 output that could not be written, 70 a bug, 130 interrupted.
+
+use thiserror::Error;
+
+/// What a user can put right. One sentence: what, where, what to do.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Error {
+    /// The case, the geometry or an option is unusable.
+    #[error("{0}")]
+    Input(String),
+    /// Something could not be written.
+    #[error("{0}")]
+    Output(String),
+    /// The run was interrupted.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl Error {
+    /// An [`Error::Input`].
+    pub fn input(message: impl Into<String>) -> Self {
+        Self::Input(message.into())
+    }
+
+    /// An [`Error::Output`].
+    pub fn output(message: impl Into<String>) -> Self {
+        Self::Output(message.into())
+    }
+
+    /// The process's exit code.
+    pub fn exit_code(&self) -> i32 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Output(_) => 4,
+            Self::Interrupted => 130,
+        }
+    }
+}

@@ -1,0 +1,339 @@
+//! Which octants of a brick a facet crosses: one exact test for all 64.
+//!
+//! Closed octant and closed triangle are disjoint exactly when they are separated along one of 13
+//! axes: the three coordinate axes, the facet's normal, and the nine products of a coordinate axis
+//! with an edge of the facet (the separating axis theorem; Akenine-Moller, "Fast 3D triangle-box
+//! overlap testing", 2001). Every axis gives a 64-bit mask of the octants that it does not separate,
+//! and the masks are and-ed. The nine products are the edges of the facet's three projections, so
+//! each depends on two coordinates only.
+//!
+//! Exactness: vertices are lattice points in [-2^27, 2^28], relative to the brick's corner below
+//! 2^29 in magnitude. An edge function is a product of two such numbers, a sum of two: below 2^60.
+//! The normal's components are below 2^59; its product with a vertex takes i128. Octant corners are
+//! `h` times small integers and `h` is a power of two, so `h * m + c >= 0` holds exactly when
+//! `m + floor(c / h) >= 0`: constants are shifted down first, and all lanes stay in i64.
+
+use crate::brick::{X, Y, Z, valid};
+use crate::lattice::ExtentBox;
+use crate::octant::{Level, ROOT_BITS};
+use bytemuck::{Pod, Zeroable};
+
+/// A facet on the lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Facet {
+    /// Three vertices in lattice units, each coordinate in [-2^27, 2^28].
+    pub v: [[i32; 3]; 3],
+}
+
+impl Facet {
+    /// Least and greatest coordinate along `axis`.
+    #[inline]
+    pub fn range(&self, axis: usize) -> (i64, i64) {
+        let [a, b, c] = [self.v[0][axis], self.v[1][axis], self.v[2][axis]];
+        (i64::from(a.min(b).min(c)), i64::from(a.max(b).max(c)))
+    }
+
+    /// Normal by the right-hand rule, of twice the facet's area; zero for a degenerate facet.
+    #[inline]
+    pub fn normal(&self) -> [i64; 3] {
+        let d = |i: usize, a: usize| i64::from(self.v[i][a]) - i64::from(self.v[0][a]);
+        let cross = |u: usize, w: usize| d(1, u) * d(2, w) - d(1, w) * d(2, u);
+        [cross(1, 2), cross(2, 0), cross(0, 1)]
+    }
+}
+
+/// Mask of the positions `first..=last` of one axis.
+const fn spans(m: [u64; 4]) -> [[u64; 4]; 4] {
+    let mut table = [[0; 4]; 4];
+    let mut a = 0;
+    while a < 4 {
+        let mut b = a;
+        let mut bits = 0;
+        while b < 4 {
+            bits |= m[b];
+            table[a][b] = bits;
+            b += 1;
+        }
+        a += 1;
+    }
+    table
+}
+
+const SPANS: [[[u64; 4]; 4]; 3] = [spans(X), spans(Y), spans(Z)];
+
+/// For each axis `a` and each half of a 4 x 4 mask over axes `a + 1` (fastest) and `a + 2`: the
+/// brick's bits over those squares, at every position along `a`.
+static COLUMNS: [[[u64; 256]; 2]; 3] = [columns(0), columns(1), columns(2)];
+
+const fn columns(a: usize) -> [[u64; 256]; 2] {
+    let families = [X, Y, Z];
+    let (u, w) = (families[(a + 1) % 3], families[(a + 2) % 3]);
+    let mut table = [[0; 256]; 2];
+    let mut half = 0;
+    while half < 2 {
+        let mut m = 0;
+        while m < 256 {
+            let mut k = 0;
+            while k < 8 {
+                if m >> k & 1 == 1 {
+                    table[half][m] |= u[k & 3] & w[2 * half + (k >> 2)];
+                }
+                k += 1;
+            }
+            m += 1;
+        }
+        half += 1;
+    }
+    table
+}
+
+/// The octants of level `l` that the facet crosses, in the brick whose minimum corner is `corner`
+/// (lattice units).
+#[inline]
+pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
+    let shift = ROOT_BITS - l;
+    let mut wide = 0;
+    let mut mask = u64::MAX;
+    for axis in 0..3 {
+        let (lo, hi) = f.range(axis);
+        // Closed octant i is [i h, (i + 1) h].
+        let first = (lo - corner[axis] - 1) >> shift;
+        let last = (hi - corner[axis]) >> shift;
+        if first > 3 || last < 0 {
+            return 0;
+        }
+        mask &= SPANS[axis][first.max(0) as usize][last.min(3) as usize];
+        wide += usize::from(first < last);
+    }
+    // A connected set that stays in one row of octants meets each that its extent meets.
+    if wide < 2 { mask } else { mask & kernel::separated(f, corner, shift) }
+}
+
+/// The octants of level `l` in the brick at `corner` whose interior meets the box's.
+pub fn box_mask(b: &ExtentBox, corner: [i64; 3], l: Level) -> u64 {
+    let shift = ROOT_BITS - l;
+    let mut mask = u64::MAX;
+    for axis in 0..3 {
+        let first = (b.min[axis] - corner[axis]) >> shift;
+        let last = (b.max[axis] - corner[axis] - 1) >> shift;
+        if first > 3 || last < 0 || b.min[axis] >= b.max[axis] {
+            return 0;
+        }
+        mask &= SPANS[axis][first.max(0) as usize][last.min(3) as usize];
+    }
+    mask & valid(l)
+}
+
+/// Plane and edge tests, in the widest vectors that the machine has.
+mod kernel {
+    use super::{COLUMNS, Facet};
+
+    /// Octants that neither the normal nor an edge axis separates from the facet. Meaningful only
+    /// together with the box axes.
+    #[inline]
+    pub fn separated(f: &Facet, corner: [i64; 3], shift: u32) -> u64 {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            // SAFETY: the features that the function is compiled for were just detected.
+            return unsafe { avx512::separated(f, corner, shift) };
+        }
+        generic(f, corner, shift, plane_lanes, edge_lanes)
+    }
+
+    /// The tests with the evaluation of lanes left open, so that all vector widths share the rest.
+    #[inline(always)]
+    pub fn generic(
+        f: &Facet,
+        corner: [i64; 3],
+        shift: u32,
+        plane: impl Fn([i64; 3], i64, i64) -> u64,
+        edge: impl Fn(i64, i64, i64) -> [u8; 2],
+    ) -> u64 {
+        let p = f.v.map(|v| [0, 1, 2].map(|a| i64::from(v[a]) - corner[a]));
+        let n = f.normal();
+        let mut mask = plane_mask(&p, n, shift, plane);
+        for a in 0..3 {
+            let (u, w) = ((a + 1) % 3, (a + 2) % 3);
+            if n[a] == 0 {
+                mask &= degenerate_mask(&p, a, shift, &edge);
+                continue;
+            }
+            let sign = n[a].signum();
+            for i in 0..3 {
+                let (from, to) = (p[i], p[(i + 1) % 3]);
+                mask &= half_plane(from, (to[u] - from[u]) * sign, (to[w] - from[w]) * sign, a, shift, &edge);
+            }
+        }
+        mask
+    }
+
+    /// Octants whose projection along `a` reaches the left of the directed line through `from`.
+    #[inline(always)]
+    fn half_plane(from: [i64; 3], eu: i64, ew: i64, a: usize, shift: u32, edge: &impl Fn(i64, i64, i64) -> [u8; 2]) -> u64 {
+        let (u, w) = ((a + 1) % 3, (a + 2) % 3);
+        // eu * (q_w - from_w) - ew * (q_u - from_u), at the corner of the first square where it is most.
+        let h = 1i64 << shift;
+        let qw = if eu > 0 { h - from[w] } else { -from[w] };
+        let qu = if ew < 0 { h - from[u] } else { -from[u] };
+        let c = (eu * qw - ew * qu) >> shift;
+        let [low, high] = edge(-ew, eu, c);
+        COLUMNS[a][0][low as usize] | COLUMNS[a][1][high as usize]
+    }
+
+    /// A projection of no area: the octants on both sides of its line, which is its longest edge's.
+    #[inline(always)]
+    fn degenerate_mask(p: &[[i64; 3]; 3], a: usize, shift: u32, edge: &impl Fn(i64, i64, i64) -> [u8; 2]) -> u64 {
+        let (u, w) = ((a + 1) % 3, (a + 2) % 3);
+        let mut best = (0i64, 0i64, p[0]);
+        for i in 0..3 {
+            let (from, to) = (p[i], p[(i + 1) % 3]);
+            let (eu, ew) = (to[u] - from[u], to[w] - from[w]);
+            if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() {
+                best = (eu, ew, from);
+            }
+        }
+        let (eu, ew, from) = best;
+        half_plane(from, eu, ew, a, shift, edge) & half_plane(from, -eu, -ew, a, shift, edge)
+    }
+
+    /// Octants that the facet's plane does not separate.
+    #[inline(always)]
+    fn plane_mask(p: &[[i64; 3]; 3], n: [i64; 3], shift: u32, plane: impl Fn([i64; 3], i64, i64) -> u64) -> u64 {
+        let at: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(p[0][a])).sum();
+        let up: i64 = n.iter().map(|v| v.max(&0)).sum();
+        let down: i64 = n.iter().map(|v| v.min(&0)).sum();
+        // Octant (i, j, k) reaches from n.(i, j, k) + down to n.(i, j, k) + up; the plane is at / h.
+        // Beyond 4 * (up - down) every comparison is decided, so clamping there changes none; and the
+        // sums of the lanes stay below 2^63, as up - down < 2^60.
+        let bound = 4 * i128::from(up - down) + 4;
+        let clamp = |v: i128| v.clamp(-bound, bound) as i64;
+        let floor = clamp(at >> shift);
+        let ceil = clamp(-((-at) >> shift));
+        plane(n, up - ceil, down - floor)
+    }
+
+    /// Bits of the octants (i, j, k) where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
+    #[inline(always)]
+    pub fn plane_lanes(n: [i64; 3], most: i64, least: i64) -> u64 {
+        let mut mask = 0;
+        for bit in 0..64u32 {
+            let at = |a: u32| i64::from((bit >> a & 1) | (bit >> (a + 3) & 1) << 1);
+            let v = n[0] * at(0) + n[1] * at(1) + n[2] * at(2);
+            mask |= u64::from((v + most >= 0) & (v + least <= 0)) << bit;
+        }
+        mask
+    }
+
+    /// Bits of the squares (i, j), i fastest, where `ci * i + cj * j + c >= 0`, in two halves.
+    #[inline(always)]
+    pub fn edge_lanes(ci: i64, cj: i64, c: i64) -> [u8; 2] {
+        let mut halves = [0; 2];
+        for k in 0..16usize {
+            let v = ci * (k & 3) as i64 + cj * (k >> 2) as i64 + c;
+            halves[k >> 3] |= u8::from(v >= 0) << (k & 7);
+        }
+        halves
+    }
+
+    /// Eight i64 lanes at a time.
+    #[cfg(target_arch = "x86_64")]
+    mod avx512 {
+        use super::Facet;
+        use std::arch::x86_64::*;
+
+        #[target_feature(enable = "avx512f,avx512dq")]
+        pub fn separated(f: &Facet, corner: [i64; 3], shift: u32) -> u64 {
+            super::generic(f, corner, shift, |n, most, least| plane(n, most, least), |ci, cj, c| edge(ci, cj, c))
+        }
+
+        #[inline]
+        #[target_feature(enable = "avx512f,avx512dq")]
+        fn plane(n: [i64; 3], most: i64, least: i64) -> u64 {
+            let lane = |m: u8, v: i64| _mm512_maskz_set1_epi64(m, v);
+            // Lanes are the low bits x0, y0, z0 of the octant's index; bytes are x1, y1, z1.
+            let low = _mm512_add_epi64(_mm512_add_epi64(lane(0xaa, n[0]), lane(0xcc, n[1])), lane(0xf0, n[2]));
+            let (most, least) = (_mm512_add_epi64(low, _mm512_set1_epi64(most)), _mm512_add_epi64(low, _mm512_set1_epi64(least)));
+            let mut mask = 0;
+            for byte in 0..8i64 {
+                let base = 2 * (n[0] * (byte & 1) + n[1] * (byte >> 1 & 1) + n[2] * (byte >> 2));
+                // v + most >= 0 and v + least <= 0, with the sum moved to the other side.
+                let m = _mm512_cmpge_epi64_mask(most, _mm512_set1_epi64(-base));
+                let m = _mm512_mask_cmple_epi64_mask(m, least, _mm512_set1_epi64(-base));
+                mask |= u64::from(m) << (8 * byte);
+            }
+            mask
+        }
+
+        #[inline]
+        #[target_feature(enable = "avx512f,avx512dq")]
+        fn edge(ci: i64, cj: i64, c: i64) -> [u8; 2] {
+            let step = _mm512_setr_epi64(0, ci, 2 * ci, 3 * ci, cj, ci + cj, 2 * ci + cj, 3 * ci + cj);
+            let low = _mm512_cmpge_epi64_mask(step, _mm512_set1_epi64(-c));
+            let high = _mm512_cmpge_epi64_mask(step, _mm512_set1_epi64(-c - 2 * cj));
+            [low, high]
+        }
+    }
+
+    #[cfg(all(test, target_arch = "x86_64"))]
+    pub fn separated_portable(f: &Facet, corner: [i64; 3], shift: u32) -> u64 {
+        generic(f, corner, shift, plane_lanes, edge_lanes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::octant::{edge, position};
+    use proptest::prelude::*;
+
+    fn vertex(reach: std::ops::Range<i32>) -> impl Strategy<Value = [i32; 3]> {
+        [reach.clone(), reach.clone(), reach]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        /// The crossed octants of a level are the parents of those of the next: the test that a
+        /// wrong sign, rounding or clamp anywhere would break.
+        #[test]
+        fn levels_agree(v in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)], coarse in 0u32..3) {
+            let f = Facet { v };
+            let l = 17;
+            let h = edge(l);
+            let up = crossed(&f, [0; 3], l);
+            for j in 0..8 {
+                let c = position(j).map(|p| 2 * h * i64::from(p));
+                let fine = crossed(&f, c, l + 1);
+                prop_assert_eq!(u64::from(crate::brick::parents(fine)), up >> (8 * j) & 0xff, "{}", coarse);
+            }
+        }
+
+        /// Moving facet and brick together changes nothing, however far from the origin.
+        #[test]
+        fn far_away_is_the_same(v in [vertex(-5000..5000), vertex(-5000..5000), vertex(-5000..5000)], far in vertex(0..(1 << 26))) {
+            let f = Facet { v };
+            let moved = Facet { v: v.map(|p| [0, 1, 2].map(|a| p[a] + far[a])) };
+            prop_assert_eq!(crossed(&f, [0; 3], 17), crossed(&moved, far.map(i64::from), 17));
+        }
+
+        /// All vector widths give the same words, on coordinates as large as they come.
+        #[test]
+        fn vector_paths_agree(v in [vertex(-(1 << 27)..(1 << 28)), vertex(-(1 << 27)..(1 << 28)), vertex(-(1 << 27)..(1 << 28))], l in 2u32..21, at in 0u64..64) {
+            let f = Facet { v };
+            let corner = position(at).map(|p| i64::from(p) << 25);
+            let shift = ROOT_BITS - l;
+            #[cfg(target_arch = "x86_64")]
+            prop_assert_eq!(kernel::separated(&f, corner, shift), kernel::separated_portable(&f, corner, shift));
+        }
+    }
+
+    #[test]
+    fn a_facet_in_a_face_plane_crosses_both_sides() {
+        let h = edge(19) as i32;
+        let f = Facet { v: [[h, 1, 1], [h, 2, 1], [h, 1, 2]] };
+        assert_eq!(crossed(&f, [0; 3], 19).count_ones(), 2);
+        let point = Facet { v: [[h, h, h]; 3] };
+        assert_eq!(crossed(&point, [0; 3], 19), 0xff);
+    }
+}

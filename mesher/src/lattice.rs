@@ -1,0 +1,205 @@
+//! From user coordinates to the integer lattice on which all geometry is exact.
+
+use crate::error::Error;
+use crate::facet::Facet;
+use crate::octant::{LEVEL_MAX, Level, ROOT_EDGE};
+
+/// The root cube, in the STL's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Root {
+    /// Minimum corner.
+    pub origin: [f64; 3],
+    /// Edge length, finite and positive.
+    pub edge: f64,
+}
+
+/// Smallest and greatest coordinates of a set of vertices, per axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Least coordinates; above `hi` while there are no vertices.
+    pub lo: [f64; 3],
+    /// Greatest coordinates.
+    pub hi: [f64; 3],
+}
+
+impl Bounds {
+    /// The bounds of nothing.
+    pub const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
+
+    /// Bounds of facets, whose coordinates must be finite.
+    pub fn of(facets: &[geometries::Facet]) -> Self {
+        let mut lo = [f32::INFINITY; 3];
+        let mut hi = [f32::NEG_INFINITY; 3];
+        for v in facets.iter().flatten() {
+            for a in 0..3 {
+                lo[a] = lo[a].min(v[a]);
+                hi[a] = hi[a].max(v[a]);
+            }
+        }
+        Self { lo: lo.map(f64::from), hi: hi.map(f64::from) }
+    }
+
+    /// Bounds of the union.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            lo: std::array::from_fn(|a| self.lo[a].min(other.lo[a])),
+            hi: std::array::from_fn(|a| self.hi[a].max(other.hi[a])),
+        }
+    }
+}
+
+impl Root {
+    /// The cube of `scale` longest edges of the bounds, centred on them. The order of the operations
+    /// is part of the mesh's definition.
+    pub fn around(bounds: &Bounds, scale: f64) -> Result<Self, Error> {
+        let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
+        if longest <= 0.0 {
+            return Err(Error::input("the geometry has no extent, so root_scale gives no root: set [root] with origin and edge"));
+        }
+        let edge = scale * longest;
+        let origin = std::array::from_fn(|a| (bounds.lo[a] + bounds.hi[a]) * 0.5 - edge * 0.5);
+        Ok(Self { origin, edge })
+    }
+
+    /// Lattice coordinate, rounded to nearest with ties to even; saturates.
+    #[inline]
+    pub fn quantise(&self, axis: usize, x: f64) -> i64 {
+        ((x - self.origin[axis]) * (ROOT_EDGE as f64 / self.edge)).round_ties_even() as i64
+    }
+
+    /// User coordinate of a lattice point.
+    pub fn locate(&self, q: [i64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| self.origin[a] + q[a] as f64 * (self.edge / ROOT_EDGE as f64))
+    }
+
+    /// The level of a spacing: the least at which cells are that size or smaller.
+    pub fn level_of(&self, spacing: f64, what: &str) -> Result<Level, Error> {
+        (0..=LEVEL_MAX).find(|&l| self.edge / f64::from(1u32 << l) <= spacing).ok_or_else(|| {
+            let least = self.edge / f64::from(1u32 << LEVEL_MAX);
+            Error::input(format!(
+                "{what} {spacing} is too small for a root of edge {}: level {LEVEL_MAX} has cells of {least}; enlarge it or shrink the root",
+                self.edge
+            ))
+        })
+    }
+
+    /// Facets on the lattice. `first` is the number of the first one in the whole geometry, for errors.
+    pub fn facets(&self, facets: &[geometries::Facet], first: u64) -> Result<Vec<Facet>, Error> {
+        let scale = ROOT_EDGE as f64 / self.edge;
+        let origin = self.origin;
+        let mut worst = 0.0f64;
+        let at = |v: [f32; 3]| std::array::from_fn(|a| ((f64::from(v[a]) - origin[a]) * scale).round_ties_even());
+        let out = facets
+            .iter()
+            .map(|f| Facet {
+                v: f.map(|v| {
+                    let q: [f64; 3] = at(v);
+                    // The distance from the root's middle, in which the allowed range is symmetric.
+                    let off = q.map(|c| (c - ROOT_EDGE as f64 * 0.5).abs());
+                    worst = worst.max(off[0]).max(off[1]).max(off[2]);
+                    q.map(|c| c as i32)
+                }),
+            })
+            .collect();
+        if worst > ROOT_EDGE as f64 * 1.5 {
+            let outside = |v: &[f32; 3]| at(*v).iter().any(|c: &f64| (c - ROOT_EDGE as f64 * 0.5).abs() > ROOT_EDGE as f64 * 1.5);
+            let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
+            let v = facets[bad].iter().find(|v| outside(v)).unwrap_or(&facets[bad][0]);
+            return Err(Error::input(format!(
+                "facet {} has a vertex at ({}, {}, {}), more than one root edge outside the root: enlarge or move the root",
+                first + bad as u64,
+                v[0],
+                v[1],
+                v[2]
+            )));
+        }
+        Ok(out)
+    }
+}
+
+/// An extent box on the lattice, clamped to the root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExtentBox {
+    /// Minimum corner.
+    pub min: [i64; 3],
+    /// Maximum corner; where it equals `min` on an axis the box has no interior and asks for nothing.
+    pub max: [i64; 3],
+    /// Least level of the leaves whose interior meets the box's.
+    pub level: Level,
+}
+
+impl ExtentBox {
+    /// Whether the interiors of the box and of the cube at `corner` of edge `h` meet.
+    #[inline]
+    pub fn meets(&self, corner: [i64; 3], h: i64) -> bool {
+        (0..3).all(|a| self.min[a].max(corner[a]) < self.max[a].min(corner[a] + h))
+    }
+}
+
+/// Everything that decides the mesh, besides the facets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rules {
+    /// The root cube.
+    pub root: Root,
+    /// Surface level D.
+    pub level_surface: Level,
+    /// Minimum thickness n of a layer, in cells.
+    pub layer_cells_min: u32,
+    /// Which side stays.
+    pub keep: Keep,
+    /// Whether crossing leaves stay in the final mesh.
+    pub keep_crossing: bool,
+    /// The extent boxes.
+    pub boxes: Vec<ExtentBox>,
+}
+
+/// Which side of the geometry the mesh keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Keep {
+    /// External flow: outside and crossing leaves.
+    Outside,
+    /// Internal flow: inside and crossing leaves.
+    Inside,
+    /// Everything.
+    All,
+}
+
+impl Rules {
+    /// Deepest level that a leaf can have.
+    pub fn level_deepest(&self) -> Level {
+        self.boxes.iter().filter(|b| (0..3).all(|a| b.min[a] < b.max[a])).map(|b| b.level).fold(self.level_surface, Level::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spacing_means_that_size_or_smaller() {
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        for (s, l) in [(9.0, 0), (8.0, 0), (7.9, 1), (1.0, 3), (0.99, 4), (8.0 / 524_288.0, 19)] {
+            assert_eq!(root.level_of(s, "spacing").unwrap(), l, "{s}");
+        }
+        assert!(root.level_of(1e-6, "spacing_min").unwrap_err().to_string().contains("spacing_min"));
+    }
+
+    #[test]
+    fn ties_round_to_even_and_far_vertices_name_their_facet() {
+        let root = Root { origin: [0.0; 3], edge: (ROOT_EDGE * 2) as f64 };
+        assert_eq!([1.0, 3.0, 5.0].map(|x| root.quantise(0, x)), [0, 2, 2]);
+        let near = [[0.0f32; 3]; 3];
+        let far = [[0.0; 3], [0.0; 3], [0.0, 3.1 * ROOT_EDGE as f32 * 2.0, 0.0]];
+        assert_eq!(root.facets(&[near], 0).unwrap().len(), 1);
+        assert!(root.facets(&[near, far], 40).unwrap_err().to_string().contains("facet 41"));
+    }
+
+    #[test]
+    fn boxes_meet_by_interiors_only() {
+        let b = ExtentBox { min: [0, 0, 0], max: [4, 4, 4], level: 3 };
+        assert!(b.meets([3, 3, 3], 4) && !b.meets([4, 0, 0], 4));
+        let flat = ExtentBox { max: [4, 4, 0], ..b };
+        assert!(!flat.meets([0, 0, 0], 4));
+    }
+}

@@ -1,0 +1,220 @@
+//! Off-body hexahedral oct-tree meshes around facets, on any number of ranks, after O'Connell and
+//! Karman, "Advances in Parallelization For Large Scale Oct-Tree Mesh Generation".
+//!
+//! [`mesh`] reads like the paper: ingest, base tree and partition, refinement, inside and outside,
+//! gradation, leaves. The mesh is a function of the facets and the rules alone (see
+//! `reference/DEFINITION.md`), not of ranks, partitioner or base level.
+
+#![deny(missing_docs)]
+
+pub mod base;
+pub mod brick;
+pub mod brickset;
+pub mod case;
+pub mod comm;
+pub mod digest;
+pub mod dilate;
+pub mod error;
+pub mod facet;
+pub mod grade;
+pub mod ingest;
+pub mod kept;
+pub mod lattice;
+pub mod octant;
+pub mod partition;
+pub mod record;
+pub mod report;
+pub mod share;
+pub mod sides;
+pub mod stl;
+pub mod stream;
+pub mod tree;
+pub mod voxelise;
+pub mod write;
+
+use base::Division;
+use case::Case;
+use comm::{Comm, agree};
+use error::Error;
+use lattice::{Bounds, Rules};
+use record::{Recorder, check_interrupt};
+use report::{Counters, Report};
+use share::Ownership;
+use sides::Sides;
+use std::path::PathBuf;
+use stream::{Counts, Leaves};
+use tree::{PerLevel, Tree};
+use write::{Manifest, OutDir, Written};
+
+/// What to do besides meshing.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// How to divide the work among ranks.
+    pub division: Division,
+    /// Stop after sides: the mesh is the base tree T0, with all its leaves.
+    pub ungraded: bool,
+    /// Directory to write the mesh to.
+    pub out: Option<PathBuf>,
+}
+
+/// Meshes a case. Collective; `Recorder` keeps this rank's times, the report is the same on all ranks.
+pub fn mesh(case: &Case, options: &Options, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
+    let out = agree(comm, make_out(options, comm))?;
+    let result = mesh_into(case, options, out.as_ref(), comm, record);
+    if let (Err(_), Some(out)) = (&result, &out) {
+        // Ranks first clear their own files, then the one that made the directory removes it.
+        if comm.rank() != 0 {
+            out.discard(comm.rank());
+        }
+        comm.sum(0);
+        if comm.rank() == 0 {
+            out.discard(0);
+        }
+    }
+    result
+}
+
+fn make_out(options: &Options, comm: &dyn Comm) -> Result<Option<OutDir>, Error> {
+    let path = options.out.as_ref();
+    path.map(|p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) }).transpose()
+}
+
+fn mesh_into(case: &Case, options: &Options, out: Option<&OutDir>, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
+    let mut counters = Counters::default();
+    let geometry = record.phase("read", || ingest::read(&case.source, comm))?;
+    let (rules, facets) = record.phase("quantise", || quantise(case, &geometry, comm))?;
+    drop(geometry.facets);
+    let refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
+    comm.agree(check_interrupt())?;
+
+    let sides = record.phase("sides", || sides::decide(&refined.tree, &refined.share, &facets, rules.keep, comm));
+    drop(facets);
+    comm.agree(check_interrupt())?;
+
+    let kept = kept::Kept::new(&sides.deleted);
+    let graded = (!options.ungraded).then(|| {
+        let (split, work) = record.phase("grade", || grade::grade(&refined.tree, &kept, &rules, &refined.share, comm));
+        counters.grade(&work);
+        split
+    });
+    comm.agree(check_interrupt())?;
+
+    let split = graded.as_ref().unwrap_or(&refined.tree.split);
+    let (counts, written) = record.phase("leaves", || emit(&refined, split, &sides, &rules, options.ungraded, out, comm))?;
+    let finish = record.phase("finish", || finish(&rules, options.ungraded, counts, &written, &sides, out, comm))?;
+    let (counts, digests, parts) = finish;
+    counters.sides(&sides, comm.rank());
+    counters.traffic(comm.traffic());
+    Ok(Report::gather(geometry.total, &rules, &counts, &digests, &parts, &sides, refined.level_base, record, &counters, comm))
+}
+
+/// The rules, and this rank's facets on the lattice. Collective.
+fn quantise(case: &Case, geometry: &ingest::Share, comm: &dyn Comm) -> Result<(Rules, Vec<facet::Facet>), Error> {
+    let mine = Bounds::of(&geometry.facets);
+    let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
+    let bounds = comm.all_gather(&words).iter().fold(Bounds::EMPTY, |b, w| {
+        let at = |i: usize| f64::from_bits(w[i]);
+        b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
+    });
+    let rules = case.rules(&bounds)?;
+    let facets = agree(comm, rules.root.facets(&geometry.facets, geometry.first))?;
+    Ok((rules, facets))
+}
+
+/// The base tree T0 as this rank holds it.
+struct Refined {
+    tree: Tree,
+    share: Ownership,
+    level_base: octant::Level,
+}
+
+/// Base tree, partition, and refinement of this rank's part. Collective.
+fn refine(
+    facets: &[facet::Facet],
+    rules: &Rules,
+    division: &Division,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+    counters: &mut Counters,
+) -> Result<Refined, Error> {
+    let depth = voxelise::Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
+    if comm.size() == 1 {
+        let root = [voxelise::Start { level: 0, code: 0 }];
+        let (tree, work) = record.phase("refine", || voxelise::refine(&voxelise::Filed::new(facets), &depth, &root));
+        counters.voxelise(&work);
+        return Ok(Refined { tree, share: Ownership::solo(), level_base: 0 });
+    }
+    let base = record.phase("base tree", || base::build(facets, rules, division, comm))?;
+    counters.voxelise(&base.work);
+    let filed = record.phase("route", || voxelise::Filed::new(&base::route(facets, &base.share, comm)));
+    let (mut tree, work) = record.phase("refine", || voxelise::refine(&filed, &depth, &base.starts));
+    counters.voxelise(&work);
+    record.phase("share top", || share_top(&mut tree, base.top, &base.share, base.level_base, comm));
+    Ok(Refined { tree, share: base.share, level_base: base.level_base })
+}
+
+/// Makes the top bricks of a rank's tree those of the whole tree. Collective.
+fn share_top(tree: &mut Tree, top: Tree, share: &Ownership, level_base: octant::Level, comm: &dyn Comm) {
+    for (sets, top) in [(&mut tree.split, top.split), (&mut tree.crossing, top.crossing)] {
+        let pairs: Vec<_> = sets.iter_mut().map(std::mem::take).zip(top).collect();
+        for ((l, set), (mine, top)) in (0..).zip(sets.iter_mut()).zip(pairs) {
+            // Above, all is known from the base tree; below, bricks are one rank's alone.
+            let mine = if l == level_base + 1 { share.scatter(l, mine, comm).0 } else { mine };
+            *set = mine.union(top);
+        }
+    }
+}
+
+/// Streams the leaves into the digest, and to disk if asked. Collective.
+fn emit(
+    refined: &Refined,
+    split: &PerLevel,
+    sides: &Sides,
+    rules: &Rules,
+    everything: bool,
+    out: Option<&OutDir>,
+    comm: &dyn Comm,
+) -> Result<(Counts, Written), Error> {
+    let leaves = Leaves { split, base: &refined.tree, sides, share: &refined.share, everything, rules };
+    let work = || match out {
+        None => {
+            let mut written = Written::default();
+            let counts = leaves.emit(|words| {
+                written.leaves += words.len() as u64;
+                written.digests.add(words);
+                check_interrupt()
+            })?;
+            Ok((counts, written))
+        }
+        Some(out) => {
+            let mut part = out.part(comm.rank())?;
+            let counts = leaves.emit(|words| {
+                check_interrupt()?;
+                part.add(words)
+            })?;
+            Ok((counts, part.finish()?))
+        }
+    };
+    agree(comm, work())
+}
+
+/// Sums over the ranks, and writes the manifest. Collective.
+#[expect(clippy::type_complexity, reason = "three results of one gathering")]
+fn finish(
+    rules: &Rules,
+    base: bool,
+    counts: Counts,
+    written: &Written,
+    sides: &Sides,
+    out: Option<&OutDir>,
+    comm: &dyn Comm,
+) -> Result<(Counts, digest::Digests, Vec<[u64; 3]>), Error> {
+    let counts = counts.gather(comm);
+    let (digests, parts) = write::gather(written, comm);
+    let publish = || match out {
+        Some(out) if comm.rank() == 0 => out.manifest(&Manifest::new(rules, base, &counts, sides.ambiguous, &digests, &parts)),
+        _ => Ok(()),
+    };
+    comm.agree(publish())?;
+    Ok((counts, digests, parts))
+}

@@ -1,0 +1,146 @@
+//! Octants: Morton codes, levels, sides and leaf words.
+//!
+//! Invariants:
+//! - the octant of level `l` at integer position `(x, y, z)`, each below `2^l`, has the Morton code
+//!   that interleaves the three (x lowest), below `8^l`; codes of one level sort in Morton order;
+//! - the parent's code is `code >> 3`, the children's are `code << 3 | child`;
+//! - a leaf word is `morton57 << 7 | level << 2 | side`, and sorted words are in Morton order.
+
+/// Distance from the root in halvings of the edge: the root is level 0.
+pub type Level = u32;
+
+/// Deepest level a leaf may have.
+pub const LEVEL_MAX: Level = 19;
+
+/// log2 of the root's edge in lattice units.
+pub const ROOT_BITS: u32 = 27;
+
+/// The root's edge in lattice units.
+pub const ROOT_EDGE: i64 = 1 << ROOT_BITS;
+
+/// Edge of an octant of level `l`, in lattice units. Voxelisation may look at level 20, a level
+/// deeper than any leaf.
+#[inline]
+pub const fn edge(l: Level) -> i64 {
+    1 << (ROOT_BITS - l)
+}
+
+/// Which side of the geometry a leaf is on; the number is the one of the leaf word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Side {
+    /// Outside the geometry.
+    Outside = 0,
+    /// Inside the geometry.
+    Inside = 1,
+    /// A facet touches the leaf (or touched the base-tree leaf that it comes from).
+    Crossing = 2,
+}
+
+/// Spreads the low 21 bits of `v`, one every third bit.
+#[inline]
+const fn spread(v: u64) -> u64 {
+    let v = v & 0x1f_ffff;
+    let v = (v | v << 32) & 0x001f_0000_0000_ffff;
+    let v = (v | v << 16) & 0x001f_0000_ff00_00ff;
+    let v = (v | v << 8) & 0x100f_00f0_0f00_f00f;
+    let v = (v | v << 4) & 0x10c3_0c30_c30c_30c3;
+    (v | v << 2) & 0x1249_2492_4924_9249
+}
+
+/// Inverse of [`spread`].
+#[inline]
+const fn gather(v: u64) -> u64 {
+    let v = v & 0x1249_2492_4924_9249;
+    let v = (v | v >> 2) & 0x10c3_0c30_c30c_30c3;
+    let v = (v | v >> 4) & 0x100f_00f0_0f00_f00f;
+    let v = (v | v >> 8) & 0x001f_0000_ff00_00ff;
+    let v = (v | v >> 16) & 0x001f_0000_0000_ffff;
+    (v | v >> 32) & 0x1f_ffff
+}
+
+/// Morton code of a position: x in the lowest bit, then y, then z.
+#[inline]
+pub const fn morton(p: [u32; 3]) -> u64 {
+    spread(p[0] as u64) | spread(p[1] as u64) << 1 | spread(p[2] as u64) << 2
+}
+
+/// The position that a Morton code stands for.
+#[inline]
+pub const fn position(code: u64) -> [u32; 3] {
+    [gather(code) as u32, gather(code >> 1) as u32, gather(code >> 2) as u32]
+}
+
+/// The Morton code at level 19 of the minimum corner of an octant of level `l <= 19`.
+#[inline]
+pub const fn start57(l: Level, code: u64) -> u64 {
+    code << (3 * (LEVEL_MAX - l))
+}
+
+/// Minimum corner of an octant, in lattice units.
+#[inline]
+pub fn corner(l: Level, code: u64) -> [i64; 3] {
+    position(code).map(|p| i64::from(p) << (ROOT_BITS - l))
+}
+
+/// Code of the octant of the same level one step along `axis` (0, 1, 2), up or down; none outside
+/// the root.
+#[inline]
+pub fn neighbour(l: Level, code: u64, axis: usize, up: bool) -> Option<u64> {
+    let mut p = position(code);
+    p[axis] = if up { p[axis].checked_add(1).filter(|&v| v < 1 << l)? } else { p[axis].checked_sub(1)? };
+    Some(morton(p))
+}
+
+/// Word of a leaf.
+#[inline]
+pub const fn word(l: Level, code: u64, side: Side) -> u64 {
+    start57(l, code) << 7 | (l as u64) << 2 | side as u64
+}
+
+/// Child digits from the root, as people write an octant: `3.1.4`; the root is `root`.
+pub fn path(l: Level, code: u64) -> String {
+    if l == 0 {
+        return "root".into();
+    }
+    let digit = |i: Level| (code >> (3 * (l - 1 - i)) & 7).to_string();
+    (0..l).map(digit).collect::<Vec<_>>().join(".")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_and_positions_are_inverse_for_all_octants_to_level_four() {
+        for l in 0..=4 {
+            for code in 0..1u64 << (3 * l) {
+                let p = position(code);
+                assert!(p.iter().all(|&v| v < 1 << l));
+                assert_eq!(morton(p), code);
+            }
+        }
+        assert_eq!(morton([(1 << 19) - 1; 3]), (1 << 57) - 1);
+        assert_eq!(position((1 << 57) - 1), [(1 << 19) - 1; 3]);
+    }
+
+    #[test]
+    fn neighbours_undo_each_other_and_stop_at_the_root() {
+        for l in 0..=3 {
+            for code in 0..1u64 << (3 * l) {
+                for axis in 0..3 {
+                    match neighbour(l, code, axis, true) {
+                        Some(n) => assert_eq!(neighbour(l, n, axis, false), Some(code)),
+                        None => assert_eq!(position(code)[axis], (1 << l) - 1),
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn paths_read_from_the_root() {
+        assert_eq!(path(0, 0), "root");
+        assert_eq!(path(3, 0o314), "3.1.4");
+    }
+}

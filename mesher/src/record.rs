@@ -1,0 +1,82 @@
+//! What a run took: time per phase, and where a rank is right now.
+
+use crate::error::Error;
+use cpu_time::ThreadTime;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Set when the user asks the run to stop; looked at between phases and while writing.
+pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// An error if the user asked the run to stop.
+pub fn check_interrupt() -> Result<(), Error> {
+    if INTERRUPTED.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// One phase on one rank.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Phase {
+    /// Its name.
+    pub name: &'static str,
+    /// Time from its start to its end, in seconds.
+    pub time_wall_s: f64,
+    /// CPU time of the rank's thread, in seconds.
+    pub time_cpu_s: f64,
+}
+
+/// Times phases, in the order in which they run, and tells a status file which one that is.
+#[derive(Debug, Default)]
+pub struct Recorder {
+    phases: Vec<Phase>,
+    status: Option<PathBuf>,
+    progress: bool,
+}
+
+impl Recorder {
+    /// A recorder that keeps the name of the phase in the file `status`, if given, and on standard error
+    /// if `progress`.
+    pub fn new(status: Option<PathBuf>, progress: bool) -> Self {
+        Self { phases: Vec::new(), status, progress }
+    }
+
+    /// Runs and times a phase. A phase that runs several times adds up.
+    pub fn phase<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        self.tell(name);
+        let (wall, cpu) = (Instant::now(), ThreadTime::now());
+        let result = work();
+        let (time_wall_s, time_cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        match self.phases.iter_mut().find(|p| p.name == name) {
+            Some(p) => {
+                p.time_wall_s += time_wall_s;
+                p.time_cpu_s += time_cpu_s;
+            }
+            None => self.phases.push(Phase { name, time_wall_s, time_cpu_s }),
+        }
+        result
+    }
+
+    /// Says what the rank is doing.
+    pub fn tell(&self, what: &str) {
+        if let Some(path) = &self.status {
+            // For whoever investigates a hang; a status that cannot be written must not end the run.
+            let _ = std::fs::write(path, format!("{what}\n"));
+        }
+        if self.progress {
+            eprint!("\r\x1b[K{what}");
+        }
+    }
+
+    /// The phases so far.
+    pub fn phases(&self) -> &[Phase] {
+        &self.phases
+    }
+}
+
+/// Peak resident memory of this process in bytes; 0 where the system does not tell.
+pub fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
+}

@@ -1,0 +1,236 @@
+//! Joins the components of bricks into those of the tree, as far as this rank sees.
+//!
+//! A depth-first walk carries, for each level, the brick on the way down and its six face
+//! neighbours, so that no neighbour is searched for. Leaves of one level are joined from the lower to
+//! the higher side; a leaf and a coarser one from the finer leaf, which climbs the way until it finds the leaf
+//! that covers the octant it faces.
+
+use super::nodes::{Component, Node, Nodes};
+use crate::brick;
+use crate::brickset::ones;
+use crate::octant::{Level, neighbour};
+use crate::share::Place;
+
+/// The joined components, and the faces that another rank must look at.
+pub struct Local {
+    parent: Vec<Component>,
+    /// Octants of other ranks' bricks that a component of this rank faces.
+    pub faces: Vec<Face>,
+}
+
+/// Octants of a brick, of leaf size or finer, that a component faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Face {
+    /// The rank whose brick it is.
+    pub rank: usize,
+    /// The level of the facing leaf.
+    pub level: Level,
+    /// The brick, of that level, that is faced.
+    pub key: u64,
+    /// The component that faces it.
+    pub component: Component,
+    /// The octants faced.
+    pub bits: u64,
+}
+
+impl Local {
+    /// The component that stands for all joined with `c`.
+    #[inline]
+    pub fn find(&mut self, mut c: Component) -> Component {
+        while self.parent[c as usize] != c {
+            let up = self.parent[self.parent[c as usize] as usize];
+            self.parent[c as usize] = up;
+            c = up;
+        }
+        c
+    }
+
+    /// Numbers the classes of joined components: the class of each component, and how many there are.
+    pub fn classes(&self) -> (Vec<u32>, usize) {
+        let mut class: Vec<u32> = Vec::with_capacity(self.parent.len());
+        let mut count = 0;
+        for (c, &up) in self.parent.iter().enumerate() {
+            // A parent's number is never higher than its child's, so its class is known.
+            class.push(if up as usize == c { count } else { class[up as usize] });
+            count += u32::from(up as usize == c);
+        }
+        (class, count as usize)
+    }
+
+    /// Joins two components; the lower number stands for both.
+    #[inline]
+    pub fn join(&mut self, a: Component, b: Component) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+}
+
+/// What lies across a brick's face.
+#[derive(Clone, Copy)]
+enum Across {
+    /// Outside the root.
+    Nothing,
+    /// Leaves coarser than this level.
+    Coarser,
+    /// Another rank's bricks.
+    Remote(usize),
+    /// A node of this level and which of its octants exist.
+    Here(Node, u64),
+}
+
+/// A brick on the way down.
+#[derive(Clone, Copy)]
+struct Frame {
+    key: u64,
+    node: Node,
+    exists: u64,
+    /// By axis, down and up.
+    across: [[Across; 2]; 3],
+}
+
+/// Joins all components that share part of a face.
+pub fn join(nodes: &Nodes) -> Local {
+    let mut w = Walk {
+        nodes,
+        local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
+        way: Vec::new(),
+    };
+    w.way.push(Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] });
+    w.visit(0);
+    w.local
+}
+
+struct Walk<'a> {
+    nodes: &'a Nodes,
+    local: Local,
+    /// The bricks on the way down, by level.
+    way: Vec<Frame>,
+}
+
+impl Walk<'_> {
+    fn visit(&mut self, l: Level) {
+        let frame = self.way[l as usize];
+        self.join_brick(l, &frame);
+        let split = self.nodes.split(l, frame.node);
+        for j in ones(u64::from(brick::parents(split))) {
+            let Some(child) = self.step_down(l, &frame, u64::from(j)) else { continue };
+            self.way.push(child);
+            self.visit(l + 1);
+            self.way.pop();
+        }
+    }
+
+    /// The frame of child brick `j`; none if it is another rank's.
+    fn step_down(&self, l: Level, frame: &Frame, j: u64) -> Option<Frame> {
+        let (node, exists) = self.nodes.child(l, frame.node, j)?;
+        if let Place::Remote(_) = self.nodes.place(l + 1, node) {
+            return None;
+        }
+        let mut across = [[Across::Nothing; 2]; 3];
+        if l >= 2 {
+            for axis in 0..3 {
+                for up in 0..2 {
+                    across[axis][up] = self.step_across(l, frame, j, axis, up);
+                }
+            }
+        }
+        Some(Frame { key: frame.key << 3 | j, node, exists, across })
+    }
+
+    /// What lies across a face of child brick `j`.
+    #[inline]
+    fn step_across(&self, l: Level, frame: &Frame, j: u64, axis: usize, up: usize) -> Across {
+        let stays = j >> axis & 1 != up as u64;
+        let node = if stays {
+            frame.node
+        } else {
+            match frame.across[axis][up] {
+                Across::Here(n, _) => n,
+                other => return other,
+            }
+        };
+        match self.nodes.child(l, node, j ^ 1 << axis) {
+            None => Across::Coarser,
+            Some((n, exists)) => match self.nodes.place(l + 1, n) {
+                Place::Remote(r) => Across::Remote(r),
+                _ => Across::Here(n, exists),
+            },
+        }
+    }
+
+    /// Joins the components of one brick with what they face.
+    fn join_brick(&mut self, l: Level, frame: &Frame) {
+        let nodes = self.nodes;
+        for (c, bits) in nodes.components(l, frame.node) {
+            let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
+            self.join_coarser(l, c, frame.key, inner, None);
+            for axis in 0..3 {
+                for up in 0..2 {
+                    let faced = brick::across(bits, axis, up == 1) & brick::valid(l);
+                    if faced != 0 {
+                        self.join_across(l, frame, c, faced, axis, up);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn join_across(&mut self, l: Level, frame: &Frame, c: Component, faced: u64, axis: usize, up: usize) {
+        let nodes = self.nodes;
+        let there = || neighbour(l - 2, frame.key, axis, up == 1).expect("a brick faces one inside the root");
+        match frame.across[axis][up] {
+            Across::Nothing => {}
+            Across::Coarser => self.join_coarser(l, c, there(), faced, Some((axis, up))),
+            Across::Remote(rank) => {
+                // What a top brick faces, the other rank sees itself.
+                if nodes.place(l, frame.node) == Place::Mine {
+                    self.local.faces.push(Face { rank, level: l, key: there(), component: c, bits: faced });
+                }
+            }
+            Across::Here(n, exists) => {
+                if up == 1 {
+                    for (d, bits) in nodes.components(l, n) {
+                        if bits & faced != 0 {
+                            self.local.join(c, d);
+                        }
+                    }
+                }
+                if faced & !exists != 0 {
+                    self.join_coarser(l, c, there(), faced & !exists, Some((axis, up)));
+                }
+            }
+        }
+    }
+
+    /// Joins a component with the leaves coarser than level `l` that cover the octants `faced` of brick
+    /// `key`, which is the brick on the way (`side` none) or its neighbour there.
+    #[inline]
+    fn join_coarser(&mut self, l: Level, c: Component, key: u64, faced: u64, side: Option<(usize, usize)>) {
+        for j in ones(u64::from(brick::parents(faced))) {
+            let mut code = key << 3 | u64::from(j);
+            let mut m = l;
+            while m > 0 {
+                m -= 1;
+                let frame = &self.way[m as usize];
+                let found = match side {
+                    _ if frame.key == code >> 6 => Some((frame.node, frame.exists)),
+                    Some((axis, up)) => match frame.across[axis][up] {
+                        Across::Here(n, exists) => Some((n, exists)),
+                        _ => None,
+                    },
+                    None => None,
+                };
+                if let Some((node, exists)) = found
+                    && exists >> (code & 63) & 1 == 1
+                {
+                    if let Some(d) = self.nodes.component_of(m, node, code & 63) {
+                        self.local.join(c, d);
+                    }
+                    break;
+                }
+                code >>= 3;
+            }
+        }
+    }
+}

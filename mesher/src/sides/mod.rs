@@ -1,0 +1,79 @@
+//! Sides: which leaves of the base tree are inside (the paper's section II.B: flood fill and rays).
+//!
+//! Non-crossing leaves that share part of a face belong to one component; a component has one side.
+//! Inside a brick, components are floods by shifts; across bricks they are joined in a union-find
+//! while walking the tree ([`components`]); across ranks by what neighbours tell each other of
+//! their common faces ([`global`]); so components are those of the whole tree. Each is put to the ray
+//! vote ([`rays`], [`vote`]).
+
+pub mod components;
+pub mod global;
+pub mod nodes;
+pub mod rays;
+pub mod vote;
+
+use crate::comm::Comm;
+use crate::facet::Facet;
+use crate::lattice::Keep;
+use crate::octant::Level;
+use crate::share::Ownership;
+use crate::tree::{LEVELS, PerLevel, Tree, per_level};
+
+/// Sides of the base tree's leaves.
+#[derive(Clone, Debug)]
+pub struct Sides {
+    /// Non-crossing leaves that are inside.
+    pub inside: PerLevel,
+    /// Non-crossing leaves that are not kept; filled for the `keep` asked for.
+    pub deleted: PerLevel,
+    /// Number of components, over all ranks.
+    pub components: u64,
+    /// Components that were decided by majority.
+    pub ambiguous: Option<Ambiguous>,
+    /// Rays cast, over all ranks.
+    pub rays: u64,
+}
+
+/// Components whose rays did not agree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ambiguous {
+    /// How many.
+    pub count: u64,
+    /// Centroid of the first candidate of one of them (the first by level and Morton code), in lattice units.
+    pub example: [i64; 3],
+}
+
+/// Decides all sides. `facets` are this rank's share of the geometry, each facet on one rank.
+/// Collective.
+pub fn decide(tree: &Tree, share: &Ownership, facets: &[Facet], keep: Keep, comm: &dyn Comm) -> Sides {
+    let nodes = nodes::Nodes::new(tree, share);
+    let local = components::join(&nodes);
+    let (class, classes) = local.classes();
+    let names = global::names(&nodes, local.faces, &class, classes, comm);
+    let candidates = vote::candidates(&nodes, &class, &names, share, comm);
+    let verdict = vote::decide(&candidates, facets, comm);
+    let inside: Vec<bool> = names.iter().map(|n| verdict.inside.contains(n)).collect();
+    let mut sides = Sides {
+        inside: per_level(),
+        deleted: per_level(),
+        components: candidates.len() as u64,
+        ambiguous: verdict.ambiguous,
+        rays: verdict.rays,
+    };
+    for l in 0..LEVELS as Level {
+        for (i, key) in nodes.keys(l) {
+            let within = nodes.components(l, i).filter(|c| inside[class[c.0 as usize] as usize]).fold(0, |w, c| w | c.1);
+            let open = nodes.open(l, i);
+            sides.inside[l as usize].push(key, if keep == Keep::All { within } else { 0 });
+            sides.deleted[l as usize].push(
+                key,
+                match keep {
+                    Keep::All => 0,
+                    Keep::Outside => within,
+                    Keep::Inside => open & !within,
+                },
+            );
+        }
+    }
+    sides
+}

@@ -1,0 +1,214 @@
+//! STL files, as they are found in the wild.
+
+use crate::error::Error;
+use geometries::Facet;
+use std::fs::File;
+use std::io::{Cursor, Read};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+const HEADER: u64 = 84;
+const RECORD: u64 = 50;
+
+/// An STL file that was looked at.
+#[derive(Debug)]
+pub struct Stl {
+    path: PathBuf,
+    file: File,
+    length: u64,
+    /// Number of facets if the file is binary.
+    pub binary: Option<u64>,
+}
+
+/// Opens a file and tells whether it is binary.
+pub fn open(path: &Path) -> Result<Stl, Error> {
+    let fail = |e: std::io::Error| Error::input(format!("{}: {e}: give a readable STL file", path.display()));
+    let file = File::open(path).map_err(fail)?;
+    let meta = file.metadata().map_err(fail)?;
+    if meta.is_dir() {
+        return Err(Error::input(format!("{} is a directory: give an STL file", path.display())));
+    }
+    let length = meta.len();
+    if length == 0 {
+        return Err(Error::input(format!("{} is empty: give an STL file with facets", path.display())));
+    }
+    let mut stl = Stl { path: path.to_owned(), file, length, binary: None };
+    if length >= HEADER {
+        let mut count = [0; 4];
+        stl.file.read_exact_at(&mut count, 80).map_err(fail)?;
+        let count = u64::from(u32::from_le_bytes(count));
+        if length == HEADER + RECORD * count {
+            stl.binary = Some(count);
+        } else if !stl.looks_like_text()? {
+            return Err(Error::input(format!(
+                "{}: the header promises {count} facets, which take {} bytes, but the file has {length}: it is truncated or not an STL; export it again",
+                path.display(),
+                HEADER + RECORD * count
+            )));
+        }
+    }
+    Ok(stl)
+}
+
+impl Stl {
+    fn fail(&self, what: impl std::fmt::Display) -> Error {
+        Error::input(format!("{}: {what}", self.path.display()))
+    }
+
+    /// Whether the file starts as text STL do and has no bytes that text has not.
+    fn looks_like_text(&self) -> Result<bool, Error> {
+        let mut head = vec![0; self.length.min(1024) as usize];
+        self.file.read_exact_at(&mut head, 0).map_err(|e| self.fail(e))?;
+        let text = head.trim_ascii_start();
+        Ok(text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid") && !head.contains(&0))
+    }
+
+    /// Facets `first..end` of a binary file.
+    pub fn read(&self, first: u64, end: u64) -> Result<Vec<Facet>, Error> {
+        const CHUNK: u64 = 8192;
+        let mut out = Vec::with_capacity((end - first) as usize);
+        let mut buffer = vec![0; (CHUNK.min(end - first) * RECORD) as usize];
+        for at in (first..end).step_by(CHUNK as usize) {
+            let count = CHUNK.min(end - at);
+            let bytes = &mut buffer[..(count * RECORD) as usize];
+            self.file.read_exact_at(bytes, HEADER + RECORD * at).map_err(|e| self.fail(format!("{e} at facet {at}: export it again")))?;
+            out.extend(bytes.as_chunks::<{ RECORD as usize }>().0.iter().map(record));
+        }
+        Ok(out)
+    }
+
+    /// All facets of all solids of a text file.
+    pub fn read_text(mut self) -> Result<Vec<Facet>, Error> {
+        if !self.looks_like_text()? {
+            return Err(self.fail("is neither a binary STL nor one in text, which begins with \"solid\": give an STL file"));
+        }
+        let mut bytes = Vec::new();
+        self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
+        let mut facets = Vec::new();
+        for (i, solid) in solids(&bytes).into_iter().enumerate() {
+            let broken = |e: std::io::Error| self.fail(format!("solid {} is malformed ({e}): export it again", i + 1));
+            let complete = solid.lines().last().is_some_and(|l| l.trim_start().starts_with("endsolid"));
+            if !complete {
+                return Err(self.fail(format!("solid {} has no \"endsolid\": the file is truncated; export it again", i + 1)));
+            }
+            for triangle in stl_io::create_stl_reader(&mut Cursor::new(solid)).map_err(broken)? {
+                facets.push(triangle.map_err(broken)?.vertices.map(|v| v.0));
+            }
+        }
+        Ok(facets)
+    }
+}
+
+/// The vertices of a binary record: they follow the normal, which is not used.
+fn record(bytes: &[u8; RECORD as usize]) -> Facet {
+    let at = |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
+    std::array::from_fn(|v| std::array::from_fn(|a| at(12 + 12 * v + 4 * a)))
+}
+
+/// The solids of a text file, in the form that `stl_io` reads: lower case, line feeds, named, one each.
+fn solids(bytes: &[u8]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for line in String::from_utf8_lossy(bytes).split(['\n', '\r']) {
+        let line = line.trim().to_ascii_lowercase();
+        let mut words = line.split_whitespace();
+        let Some(first) = words.next() else { continue };
+        let open = out.last().is_some_and(|s| !s.ends_with("endsolid x\n"));
+        match (first, out.last_mut()) {
+            ("solid", _) => out.push("solid x\n".into()),
+            ("endsolid", Some(s)) if open => s.push_str("endsolid x\n"),
+            (_, Some(s)) => {
+                s.push_str(&line);
+                s.push('\n');
+            }
+            (_, None) => {}
+        }
+    }
+    out
+}
+
+/// An error naming the first facet that has a coordinate that is not a number.
+pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
+    // 0 * x is not 0 exactly when x is infinite or not a number; summing keeps the loop free of branches.
+    let flat: &[f32] = facets.as_flattened().as_flattened();
+    if flat.iter().map(|x| 0.0 * x).sum::<f32>() == 0.0 {
+        return Ok(());
+    }
+    let bad = facets.iter().position(|f| !f.as_flattened().iter().all(|x| x.is_finite())).unwrap_or(0);
+    Err(Error::input(format!(
+        "facet {} has a vertex that is not finite: {:?}: repair the geometry",
+        first + bad as u64,
+        facets[bad]
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn text(s: &str) -> Result<Vec<Facet>, Error> {
+        let mut f = tempfile::NamedTempFile::new().unwrap();
+        f.write_all(s.as_bytes()).unwrap();
+        let stl = open(f.path())?;
+        assert!(stl.binary.is_none());
+        stl.read_text()
+    }
+
+    const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e-1 0\nendloop\nendfacet\n";
+
+    #[test]
+    fn text_is_read_however_it_is_written() {
+        let plain = format!("solid a b\n{FACET}{FACET}endsolid a b\n");
+        let two = format!("solid\n{FACET}endsolid\nsolid z\n{FACET}endsolid z\n");
+        for s in [
+            plain.clone(),
+            plain.replace('\n', "\r\n"),
+            plain.replace('\n', "\r"),
+            plain.to_uppercase(),
+            format!("\n\n  {plain}"),
+            two,
+        ] {
+            let facets = text(&s).unwrap_or_else(|e| panic!("{e}\n{s}"));
+            assert_eq!(facets, [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.1, 0.0]]; 2], "{s}");
+        }
+        assert!(text("solid nothing\nendsolid nothing\n").unwrap().is_empty());
+    }
+
+    #[test]
+    fn broken_text_is_an_error() {
+        let plain = format!("solid a\n{FACET}endsolid a\n");
+        for s in ["hello", "solid a\n", &plain[..60], &plain[..plain.len() - 11], &plain.replace("1 0 0", "1 0"), &plain.replace("1 0 0", "1 x 0")] {
+            assert!(matches!(text(s), Err(Error::Input(_))), "{s:?}");
+        }
+        let infinite = text(&plain.replace("1e-1", "1e99")).unwrap();
+        assert!(check_finite(&infinite, 7).unwrap_err().to_string().contains("facet 7"));
+    }
+
+    #[test]
+    fn binary_is_told_by_its_length() {
+        let mut bytes = b"solid but binary".to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend(2u32.to_le_bytes());
+        for i in 0..2 * 12 {
+            bytes.extend((i as f32).to_le_bytes());
+            if i % 12 == 11 {
+                bytes.extend([0, 0]);
+            }
+        }
+        let try_open = |b: &[u8]| {
+            let mut f = tempfile::NamedTempFile::new().unwrap();
+            f.write_all(b).unwrap();
+            open(f.path()).and_then(|s| match s.binary {
+                Some(n) => s.read(0, n),
+                None => s.read_text(),
+            })
+        };
+        let facets = try_open(&bytes).unwrap();
+        assert_eq!(facets[1], [[15.0, 16.0, 17.0], [18.0, 19.0, 20.0], [21.0, 22.0, 23.0]]);
+        for cut in [0, 1, 83, 84, 100, bytes.len() - 1] {
+            assert!(matches!(try_open(&bytes[..cut]), Err(Error::Input(_))), "cut at {cut}");
+        }
+        bytes.push(0);
+        assert!(try_open(&bytes).is_err());
+    }
+}

@@ -1,0 +1,186 @@
+//! The leaves in Morton order: what digest, counts, files and exports read.
+//!
+//! A depth-first merge of the levels: each level's sets are read once, front to back, so a mesh larger
+//! than memory can be written. The unit of the walk is a group of eight siblings.
+
+use crate::brick;
+use crate::brickset::{BrickSet, Cursor, ones};
+use crate::lattice::{Keep, Rules};
+use crate::octant::{Level, Side, start57};
+use crate::share::{Ownership, Place};
+use crate::sides::Sides;
+use crate::tree::{LEVELS, Tree};
+
+/// Words handed over at a time, at most.
+const CHUNK: usize = 4096;
+
+/// Leaves by level and side.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// `by_level[l][side]`.
+    pub by_level: [[u64; 3]; LEVELS],
+}
+
+impl Counts {
+    /// The sum over the ranks. Collective.
+    pub fn gather(&self, comm: &dyn crate::comm::Comm) -> Self {
+        let mut sum = Self::default();
+        for words in comm.all_gather(self.by_level.as_flattened()) {
+            sum.by_level.as_flattened_mut().iter_mut().zip(words).for_each(|(s, w)| *s += w);
+        }
+        sum
+    }
+
+    /// All leaves.
+    pub fn total(&self) -> u64 {
+        self.by_level.iter().flatten().sum()
+    }
+}
+
+/// What to emit: the leaves of `split`, with the sides of the base tree's.
+pub struct Leaves<'a> {
+    /// Split octants of the tree to emit: the graded one, or the base tree's.
+    pub split: &'a [BrickSet],
+    /// The base tree, for its crossing leaves.
+    pub base: &'a Tree,
+    /// Sides of the base tree's leaves.
+    pub sides: &'a Sides,
+    /// Whose bricks are whose.
+    pub share: &'a Ownership,
+    /// Whether all leaves are emitted, also those that the rules delete.
+    pub everything: bool,
+    /// The mesh's rules.
+    pub rules: &'a Rules,
+}
+
+impl Leaves<'_> {
+    /// Calls `sink` with the words of the leaves that this rank answers for, in order, some thousands
+    /// at a time. Stops at the first error of the sink's.
+    pub fn emit<E>(&self, sink: impl FnMut(&[u64]) -> Result<(), E>) -> Result<Counts, E> {
+        let levels = (0..LEVELS).map(|l| LevelCursors {
+            split: self.split[l].cursor(),
+            crossing: self.base.crossing[l].cursor(),
+            inside: self.sides.inside[l].cursor(),
+            deleted: self.sides.deleted[l].cursor(),
+        });
+        let mut walk = Walk { levels: levels.collect(), of: self, buffer: Vec::with_capacity(CHUNK + 8), counts: Counts::default(), sink };
+        let root = walk.load(0, 0, 1, 0, 0);
+        walk.group(0, &root, 0)?;
+        walk.flush()?;
+        Ok(walk.counts)
+    }
+}
+
+/// The sets of one level, read side by side.
+struct LevelCursors<'a> {
+    split: Cursor<'a>,
+    crossing: Cursor<'a>,
+    inside: Cursor<'a>,
+    deleted: Cursor<'a>,
+}
+
+/// A brick on the way down.
+struct Loaded {
+    key: u64,
+    /// Octants to emit.
+    leaves: u64,
+    split: u64,
+    /// Sides of the leaves, and of split ones for their descendants.
+    crossing: u64,
+    inside: u64,
+    place: Place,
+}
+
+struct Walk<'a, S> {
+    levels: Vec<LevelCursors<'a>>,
+    of: &'a Leaves<'a>,
+    buffer: Vec<u64>,
+    counts: Counts,
+    sink: S,
+}
+
+impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
+    /// Reads a brick of which the octants `exists` exist; `crossing` and `inside` are what they inherit.
+    #[inline]
+    fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
+        let (of, at) = (self.of, &mut self.levels[l as usize]);
+        let place = if of.share.answers_for(l, key) { Place::Mine } else { of.share.place(l, key) };
+        let split = at.split.get(key) & exists;
+        let crossing = at.crossing.get(key) | crossing;
+        let deleted = at.deleted.get(key);
+        let inside = match of.rules.keep {
+            Keep::Outside => deleted,
+            Keep::Inside => !deleted,
+            Keep::All => at.inside.get(key) | inside,
+        };
+        let mut leaves = exists & !split;
+        if !of.everything {
+            leaves &= !deleted;
+            if !of.rules.keep_crossing {
+                leaves &= !crossing;
+            }
+        }
+        if place != Place::Mine {
+            leaves = 0;
+        }
+        Loaded { key, leaves, split, crossing, inside, place }
+    }
+
+    /// Emits eight siblings and all that is below them.
+    fn group(&mut self, l: Level, brick: &Loaded, j: u64) -> Result<(), E> {
+        let split = brick::byte(brick.split, j);
+        let leaves = brick::byte(brick.leaves, j);
+        let crossing = brick::byte(brick.crossing, j);
+        let inside = brick::byte(brick.inside, j) & !crossing;
+        if split == 0 {
+            self.count(l, leaves, crossing, inside);
+            self.put(l, brick.key << 3 | j, leaves, crossing, inside);
+            return if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) };
+        }
+        let below = |sides: u8| brick::children(sides & split);
+        let child = self.load(l + 1, brick.key << 3 | j, brick::children(split), below(crossing), below(inside));
+        if matches!(child.place, Place::Remote(_)) {
+            self.count(l, leaves, crossing, inside);
+            self.put(l, brick.key << 3 | j, leaves, crossing, inside);
+            return Ok(());
+        }
+        self.count(l, leaves, crossing, inside);
+        for o in 0..8 {
+            if split >> o & 1 == 1 {
+                self.group(l + 1, &child, o)?;
+            } else {
+                self.put(l, brick.key << 3 | j, leaves & 1 << o, crossing, inside);
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn count(&mut self, l: Level, leaves: u8, crossing: u8, inside: u8) {
+        let counts = &mut self.counts.by_level[l as usize];
+        let of = |sides: u8| u64::from((leaves & sides).count_ones());
+        counts[Side::Crossing as usize] += of(crossing);
+        counts[Side::Inside as usize] += of(inside);
+        counts[Side::Outside as usize] += of(!(crossing | inside));
+    }
+
+    /// Words of the leaves among the children of octant `parent` of level `l - 1`.
+    #[inline]
+    fn put(&mut self, l: Level, parent: u64, leaves: u8, crossing: u8, inside: u8) {
+        // Octant bit 0 of the lone root is not a child of anything; its code is 0 all the same.
+        let base = start57(l, parent << 3) << 7 | u64::from(l) << 2;
+        let step = start57(l, 1) << 7;
+        let side = |o: u32| u64::from(crossing >> o & 1) << 1 | u64::from(inside >> o & 1);
+        if leaves == 0xff {
+            self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| base + o as u64 * step | side(o as u32)));
+        } else {
+            self.buffer.extend(ones(u64::from(leaves)).map(|o| base + u64::from(o) * step | side(o)));
+        }
+    }
+
+    fn flush(&mut self) -> Result<(), E> {
+        let result = if self.buffer.is_empty() { Ok(()) } else { (self.sink)(&self.buffer) };
+        self.buffer.clear();
+        result
+    }
+}

@@ -1,0 +1,263 @@
+//! Writing a mesh: one `.npy` file of leaf words per rank, and the manifest.
+//!
+//! Nothing half-written ever has its final name: files are written beside it, synced and renamed,
+//! the manifest last. After an error nothing is left behind.
+
+use crate::comm::Comm;
+use crate::digest::{Digests, OCTANTS, hex};
+use crate::error::Error;
+use crate::lattice::{Keep, Rules};
+use crate::octant::LEVEL_MAX;
+use crate::sides::Ambiguous;
+use crate::stream::Counts;
+use npyz::WriterBuilder;
+use serde::Serialize;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Name of the manifest.
+pub const MANIFEST: &str = "mesh.json";
+
+/// Name of a rank's part.
+pub fn part_name(rank: usize) -> String {
+    format!("leaves-{rank:05}.npy")
+}
+
+/// A directory that a mesh is written to.
+#[derive(Debug)]
+pub struct OutDir {
+    path: PathBuf,
+    /// Whether it was made for this mesh, and so is removed after an error.
+    made: bool,
+}
+
+fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
+    Error::output(format!("{}: {e}: nothing was written there; choose another --out or make room", path.display()))
+}
+
+impl OutDir {
+    /// Makes the directory, or takes an empty one. On one rank.
+    pub fn make(path: &Path) -> Result<Self, Error> {
+        match std::fs::read_dir(path) {
+            Ok(mut entries) => {
+                if entries.next().is_some() {
+                    return Err(output(path, &"the directory is not empty"));
+                }
+                // Found out now rather than after the meshing.
+                NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
+                Ok(Self { path: path.to_owned(), made: false })
+            }
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                std::fs::create_dir(path).map_err(|e| output(path, &e))?;
+                Ok(Self { path: path.to_owned(), made: true })
+            }
+            Err(e) => Err(output(path, &e)),
+        }
+    }
+
+    /// The same directory as another rank sees it.
+    pub fn join(path: &Path) -> Self {
+        Self { path: path.to_owned(), made: false }
+    }
+
+    /// Starts this rank's part.
+    pub fn part(&self, rank: usize) -> Result<Part, Error> {
+        let file = NamedTempFile::new_in(&self.path).map_err(|e| output(&self.path, &e))?;
+        let (file, temporary) = file.into_parts();
+        let begin = || -> io::Result<_> {
+            npyz::WriteOptions::new().default_dtype().writer(BufWriter::with_capacity(1 << 20, file)).begin_1d()
+        };
+        let writer = begin().map_err(|e| output(&self.path, &e))?;
+        Ok(Part { path: self.path.join(part_name(rank)), writer, temporary, digests: Digests::default(), leaves: 0 })
+    }
+
+    /// Removes what was written, after an error on any rank.
+    pub fn discard(&self, rank: usize) {
+        let _ = std::fs::remove_file(self.path.join(part_name(rank)));
+        if rank == 0 {
+            let _ = std::fs::remove_file(self.path.join(MANIFEST));
+        }
+        if self.made {
+            // The other ranks' parts may still be there; they are the mesher's too.
+            for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
+                let name = entry.file_name();
+                let name = name.to_string_lossy();
+                if name.starts_with("leaves-") || name.starts_with(".tmp") || name == MANIFEST {
+                    let _ = std::fs::remove_file(entry.path());
+                }
+            }
+            let _ = std::fs::remove_dir(&self.path);
+        }
+    }
+
+    /// Writes the manifest. On one rank, after all parts are finished.
+    pub fn manifest(&self, manifest: &Manifest) -> Result<(), Error> {
+        let write = || -> io::Result<()> {
+            let mut file = NamedTempFile::new_in(&self.path)?;
+            serde_json::to_writer_pretty(&mut file, manifest)?;
+            file.write_all(b"\n")?;
+            publish(file.as_file(), || file.path().to_owned(), &self.path.join(MANIFEST))?;
+            let _ = file.into_temp_path().keep();
+            File::open(&self.path)?.sync_all()
+        };
+        write().map_err(|e| output(&self.path, &e))
+    }
+}
+
+/// Syncs a file and gives it its final name, with the permissions of a file made in the ordinary way.
+fn publish(file: &File, temporary: impl Fn() -> PathBuf, to: &Path) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    file.sync_all()?;
+    std::fs::rename(temporary(), to)
+}
+
+/// A rank's part while it is written.
+pub struct Part {
+    path: PathBuf,
+    writer: npyz::NpyWriter<u64, BufWriter<File>>,
+    temporary: tempfile::TempPath,
+    digests: Digests,
+    leaves: u64,
+}
+
+/// What a part holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Number of leaves.
+    pub leaves: u64,
+    /// Their digests.
+    pub digests: Digests,
+}
+
+impl Part {
+    /// Appends words.
+    pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
+        self.digests.add(words);
+        self.leaves += words.len() as u64;
+        self.writer.extend(words.iter().copied()).map_err(|e| output(&self.path, &e))
+    }
+
+    /// Completes the file and gives it its name.
+    pub fn finish(self) -> Result<Written, Error> {
+        let Self { path, writer, temporary, digests, leaves } = self;
+        let close = || -> io::Result<()> {
+            writer.finish()?;
+            let file = File::options().write(true).open(&temporary)?;
+            publish(&file, || temporary.to_path_buf(), &path)?;
+            let _ = temporary.keep();
+            Ok(())
+        };
+        close().map_err(|e| output(&path, &e))?;
+        Ok(Written { leaves, digests })
+    }
+}
+
+/// What `mesh.json` says. Lengths of the boxes are in lattice units, of the root in the geometry's.
+#[derive(Clone, Debug, Serialize)]
+pub struct Manifest {
+    schema: &'static str,
+    program: String,
+    tree: &'static str,
+    root: RootEntry,
+    level_surface: u32,
+    layer_cells_min: u32,
+    keep: Keep,
+    keep_crossing: bool,
+    boxes: Vec<BoxEntry>,
+    leaves: u64,
+    leaves_by_level: Vec<u64>,
+    leaves_by_side: SideEntry,
+    components_ambiguous: AmbiguousEntry,
+    digest: String,
+    octant_digests: Vec<String>,
+    parts: Vec<PartEntry>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct RootEntry {
+    origin: [f64; 3],
+    edge: f64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct BoxEntry {
+    min: [i64; 3],
+    max: [i64; 3],
+    level: u32,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct SideEntry {
+    outside: u64,
+    inside: u64,
+    crossing: u64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct AmbiguousEntry {
+    count: u64,
+    example: Option<[f64; 3]>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct PartEntry {
+    file: String,
+    leaves: u64,
+    digest: String,
+}
+
+/// One entry of a part: its leaves and the two halves of its digest.
+type PartWords = [u64; 3];
+
+/// The mesh's digests and parts, gathered from all ranks. Collective.
+pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
+    let split = |d: u128| [(d >> 64) as u64, d as u64];
+    let whole = split(mine.digests.whole());
+    let mut words = vec![mine.leaves, whole[0], whole[1]];
+    words.extend(mine.digests.octants.iter().flat_map(|&d| split(d)));
+    let mut digests = Digests::default();
+    let mut parts = Vec::new();
+    for theirs in comm.all_gather(&words) {
+        parts.push([theirs[0], theirs[1], theirs[2]]);
+        let octants: Vec<u128> = theirs[3..].chunks_exact(2).map(|w| u128::from(w[0]) << 64 | u128::from(w[1])).collect();
+        debug_assert_eq!(octants.len(), OCTANTS);
+        digests.merge(&octants);
+    }
+    (digests, parts)
+}
+
+impl Manifest {
+    /// The manifest of a mesh with these leaves, digests and parts.
+    pub fn new(rules: &Rules, base: bool, counts: &Counts, ambiguous: Option<Ambiguous>, digests: &Digests, parts: &[PartWords]) -> Self {
+        let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
+        let entry = |(i, p): (usize, &PartWords)| PartEntry {
+            file: part_name(i),
+            leaves: p[0],
+            digest: hex(u128::from(p[1]) << 64 | u128::from(p[2])),
+        };
+        Self {
+            schema: "octree-leaf-set/1",
+            program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
+            tree: if base { "base" } else { "final" },
+            root: RootEntry { origin: rules.root.origin, edge: rules.root.edge },
+            level_surface: rules.level_surface,
+            layer_cells_min: rules.layer_cells_min,
+            keep: rules.keep,
+            keep_crossing: rules.keep_crossing,
+            boxes: rules.boxes.iter().map(|b| BoxEntry { min: b.min, max: b.max, level: b.level }).collect(),
+            leaves: counts.total(),
+            leaves_by_level: counts.by_level[..=LEVEL_MAX as usize].iter().map(|l| l.iter().sum()).collect(),
+            leaves_by_side: SideEntry { outside: side(0), inside: side(1), crossing: side(2) },
+            components_ambiguous: AmbiguousEntry {
+                count: ambiguous.map_or(0, |a| a.count),
+                example: ambiguous.map(|a| rules.root.locate(a.example)),
+            },
+            digest: hex(digests.whole()),
+            octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
+            parts: parts.iter().enumerate().map(entry).collect(),
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! From the user's units to the lattice, where every decision is exact.
+use crate::case::{Case, Root};
+use crate::error::Error;
+use crate::octant::{Extent, LEVEL_MAX, ROOT_EDGE};
+
+/// A facet: three lattice points, each coordinate within [-2^27, 2^28].
+pub type Facet = [[i64; 3]; 3];
+
+/// An extent box on the lattice, clamped to the root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LatticeBox {
+    /// The box.
+    pub extent: Extent,
+    /// The least level of the leaves that it meets.
+    pub level: u32,
+}
+
+/// A case on the lattice: all that the algorithm sees.
+#[derive(Clone, Debug)]
+pub struct Input {
+    /// The root, needed only to report a location in the user's units.
+    pub root: Root,
+    /// The facets.
+    pub facets: Vec<Facet>,
+    /// The extent boxes.
+    pub boxes: Vec<LatticeBox>,
+    /// The level D that `spacing_min` asks for.
+    pub level_surface: u32,
+    /// The least thickness of a layer, in cells.
+    pub layer_cells_min: u32,
+    /// Whether crossing leaves stay.
+    pub keep_crossing: bool,
+}
+
+impl Input {
+    /// Checks a case and puts it on the lattice.
+    ///
+    /// # Errors
+    /// A size that is not finite and positive, a layer of no cells, a spacing that takes a level
+    /// beyond 19, a box that is inside out, a vertex that is not finite or too far outside.
+    pub fn new(case: &Case) -> Result<Self, Error> {
+        let root = case.root;
+        if !root.origin.iter().all(|x| x.is_finite()) {
+            return Err(Error::RootOrigin(root.origin));
+        }
+        if !is_size(root.edge) {
+            return Err(Error::RootEdge(root.edge));
+        }
+        if case.layer_cells_min == 0 {
+            return Err(Error::LayerCells);
+        }
+        let level_surface = level(&root, "spacing_min", case.spacing_min)?;
+        let mut boxes = Vec::new();
+        for (index, spec) in case.boxes.iter().enumerate() {
+            let finite = spec.min.iter().chain(&spec.max).all(|x| x.is_finite());
+            if !finite || (0..3).any(|a| spec.min[a] >= spec.max[a]) {
+                return Err(Error::BoxCorners {
+                    index,
+                    min: spec.min,
+                    max: spec.max,
+                });
+            }
+            let level = level(&root, &format!("the spacing of box {index}"), spec.spacing)?;
+            let corner = |x| quantised(&root, x).map(|q| q.clamp(0.0, ROOT_EDGE as f64) as i64);
+            let extent = Extent {
+                min: corner(spec.min),
+                max: corner(spec.max),
+            };
+            boxes.push(LatticeBox { extent, level });
+        }
+        let facets = case.facets.iter().enumerate();
+        Ok(Self {
+            root,
+            facets: facets
+                .map(|(index, f)| on_lattice(&root, index, f))
+                .collect::<Result<_, _>>()?,
+            boxes,
+            level_surface,
+            layer_cells_min: case.layer_cells_min,
+            keep_crossing: case.keep_crossing,
+        })
+    }
+}
+
+/// Where a lattice point is, in the user's units.
+#[must_use]
+pub fn location(root: &Root, point: [i64; 3]) -> [f64; 3] {
+    let unit = root.edge / ROOT_EDGE as f64;
+    std::array::from_fn(|a| root.origin[a] + point[a] as f64 * unit)
+}
+
+fn is_size(x: f64) -> bool {
+    x.is_finite() && x > 0.0
+}
+
+/// The least level whose cells are of edge `spacing` or smaller.
+fn level(root: &Root, name: &str, spacing: f64) -> Result<u32, Error> {
+    if !is_size(spacing) {
+        return Err(Error::Spacing {
+            name: name.to_owned(),
+            spacing,
+        });
+    }
+    (0..=LEVEL_MAX)
+        .find(|&d| root.edge / f64::from(1_u32 << d) <= spacing)
+        .ok_or_else(|| {
+            let least = root.edge / f64::from(1_u32 << LEVEL_MAX);
+            Error::SpacingTooFine {
+                name: name.to_owned(),
+                spacing,
+                least,
+            }
+        })
+}
+
+/// The nearest lattice point, still as floating-point numbers, for it may be anywhere.
+fn quantised(root: &Root, x: [f64; 3]) -> [f64; 3] {
+    let scale = ROOT_EDGE as f64 / root.edge;
+    std::array::from_fn(|a| ((x[a] - root.origin[a]) * scale).round_ties_even())
+}
+
+fn on_lattice(root: &Root, index: usize, facet: &[[f64; 3]; 3]) -> Result<Facet, Error> {
+    let mut points = [[0; 3]; 3];
+    for (point, &vertex) in points.iter_mut().zip(facet) {
+        let q = quantised(root, vertex);
+        if !vertex.iter().chain(&q).all(|x| x.is_finite()) {
+            return Err(Error::VertexNotFinite {
+                facet: index,
+                vertex,
+            });
+        }
+        let near = -(ROOT_EDGE as f64)..=2.0 * ROOT_EDGE as f64;
+        if !q.iter().all(|x| near.contains(x)) {
+            return Err(Error::VertexOutside {
+                facet: index,
+                vertex,
+                root: *root,
+            });
+        }
+        // Exact: the numbers are whole and at most 2^28.
+        *point = q.map(|x| x as i64);
+    }
+    Ok(points)
+}

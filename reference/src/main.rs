@@ -1,0 +1,130 @@
+//! `reference CASE.toml`: meshes a case by the serial algorithm of the paper.
+use clap::Parser;
+use reference::write::{self, AmbiguousCount, Which};
+use reference::{Error, Mesh, base_tree, case_file, leaves, mesh};
+use serde::Serialize;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// The exit code of a bug, which is what a panic is.
+const EXIT_BUG: u8 = 70;
+
+/// Meshes a case by the paper's serial algorithm: plain, exact and slow.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// The case file.
+    #[arg(value_name = "CASE.toml")]
+    case: PathBuf,
+    /// Where the leaf set goes: a directory that is absent or empty.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Stop at the base tree: all leaves with their sides, before deletion and gradation.
+    #[arg(long)]
+    ungraded: bool,
+    /// Where the record of this run goes.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// The record of a run.
+#[derive(Serialize)]
+struct Run {
+    schema: &'static str,
+    program: &'static str,
+    tree: Which,
+    ranks: u32,
+    facets: u64,
+    cells: u64,
+    cells_by_level: [u64; 20],
+    components_ambiguous: AmbiguousCount,
+    digest: String,
+    time_wall_s: f64,
+    /// One number, the only rank's; none where the system does not tell.
+    peak_rss_bytes: Vec<u64>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match std::panic::catch_unwind(|| run(&arguments)) {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+        // The panic has already said what happened.
+        Err(_) => ExitCode::from(EXIT_BUG),
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Error> {
+    let start = Instant::now();
+    if let Some(directory) = &arguments.out {
+        // Better now than after an hour of meshing.
+        write::check_vacant(directory)?;
+    }
+    let case = case_file::read(&arguments.case)?;
+    let (which, mesh) = if arguments.ungraded {
+        (Which::Base, base_tree(&case)?)
+    } else {
+        (Which::Final, mesh(&case)?)
+    };
+    if let Some(directory) = &arguments.out {
+        write::leaf_set(directory, which, &case, &mesh)?;
+    }
+    let tally = leaves::Tally::of(&mesh.words);
+    let record = Run {
+        schema: "octree-reference-run/1",
+        program: write::PROGRAM,
+        tree: which,
+        ranks: 1,
+        facets: case.facets.len() as u64,
+        cells: mesh.words.len() as u64,
+        cells_by_level: tally.leaves_by_level,
+        components_ambiguous: AmbiguousCount::of(&mesh),
+        digest: leaves::hex(tally.digest),
+        time_wall_s: start.elapsed().as_secs_f64(),
+        peak_rss_bytes: peak_rss_bytes().into_iter().collect(),
+    };
+    if let Some(path) = &arguments.json {
+        write::json(path, &record)?;
+    }
+    say(&mesh, &record)
+}
+
+fn say(mesh: &Mesh, record: &Run) -> Result<(), Error> {
+    if let Some(ambiguous) = &mesh.ambiguous {
+        let [x, y, z] = ambiguous.example;
+        eprintln!(
+            "warning: the rays of {} components disagree, for example at ({x}, {y}, {z}); \
+             look for holes or single sheets there",
+            ambiguous.components
+        );
+    }
+    let Run {
+        cells,
+        digest,
+        time_wall_s,
+        ..
+    } = record;
+    writeln!(
+        std::io::stdout(),
+        "{cells} cells, digest {digest}, {time_wall_s:.2} s"
+    )
+    .map_err(|source| Error::Write {
+        path: PathBuf::from("standard output"),
+        source,
+    })
+}
+
+/// The most memory that this process has held, where the system tells.
+fn peak_rss_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
+    Some(kibibytes * 1024)
+}

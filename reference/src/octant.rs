@@ -1,0 +1,118 @@
+//! Octants on the lattice: where they are, what they meet, and the word that stands for a leaf.
+//!
+//! The root is the cube [0, 2^27]^3. An octant of level l is closed, has edge 2^(27-l), and its
+//! corners are multiples of that edge. No octant is narrower than 256 lattice units.
+
+/// The level of the finest octants.
+pub const LEVEL_MAX: u32 = 19;
+
+/// The edge of the root, in lattice units.
+pub const ROOT_EDGE: i64 = 1 << 27;
+
+/// Where a leaf lies with respect to the facets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// In a component that the rays find outside.
+    Outside = 0,
+    /// In a component that the rays find inside.
+    Inside = 1,
+    /// Crossed by a facet, or descended from a leaf that is.
+    Crossing = 2,
+}
+
+/// A box with corners on the lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// The minimum corner.
+    pub min: [i64; 3],
+    /// The maximum corner.
+    pub max: [i64; 3],
+}
+
+impl Extent {
+    /// Whether the two interiors share a point. A box without volume has no interior.
+    #[must_use]
+    pub fn interiors_meet(&self, other: &Extent) -> bool {
+        (0..3).all(|a| self.min[a].max(other.min[a]) < self.max[a].min(other.max[a]))
+    }
+
+    /// The box grown by `margin` on every side.
+    ///
+    /// Corners being integers, a closed box touches this one just if its interior meets the
+    /// interior of this one grown by 1.
+    #[must_use]
+    pub fn enlarged(&self, margin: i64) -> Extent {
+        Extent {
+            min: self.min.map(|x| x - margin),
+            max: self.max.map(|x| x + margin),
+        }
+    }
+}
+
+/// A cube of the oct-tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Octant {
+    /// The minimum corner.
+    pub min: [i64; 3],
+    /// How many times the root was halved.
+    pub level: u32,
+}
+
+impl Octant {
+    /// The octant of level 0.
+    pub const ROOT: Octant = Octant {
+        min: [0; 3],
+        level: 0,
+    };
+
+    /// The edge, in lattice units.
+    #[must_use]
+    pub fn edge(&self) -> i64 {
+        ROOT_EDGE >> self.level
+    }
+
+    /// The octant's closed cube.
+    #[must_use]
+    pub fn extent(&self) -> Extent {
+        Extent {
+            min: self.min,
+            max: self.min.map(|x| x + self.edge()),
+        }
+    }
+
+    /// The centre, a lattice point.
+    #[must_use]
+    pub fn centroid(&self) -> [i64; 3] {
+        self.min.map(|x| x + self.edge() / 2)
+    }
+
+    /// Child `index`: bit 0 says the upper half in x, bit 1 in y, bit 2 in z.
+    #[must_use]
+    pub fn child(&self, index: usize) -> Octant {
+        let half = self.edge() / 2;
+        let min = std::array::from_fn(|a| self.min[a] + half * (index >> a & 1) as i64);
+        Octant {
+            min,
+            level: self.level + 1,
+        }
+    }
+
+    /// The Morton key: the minimum corner's coordinates in level-19 cells, interleaved, x lowest.
+    #[must_use]
+    pub fn key(&self) -> u64 {
+        let mut key = 0;
+        for bit in 0..LEVEL_MAX {
+            for a in 0..3 {
+                let cell = (self.min[a] >> (27 - LEVEL_MAX)) as u64;
+                key |= (cell >> bit & 1) << (3 * bit + a as u32);
+            }
+        }
+        key
+    }
+
+    /// The word that stands for this octant as a leaf of `side`.
+    #[must_use]
+    pub fn word(&self, side: Side) -> u64 {
+        self.key() << 7 | u64::from(self.level) << 2 | side as u64
+    }
+}

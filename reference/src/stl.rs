@@ -1,0 +1,94 @@
+//! STL files: triangle soup, binary or ASCII.
+//!
+//! A file is binary if its length is 84 + 50 n for the n in its header, whatever it begins with, for
+//! there are binary files that begin with "solid". Anything else must be ASCII.
+mod ascii;
+
+use crate::error::Error;
+use std::path::Path;
+
+/// One facet, as STL stores it.
+pub type Facet = [[f32; 3]; 3];
+
+const HEADER_BYTES: usize = 84;
+const FACET_BYTES: usize = 50;
+
+/// Reads the facets of an STL file. A file may hold none; an empty file is an error.
+///
+/// # Errors
+/// A file that cannot be read, is damaged, or is not STL at all; a vertex that is not finite.
+pub fn read(path: &Path) -> Result<Vec<Facet>, Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    parse(&bytes).map_err(|problem| Error::Stl {
+        path: path.to_owned(),
+        problem,
+    })
+}
+
+/// The facets in the bytes of an STL file, or a sentence on what is wrong with them.
+///
+/// # Errors
+/// As [`read`], without the file.
+pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
+    if bytes.is_empty() {
+        return Err("the file is empty; export the geometry again".to_owned());
+    }
+    let facets = match facets_promised(bytes) {
+        Some(promised) if length_for(promised) == bytes.len() as u64 => binary(bytes),
+        _ if ascii::is_likely(bytes) => ascii::parse(bytes)?,
+        Some(promised) => return Err(does_not_fit(promised, bytes.len())),
+        None => {
+            return Err(
+                "the file is neither ASCII STL, which begins with \"solid\", nor long enough \
+                        for binary STL; give an STL file"
+                    .to_owned(),
+            );
+        }
+    };
+    let finite = |facet: &Facet| facet.as_flattened().iter().all(|x| x.is_finite());
+    if let Some(index) = facets.iter().position(|facet| !finite(facet)) {
+        let vertices = facets[index];
+        return Err(format!(
+            "facet {index} has a vertex that is not finite ({vertices:?}); repair the geometry"
+        ));
+    }
+    Ok(facets)
+}
+
+/// The facet count in a binary header. It may say anything: nothing is allocated for its sake.
+fn facets_promised(bytes: &[u8]) -> Option<u32> {
+    let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
+    Some(u32::from_le_bytes(count.try_into().expect("four bytes")))
+}
+
+fn length_for(facets: u32) -> u64 {
+    HEADER_BYTES as u64 + FACET_BYTES as u64 * u64::from(facets)
+}
+
+fn does_not_fit(promised: u32, length: usize) -> String {
+    format!(
+        "as binary STL its header promises {promised} facets, {} bytes in all, but the file has \
+         {length}, and it is not ASCII STL either; it is damaged or no STL: export it again",
+        length_for(promised)
+    )
+}
+
+/// Every facet is a normal, which is ignored, three vertices, and two bytes of attributes.
+fn binary(bytes: &[u8]) -> Vec<Facet> {
+    let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("four bytes"));
+    let facet = |record: &[u8]| {
+        std::array::from_fn(|vertex| {
+            std::array::from_fn(|axis| {
+                let at = 12 + 12 * vertex + 4 * axis;
+                number(&record[at..at + 4])
+            })
+        })
+    };
+    bytes[HEADER_BYTES..]
+        .chunks_exact(FACET_BYTES)
+        .map(facet)
+        .collect()
+}

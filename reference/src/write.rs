@@ -1,0 +1,219 @@
+//! Leaf-set directories: one file of words and the manifest, written so that a reader never sees half
+//! of either.
+use crate::Mesh;
+use crate::case::{Case, Keep, Root};
+use crate::error::Error;
+use crate::leaves::{Tally, hex};
+use serde::Serialize;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// This program, as manifests name it.
+pub const PROGRAM: &str = concat!("reference ", env!("CARGO_PKG_VERSION"));
+
+const LEAF_FILE: &str = "leaves-00000.npy";
+const MANIFEST_FILE: &str = "mesh.json";
+
+/// Which tree a leaf set is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Which {
+    /// The base tree: all leaves with their sides.
+    Base,
+    /// The final mesh.
+    Final,
+}
+
+#[derive(Serialize)]
+struct Manifest {
+    schema: &'static str,
+    program: &'static str,
+    tree: Which,
+    root: Root,
+    level_surface: u32,
+    layer_cells_min: u32,
+    keep: Keep,
+    keep_crossing: bool,
+    boxes: Vec<ManifestBox>,
+    leaves: u64,
+    leaves_by_level: [u64; 20],
+    leaves_by_side: BySide,
+    components_ambiguous: AmbiguousCount,
+    digest: String,
+    octant_digests: Vec<String>,
+    parts: [Part; 1],
+}
+
+#[derive(Serialize)]
+struct ManifestBox {
+    min: [i64; 3],
+    max: [i64; 3],
+    level: u32,
+}
+
+#[derive(Serialize)]
+struct BySide {
+    outside: u64,
+    inside: u64,
+    crossing: u64,
+}
+
+/// How many components were ambiguous, and where one of them is.
+#[derive(Serialize)]
+pub struct AmbiguousCount {
+    count: u64,
+    example: Option<[f64; 3]>,
+}
+
+impl AmbiguousCount {
+    /// Of a mesh.
+    #[must_use]
+    pub fn of(mesh: &Mesh) -> Self {
+        let ambiguous = mesh.ambiguous.as_ref();
+        Self {
+            count: ambiguous.map_or(0, |a| a.components),
+            example: ambiguous.map(|a| a.example),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Part {
+    file: &'static str,
+    leaves: u64,
+    digest: String,
+}
+
+impl Manifest {
+    fn new(which: Which, case: &Case, mesh: &Mesh) -> Self {
+        let tally = Tally::of(&mesh.words);
+        let leaves = mesh.words.len() as u64;
+        let digest = hex(tally.digest);
+        let [outside, inside, crossing] = tally.leaves_by_side;
+        let boxes = mesh.boxes.iter();
+        Self {
+            schema: "octree-leaf-set/1",
+            program: PROGRAM,
+            tree: which,
+            root: case.root,
+            level_surface: mesh.level_surface,
+            layer_cells_min: case.layer_cells_min,
+            keep: case.keep,
+            keep_crossing: case.keep_crossing,
+            boxes: boxes
+                .map(|b| ManifestBox {
+                    min: b.extent.min,
+                    max: b.extent.max,
+                    level: b.level,
+                })
+                .collect(),
+            leaves,
+            leaves_by_level: tally.leaves_by_level,
+            leaves_by_side: BySide {
+                outside,
+                inside,
+                crossing,
+            },
+            components_ambiguous: AmbiguousCount::of(mesh),
+            digest: digest.clone(),
+            octant_digests: tally.octant_digests.into_iter().map(hex).collect(),
+            parts: [Part {
+                file: LEAF_FILE,
+                leaves,
+                digest,
+            }],
+        }
+    }
+}
+
+/// Whether a leaf set may be written to `directory`: it must be absent or empty.
+///
+/// # Errors
+/// A directory that holds something, or cannot be looked into.
+pub fn check_vacant(directory: &Path) -> Result<(), Error> {
+    match fs::read_dir(directory).map(|mut entries| entries.next().is_none()) {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(Error::OutputNotEmpty {
+            path: directory.to_owned(),
+        }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(source) => Err(Error::Write {
+            path: directory.to_owned(),
+            source,
+        }),
+    }
+}
+
+/// Writes a mesh to `directory`, the manifest last: where there is one, the leaf set is whole.
+///
+/// # Errors
+/// Whatever keeps the files from being written.
+pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Result<(), Error> {
+    check_vacant(directory)?;
+    fs::create_dir_all(directory).map_err(|source| Error::Write {
+        path: directory.to_owned(),
+        source,
+    })?;
+    file(&directory.join(LEAF_FILE), |to| npy(to, &mesh.words))?;
+    json(
+        &directory.join(MANIFEST_FILE),
+        &Manifest::new(which, case, mesh),
+    )
+}
+
+/// Writes a JSON file.
+///
+/// # Errors
+/// Whatever keeps the file from being written.
+pub fn json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
+    file(path, |to| {
+        serde_json::to_writer_pretty(&mut *to, value)?;
+        to.write_all(b"\n")
+    })
+}
+
+/// Writes a file beside its place, makes sure of it, and moves it there.
+fn file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".tmp");
+    let beside = path.with_file_name(name);
+    let written = (|| {
+        let mut to = BufWriter::new(File::create(&beside)?);
+        fill(&mut to)?;
+        to.into_inner()?.sync_all()?;
+        fs::rename(&beside, path)
+    })();
+    written.map_err(|source| {
+        // What could not be finished is of no use to anyone; that it may not be removable either is
+        // not news.
+        let _ = fs::remove_file(&beside);
+        Error::Write {
+            path: path.to_owned(),
+            source,
+        }
+    })
+}
+
+/// NumPy's format, version 1.0: a header of a multiple of 64 bytes, then the words.
+fn npy(to: &mut dyn Write, words: &[u64]) -> io::Result<()> {
+    const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
+    let mut header = format!(
+        "{{'descr': '<u8', 'fortran_order': False, 'shape': ({},), }}",
+        words.len()
+    );
+    while !(MAGIC.len() + 2 + header.len() + 1).is_multiple_of(64) {
+        header.push(' ');
+    }
+    header.push('\n');
+    to.write_all(MAGIC)?;
+    to.write_all(
+        &u16::try_from(header.len())
+            .expect("a short header")
+            .to_le_bytes(),
+    )?;
+    to.write_all(header.as_bytes())?;
+    words
+        .iter()
+        .try_for_each(|word| to.write_all(&word.to_le_bytes()))
+}

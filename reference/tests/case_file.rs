@@ -1,0 +1,171 @@
+//! Case files: defaults, and a sentence for everything that can be wrong.
+use reference::{BoxSpec, Case, Error, Keep, Root, case_file};
+use std::fs;
+
+const GENERATED: &str = "[generator]\nshape = \"cube\"\nfacets = 12\n";
+const ROOT: &str = "[root]\norigin = [-4.0, -4, -4.0]\nedge = 8\n";
+
+fn read(text: &str) -> Result<Case, Error> {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("case.toml");
+    fs::write(&path, text).unwrap();
+    case_file::read(&path)
+}
+
+fn refused(text: &str, part: &str) {
+    let problem = read(text).unwrap_err().to_string();
+    assert!(problem.contains(part), "{problem:?} should say {part:?}");
+}
+
+#[test]
+fn defaults() {
+    let case = read(&format!("spacing_min = 0.5\n{GENERATED}")).unwrap();
+    assert_eq!(
+        (case.facets.len(), case.spacing_min, case.layer_cells_min),
+        (12, 0.5, 4)
+    );
+    assert_eq!(
+        (case.keep, case.keep_crossing, case.boxes.len()),
+        (Keep::Outside, true, 0)
+    );
+    assert_eq!(case.root, Root::around(&case.facets, 10.0).unwrap());
+}
+
+#[test]
+fn everything_given() {
+    let text = format!(
+        "spacing_min = 1\nlayer_cells_min = 2\nkeep = \"inside\"\nkeep_crossing = false\n{ROOT}{GENERATED}\
+         [[box]]\nmin = [0.0, -1.0, -1.0]\nmax = [4.0, 1.0, 1.0]\nspacing = 0.05\n\
+         [[box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nspacing = 0.1\n"
+    );
+    let case = read(&text).unwrap();
+    assert_eq!(
+        case.root,
+        Root {
+            origin: [-4.0; 3],
+            edge: 8.0
+        }
+    );
+    assert_eq!(
+        (case.keep, case.keep_crossing, case.layer_cells_min),
+        (Keep::Inside, false, 2)
+    );
+    let first = BoxSpec {
+        min: [0.0, -1.0, -1.0],
+        max: [4.0, 1.0, 1.0],
+        spacing: 0.05,
+    };
+    let second = BoxSpec {
+        min: [0.0; 3],
+        max: [1.0; 3],
+        spacing: 0.1,
+    };
+    assert_eq!(case.boxes, [first, second]);
+}
+
+/// The path of a geometry starts at the case file, and vertices are the nearest f32.
+#[test]
+fn geometry_beside_the_case() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("case.toml");
+    let facet =
+        "facet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 0.1 0 endloop endfacet";
+    fs::write(
+        directory.path().join("body.stl"),
+        format!("solid\n{facet}\nendsolid\n"),
+    )
+    .unwrap();
+    fs::write(
+        &path,
+        "geometry = \"body.stl\"\nspacing_min = 1.0\nroot_scale = 2.0\n",
+    )
+    .unwrap();
+    let case = case_file::read(&path).unwrap();
+    assert_eq!(
+        case.facets,
+        [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.10000000149011612, 0.0]]]
+    );
+    assert_eq!(case.root, Root::around(&case.facets, 2.0).unwrap());
+
+    fs::write(directory.path().join("body.stl"), "solid\nendsolid\n").unwrap();
+    assert!(
+        case_file::read(&path)
+            .unwrap_err()
+            .to_string()
+            .contains("no facets or no size")
+    );
+    fs::write(
+        &path,
+        format!("geometry = \"body.stl\"\nspacing_min = 1.0\n{ROOT}"),
+    )
+    .unwrap();
+    assert!(
+        case_file::read(&path).unwrap().facets.is_empty(),
+        "a root of its own will do"
+    );
+    fs::write(&path, "geometry = \"boddy.stl\"\nspacing_min = 1.0\n").unwrap();
+    assert!(matches!(case_file::read(&path), Err(Error::Read { .. })));
+}
+
+#[test]
+fn unknown_keys_name_the_nearest_known_one() {
+    let with = |line: &str| format!("spacing_min = 1.0\n{line}\n{GENERATED}");
+    refused(
+        &with("layer_cell_min = 3"),
+        "line 2: unknown field `layer_cell_min`",
+    );
+    refused(
+        &with("layer_cell_min = 3"),
+        "did you mean `layer_cells_min`?",
+    );
+    refused(&with("rootscale = 3"), "did you mean `root_scale`?");
+    refused(&with("keep = \"outsde\""), "did you mean `outside`?");
+    refused(
+        &with("[root]\norigin = [0, 0, 0]\nedges = 1"),
+        "did you mean `edge`?",
+    );
+    refused(
+        &with("[[box]]\nmin = [0, 0, 0]\nmxa = [1, 1, 1]\nspacing = 1"),
+        "did you mean `max`?",
+    );
+    refused(&with("[[boxes]]\nspacing = 1"), "did you mean `box`?");
+    refused(
+        "spacing_min = 1\n[generator]\nshape = \"cube\"\nfacet = 12",
+        "did you mean `facets`?",
+    );
+    refused(
+        "spacing_min = 1\n[generator]\nshape = \"cub\"\nfacets = 12",
+        "did you mean `cube`?",
+    );
+}
+
+#[test]
+fn what_makes_no_sense() {
+    refused(GENERATED, "missing field `spacing_min`");
+    refused(
+        "spacing_min = 1",
+        "either `geometry` or a [generator] table",
+    );
+    let both = format!("spacing_min = 1\ngeometry = \"body.stl\"\n{GENERATED}");
+    refused(&both, "either `geometry` or a [generator] table");
+    let with = |line: &str| format!("spacing_min = 1.0\n{line}\n{GENERATED}");
+    refused(
+        &with(&format!("root_scale = 2.0\n{ROOT}")),
+        "either `root_scale` or a [root] table",
+    );
+    for scale in ["0", "-1.0", "nan", "inf"] {
+        refused(
+            &with(&format!("root_scale = {scale}")),
+            "finite and greater than 0",
+        );
+    }
+    refused(&with("layer_cells_min = -1"), "line 2");
+    refused(&with("layer_cells_min = 1.5"), "line 2");
+    refused(&with("keep_crossing = 1"), "expected a boolean");
+    refused(&with("[root]\norigin = [0, 0]\nedge = 1"), "line 3");
+    refused("spacing_min = = 1", "line 1");
+    refused("spacing_min = 1\nspacing_min = 2", "line 2");
+    let directory = tempfile::tempdir().unwrap();
+    let nowhere = case_file::read(&directory.path().join("nowhere.toml")).unwrap_err();
+    assert!(nowhere.to_string().contains("nowhere.toml"));
+}
