@@ -2,6 +2,8 @@
 //!
 //! A size that the shape does not have is an error, exactly as an unknown key is.
 
+use std::fmt;
+
 use serde::Deserialize;
 
 use crate::{Facet, Mesh, shapes};
@@ -28,6 +30,22 @@ pub enum Shape {
     Fighter,
 }
 
+impl fmt::Display for Shape {
+    /// The name in a case file.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Cube => "cube",
+            Self::Sphere => "sphere",
+            Self::Torus => "torus",
+            Self::NestedSpheres => "nested_spheres",
+            Self::Plate => "plate",
+            Self::Pipe => "pipe",
+            Self::Uav => "uav",
+            Self::Fighter => "fighter",
+        })
+    }
+}
+
 /// What a case file's `[generator]` table holds. Sizes left out take the shape's defaults.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
@@ -52,13 +70,14 @@ pub struct Generator {
     /// `torus`: of the tube, default 0.2 of `radius`.
     #[serde(default)]
     pub radius_tube: Option<f64>,
-    /// `pipe`: of the bend's centre line, default 0.3.
+    /// `pipe`: of the bend's centre line, default 3 times `radius`.
     #[serde(default)]
     pub radius_bend: Option<f64>,
     /// `pipe`: how far the bend turns, in degrees below 360, default 90.
     #[serde(default)]
     pub angle: Option<f64>,
-    /// `plate`: along x, default 1. `pipe`: of each straight, default 0.5. `uav` and `fighter`: the
+    /// `plate`: along x, default 1. `pipe`: of each straight, default 5 times
+    /// `radius`. `uav` and `fighter`: the
     /// longest edge of the bounding box, default 1.
     #[serde(default)]
     pub length: Option<f64>,
@@ -74,7 +93,7 @@ pub struct Generator {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GeneratorError {
     /// A size was given that this shape does not have.
-    #[error("the shape {shape:?} has no size `{key}`; it has {known}")]
+    #[error("the shape {shape} has no size `{key}`; it has {known}")]
     SizeForeign {
         /// The shape asked for.
         shape: Shape,
@@ -94,7 +113,7 @@ pub enum GeneratorError {
         want: String,
     },
     /// Fewer facets than the shape can be drawn in, or more than indices can number.
-    #[error("[generator] facets = {facets}: {shape:?} needs at least {least} and at most {most}")]
+    #[error("[generator] facets = {facets}: {shape} needs at least {least} and at most {most}")]
     FacetsWrong {
         /// The shape asked for.
         shape: Shape,

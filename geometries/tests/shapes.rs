@@ -231,7 +231,7 @@ fn vertices_are_the_same_everywhere() {
         "NestedSpheres 7fed22e94e96d6cb",
         "Plate ab2156a40181d6f1",
         "Pipe e619cd95ecd928a7",
-        "Uav 2bc1f4513287d24d",
+        "Uav d69a389f190928e2",
         "Fighter c8c5ca71f8b4b867",
     ];
     assert_eq!(found, expected);

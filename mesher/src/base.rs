@@ -48,7 +48,12 @@ pub struct Base {
 }
 
 /// Builds the base tree and deals it out. Collective.
-pub fn build(facets: &[Facet], rules: &Rules, division: &Division, comm: &dyn Comm) -> Result<Base, Error> {
+pub fn build(
+    facets: &[Facet],
+    rules: &Rules,
+    division: &Division,
+    comm: &dyn Comm,
+) -> Result<Base, Error> {
     let deepest = rules.level_deepest();
     let mark_level = match division.level_base {
         Some(l) => (l + 1).min(deepest.max(1)),
@@ -59,7 +64,9 @@ pub fn build(facets: &[Facet], rules: &Rules, division: &Division, comm: &dyn Co
         Some(_) => mark_level - 1,
         None => {
             let enough = SPLIT_LEAVES_PER_RANK * comm.size() as u64;
-            (0..mark_level).find(|&l| marks.split[l as usize].count() >= enough).unwrap_or(mark_level - 1)
+            (0..mark_level)
+                .find(|&l| marks.split[l as usize].count() >= enough)
+                .unwrap_or(mark_level - 1)
         }
     };
     let (internal, top, mut leaves) = cut(&marks, level_base, rules.level_surface);
@@ -67,18 +74,41 @@ pub fn build(facets: &[Facet], rules: &Rules, division: &Division, comm: &dyn Co
     let heavy: Vec<bool> = leaves.iter().map(split).collect();
     let weights = partition::weigh(&leaves, &heavy, facets, rules, division.weights, comm);
     let owners = partition::assign(&leaves, &weights, division.partitioner, comm)?;
-    leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
-    let mine = leaves.iter().zip(&heavy).filter(|(b, heavy)| **heavy && b.owner == comm.rank());
-    let starts = mine.map(|(b, _)| Start { level: b.level, code: b.code }).collect();
+    leaves
+        .iter_mut()
+        .zip(owners)
+        .for_each(|(b, owner)| b.owner = owner);
+    let mine = leaves
+        .iter()
+        .zip(&heavy)
+        .filter(|(b, heavy)| **heavy && b.owner == comm.rank());
+    let starts = mine
+        .map(|(b, _)| Start {
+            level: b.level,
+            code: b.code,
+        })
+        .collect();
     let share = Ownership::new(comm.rank(), comm.size(), internal, leaves);
     share.check_invariants();
-    Ok(Base { share, top, starts, level_base, work })
+    Ok(Base {
+        share,
+        top,
+        starts,
+        level_base,
+        work,
+    })
 }
 
 /// What all facets and boxes ask to be split down to `level`: exact above it. Collective.
 fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree, Work) {
-    let boxes = rules.boxes.iter().map(|b| crate::lattice::ExtentBox { level: b.level.min(level), ..*b });
-    let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
+    let boxes = rules.boxes.iter().map(|b| crate::lattice::ExtentBox {
+        level: b.level.min(level),
+        ..*b
+    });
+    let depth = Depth {
+        surface: rules.level_surface.min(level),
+        boxes: boxes.collect(),
+    };
     let (mine, work) = refine(&Filed::new(facets), &depth, &[Start { level: 0, code: 0 }]);
     let mut words = Vec::new();
     for sets in [&mine.split, &mine.crossing] {
@@ -93,7 +123,10 @@ fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree
         for sets in [&mut tree.split, &mut tree.crossing] {
             for set in &mut sets[..=level as usize] {
                 let count = at[0] as usize;
-                let bricks = at[1..1 + 2 * count].chunks_exact(2).map(|w| Brick { key: w[0], bits: w[1] });
+                let bricks = at[1..1 + 2 * count].chunks_exact(2).map(|w| Brick {
+                    key: w[0],
+                    bits: w[1],
+                });
                 *set = std::mem::take(set).union(BrickSet::from_unsorted(bricks.collect()));
                 at = &at[1 + 2 * count..];
             }
@@ -121,9 +154,17 @@ fn cut(marks: &Tree, level_base: Level, surface: Level) -> (PerLevel, Tree, Vec<
             internal[l] = marks.split[l].clone();
         }
         for b in Tree::exists(&marks.split, l as Level) {
-            let bits = if split_below { b.bits & !marks.split[l].get(b.key) } else { b.bits };
+            let bits = if split_below {
+                b.bits & !marks.split[l].get(b.key)
+            } else {
+                b.bits
+            };
             let codes = crate::brickset::ones(bits).map(|bit| b.key << 6 | u64::from(bit));
-            leaves.extend(codes.map(|code| BaseLeaf { level: l as Level, code, owner: 0 }));
+            leaves.extend(codes.map(|code| BaseLeaf {
+                level: l as Level,
+                code,
+                owner: 0,
+            }));
         }
     }
     leaves.sort_unstable_by_key(|b| start57(b.level, b.code));
@@ -142,14 +183,23 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
             if start57(b.level, b.code) >= end {
                 break;
             }
-            let there = b.level <= home.level() || reaches(f, &Start { level: b.level, code: b.code });
+            let there = b.level <= home.level()
+                || reaches(
+                    f,
+                    &Start {
+                        level: b.level,
+                        code: b.code,
+                    },
+                );
             if there && std::mem::replace(&mut last[b.owner], i) != i {
                 packed[b.owner].push(*f);
             }
         }
     }
     let mut mine = std::mem::take(&mut packed[comm.rank()]);
-    let out = packed.iter().map(|facets| facets.iter().flat_map(pack).collect());
+    let out = packed
+        .iter()
+        .map(|facets| facets.iter().flat_map(pack).collect());
     for (_, words) in comm.exchange(out.enumerate().collect()) {
         mine.extend(words.chunks_exact(5).map(unpack));
     }
@@ -159,22 +209,31 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
 /// Nine coordinates in five words.
 fn pack(f: &Facet) -> [u64; 5] {
     let c = f.v.as_flattened();
-    std::array::from_fn(|i| u64::from(c[2 * i] as u32) | u64::from(c.get(2 * i + 1).map_or(0, |v| *v as u32)) << 32)
+    std::array::from_fn(|i| {
+        u64::from(c[2 * i] as u32) | u64::from(c.get(2 * i + 1).map_or(0, |v| *v as u32)) << 32
+    })
 }
 
 fn unpack(words: &[u64]) -> Facet {
     let at = |i: usize| (words[i / 2] >> (32 * (i % 2))) as u32 as i32;
-    Facet { v: std::array::from_fn(|v| std::array::from_fn(|a| at(3 * v + a))) }
+    Facet {
+        v: std::array::from_fn(|v| std::array::from_fn(|a| at(3 * v + a))),
+    }
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.
 #[cfg_attr(not(feature = "metis"), allow(dead_code))]
-pub(crate) fn face_neighbours(leaves: &[BaseLeaf], leaf_at: impl Fn(u64) -> usize) -> Vec<(usize, usize)> {
+pub(crate) fn face_neighbours(
+    leaves: &[BaseLeaf],
+    leaf_at: impl Fn(u64) -> usize,
+) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for (i, b) in leaves.iter().enumerate() {
         for axis in 0..3 {
             for up in [false, true] {
-                let Some(n) = crate::octant::neighbour(b.level, b.code, axis, up) else { continue };
+                let Some(n) = crate::octant::neighbour(b.level, b.code, axis, up) else {
+                    continue;
+                };
                 let j = leaf_at(start57(b.level, n));
                 // A finer neighbour finds this one itself.
                 if leaves[j].level <= b.level {
@@ -194,8 +253,12 @@ pub(crate) fn middle(f: &Facet) -> Option<u64> {
         let (lo, hi) = f.range(a);
         (lo + hi) / 2
     });
-    let inside = mid.iter().all(|c: &i64| (0..crate::octant::ROOT_EDGE).contains(c));
-    inside.then(|| crate::octant::morton(mid.map(|c| (c >> (crate::octant::ROOT_BITS - LEVEL_MAX)) as u32)))
+    let inside = mid
+        .iter()
+        .all(|c: &i64| (0..crate::octant::ROOT_EDGE).contains(c));
+    inside.then(|| {
+        crate::octant::morton(mid.map(|c| (c >> (crate::octant::ROOT_BITS - LEVEL_MAX)) as u32))
+    })
 }
 
 #[cfg(test)]
@@ -205,18 +268,32 @@ mod tests {
 
     #[test]
     fn facets_survive_the_journey() {
-        let f = Facet { v: [[-5, 1 << 28, 0], [7, -(1 << 27), 3], [i32::MAX, i32::MIN, -1]] };
+        let f = Facet {
+            v: [
+                [-5, 1 << 28, 0],
+                [7, -(1 << 27), 3],
+                [i32::MAX, i32::MIN, -1],
+            ],
+        };
         assert_eq!(unpack(&pack(&f)), f);
     }
 
     #[test]
     fn neighbours_of_a_uniform_base_tree() {
-        let leaves: Vec<BaseLeaf> = (0..64).map(|code| BaseLeaf { level: 2, code, owner: 0 }).collect();
+        let leaves: Vec<BaseLeaf> = (0..64)
+            .map(|code| BaseLeaf {
+                level: 2,
+                code,
+                owner: 0,
+            })
+            .collect();
         let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
         assert_eq!(pairs.len(), 3 * 3 * 16);
         let apart = |a: usize, b: usize| -> i64 {
             let (p, q) = (position(a as u64), position(b as u64));
-            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).abs()).sum()
+            (0..3)
+                .map(|i| (i64::from(p[i]) - i64::from(q[i])).abs())
+                .sum()
         };
         assert!(pairs.iter().all(|&(a, b)| apart(a, b) == 1));
     }

@@ -79,7 +79,8 @@ impl Case {
     /// Reads a case file. The geometry's path is relative to it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let fail = |e: &dyn std::fmt::Display| Error::input(format!("{}: {e}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|e| fail(&format!("{e}: give a readable case file")))?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| fail(&format!("{e}: give a readable case file")))?;
         let file: File = toml::from_str(&text).map_err(|e| fail(&explain(&text, &e)))?;
         let folder = path.parent().unwrap_or(Path::new("."));
         file.into_case(folder).map_err(|e| fail(&e))
@@ -88,11 +89,19 @@ impl Case {
     /// What decides the mesh, given the bounds of the geometry.
     pub fn rules(&self, bounds: &Bounds) -> Result<Rules, Error> {
         let positive = |what: &str, v: f64| {
-            if v.is_finite() && v > 0.0 { Ok(()) } else { Err(Error::input(format!("{what} is {v}: give a positive number"))) }
+            if v.is_finite() && v > 0.0 {
+                Ok(())
+            } else {
+                Err(Error::input(format!(
+                    "{what} is {v}: give a positive number"
+                )))
+            }
         };
         positive("spacing_min", self.spacing_min)?;
         if self.layer_cells_min == 0 {
-            return Err(Error::input("layer_cells_min is 0: a layer has at least 1 cell"));
+            return Err(Error::input(
+                "layer_cells_min is 0: a layer has at least 1 cell",
+            ));
         }
         let root = match self.root {
             RootSpec::Exact(root) => root,
@@ -103,27 +112,52 @@ impl Case {
         };
         positive("the root's edge", root.edge)?;
         if !root.origin.iter().all(|c| c.is_finite()) {
-            return Err(Error::input("the root's origin is not finite: give three numbers"));
+            return Err(Error::input(
+                "the root's origin is not finite: give three numbers",
+            ));
         }
         let level_surface = root.level_of(self.spacing_min, "spacing_min")?;
-        let boxes = self.boxes.iter().enumerate().map(|(i, b)| b.on(&root, i + 1)).collect::<Result<_, _>>()?;
-        Ok(Rules { root, level_surface, layer_cells_min: self.layer_cells_min, keep: self.keep, keep_crossing: self.keep_crossing, boxes })
+        let boxes = self
+            .boxes
+            .iter()
+            .enumerate()
+            .map(|(i, b)| b.on(&root, i + 1))
+            .collect::<Result<_, _>>()?;
+        Ok(Rules {
+            root,
+            level_surface,
+            layer_cells_min: self.layer_cells_min,
+            keep: self.keep,
+            keep_crossing: self.keep_crossing,
+            boxes,
+        })
     }
 }
 
 impl BoxSpec {
     /// The box on the lattice; `number` counts from 1, for errors.
     fn on(&self, root: &Root, number: usize) -> Result<ExtentBox, Error> {
-        let ordered = (0..3).all(|a| self.min[a] < self.max[a] && self.min[a].is_finite() && self.max[a].is_finite());
+        let ordered = (0..3).all(|a| {
+            self.min[a] < self.max[a] && self.min[a].is_finite() && self.max[a].is_finite()
+        });
         if !ordered {
-            return Err(Error::input(format!("box {number}: min must be below max on every axis, and both finite")));
+            return Err(Error::input(format!(
+                "box {number}: min must be below max on every axis, and both finite"
+            )));
         }
         if !(self.spacing.is_finite() && self.spacing > 0.0) {
-            return Err(Error::input(format!("box {number}: spacing is {}: give a positive number", self.spacing)));
+            return Err(Error::input(format!(
+                "box {number}: spacing is {}: give a positive number",
+                self.spacing
+            )));
         }
         let at = |p: [f64; 3]| std::array::from_fn(|a| root.quantise(a, p[a]).clamp(0, ROOT_EDGE));
         let level = root.level_of(self.spacing, &format!("box {number}: spacing"))?;
-        Ok(ExtentBox { min: at(self.min), max: at(self.max), level })
+        Ok(ExtentBox {
+            min: at(self.min),
+            max: at(self.max),
+            level,
+        })
     }
 }
 
@@ -132,17 +166,30 @@ impl File {
         let source = match (self.geometry, self.generator) {
             (Some(path), None) => Source::Stl(folder.join(path)),
             (None, Some(g)) => Source::Generated(g),
-            (Some(_), Some(_)) => return Err(Error::input("give geometry or [generator], not both")),
-            (None, None) => return Err(Error::input("no geometry: give geometry = \"file.stl\" or a [generator] table")),
+            (Some(_), Some(_)) => {
+                return Err(Error::input("give geometry or [generator], not both"));
+            }
+            (None, None) => {
+                return Err(Error::input(
+                    "no geometry: give geometry = \"file.stl\" or a [generator] table",
+                ));
+            }
         };
         let root = match (self.root_scale, self.root) {
             (Some(_), Some(_)) => return Err(Error::input("give root_scale or [root], not both")),
-            (_, Some(r)) => RootSpec::Exact(Root { origin: r.origin, edge: r.edge }),
+            (_, Some(r)) => RootSpec::Exact(Root {
+                origin: r.origin,
+                edge: r.edge,
+            }),
             (scale, None) => RootSpec::Scale(scale.unwrap_or(ROOT_SCALE)),
         };
         let n = self.layer_cells_min.unwrap_or(i64::from(LAYER_CELLS_MIN));
-        let layer_cells_min =
-            u32::try_from(n).map_err(|_| Error::input(format!("layer_cells_min is {n}: give a whole number from 1 to {}", u32::MAX)))?;
+        let layer_cells_min = u32::try_from(n).map_err(|_| {
+            Error::input(format!(
+                "layer_cells_min is {n}: give a whole number from 1 to {}",
+                u32::MAX
+            ))
+        })?;
         Ok(Case {
             source,
             spacing_min: self.spacing_min,
@@ -157,12 +204,18 @@ impl File {
 
 /// One sentence for a malformed case file, with the nearest known key for an unknown one.
 fn explain(text: &str, e: &toml::de::Error) -> String {
-    let line = e.span().map_or(String::new(), |s| format!("line {}: ", text[..s.start].lines().count().max(1)));
+    let line = e.span().map_or(String::new(), |s| {
+        format!("line {}: ", text[..s.start].matches('\n').count() + 1)
+    });
     let message = e.message().replace('\n', " ");
     let mut quoted = message.split('`').skip(1).step_by(2);
     let nearest = message.starts_with("unknown field").then(|| {
         let wrong = quoted.next().unwrap_or_default();
-        quoted.max_by(|a, b| strsim::jaro_winkler(a, wrong).total_cmp(&strsim::jaro_winkler(b, wrong))).map(|known| (wrong, known))
+        quoted
+            .max_by(|a, b| {
+                strsim::jaro_winkler(a, wrong).total_cmp(&strsim::jaro_winkler(b, wrong))
+            })
+            .map(|known| (wrong, known))
     });
     match nearest.flatten() {
         Some((wrong, known)) => format!("{line}unknown key \"{wrong}\": did you mean \"{known}\"?"),
@@ -183,19 +236,37 @@ mod tests {
     #[test]
     fn defaults_are_the_documented_ones() {
         let c = parse("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
-        assert_eq!((c.layer_cells_min, c.keep, c.keep_crossing, c.root), (4, Keep::Outside, true, RootSpec::Scale(10.0)));
+        assert_eq!(
+            (c.layer_cells_min, c.keep, c.keep_crossing, c.root),
+            (4, Keep::Outside, true, RootSpec::Scale(10.0))
+        );
     }
 
     #[test]
     fn mistakes_are_named() {
         for (text, told) in [
-            ("geometry = \"a.stl\"\nspacing_mim = 0.5\n", "line 2: unknown key \"spacing_mim\": did you mean \"spacing_min\"?"),
-            ("geometry = \"a.stl\"\nspacing_min = 1\n[[box]]\nmin = [0,0,0]\nmax = [1,1,1]\nspacing = 1\nlevel = 3\n", "unknown key \"level\""),
+            (
+                "geometry = \"a.stl\"\nspacing_mim = 0.5\n",
+                "line 2: unknown key \"spacing_mim\": did you mean \"spacing_min\"?",
+            ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 1\n[[box]]\nmin = [0,0,0]\nmax = [1,1,1]\nspacing = 1\nlevel = 3\n",
+                "unknown key \"level\"",
+            ),
             ("spacing_min = 0.5\n", "no geometry"),
             ("geometry = \"a.stl\"\n", "spacing_min"),
-            ("geometry = \"a.stl\"\nspacing_min = 0.5\nlayer_cells_min = -1\n", "layer_cells_min is -1"),
-            ("geometry = \"a.stl\"\nspacing_min = 0.5\nkeep = \"none\"\n", "none"),
-            ("geometry = \"a.stl\"\nspacing_min = 0.5\nroot_scale = 2.0\n[root]\norigin = [0,0,0]\nedge = 1\n", "not both"),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\nlayer_cells_min = -1\n",
+                "layer_cells_min is -1",
+            ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\nkeep = \"none\"\n",
+                "none",
+            ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\nroot_scale = 2.0\n[root]\norigin = [0,0,0]\nedge = 1\n",
+                "not both",
+            ),
             ("geometry = ", "line 1"),
         ] {
             let e = parse(text).unwrap_err();
@@ -206,14 +277,38 @@ mod tests {
     #[test]
     fn rules_refuse_what_cannot_be_meshed() {
         let c = parse("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
-        let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
+        let unit = Bounds {
+            lo: [0.0; 3],
+            hi: [1.0; 3],
+        };
         assert_eq!(c.rules(&unit).unwrap().level_surface, 5);
         for spacing_min in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-9] {
-            assert!(Case { spacing_min, ..c.clone() }.rules(&unit).is_err());
+            assert!(
+                Case {
+                    spacing_min,
+                    ..c.clone()
+                }
+                .rules(&unit)
+                .is_err()
+            );
         }
         assert!(c.rules(&Bounds::EMPTY).is_err());
-        assert!(Case { layer_cells_min: 0, ..c.clone() }.rules(&unit).is_err());
-        let boxed = |min: [f64; 3]| Case { boxes: vec![BoxSpec { min, max: [1.0; 3], spacing: 0.1 }], ..c.clone() };
+        assert!(
+            Case {
+                layer_cells_min: 0,
+                ..c.clone()
+            }
+            .rules(&unit)
+            .is_err()
+        );
+        let boxed = |min: [f64; 3]| Case {
+            boxes: vec![BoxSpec {
+                min,
+                max: [1.0; 3],
+                spacing: 0.1,
+            }],
+            ..c.clone()
+        };
         assert!(boxed([0.0; 3]).rules(&unit).is_ok());
         assert!(boxed([0.0, 1.0, 0.0]).rules(&unit).is_err());
     }

@@ -53,7 +53,9 @@ fn digest_lanes(words: &[u64]) -> u128 {
             low += b & 0xffff_ffff;
             low_top += b >> 32;
         }
-        let sum = (u128::from(high) << 64).wrapping_add(u128::from(low)).wrapping_add(u128::from(low_top) << 32);
+        let sum = (u128::from(high) << 64)
+            .wrapping_add(u128::from(low))
+            .wrapping_add(u128::from(low_top) << 32);
         total = total.wrapping_add(sum);
     }
     total
@@ -79,7 +81,9 @@ pub struct Digests {
 
 impl Default for Digests {
     fn default() -> Self {
-        Self { octants: vec![0; OCTANTS] }
+        Self {
+            octants: vec![0; OCTANTS],
+        }
     }
 }
 
@@ -89,7 +93,11 @@ impl Digests {
         const SHIFT: u32 = 64 - 3 * OCTANT_LEVEL;
         while let (Some(first), Some(last)) = (words.first(), words.last()) {
             let octant = first >> SHIFT;
-            let run = if last >> SHIFT == octant { words.len() } else { words.partition_point(|w| w >> SHIFT == octant) };
+            let run = if last >> SHIFT == octant {
+                words.len()
+            } else {
+                words.partition_point(|w| w >> SHIFT == octant)
+            };
             let sum = &mut self.octants[octant as usize];
             *sum = sum.wrapping_add(digest(&words[..run]));
             words = &words[run..];
@@ -103,7 +111,10 @@ impl Digests {
 
     /// Adds another part's digests.
     pub fn merge(&mut self, other: &[u128]) {
-        self.octants.iter_mut().zip(other).for_each(|(a, b)| *a = a.wrapping_add(*b));
+        self.octants
+            .iter_mut()
+            .zip(other)
+            .for_each(|(a, b)| *a = a.wrapping_add(*b));
     }
 }
 
@@ -113,7 +124,9 @@ mod tests {
 
     #[test]
     fn sums_of_parts_are_the_sum_of_the_whole() {
-        let mut words: Vec<u64> = (0..5000u64).map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
+        let mut words: Vec<u64> = (0..5000u64)
+            .map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+            .collect();
         words.sort_unstable();
         let naive = words.iter().fold(0u128, |s, &w| s.wrapping_add(mix(w)));
         assert_eq!(digest(&words), naive);

@@ -28,7 +28,12 @@ pub type Words = u64;
 
 /// The parents, at level `l - 1`, of all octants of level `l` within `radius` of a source, octants
 /// outside the root left out. Sources come in Morton order.
-pub fn dilate_to_parents(l: Level, sources: impl Iterator<Item = Brick>, radius: u32, words: &mut Words) -> BrickSet {
+pub fn dilate_to_parents(
+    l: Level,
+    sources: impl Iterator<Item = Brick>,
+    radius: u32,
+    words: &mut Words,
+) -> BrickSet {
     let odd = dilate_tiles(l, sources, (radius & 1) as usize, true, words);
     dilate(l - 1, odd, radius / 2, words)
 }
@@ -46,7 +51,13 @@ pub fn dilate(l: Level, mut set: BrickSet, radius: u32, words: &mut Words) -> Br
 }
 
 /// One pass over the tiles; the result is of level `l - 1` if `to_parents`.
-fn dilate_tiles(l: Level, sources: impl Iterator<Item = Brick>, radius: usize, to_parents: bool, words: &mut Words) -> BrickSet {
+fn dilate_tiles(
+    l: Level,
+    sources: impl Iterator<Item = Brick>,
+    radius: usize,
+    to_parents: bool,
+    words: &mut Words,
+) -> BrickSet {
     let mut out = Gathered::new(if to_parents { l - 1 } else { l });
     let mut tile = Tile::new(radius);
     let mut now = None;
@@ -81,12 +92,18 @@ impl Tile {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         let margin = radius.next_multiple_of(8);
         let side = TILE + 2 * margin;
-        Self { radius, margin, side, rows: vec![0; side * side] }
+        Self {
+            radius,
+            margin,
+            side,
+            rows: vec![0; side * side],
+        }
     }
 
     /// Adds a source brick.
     fn put(&mut self, b: Brick) {
-        let [x, y, z] = position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
+        let [x, y, z] =
+            position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
         let rows = brick::to_rows(b.bits);
         let shift = MARGIN + x;
         for dz in 0..4 {
@@ -129,12 +146,20 @@ impl Tile {
     /// Hands over the result and empties the tile.
     fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
-        let rows: Vec<u64> = if to_parents { self.halved() } else { self.rows.clone() };
+        let rows: Vec<u64> = if to_parents {
+            self.halved()
+        } else {
+            self.rows.clone()
+        };
         self.rows.fill(0);
         let side = self.side / scale;
         // The first brick of the padded tile, in bricks of the result's level.
         let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
-        let first = [MARGIN / scale / 4, self.margin / scale / 4, self.margin / scale / 4];
+        let first = [
+            MARGIN / scale / 4,
+            self.margin / scale / 4,
+            self.margin / scale / 4,
+        ];
         for bz in 0..side / 4 {
             for by in 0..side / 4 {
                 let at = |dy: usize, dz: usize| rows[(4 * bz + dz) * side + 4 * by + dy];
@@ -146,7 +171,9 @@ impl Tile {
                     if any >> (4 * bx) & 15 == 0 {
                         continue;
                     }
-                    let bits = (0..16).fold(0, |w, i| w | (at(i & 3, i >> 2) >> (4 * bx) & 15) << (4 * i));
+                    let bits = (0..16).fold(0, |w, i| {
+                        w | (at(i & 3, i >> 2) >> (4 * bx) & 15) << (4 * i)
+                    });
                     let b = [bx, by, bz];
                     let p = std::array::from_fn(|a| origin[a] + b[a] as i64 - first[a] as i64);
                     out.add(p, brick::from_rows(bits));
@@ -180,15 +207,15 @@ fn or_into(to: &mut [u64], from: &[u64]) {
 /// A row with every bit spread by `r` to both sides, by doubling.
 #[inline]
 fn dilate_row(row: u64, r: usize) -> u64 {
-    // After a step the run to the right of each bit is `run` long.
-    let mut wide = row;
+    // Every bit starts a run that is `run` long; the margin below keeps bits from falling out.
+    let mut wide = row >> r;
     let mut run = 1;
     while run < 2 * r + 1 {
         let step = run.min(2 * r + 1 - run);
         wide |= wide << step;
         run += step;
     }
-    wide >> r
+    wide
 }
 
 /// Bit `i` of the result is set where bit `2i` or `2i + 1` of `row` is.
@@ -275,7 +302,9 @@ impl std::hash::Hasher for Spread {
         }
     }
     fn write_u64(&mut self, v: u64) {
-        self.0 = (self.0 ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
+        self.0 = (self.0 ^ v)
+            .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            .rotate_left(26);
     }
 }
 
@@ -286,7 +315,15 @@ mod tests {
     use std::collections::BTreeSet;
 
     fn set(codes: &BTreeSet<u64>) -> BrickSet {
-        BrickSet::from_unsorted(codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect())
+        BrickSet::from_unsorted(
+            codes
+                .iter()
+                .map(|c| Brick {
+                    key: c >> 6,
+                    bits: 1 << (c & 63),
+                })
+                .collect(),
+        )
     }
 
     fn naive(l: Level, codes: &BTreeSet<u64>, r: i64) -> BTreeSet<u64> {

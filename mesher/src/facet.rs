@@ -107,7 +107,11 @@ pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
         wide += usize::from(first < last);
     }
     // A connected set that stays in one row of octants meets each that its extent meets.
-    if wide < 2 { mask } else { mask & kernel::separated(f, corner, shift) }
+    if wide < 2 {
+        mask
+    } else {
+        mask & kernel::separated(f, corner, shift)
+    }
 }
 
 /// The octants of level `l` in the brick at `corner` whose interior meets the box's.
@@ -162,7 +166,14 @@ mod kernel {
             let sign = n[a].signum();
             for i in 0..3 {
                 let (from, to) = (p[i], p[(i + 1) % 3]);
-                mask &= half_plane(from, (to[u] - from[u]) * sign, (to[w] - from[w]) * sign, a, shift, &edge);
+                mask &= half_plane(
+                    from,
+                    (to[u] - from[u]) * sign,
+                    (to[w] - from[w]) * sign,
+                    a,
+                    shift,
+                    &edge,
+                );
             }
         }
         mask
@@ -170,7 +181,14 @@ mod kernel {
 
     /// Octants whose projection along `a` reaches the left of the directed line through `from`.
     #[inline(always)]
-    fn half_plane(from: [i64; 3], eu: i64, ew: i64, a: usize, shift: u32, edge: &impl Fn(i64, i64, i64) -> [u8; 2]) -> u64 {
+    fn half_plane(
+        from: [i64; 3],
+        eu: i64,
+        ew: i64,
+        a: usize,
+        shift: u32,
+        edge: &impl Fn(i64, i64, i64) -> [u8; 2],
+    ) -> u64 {
         let (u, w) = ((a + 1) % 3, (a + 2) % 3);
         // eu * (q_w - from_w) - ew * (q_u - from_u), at the corner of the first square where it is most.
         let h = 1i64 << shift;
@@ -183,7 +201,12 @@ mod kernel {
 
     /// A projection of no area: the octants on both sides of its line, which is its longest edge's.
     #[inline(always)]
-    fn degenerate_mask(p: &[[i64; 3]; 3], a: usize, shift: u32, edge: &impl Fn(i64, i64, i64) -> [u8; 2]) -> u64 {
+    fn degenerate_mask(
+        p: &[[i64; 3]; 3],
+        a: usize,
+        shift: u32,
+        edge: &impl Fn(i64, i64, i64) -> [u8; 2],
+    ) -> u64 {
         let (u, w) = ((a + 1) % 3, (a + 2) % 3);
         let mut best = (0i64, 0i64, p[0]);
         for i in 0..3 {
@@ -199,7 +222,12 @@ mod kernel {
 
     /// Octants that the facet's plane does not separate.
     #[inline(always)]
-    fn plane_mask(p: &[[i64; 3]; 3], n: [i64; 3], shift: u32, plane: impl Fn([i64; 3], i64, i64) -> u64) -> u64 {
+    fn plane_mask(
+        p: &[[i64; 3]; 3],
+        n: [i64; 3],
+        shift: u32,
+        plane: impl Fn([i64; 3], i64, i64) -> u64,
+    ) -> u64 {
         let at: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(p[0][a])).sum();
         let up: i64 = n.iter().map(|v| v.max(&0)).sum();
         let down: i64 = n.iter().map(|v| v.min(&0)).sum();
@@ -244,7 +272,13 @@ mod kernel {
 
         #[target_feature(enable = "avx512f,avx512dq")]
         pub fn separated(f: &Facet, corner: [i64; 3], shift: u32) -> u64 {
-            super::generic(f, corner, shift, |n, most, least| plane(n, most, least), |ci, cj, c| edge(ci, cj, c))
+            super::generic(
+                f,
+                corner,
+                shift,
+                |n, most, least| plane(n, most, least),
+                |ci, cj, c| edge(ci, cj, c),
+            )
         }
 
         #[inline]
@@ -252,8 +286,14 @@ mod kernel {
         fn plane(n: [i64; 3], most: i64, least: i64) -> u64 {
             let lane = |m: u8, v: i64| _mm512_maskz_set1_epi64(m, v);
             // Lanes are the low bits x0, y0, z0 of the octant's index; bytes are x1, y1, z1.
-            let low = _mm512_add_epi64(_mm512_add_epi64(lane(0xaa, n[0]), lane(0xcc, n[1])), lane(0xf0, n[2]));
-            let (most, least) = (_mm512_add_epi64(low, _mm512_set1_epi64(most)), _mm512_add_epi64(low, _mm512_set1_epi64(least)));
+            let low = _mm512_add_epi64(
+                _mm512_add_epi64(lane(0xaa, n[0]), lane(0xcc, n[1])),
+                lane(0xf0, n[2]),
+            );
+            let (most, least) = (
+                _mm512_add_epi64(low, _mm512_set1_epi64(most)),
+                _mm512_add_epi64(low, _mm512_set1_epi64(least)),
+            );
             let mut mask = 0;
             for byte in 0..8i64 {
                 let base = 2 * (n[0] * (byte & 1) + n[1] * (byte >> 1 & 1) + n[2] * (byte >> 2));
@@ -268,7 +308,8 @@ mod kernel {
         #[inline]
         #[target_feature(enable = "avx512f,avx512dq")]
         fn edge(ci: i64, cj: i64, c: i64) -> [u8; 2] {
-            let step = _mm512_setr_epi64(0, ci, 2 * ci, 3 * ci, cj, ci + cj, 2 * ci + cj, 3 * ci + cj);
+            let step =
+                _mm512_setr_epi64(0, ci, 2 * ci, 3 * ci, cj, ci + cj, 2 * ci + cj, 3 * ci + cj);
             let low = _mm512_cmpge_epi64_mask(step, _mm512_set1_epi64(-c));
             let high = _mm512_cmpge_epi64_mask(step, _mm512_set1_epi64(-c - 2 * cj));
             [low, high]
@@ -331,7 +372,9 @@ mod tests {
     #[test]
     fn a_facet_in_a_face_plane_crosses_both_sides() {
         let h = edge(19) as i32;
-        let f = Facet { v: [[h, 1, 1], [h, 2, 1], [h, 1, 2]] };
+        let f = Facet {
+            v: [[h, 1, 1], [h, 2, 1], [h, 1, 2]],
+        };
         assert_eq!(crossed(&f, [0; 3], 19).count_ones(), 2);
         let point = Facet { v: [[h, h, h]; 3] };
         assert_eq!(crossed(&point, [0; 3], 19), 0xff);

@@ -30,8 +30,21 @@ pub struct Work {
 
 /// Refines the kept part of `base` until layers are thick enough and touching leaves differ by at most
 /// one level. Collective. Returns the split sets of the graded tree.
-pub fn grade(base: &Tree, kept: &Kept, rules: &Rules, share: &Ownership, comm: &dyn Comm) -> (PerLevel, Work) {
-    let mut g = Gradation { split: base.split.clone(), base, kept, share, comm, work: Work::default() };
+pub fn grade(
+    base: &Tree,
+    kept: &Kept,
+    rules: &Rules,
+    share: &Ownership,
+    comm: &dyn Comm,
+) -> (PerLevel, Work) {
+    let mut g = Gradation {
+        split: base.split.clone(),
+        base,
+        kept,
+        share,
+        comm,
+        work: Work::default(),
+    };
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer(rules.level_surface);
     }
@@ -79,13 +92,21 @@ impl Gradation<'_> {
         let mut deleted = self.kept.deleted(l).cursor();
         Tree::exists(&self.split, l)
             .filter(|b| self.share.answers_for(l, b.key))
-            .map(|b| Brick { key: b.key, bits: b.bits & !split.get(b.key) & !deleted.get(b.key) })
+            .map(|b| Brick {
+                key: b.key,
+                bits: b.bits & !split.get(b.key) & !deleted.get(b.key),
+            })
             .filter(|b| b.bits != 0)
             .collect()
     }
 
     fn reach(&mut self, l: Level, sources: &[Brick], radius: u32) -> BrickSet {
-        dilate_to_parents(l, sources.iter().copied(), radius, &mut self.work.words_dilated)
+        dilate_to_parents(
+            l,
+            sources.iter().copied(),
+            radius,
+            &mut self.work.words_dilated,
+        )
     }
 
     /// The paper's exchange of extent boxes: what was reached goes to whoever holds it, and is split
@@ -133,4 +154,3 @@ fn without(set: &BrickSet, other: &BrickSet) -> BrickSet {
     }
     rest
 }
-

@@ -34,12 +34,18 @@ impl<'a> Kept<'a> {
         if !self.any {
             return set;
         }
-        let mut finder = LeafFinder { kept: self, base, last: None };
+        let mut finder = LeafFinder {
+            kept: self,
+            base,
+            last: None,
+        };
         let mut deleted = self.deleted[l as usize].cursor();
         let mut above = (l > 0).then(|| base.split[l as usize - 1].cursor());
         let mut out = BrickSet::default();
         for b in set.bricks() {
-            let here = above.as_mut().map_or(1, |a| brick::children(brick::byte(a.get(b.key >> 3), b.key & 7)));
+            let here = above.as_mut().map_or(1, |a| {
+                brick::children(brick::byte(a.get(b.key >> 3), b.key & 7))
+            });
             let mut bits = b.bits & here & !deleted.get(b.key);
             let coarse = brick::parents(b.bits & !here);
             for j in ones(u64::from(coarse)) {
@@ -59,7 +65,11 @@ impl<'a> Kept<'a> {
             let mut split = base.split[l].cursor();
             let mut crossing = base.crossing[l].cursor();
             for Brick { key, bits } in self.deleted[l].bricks() {
-                assert_eq!(bits & (split.get(*key) | crossing.get(*key)), 0, "level {l}: only leaves off the surface are deleted");
+                assert_eq!(
+                    bits & (split.get(*key) | crossing.get(*key)),
+                    0,
+                    "level {l}: only leaves off the surface are deleted"
+                );
             }
         }
     }
@@ -89,7 +99,7 @@ impl LeafFinder<'_> {
             let try_at = match split {
                 Some(s) => s + (leaf - s) / 2,
                 None if leaf == 0 => break,
-                None => leaf - leaf.min(2).max(1),
+                None => leaf - leaf.clamp(1, 2),
             };
             if self.base.split[try_at as usize].contains(code >> (3 * (l - try_at))) {
                 split = Some(try_at);
@@ -99,7 +109,10 @@ impl LeafFinder<'_> {
         }
         let code = code >> (3 * (l - leaf));
         let kept = !self.kept.deleted[leaf as usize].contains(code);
-        self.last = Some((start57(leaf, code)..start57(leaf, code) + (1 << (3 * (LEVEL_MAX - leaf))), kept));
+        self.last = Some((
+            start57(leaf, code)..start57(leaf, code) + (1 << (3 * (LEVEL_MAX - leaf))),
+            kept,
+        ));
         kept
     }
 }

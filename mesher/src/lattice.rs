@@ -24,7 +24,10 @@ pub struct Bounds {
 
 impl Bounds {
     /// The bounds of nothing.
-    pub const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
+    pub const EMPTY: Self = Self {
+        lo: [f64::INFINITY; 3],
+        hi: [f64::NEG_INFINITY; 3],
+    };
 
     /// Bounds of facets, whose coordinates must be finite.
     pub fn of(facets: &[geometries::Facet]) -> Self {
@@ -36,7 +39,10 @@ impl Bounds {
                 hi[a] = hi[a].max(v[a]);
             }
         }
-        Self { lo: lo.map(f64::from), hi: hi.map(f64::from) }
+        Self {
+            lo: lo.map(f64::from),
+            hi: hi.map(f64::from),
+        }
     }
 
     /// Bounds of the union.
@@ -52,9 +58,13 @@ impl Root {
     /// The cube of `scale` longest edges of the bounds, centred on them. The order of the operations
     /// is part of the mesh's definition.
     pub fn around(bounds: &Bounds, scale: f64) -> Result<Self, Error> {
-        let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
+        let longest = (0..3)
+            .map(|a| bounds.hi[a] - bounds.lo[a])
+            .fold(0.0, f64::max);
         if longest <= 0.0 {
-            return Err(Error::input("the geometry has no extent, so root_scale gives no root: set [root] with origin and edge"));
+            return Err(Error::input(
+                "the geometry has no extent, so root_scale gives no root: set [root] with origin and edge",
+            ));
         }
         let edge = scale * longest;
         let origin = std::array::from_fn(|a| (bounds.lo[a] + bounds.hi[a]) * 0.5 - edge * 0.5);
@@ -88,7 +98,9 @@ impl Root {
         let scale = ROOT_EDGE as f64 / self.edge;
         let origin = self.origin;
         let mut worst = 0.0f64;
-        let at = |v: [f32; 3]| std::array::from_fn(|a| ((f64::from(v[a]) - origin[a]) * scale).round_ties_even());
+        let at = |v: [f32; 3]| {
+            std::array::from_fn(|a| ((f64::from(v[a]) - origin[a]) * scale).round_ties_even())
+        };
         let out = facets
             .iter()
             .map(|f| Facet {
@@ -102,9 +114,19 @@ impl Root {
             })
             .collect();
         if worst > ROOT_EDGE as f64 * 1.5 {
-            let outside = |v: &[f32; 3]| at(*v).iter().any(|c: &f64| (c - ROOT_EDGE as f64 * 0.5).abs() > ROOT_EDGE as f64 * 1.5);
-            let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
-            let v = facets[bad].iter().find(|v| outside(v)).unwrap_or(&facets[bad][0]);
+            let outside = |v: &[f32; 3]| {
+                at(*v)
+                    .iter()
+                    .any(|c: &f64| (c - ROOT_EDGE as f64 * 0.5).abs() > ROOT_EDGE as f64 * 1.5)
+            };
+            let bad = facets
+                .iter()
+                .position(|f| f.iter().any(outside))
+                .unwrap_or(0);
+            let v = facets[bad]
+                .iter()
+                .find(|v| outside(v))
+                .unwrap_or(&facets[bad][0]);
             return Err(Error::input(format!(
                 "facet {} has a vertex at ({}, {}, {}), more than one root edge outside the root: enlarge or move the root",
                 first + bad as u64,
@@ -154,7 +176,9 @@ pub struct Rules {
 }
 
 /// Which side of the geometry the mesh keeps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
     /// External flow: outside and crossing leaves.
@@ -168,7 +192,11 @@ pub enum Keep {
 impl Rules {
     /// Deepest level that a leaf can have.
     pub fn level_deepest(&self) -> Level {
-        self.boxes.iter().filter(|b| (0..3).all(|a| b.min[a] < b.max[a])).map(|b| b.level).fold(self.level_surface, Level::max)
+        self.boxes
+            .iter()
+            .filter(|b| (0..3).all(|a| b.min[a] < b.max[a]))
+            .map(|b| b.level)
+            .fold(self.level_surface, Level::max)
     }
 }
 
@@ -178,28 +206,58 @@ mod tests {
 
     #[test]
     fn a_spacing_means_that_size_or_smaller() {
-        let root = Root { origin: [0.0; 3], edge: 8.0 };
-        for (s, l) in [(9.0, 0), (8.0, 0), (7.9, 1), (1.0, 3), (0.99, 4), (8.0 / 524_288.0, 19)] {
+        let root = Root {
+            origin: [0.0; 3],
+            edge: 8.0,
+        };
+        for (s, l) in [
+            (9.0, 0),
+            (8.0, 0),
+            (7.9, 1),
+            (1.0, 3),
+            (0.99, 4),
+            (8.0 / 524_288.0, 19),
+        ] {
             assert_eq!(root.level_of(s, "spacing").unwrap(), l, "{s}");
         }
-        assert!(root.level_of(1e-6, "spacing_min").unwrap_err().to_string().contains("spacing_min"));
+        assert!(
+            root.level_of(1e-6, "spacing_min")
+                .unwrap_err()
+                .to_string()
+                .contains("spacing_min")
+        );
     }
 
     #[test]
     fn ties_round_to_even_and_far_vertices_name_their_facet() {
-        let root = Root { origin: [0.0; 3], edge: (ROOT_EDGE * 2) as f64 };
+        let root = Root {
+            origin: [0.0; 3],
+            edge: (ROOT_EDGE * 2) as f64,
+        };
         assert_eq!([1.0, 3.0, 5.0].map(|x| root.quantise(0, x)), [0, 2, 2]);
         let near = [[0.0f32; 3]; 3];
         let far = [[0.0; 3], [0.0; 3], [0.0, 3.1 * ROOT_EDGE as f32 * 2.0, 0.0]];
         assert_eq!(root.facets(&[near], 0).unwrap().len(), 1);
-        assert!(root.facets(&[near, far], 40).unwrap_err().to_string().contains("facet 41"));
+        assert!(
+            root.facets(&[near, far], 40)
+                .unwrap_err()
+                .to_string()
+                .contains("facet 41")
+        );
     }
 
     #[test]
     fn boxes_meet_by_interiors_only() {
-        let b = ExtentBox { min: [0, 0, 0], max: [4, 4, 4], level: 3 };
+        let b = ExtentBox {
+            min: [0, 0, 0],
+            max: [4, 4, 4],
+            level: 3,
+        };
         assert!(b.meets([3, 3, 3], 4) && !b.meets([4, 0, 0], 4));
-        let flat = ExtentBox { max: [4, 4, 0], ..b };
+        let flat = ExtentBox {
+            max: [4, 4, 0],
+            ..b
+        };
         assert!(!flat.meets([0, 0, 0], 4));
     }
 }

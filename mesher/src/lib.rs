@@ -58,7 +58,12 @@ pub struct Options {
 }
 
 /// Meshes a case. Collective; `Recorder` keeps this rank's times, the report is the same on all ranks.
-pub fn mesh(case: &Case, options: &Options, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
+pub fn mesh(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<Report, Error> {
     let out = agree(comm, make_out(options, comm))?;
     let result = mesh_into(case, options, out.as_ref(), comm, record);
     if let (Err(_), Some(out)) = (&result, &out) {
@@ -76,45 +81,152 @@ pub fn mesh(case: &Case, options: &Options, comm: &dyn Comm, record: &mut Record
 
 fn make_out(options: &Options, comm: &dyn Comm) -> Result<Option<OutDir>, Error> {
     let path = options.out.as_ref();
-    path.map(|p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) }).transpose()
+    path.map(|p| {
+        if comm.rank() == 0 {
+            OutDir::make(p)
+        } else {
+            Ok(OutDir::join(p))
+        }
+    })
+    .transpose()
 }
 
-fn mesh_into(case: &Case, options: &Options, out: Option<&OutDir>, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
+fn mesh_into(
+    case: &Case,
+    options: &Options,
+    out: Option<&OutDir>,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<Report, Error> {
+    let (meshed, mut counters) = build(case, options, comm, record)?;
+    let (counts, written) = record.phase("leaves", || emit(&meshed, out, comm))?;
+    let Meshed { rules, sides, .. } = &meshed;
+    let finished = record.phase("finish", || {
+        finish(rules, options.ungraded, counts, &written, sides, out, comm)
+    });
+    let (counts, digests, parts) = finished?;
+    counters.sides(sides, comm.rank());
+    counters.traffic(comm.traffic());
+    Ok(Report::gather(
+        meshed.facets,
+        rules,
+        &counts,
+        &digests,
+        &parts,
+        sides,
+        meshed.refined.level_base,
+        record,
+        &counters,
+        comm,
+    ))
+}
+
+/// The leaf words that this rank answers for, in order, and the components decided by majority: the
+/// whole result without a report. Collective.
+pub fn words(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+) -> Result<(Vec<u64>, Option<sides::Ambiguous>), Error> {
+    let (meshed, _) = build(case, options, comm, &mut Recorder::default())?;
+    let mut words = Vec::new();
+    meshed.leaves().emit(|w| {
+        words.extend_from_slice(w);
+        Ok::<(), Error>(())
+    })?;
+    Ok((words, meshed.sides.ambiguous))
+}
+
+/// A mesh that has not been written out.
+struct Meshed {
+    facets: u64,
+    rules: Rules,
+    refined: Refined,
+    sides: Sides,
+    /// The graded tree's splits; none for the base tree.
+    graded: Option<PerLevel>,
+}
+
+impl Meshed {
+    fn leaves(&self) -> Leaves<'_> {
+        Leaves {
+            split: self.graded.as_ref().unwrap_or(&self.refined.tree.split),
+            base: &self.refined.tree,
+            sides: &self.sides,
+            share: &self.refined.share,
+            everything: self.graded.is_none(),
+            rules: &self.rules,
+        }
+    }
+}
+
+/// The phases up to the finished tree. Collective.
+fn build(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<(Meshed, Counters), Error> {
     let mut counters = Counters::default();
     let geometry = record.phase("read", || ingest::read(&case.source, comm))?;
     let (rules, facets) = record.phase("quantise", || quantise(case, &geometry, comm))?;
     drop(geometry.facets);
-    let refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
+    let refined = refine(
+        &facets,
+        &rules,
+        &options.division,
+        comm,
+        record,
+        &mut counters,
+    )?;
     comm.agree(check_interrupt())?;
 
-    let sides = record.phase("sides", || sides::decide(&refined.tree, &refined.share, &facets, rules.keep, comm));
+    let sides = record.phase("sides", || {
+        sides::decide(&refined.tree, &refined.share, &facets, rules.keep, comm)
+    });
     drop(facets);
     comm.agree(check_interrupt())?;
 
-    let kept = kept::Kept::new(&sides.deleted);
     let graded = (!options.ungraded).then(|| {
-        let (split, work) = record.phase("grade", || grade::grade(&refined.tree, &kept, &rules, &refined.share, comm));
+        let kept = kept::Kept::new(&sides.deleted);
+        let (split, work) = record.phase("grade", || {
+            grade::grade(&refined.tree, &kept, &rules, &refined.share, comm)
+        });
         counters.grade(&work);
         split
     });
     comm.agree(check_interrupt())?;
-
-    let split = graded.as_ref().unwrap_or(&refined.tree.split);
-    let (counts, written) = record.phase("leaves", || emit(&refined, split, &sides, &rules, options.ungraded, out, comm))?;
-    let finish = record.phase("finish", || finish(&rules, options.ungraded, counts, &written, &sides, out, comm))?;
-    let (counts, digests, parts) = finish;
-    counters.sides(&sides, comm.rank());
-    counters.traffic(comm.traffic());
-    Ok(Report::gather(geometry.total, &rules, &counts, &digests, &parts, &sides, refined.level_base, record, &counters, comm))
+    Ok((
+        Meshed {
+            facets: geometry.total,
+            rules,
+            refined,
+            sides,
+            graded,
+        },
+        counters,
+    ))
 }
 
 /// The rules, and this rank's facets on the lattice. Collective.
-fn quantise(case: &Case, geometry: &ingest::Share, comm: &dyn Comm) -> Result<(Rules, Vec<facet::Facet>), Error> {
+fn quantise(
+    case: &Case,
+    geometry: &ingest::Share,
+    comm: &dyn Comm,
+) -> Result<(Rules, Vec<facet::Facet>), Error> {
     let mine = Bounds::of(&geometry.facets);
-    let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
+    let words: Vec<u64> = mine
+        .lo
+        .iter()
+        .chain(&mine.hi)
+        .map(|c| c.to_bits())
+        .collect();
     let bounds = comm.all_gather(&words).iter().fold(Bounds::EMPTY, |b, w| {
         let at = |i: usize| f64::from_bits(w[i]);
-        b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
+        b.union(Bounds {
+            lo: [at(0), at(1), at(2)],
+            hi: [at(3), at(4), at(5)],
+        })
     });
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(&geometry.facets, geometry.first))?;
@@ -137,29 +249,60 @@ fn refine(
     record: &mut Recorder,
     counters: &mut Counters,
 ) -> Result<Refined, Error> {
-    let depth = voxelise::Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
+    let depth = voxelise::Depth {
+        surface: rules.level_surface,
+        boxes: rules.boxes.clone(),
+    };
     if comm.size() == 1 {
         let root = [voxelise::Start { level: 0, code: 0 }];
-        let (tree, work) = record.phase("refine", || voxelise::refine(&voxelise::Filed::new(facets), &depth, &root));
+        let (tree, work) = record.phase("refine", || {
+            voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
+        });
         counters.voxelise(&work);
-        return Ok(Refined { tree, share: Ownership::solo(), level_base: 0 });
+        return Ok(Refined {
+            tree,
+            share: Ownership::solo(),
+            level_base: 0,
+        });
     }
     let base = record.phase("base tree", || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
-    let filed = record.phase("route", || voxelise::Filed::new(&base::route(facets, &base.share, comm)));
-    let (mut tree, work) = record.phase("refine", || voxelise::refine(&filed, &depth, &base.starts));
+    let filed = record.phase("route", || {
+        voxelise::Filed::new(&base::route(facets, &base.share, comm))
+    });
+    let (mut tree, work) =
+        record.phase("refine", || voxelise::refine(&filed, &depth, &base.starts));
     counters.voxelise(&work);
-    record.phase("share top", || share_top(&mut tree, base.top, &base.share, base.level_base, comm));
-    Ok(Refined { tree, share: base.share, level_base: base.level_base })
+    record.phase("share top", || {
+        share_top(&mut tree, base.top, &base.share, base.level_base, comm)
+    });
+    Ok(Refined {
+        tree,
+        share: base.share,
+        level_base: base.level_base,
+    })
 }
 
 /// Makes the top bricks of a rank's tree those of the whole tree. Collective.
-fn share_top(tree: &mut Tree, top: Tree, share: &Ownership, level_base: octant::Level, comm: &dyn Comm) {
-    for (sets, top) in [(&mut tree.split, top.split), (&mut tree.crossing, top.crossing)] {
+fn share_top(
+    tree: &mut Tree,
+    top: Tree,
+    share: &Ownership,
+    level_base: octant::Level,
+    comm: &dyn Comm,
+) {
+    for (sets, top) in [
+        (&mut tree.split, top.split),
+        (&mut tree.crossing, top.crossing),
+    ] {
         let pairs: Vec<_> = sets.iter_mut().map(std::mem::take).zip(top).collect();
         for ((l, set), (mine, top)) in (0..).zip(sets.iter_mut()).zip(pairs) {
             // Above, all is known from the base tree; below, bricks are one rank's alone.
-            let mine = if l == level_base + 1 { share.scatter(l, mine, comm).0 } else { mine };
+            let mine = if l == level_base + 1 {
+                share.scatter(l, mine, comm).0
+            } else {
+                mine
+            };
             *set = mine.union(top);
         }
     }
@@ -167,19 +310,14 @@ fn share_top(tree: &mut Tree, top: Tree, share: &Ownership, level_base: octant::
 
 /// Streams the leaves into the digest, and to disk if asked. Collective.
 fn emit(
-    refined: &Refined,
-    split: &PerLevel,
-    sides: &Sides,
-    rules: &Rules,
-    everything: bool,
+    meshed: &Meshed,
     out: Option<&OutDir>,
     comm: &dyn Comm,
 ) -> Result<(Counts, Written), Error> {
-    let leaves = Leaves { split, base: &refined.tree, sides, share: &refined.share, everything, rules };
     let work = || match out {
         None => {
             let mut written = Written::default();
-            let counts = leaves.emit(|words| {
+            let counts = meshed.leaves().emit(|words| {
                 written.leaves += words.len() as u64;
                 written.digests.add(words);
                 check_interrupt()
@@ -188,7 +326,7 @@ fn emit(
         }
         Some(out) => {
             let mut part = out.part(comm.rank())?;
-            let counts = leaves.emit(|words| {
+            let counts = meshed.leaves().emit(|words| {
                 check_interrupt()?;
                 part.add(words)
             })?;
@@ -199,7 +337,6 @@ fn emit(
 }
 
 /// Sums over the ranks, and writes the manifest. Collective.
-#[expect(clippy::type_complexity, reason = "three results of one gathering")]
 fn finish(
     rules: &Rules,
     base: bool,
@@ -212,7 +349,14 @@ fn finish(
     let counts = counts.gather(comm);
     let (digests, parts) = write::gather(written, comm);
     let publish = || match out {
-        Some(out) if comm.rank() == 0 => out.manifest(&Manifest::new(rules, base, &counts, sides.ambiguous, &digests, &parts)),
+        Some(out) if comm.rank() == 0 => out.manifest(&Manifest::new(
+            rules,
+            base,
+            &counts,
+            sides.ambiguous,
+            &digests,
+            &parts,
+        )),
         _ => Ok(()),
     };
     comm.agree(publish())?;

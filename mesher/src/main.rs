@@ -117,16 +117,24 @@ fn comm_choice(s: &str) -> Result<CommChoice, String> {
         (Some("mpi"), None, None) => Some(CommChoice::Mpi),
         (Some("sim"), Some(ranks), seed) => (|| {
             let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
-            Some(CommChoice::Sim { ranks, seed: seed.unwrap_or("1").parse().ok()? })
+            Some(CommChoice::Sim {
+                ranks,
+                seed: seed.unwrap_or("1").parse().ok()?,
+            })
         })(),
         _ => None,
     };
-    choice.filter(|_| words.next().is_none()).ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
+    choice
+        .filter(|_| words.next().is_none())
+        .ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
 }
 
 fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
     let values: Result<Vec<f64>, _> = s.split(',').map(|w| w.trim().parse::<f64>()).collect();
-    values.ok().and_then(|v| v.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
+    values
+        .ok()
+        .and_then(|v| v.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
 fn main() {
@@ -154,12 +162,22 @@ fn main() {
 
 /// Number of ranks that an MPI launcher has started, if one has.
 fn launched() -> Option<usize> {
-    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS"].iter().find_map(|v| std::env::var(v).ok()?.parse().ok())
+    [
+        "OMPI_COMM_WORLD_SIZE",
+        "PMI_SIZE",
+        "PMIX_SIZE",
+        "MPI_LOCALNRANKS",
+    ]
+    .iter()
+    .find_map(|v| std::env::var(v).ok()?.parse().ok())
 }
 
 fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     let wants_mpi = match asked {
-        CommChoice::Auto => launched().is_some() || std::env::var("SLURM_PROCID").is_ok() && std::env::var("PMIX_RANK").is_ok(),
+        CommChoice::Auto => {
+            launched().is_some()
+                || std::env::var("SLURM_PROCID").is_ok() && std::env::var("PMIX_RANK").is_ok()
+        }
         CommChoice::Mpi => true,
         _ => return Ok(asked),
     };
@@ -171,7 +189,9 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
     match launched() {
         Some(1) => Ok(CommChoice::Solo),
-        _ => Err(Error::input("this mesher was built without MPI: build it with --features mpi, or run it without mpirun")),
+        _ => Err(Error::input(
+            "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
+        )),
     }
 }
 
@@ -209,7 +229,10 @@ fn fail(e: &Error) -> i32 {
 /// One rank's run; returns the exit code, the same on all ranks.
 fn run(args: &Args, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
-    let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
+    let status = args
+        .status
+        .as_ref()
+        .map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);
     record.tell("start");
@@ -233,12 +256,22 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
 
 fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
     if let Some(dir) = &args.status {
-        comm.agree(std::fs::create_dir_all(dir).map_err(|e| Error::output(format!("{}: {e}: choose another --status", dir.display()))))?;
+        comm.agree(std::fs::create_dir_all(dir).map_err(|e| {
+            Error::output(format!("{}: {e}: choose another --status", dir.display()))
+        }))?;
     }
     let case = mesher::comm::agree(comm, case(args))?;
-    let partitioner = args.partitioner.unwrap_or(if cfg!(feature = "metis") { Partitioner::Metis } else { Partitioner::Morton });
+    let partitioner = args.partitioner.unwrap_or(if cfg!(feature = "metis") {
+        Partitioner::Metis
+    } else {
+        Partitioner::Morton
+    });
     let options = Options {
-        division: Division { partitioner, weights: args.weights, level_base: args.level_base.0 },
+        division: Division {
+            partitioner,
+            weights: args.weights,
+            level_base: args.level_base.0,
+        },
         ungraded: args.ungraded,
         out: args.out.clone(),
     };
@@ -253,16 +286,29 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
 
 fn case(args: &Args) -> Result<Case, Error> {
     let b = &args.body;
-    let is_case = args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let is_case = args
+        .input
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if is_case {
-        let given = b.spacing_min.is_some() || b.layer_cells_min.is_some() || b.keep.is_some() || b.drop_crossing;
+        let given = b.spacing_min.is_some()
+            || b.layer_cells_min.is_some()
+            || b.keep.is_some()
+            || b.drop_crossing;
         if given || b.root_scale.is_some() || b.root.is_some() || !b.boxes.is_empty() {
-            return Err(Error::input(format!("{} is a case file, which says it all: change it there", args.input.display())));
+            return Err(Error::input(format!(
+                "{} is a case file, which says it all: change it there",
+                args.input.display()
+            )));
         }
         return Case::read(&args.input);
     }
-    let spacing_min =
-        b.spacing_min.ok_or_else(|| Error::input(format!("{} is taken for an STL file: give --spacing-min, or a case file (.toml)", args.input.display())))?;
+    let spacing_min = b.spacing_min.ok_or_else(|| {
+        Error::input(format!(
+            "{} is taken for an STL file: give --spacing-min, or a case file (.toml)",
+            args.input.display()
+        ))
+    })?;
     Ok(Case {
         source: Source::Stl(args.input.clone()),
         spacing_min,
@@ -270,15 +316,29 @@ fn case(args: &Args) -> Result<Case, Error> {
         keep: b.keep.unwrap_or(Keep::Outside),
         keep_crossing: !b.drop_crossing,
         root: match b.root {
-            Some([x, y, z, edge]) => RootSpec::Exact(Root { origin: [x, y, z], edge }),
+            Some([x, y, z, edge]) => RootSpec::Exact(Root {
+                origin: [x, y, z],
+                edge,
+            }),
             None => RootSpec::Scale(b.root_scale.unwrap_or(ROOT_SCALE)),
         },
-        boxes: b.boxes.iter().map(|v| BoxSpec { min: [v[0], v[1], v[2]], max: [v[3], v[4], v[5]], spacing: v[6] }).collect(),
+        boxes: b
+            .boxes
+            .iter()
+            .map(|v| BoxSpec {
+                min: [v[0], v[1], v[2]],
+                max: [v[3], v[4], v[5]],
+                spacing: v[6],
+            })
+            .collect(),
     })
 }
 
 fn write_json(path: &Path, report: &Report) -> Result<(), Error> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let write = || -> std::io::Result<()> {
         let mut file = tempfile::NamedTempFile::new_in(folder)?;
         serde_json::to_writer_pretty(&mut file, report)?;

@@ -68,7 +68,11 @@ pub const fn morton(p: [u32; 3]) -> u64 {
 /// The position that a Morton code stands for.
 #[inline]
 pub const fn position(code: u64) -> [u32; 3] {
-    [gather(code) as u32, gather(code >> 1) as u32, gather(code >> 2) as u32]
+    [
+        gather(code) as u32,
+        gather(code >> 1) as u32,
+        gather(code >> 2) as u32,
+    ]
 }
 
 /// The Morton code at level 19 of the minimum corner of an octant of level `l <= 19`.
@@ -88,7 +92,11 @@ pub fn corner(l: Level, code: u64) -> [i64; 3] {
 #[inline]
 pub fn neighbour(l: Level, code: u64, axis: usize, up: bool) -> Option<u64> {
     let mut p = position(code);
-    p[axis] = if up { p[axis].checked_add(1).filter(|&v| v < 1 << l)? } else { p[axis].checked_sub(1)? };
+    p[axis] = if up {
+        p[axis].checked_add(1).filter(|&v| v < 1 << l)?
+    } else {
+        p[axis].checked_sub(1)?
+    };
     Some(morton(p))
 }
 

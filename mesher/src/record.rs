@@ -11,7 +11,11 @@ pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// An error if the user asked the run to stop.
 pub fn check_interrupt() -> Result<(), Error> {
-    if INTERRUPTED.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    if INTERRUPTED.load(Ordering::Relaxed) {
+        Err(Error::Interrupted)
+    } else {
+        Ok(())
+    }
 }
 
 /// One phase on one rank.
@@ -37,7 +41,11 @@ impl Recorder {
     /// A recorder that keeps the name of the phase in the file `status`, if given, and on standard error
     /// if `progress`.
     pub fn new(status: Option<PathBuf>, progress: bool) -> Self {
-        Self { phases: Vec::new(), status, progress }
+        Self {
+            phases: Vec::new(),
+            status,
+            progress,
+        }
     }
 
     /// Runs and times a phase. A phase that runs several times adds up.
@@ -51,7 +59,11 @@ impl Recorder {
                 p.time_wall_s += time_wall_s;
                 p.time_cpu_s += time_cpu_s;
             }
-            None => self.phases.push(Phase { name, time_wall_s, time_cpu_s }),
+            None => self.phases.push(Phase {
+                name,
+                time_wall_s,
+                time_cpu_s,
+            }),
         }
         result
     }

@@ -33,7 +33,10 @@ const COUNTERS: [&str; 9] = [
 
 impl Counters {
     fn add(&mut self, name: &str, v: u64) {
-        let at = COUNTERS.iter().position(|n| *n == name).expect("the counter has a name in the list");
+        let at = COUNTERS
+            .iter()
+            .position(|n| *n == name)
+            .expect("the counter has a name in the list");
         self.values[at] += v;
     }
 
@@ -132,10 +135,19 @@ impl Report {
         counters.leaves(parts[comm.rank()][0]);
         let mut words = vec![peak_rss_bytes()];
         words.extend(counters.values);
-        words.extend(record.phases().iter().flat_map(|p| [p.time_wall_s.to_bits(), p.time_cpu_s.to_bits()]));
+        words.extend(
+            record
+                .phases()
+                .iter()
+                .flat_map(|p| [p.time_wall_s.to_bits(), p.time_cpu_s.to_bits()]),
+        );
         let all = comm.all_gather(&words);
         let column = |i: usize| all.iter().map(|w| w[i]).collect::<Vec<u64>>();
-        let seconds = |i: usize| all.iter().map(|w| f64::from_bits(w[i])).collect::<Vec<f64>>();
+        let seconds = |i: usize| {
+            all.iter()
+                .map(|w| f64::from_bits(w[i]))
+                .collect::<Vec<f64>>()
+        };
         let first = 1 + COUNTERS.len();
         let phases: Vec<PhaseEntry> = (record.phases().iter().enumerate())
             .map(|(i, p)| PhaseEntry {
@@ -152,7 +164,10 @@ impl Report {
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
             facets,
             cells: counts.total(),
-            cells_by_level: counts.by_level[..=LEVEL_MAX as usize].iter().map(|l| l.iter().sum()).collect(),
+            cells_by_level: counts.by_level[..=LEVEL_MAX as usize]
+                .iter()
+                .map(|l| l.iter().sum())
+                .collect(),
             cells_by_side: std::array::from_fn(side),
             digest: hex(digests.whole()),
             root_edge: rules.root.edge,
@@ -165,7 +180,11 @@ impl Report {
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
             peak_rss_bytes: column(0),
             phases,
-            counters: COUNTERS.iter().enumerate().map(|(i, n)| (*n, column(1 + i))).collect(),
+            counters: COUNTERS
+                .iter()
+                .enumerate()
+                .map(|(i, n)| (*n, column(1 + i)))
+                .collect(),
         }
     }
 }
@@ -173,7 +192,11 @@ impl Report {
 /// Greatest over mean: 1 is perfect balance.
 fn imbalance(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    if mean > 0.0 { values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean } else { 1.0 }
+    if mean > 0.0 {
+        values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean
+    } else {
+        1.0
+    }
 }
 
 impl fmt::Display for Report {
@@ -182,28 +205,73 @@ impl fmt::Display for Report {
         let peak: u64 = self.peak_rss_bytes.iter().sum();
         let cells = self.cells.max(1) as f64;
         writeln!(f, "facets         {}", grouped(self.facets))?;
-        writeln!(f, "root edge      {} (level 0), surface level {}", self.root_edge, self.level_surface)?;
+        writeln!(
+            f,
+            "root edge      {} (level 0), surface level {}",
+            self.root_edge, self.level_surface
+        )?;
         writeln!(f, "cells          {}", grouped(self.cells))?;
-        writeln!(f, "  by side      outside {}, inside {}, crossing {}", grouped(outside), grouped(inside), grouped(crossing))?;
-        for (l, &n) in self.cells_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
-            writeln!(f, "  level {l:>2}     {:>16}   edge {:e}", grouped(n), self.root_edge / f64::from(1u32 << l))?;
+        writeln!(
+            f,
+            "  by side      outside {}, inside {}, crossing {}",
+            grouped(outside),
+            grouped(inside),
+            grouped(crossing)
+        )?;
+        for (l, &n) in self
+            .cells_by_level
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| **n > 0)
+        {
+            writeln!(
+                f,
+                "  level {l:>2}     {:>16}   edge {:e}",
+                grouped(n),
+                self.root_edge / f64::from(1u32 << l)
+            )?;
         }
         write!(f, "components     {}", grouped(self.components))?;
         match self.ambiguous_example {
             None => writeln!(f)?,
-            Some(p) => writeln!(f, ", {} decided by majority, one at ({}, {}, {})", self.components_ambiguous, p[0], p[1], p[2])?,
+            Some(p) => writeln!(
+                f,
+                ", {} decided by majority, one at ({}, {}, {})",
+                self.components_ambiguous, p[0], p[1], p[2]
+            )?,
         }
         writeln!(f, "digest         {}", self.digest)?;
         let share: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
-        writeln!(f, "ranks          {}, cells max/mean {:.3}, base level {}", self.ranks, imbalance(&share), self.level_base)?;
+        writeln!(
+            f,
+            "ranks          {}, cells max/mean {:.3}, base level {}",
+            self.ranks,
+            imbalance(&share),
+            self.level_base
+        )?;
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
         for p in &self.phases {
             let wall = p.time_wall_s.iter().fold(0.0, |m: f64, v| m.max(*v));
             let cpu: f64 = p.time_cpu_s.iter().sum();
-            writeln!(f, "  {:<12} {wall:>10.3} {cpu:>9.3}   {:>8.3}", p.name, imbalance(&p.time_cpu_s))?;
+            writeln!(
+                f,
+                "  {:<12} {wall:>10.3} {cpu:>9.3}   {:>8.3}",
+                p.name,
+                imbalance(&p.time_cpu_s)
+            )?;
         }
-        writeln!(f, "time           {:.3} s wall, {:.2} M cells/s", self.time_wall_s, cells / self.time_wall_s.max(1e-9) / 1e6)?;
-        write!(f, "peak memory    {:.1} MB over all ranks, {:.2} bytes per cell", peak as f64 / 1e6, peak as f64 / cells)
+        writeln!(
+            f,
+            "time           {:.3} s wall, {:.2} M cells/s",
+            self.time_wall_s,
+            cells / self.time_wall_s.max(1e-9) / 1e6
+        )?;
+        write!(
+            f,
+            "peak memory    {:.1} MB over all ranks, {:.2} bytes per cell",
+            peak as f64 / 1e6,
+            peak as f64 / cells
+        )
     }
 }
 
@@ -212,7 +280,7 @@ fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, d) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             out.push(',');
         }
         out.push(d);
@@ -226,7 +294,10 @@ mod tests {
 
     #[test]
     fn numbers_read_in_threes() {
-        assert_eq!([0, 12, 123, 1234, 1_234_567].map(grouped), ["0", "12", "123", "1,234", "1,234,567"]);
+        assert_eq!(
+            [0, 12, 123, 1234, 1_234_567].map(grouped),
+            ["0", "12", "123", "1,234", "1,234,567"]
+        );
     }
 
     #[test]

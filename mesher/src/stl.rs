@@ -22,17 +22,30 @@ pub struct Stl {
 
 /// Opens a file and tells whether it is binary.
 pub fn open(path: &Path) -> Result<Stl, Error> {
-    let fail = |e: std::io::Error| Error::input(format!("{}: {e}: give a readable STL file", path.display()));
+    let fail = |e: std::io::Error| {
+        Error::input(format!("{}: {e}: give a readable STL file", path.display()))
+    };
     let file = File::open(path).map_err(fail)?;
     let meta = file.metadata().map_err(fail)?;
     if meta.is_dir() {
-        return Err(Error::input(format!("{} is a directory: give an STL file", path.display())));
+        return Err(Error::input(format!(
+            "{} is a directory: give an STL file",
+            path.display()
+        )));
     }
     let length = meta.len();
     if length == 0 {
-        return Err(Error::input(format!("{} is empty: give an STL file with facets", path.display())));
+        return Err(Error::input(format!(
+            "{} is empty: give an STL file with facets",
+            path.display()
+        )));
     }
-    let mut stl = Stl { path: path.to_owned(), file, length, binary: None };
+    let mut stl = Stl {
+        path: path.to_owned(),
+        file,
+        length,
+        binary: None,
+    };
     if length >= HEADER {
         let mut count = [0; 4];
         stl.file.read_exact_at(&mut count, 80).map_err(fail)?;
@@ -58,7 +71,9 @@ impl Stl {
     /// Whether the file starts as text STL do and has no bytes that text has not.
     fn looks_like_text(&self) -> Result<bool, Error> {
         let mut head = vec![0; self.length.min(1024) as usize];
-        self.file.read_exact_at(&mut head, 0).map_err(|e| self.fail(e))?;
+        self.file
+            .read_exact_at(&mut head, 0)
+            .map_err(|e| self.fail(e))?;
         let text = head.trim_ascii_start();
         Ok(text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid") && !head.contains(&0))
     }
@@ -71,8 +86,16 @@ impl Stl {
         for at in (first..end).step_by(CHUNK as usize) {
             let count = CHUNK.min(end - at);
             let bytes = &mut buffer[..(count * RECORD) as usize];
-            self.file.read_exact_at(bytes, HEADER + RECORD * at).map_err(|e| self.fail(format!("{e} at facet {at}: export it again")))?;
-            out.extend(bytes.as_chunks::<{ RECORD as usize }>().0.iter().map(record));
+            self.file
+                .read_exact_at(bytes, HEADER + RECORD * at)
+                .map_err(|e| self.fail(format!("{e} at facet {at}: export it again")))?;
+            out.extend(
+                bytes
+                    .as_chunks::<{ RECORD as usize }>()
+                    .0
+                    .iter()
+                    .map(record),
+            );
         }
         Ok(out)
     }
@@ -83,13 +106,26 @@ impl Stl {
             return Err(self.fail("is neither a binary STL nor one in text, which begins with \"solid\": give an STL file"));
         }
         let mut bytes = Vec::new();
-        self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
+        self.file
+            .read_to_end(&mut bytes)
+            .map_err(|e| self.fail(e))?;
         let mut facets = Vec::new();
         for (i, solid) in solids(&bytes).into_iter().enumerate() {
-            let broken = |e: std::io::Error| self.fail(format!("solid {} is malformed ({e}): export it again", i + 1));
-            let complete = solid.lines().last().is_some_and(|l| l.trim_start().starts_with("endsolid"));
+            let broken = |e: std::io::Error| {
+                self.fail(format!(
+                    "solid {} is malformed ({e}): export it again",
+                    i + 1
+                ))
+            };
+            let complete = solid
+                .lines()
+                .last()
+                .is_some_and(|l| l.trim_start().starts_with("endsolid"));
             if !complete {
-                return Err(self.fail(format!("solid {} has no \"endsolid\": the file is truncated; export it again", i + 1)));
+                return Err(self.fail(format!(
+                    "solid {} has no \"endsolid\": the file is truncated; export it again",
+                    i + 1
+                )));
             }
             for triangle in stl_io::create_stl_reader(&mut Cursor::new(solid)).map_err(broken)? {
                 facets.push(triangle.map_err(broken)?.vertices.map(|v| v.0));
@@ -133,7 +169,10 @@ pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
     if flat.iter().map(|x| 0.0 * x).sum::<f32>() == 0.0 {
         return Ok(());
     }
-    let bad = facets.iter().position(|f| !f.as_flattened().iter().all(|x| x.is_finite())).unwrap_or(0);
+    let bad = facets
+        .iter()
+        .position(|f| !f.as_flattened().iter().all(|x| x.is_finite()))
+        .unwrap_or(0);
     Err(Error::input(format!(
         "facet {} has a vertex that is not finite: {:?}: repair the geometry",
         first + bad as u64,
@@ -169,19 +208,41 @@ mod tests {
             two,
         ] {
             let facets = text(&s).unwrap_or_else(|e| panic!("{e}\n{s}"));
-            assert_eq!(facets, [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.1, 0.0]]; 2], "{s}");
+            assert_eq!(
+                facets,
+                [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.1, 0.0]]; 2],
+                "{s}"
+            );
         }
-        assert!(text("solid nothing\nendsolid nothing\n").unwrap().is_empty());
+        assert!(
+            text("solid nothing\nendsolid nothing\n")
+                .unwrap()
+                .is_empty()
+        );
     }
 
     #[test]
     fn broken_text_is_an_error() {
         let plain = format!("solid a\n{FACET}endsolid a\n");
-        for s in ["hello", "solid a\n", &plain[..60], &plain[..plain.len() - 11], &plain.replace("1 0 0", "1 0"), &plain.replace("1 0 0", "1 x 0")] {
+        for s in [
+            "hello",
+            "solid a\n",
+            &plain[..60],
+            &plain[..plain.len() - 11],
+            &plain.replace("1 0 0", "1 0"),
+            &plain.replace("1 0 0", "1 x 0"),
+        ] {
             assert!(matches!(text(s), Err(Error::Input(_))), "{s:?}");
         }
-        let infinite = text(&plain.replace("1e-1", "1e99")).unwrap();
-        assert!(check_finite(&infinite, 7).unwrap_err().to_string().contains("facet 7"));
+        assert!(text(&plain.replace("1e-1", "1e99")).is_err());
+        let bad = [[[0.0; 3]; 3], [[0.0, 1.0, f32::NAN]; 3]];
+        assert!(
+            check_finite(&bad, 7)
+                .unwrap_err()
+                .to_string()
+                .contains("facet 8")
+        );
+        assert!(check_finite(&bad[..1], 7).is_ok());
     }
 
     #[test]
@@ -204,9 +265,15 @@ mod tests {
             })
         };
         let facets = try_open(&bytes).unwrap();
-        assert_eq!(facets[1], [[15.0, 16.0, 17.0], [18.0, 19.0, 20.0], [21.0, 22.0, 23.0]]);
+        assert_eq!(
+            facets[1],
+            [[15.0, 16.0, 17.0], [18.0, 19.0, 20.0], [21.0, 22.0, 23.0]]
+        );
         for cut in [0, 1, 83, 84, 100, bytes.len() - 1] {
-            assert!(matches!(try_open(&bytes[..cut]), Err(Error::Input(_))), "cut at {cut}");
+            assert!(
+                matches!(try_open(&bytes[..cut]), Err(Error::Input(_))),
+                "cut at {cut}"
+            );
         }
         bytes.push(0);
         assert!(try_open(&bytes).is_err());

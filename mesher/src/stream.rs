@@ -26,7 +26,11 @@ impl Counts {
     pub fn gather(&self, comm: &dyn crate::comm::Comm) -> Self {
         let mut sum = Self::default();
         for words in comm.all_gather(self.by_level.as_flattened()) {
-            sum.by_level.as_flattened_mut().iter_mut().zip(words).for_each(|(s, w)| *s += w);
+            sum.by_level
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(words)
+                .for_each(|(s, w)| *s += w);
         }
         sum
     }
@@ -63,7 +67,13 @@ impl Leaves<'_> {
             inside: self.sides.inside[l].cursor(),
             deleted: self.sides.deleted[l].cursor(),
         });
-        let mut walk = Walk { levels: levels.collect(), of: self, buffer: Vec::with_capacity(CHUNK + 8), counts: Counts::default(), sink };
+        let mut walk = Walk {
+            levels: levels.collect(),
+            of: self,
+            buffer: Vec::with_capacity(CHUNK + 8),
+            counts: Counts::default(),
+            sink,
+        };
         let root = walk.load(0, 0, 1, 0, 0);
         walk.group(0, &root, 0)?;
         walk.flush()?;
@@ -104,7 +114,11 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
         let (of, at) = (self.of, &mut self.levels[l as usize]);
-        let place = if of.share.answers_for(l, key) { Place::Mine } else { of.share.place(l, key) };
+        let place = if of.share.answers_for(l, key) {
+            Place::Mine
+        } else {
+            of.share.place(l, key)
+        };
         let split = at.split.get(key) & exists;
         let crossing = at.crossing.get(key) | crossing;
         let deleted = at.deleted.get(key);
@@ -123,7 +137,14 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         if place != Place::Mine {
             leaves = 0;
         }
-        Loaded { key, leaves, split, crossing, inside, place }
+        Loaded {
+            key,
+            leaves,
+            split,
+            crossing,
+            inside,
+            place,
+        }
     }
 
     /// Emits eight siblings and all that is below them.
@@ -135,10 +156,20 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         if split == 0 {
             self.count(l, leaves, crossing, inside);
             self.put(l, brick.key << 3 | j, leaves, crossing, inside);
-            return if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) };
+            return if self.buffer.len() >= CHUNK {
+                self.flush()
+            } else {
+                Ok(())
+            };
         }
         let below = |sides: u8| brick::children(sides & split);
-        let child = self.load(l + 1, brick.key << 3 | j, brick::children(split), below(crossing), below(inside));
+        let child = self.load(
+            l + 1,
+            brick.key << 3 | j,
+            brick::children(split),
+            below(crossing),
+            below(inside),
+        );
         if matches!(child.place, Place::Remote(_)) {
             self.count(l, leaves, crossing, inside);
             self.put(l, brick.key << 3 | j, leaves, crossing, inside);
@@ -172,14 +203,21 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         let step = start57(l, 1) << 7;
         let side = |o: u32| u64::from(crossing >> o & 1) << 1 | u64::from(inside >> o & 1);
         if leaves == 0xff {
-            self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| base + o as u64 * step | side(o as u32)));
+            self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| {
+                (base + o as u64 * step) | side(o as u32)
+            }));
         } else {
-            self.buffer.extend(ones(u64::from(leaves)).map(|o| base + u64::from(o) * step | side(o)));
+            self.buffer
+                .extend(ones(u64::from(leaves)).map(|o| (base + u64::from(o) * step) | side(o)));
         }
     }
 
     fn flush(&mut self) -> Result<(), E> {
-        let result = if self.buffer.is_empty() { Ok(()) } else { (self.sink)(&self.buffer) };
+        let result = if self.buffer.is_empty() {
+            Ok(())
+        } else {
+            (self.sink)(&self.buffer)
+        };
         self.buffer.clear();
         result
     }

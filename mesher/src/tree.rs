@@ -34,13 +34,19 @@ pub struct Tree {
 
 impl Default for Tree {
     fn default() -> Self {
-        Self { split: per_level(), crossing: per_level() }
+        Self {
+            split: per_level(),
+            crossing: per_level(),
+        }
     }
 }
 
 impl Tree {
     /// The octants of level `l` that exist, brick by brick in Morton order.
-    pub fn exists(split: &[BrickSet], l: Level) -> Box<dyn Iterator<Item = crate::brick::Brick> + '_> {
+    pub fn exists(
+        split: &[BrickSet],
+        l: Level,
+    ) -> Box<dyn Iterator<Item = crate::brick::Brick> + '_> {
         if l == 0 {
             Box::new(std::iter::once(crate::brick::Brick { key: 0, bits: 1 }))
         } else {
@@ -50,7 +56,10 @@ impl Tree {
 
     /// The deepest level at which something is split, plus one; 0 for a lone root.
     pub fn depth(&self) -> Level {
-        (0..LEVELS).rev().find(|&l| !self.split[l].is_empty()).map_or(0, |l| l as Level + 1)
+        (0..LEVELS)
+            .rev()
+            .find(|&l| !self.split[l].is_empty())
+            .map_or(0, |l| l as Level + 1)
     }
 
     /// Checks the invariants of a whole tree (on one rank).
@@ -64,12 +73,24 @@ impl Tree {
             for b in Self::exists(&self.split, l as Level) {
                 let (s, c) = (split.get(b.key), crossing.get(b.key));
                 assert_eq!(s & !b.bits, 0, "level {l}: split octants must exist");
-                assert_eq!(c & (!b.bits | s), 0, "level {l}: crossing octants must be leaves");
+                assert_eq!(
+                    c & (!b.bits | s),
+                    0,
+                    "level {l}: crossing octants must be leaves"
+                );
                 splits += u64::from(s.count_ones());
                 crossings += u64::from(c.count_ones());
             }
-            assert_eq!(splits, self.split[l].count(), "level {l}: a split octant has no parent");
-            assert_eq!(crossings, self.crossing[l].count(), "level {l}: a crossing leaf has no parent");
+            assert_eq!(
+                splits,
+                self.split[l].count(),
+                "level {l}: a split octant has no parent"
+            );
+            assert_eq!(
+                crossings,
+                self.crossing[l].count(),
+                "level {l}: a crossing leaf has no parent"
+            );
         }
     }
 }

@@ -43,7 +43,9 @@ impl Home {
             return Some(Self(0));
         }
         let drop = 64 - differ.leading_zeros();
-        Some(Self(morton(low.map(|p| p >> drop << drop)) << 5 | u64::from(LEVEL_MAX - drop)))
+        Some(Self(
+            morton(low.map(|p| p >> drop << drop)) << 5 | u64::from(LEVEL_MAX - drop),
+        ))
     }
 
     /// Level of the home.
@@ -76,9 +78,17 @@ impl Filed {
     /// Files facets; those that miss the root are dropped.
     pub fn new(facets: &[Facet]) -> Self {
         let mut order: Vec<(Home, u32)> = Vec::with_capacity(facets.len());
-        order.extend(facets.iter().zip(0..).filter_map(|(f, i)| Some((Home::of(f)?, i))));
+        order.extend(
+            facets
+                .iter()
+                .zip(0..)
+                .filter_map(|(f, i)| Some((Home::of(f)?, i))),
+        );
         order.sort_unstable_by_key(|o| o.0);
-        Self { homes: order.iter().map(|o| o.0).collect(), facets: order.iter().map(|o| facets[o.1 as usize]).collect() }
+        Self {
+            homes: order.iter().map(|o| o.0).collect(),
+            facets: order.iter().map(|o| facets[o.1 as usize]).collect(),
+        }
     }
 
     /// The facets at home in an octant (given by the range of level-19 codes) or deeper.
@@ -86,7 +96,8 @@ impl Filed {
         let at = |start| self.homes.partition_point(|h| *h < Home::first_in(start));
         let range = at(start57(l, code))..at(start57(l, code + 1));
         // Coarser octants with the same corner sort first; the facets at home there are not residents.
-        let skip = self.homes[range.clone()].partition_point(|h| h.start() == start57(l, code) && h.level() < l);
+        let skip = self.homes[range.clone()]
+            .partition_point(|h| h.start() == start57(l, code) && h.level() < l);
         range.start + skip..range.end
     }
 }
@@ -164,7 +175,9 @@ impl Voxeliser<'_> {
             let from = begins.partition_point(|&b| b < home.start());
             let inside = begins[from..].partition_point(|&b| b < end);
             for s in from..from + inside {
-                if starts[s].level > home.level() && reaches(&self.filed.facets[i as usize], &starts[s]) {
+                if starts[s].level > home.level()
+                    && reaches(&self.filed.facets[i as usize], &starts[s])
+                {
                     lists[s].push(i);
                 }
             }
@@ -177,7 +190,10 @@ impl Voxeliser<'_> {
         let residents = self.filed.residents(m, code);
         let begin = self.lists.len();
         self.lists.extend(straddlers);
-        let load = Load { residents, straddlers: begin..self.lists.len() };
+        let load = Load {
+            residents,
+            straddlers: begin..self.lists.len(),
+        };
         // Tests fall on levels with the parity of the surface level, so that one falls on it.
         let (l, key, allowed) = match (m, (self.surface ^ m) & 1) {
             (0, odd) => (odd, 0, brick::valid(odd)),
@@ -194,21 +210,42 @@ impl Voxeliser<'_> {
         let at = if l < 2 { [0; 3] } else { corner(l - 2, key) };
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
-        let crossing = (self.test(&load, l, at) | self.settle(&load.residents, l, at, &mut runs)) & allowed;
-        let near: Vec<ExtentBox> = boxes.iter().filter(|b| b.level >= l && box_mask(b, at, l) != 0).copied().collect();
-        let asked = |least: Level| near.iter().filter(|b| b.level > least).map(|b| box_mask(b, at, l)).fold(0, |m, b| m | b) & allowed;
+        let crossing =
+            (self.test(&load, l, at) | self.settle(&load.residents, l, at, &mut runs)) & allowed;
+        let near: Vec<ExtentBox> = boxes
+            .iter()
+            .filter(|b| b.level >= l && box_mask(b, at, l) != 0)
+            .copied()
+            .collect();
+        let asked = |least: Level| {
+            near.iter()
+                .filter(|b| b.level > least)
+                .map(|b| box_mask(b, at, l))
+                .fold(0, |m, b| m | b)
+                & allowed
+        };
         let split = if l < self.surface { crossing } else { 0 } | asked(l);
-        let exists = if l == 0 { 1 } else { self.level_above(l, key, crossing, asked(l - 1)) };
+        let exists = if l == 0 {
+            1
+        } else {
+            self.level_above(l, key, crossing, asked(l - 1))
+        };
         self.tree.split[l as usize].push(key, split);
         if l >= self.surface {
             self.tree.crossing[l as usize].push(key, crossing & exists & !split);
         }
         for bit in ones(split) {
             let begin = self.lists.len();
-            let reach = self.pairs[first_pair..].iter().filter(|p| p.1 >> bit & 1 == 1).map(|p| p.0);
+            let reach = self.pairs[first_pair..]
+                .iter()
+                .filter(|p| p.1 >> bit & 1 == 1)
+                .map(|p| p.0);
             self.lists.extend(reach);
             let (from, to) = runs[bit as usize];
-            let load = Load { residents: from as usize..to as usize, straddlers: begin..self.lists.len() };
+            let load = Load {
+                residents: from as usize..to as usize,
+                straddlers: begin..self.lists.len(),
+            };
             self.brick(l + 2, key << 6 | u64::from(bit), load, &near, u64::MAX);
             self.lists.truncate(begin);
         }
@@ -243,7 +280,13 @@ impl Voxeliser<'_> {
     }
 
     /// Files the facets at home in the brick under its octants, and tests those at home above them.
-    fn settle(&mut self, residents: &Range<usize>, l: Level, at: [i64; 3], runs: &mut [(u32, u32); 64]) -> u64 {
+    fn settle(
+        &mut self,
+        residents: &Range<usize>,
+        l: Level,
+        at: [i64; 3],
+        runs: &mut [(u32, u32); 64],
+    ) -> u64 {
         let mut crossing = 0;
         let mut i = residents.start;
         while i < residents.end {

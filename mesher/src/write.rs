@@ -34,7 +34,10 @@ pub struct OutDir {
 }
 
 fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
-    Error::output(format!("{}: {e}: nothing was written there; choose another --out or make room", path.display()))
+    Error::output(format!(
+        "{}: {e}: nothing was written there; choose another --out or make room",
+        path.display()
+    ))
 }
 
 impl OutDir {
@@ -47,11 +50,17 @@ impl OutDir {
                 }
                 // Found out now rather than after the meshing.
                 NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), made: false })
+                Ok(Self {
+                    path: path.to_owned(),
+                    made: false,
+                })
             }
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 std::fs::create_dir(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), made: true })
+                Ok(Self {
+                    path: path.to_owned(),
+                    made: true,
+                })
             }
             Err(e) => Err(output(path, &e)),
         }
@@ -59,7 +68,10 @@ impl OutDir {
 
     /// The same directory as another rank sees it.
     pub fn join(path: &Path) -> Self {
-        Self { path: path.to_owned(), made: false }
+        Self {
+            path: path.to_owned(),
+            made: false,
+        }
     }
 
     /// Starts this rank's part.
@@ -67,10 +79,19 @@ impl OutDir {
         let file = NamedTempFile::new_in(&self.path).map_err(|e| output(&self.path, &e))?;
         let (file, temporary) = file.into_parts();
         let begin = || -> io::Result<_> {
-            npyz::WriteOptions::new().default_dtype().writer(BufWriter::with_capacity(1 << 20, file)).begin_1d()
+            npyz::WriteOptions::new()
+                .default_dtype()
+                .writer(BufWriter::with_capacity(1 << 20, file))
+                .begin_1d()
         };
         let writer = begin().map_err(|e| output(&self.path, &e))?;
-        Ok(Part { path: self.path.join(part_name(rank)), writer, temporary, digests: Digests::default(), leaves: 0 })
+        Ok(Part {
+            path: self.path.join(part_name(rank)),
+            writer,
+            temporary,
+            digests: Digests::default(),
+            leaves: 0,
+        })
     }
 
     /// Removes what was written, after an error on any rank.
@@ -81,7 +102,11 @@ impl OutDir {
         }
         if self.made {
             // The other ranks' parts may still be there; they are the mesher's too.
-            for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
+            for entry in std::fs::read_dir(&self.path)
+                .into_iter()
+                .flatten()
+                .flatten()
+            {
                 let name = entry.file_name();
                 let name = name.to_string_lossy();
                 if name.starts_with("leaves-") || name.starts_with(".tmp") || name == MANIFEST {
@@ -98,7 +123,11 @@ impl OutDir {
             let mut file = NamedTempFile::new_in(&self.path)?;
             serde_json::to_writer_pretty(&mut file, manifest)?;
             file.write_all(b"\n")?;
-            publish(file.as_file(), || file.path().to_owned(), &self.path.join(MANIFEST))?;
+            publish(
+                file.as_file(),
+                || file.path().to_owned(),
+                &self.path.join(MANIFEST),
+            )?;
             let _ = file.into_temp_path().keep();
             File::open(&self.path)?.sync_all()
         };
@@ -137,12 +166,20 @@ impl Part {
     pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
         self.digests.add(words);
         self.leaves += words.len() as u64;
-        self.writer.extend(words.iter().copied()).map_err(|e| output(&self.path, &e))
+        self.writer
+            .extend(words.iter().copied())
+            .map_err(|e| output(&self.path, &e))
     }
 
     /// Completes the file and gives it its name.
     pub fn finish(self) -> Result<Written, Error> {
-        let Self { path, writer, temporary, digests, leaves } = self;
+        let Self {
+            path,
+            writer,
+            temporary,
+            digests,
+            leaves,
+        } = self;
         let close = || -> io::Result<()> {
             writer.finish()?;
             let file = File::options().write(true).open(&temporary)?;
@@ -222,7 +259,10 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     let mut parts = Vec::new();
     for theirs in comm.all_gather(&words) {
         parts.push([theirs[0], theirs[1], theirs[2]]);
-        let octants: Vec<u128> = theirs[3..].chunks_exact(2).map(|w| u128::from(w[0]) << 64 | u128::from(w[1])).collect();
+        let octants: Vec<u128> = theirs[3..]
+            .chunks_exact(2)
+            .map(|w| u128::from(w[0]) << 64 | u128::from(w[1]))
+            .collect();
         debug_assert_eq!(octants.len(), OCTANTS);
         digests.merge(&octants);
     }
@@ -231,7 +271,14 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
 
 impl Manifest {
     /// The manifest of a mesh with these leaves, digests and parts.
-    pub fn new(rules: &Rules, base: bool, counts: &Counts, ambiguous: Option<Ambiguous>, digests: &Digests, parts: &[PartWords]) -> Self {
+    pub fn new(
+        rules: &Rules,
+        base: bool,
+        counts: &Counts,
+        ambiguous: Option<Ambiguous>,
+        digests: &Digests,
+        parts: &[PartWords],
+    ) -> Self {
         let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
         let entry = |(i, p): (usize, &PartWords)| PartEntry {
             file: part_name(i),
@@ -242,15 +289,33 @@ impl Manifest {
             schema: "octree-leaf-set/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
             tree: if base { "base" } else { "final" },
-            root: RootEntry { origin: rules.root.origin, edge: rules.root.edge },
+            root: RootEntry {
+                origin: rules.root.origin,
+                edge: rules.root.edge,
+            },
             level_surface: rules.level_surface,
             layer_cells_min: rules.layer_cells_min,
             keep: rules.keep,
             keep_crossing: rules.keep_crossing,
-            boxes: rules.boxes.iter().map(|b| BoxEntry { min: b.min, max: b.max, level: b.level }).collect(),
+            boxes: rules
+                .boxes
+                .iter()
+                .map(|b| BoxEntry {
+                    min: b.min,
+                    max: b.max,
+                    level: b.level,
+                })
+                .collect(),
             leaves: counts.total(),
-            leaves_by_level: counts.by_level[..=LEVEL_MAX as usize].iter().map(|l| l.iter().sum()).collect(),
-            leaves_by_side: SideEntry { outside: side(0), inside: side(1), crossing: side(2) },
+            leaves_by_level: counts.by_level[..=LEVEL_MAX as usize]
+                .iter()
+                .map(|l| l.iter().sum())
+                .collect(),
+            leaves_by_side: SideEntry {
+                outside: side(0),
+                inside: side(1),
+                crossing: side(2),
+            },
             components_ambiguous: AmbiguousEntry {
                 count: ambiguous.map_or(0, |a| a.count),
                 example: ambiguous.map(|a| rules.root.locate(a.example)),

@@ -1,15 +1,10 @@
-//! From a solid given by a distance function to one closed surface of triangles.
-//!
-//! Space is a grid of cubes, each cut into the six tetrahedra around its diagonal. Every edge of that
-//! grid whose ends lie on different sides of the surface holds one vertex, found along the edge, and the
-//! tetrahedra join the vertices to triangles. Tetrahedra have no ambiguous cases, so the result is a
-//! closed manifold whatever the function: each triangle's edge lies in a face that two tetrahedra share.
-
-use std::collections::HashMap;
+//! From a solid given by a distance function to a surface of so many triangles: which grid it takes.
 
 use super::solids::Vec3;
-use crate::mesh::EdgeHasher;
 use crate::{Generator, GeneratorError, Mesh};
+use grid::Drawing;
+
+mod grid;
 
 /// A solid that can be drawn at any grid spacing.
 pub(super) trait Body {
@@ -25,15 +20,6 @@ pub(super) trait Body {
     /// Negative inside; differs between two points by no more than they are apart.
     fn distance(&self, p: Vec3) -> f64;
 }
-
-/// A part thinner than a cell's diagonal could slip between the grid's points.
-const RADIUS_LEAST: f64 = 0.95;
-
-/// Cells around the bounds.
-const ROOM: f64 = 3.0;
-
-/// Vertices keep this part of an edge away from its ends, so that no triangle degenerates.
-const MARGIN: f64 = 0.05;
 
 /// What part of the facets asked for the grid should give; splitting edges gives the rest.
 const AIM: f64 = 0.97;
@@ -84,232 +70,9 @@ fn fit<B: Body>(facets: usize) -> Mesh {
     unreachable!("a coarse enough grid has few enough facets")
 }
 
-/// Cells along an edge of a block that is sampled as a whole.
-const BLOCK: usize = 4;
-
-struct Drawing<B> {
-    body: B,
-    low: Vec3,
-    spacing: f64,
-    mesh: Mesh,
-    /// Vertices by grid edge: its lower end, 20 bits a coordinate, and its direction, 3 bits.
-    numbers: HashMap<u64, u32, EdgeHasher>,
-}
-
-/// A grid point.
-type Place = [usize; 3];
-
-impl<B: Body> Drawing<B> {
-    fn of(spacing: f64) -> Mesh {
-        // Thickening reaches a radius beyond the bounds, and a block's corner may lie on them.
-        let room = ROOM * spacing;
-        let [low, high] = B::BOUNDS;
-        let widest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max) + 2.0 * room;
-        let mut cells = BLOCK;
-        while (cells as f64) * spacing < widest {
-            cells *= 2;
-        }
-        assert!(cells < 1 << 20, "grid places have 20 bits");
-        let body = B::new(spacing * RADIUS_LEAST);
-        let mut drawing = Self {
-            body,
-            low: low.map(|x| x - room),
-            spacing,
-            mesh: Mesh::default(),
-            numbers: HashMap::default(),
-        };
-        drawing.visit([0; 3], cells);
-        drawing.mesh
-    }
-
-    fn position(&self, place: Place) -> Vec3 {
-        std::array::from_fn(|a| self.low[a] + place[a] as f64 * self.spacing)
-    }
-
-    /// Goes down to the blocks that may hold surface: those whose centre is no farther from it than
-    /// their corners are.
-    fn visit(&mut self, place: Place, cells: usize) {
-        let half = cells as f64 * 0.5 * self.spacing;
-        let centre = self.position(place).map(|x| x + half);
-        let reach = half * 1.7321;
-        if self.body.distance(centre).abs() > reach {
-            return;
-        }
-        if cells == BLOCK {
-            return self.block(place);
-        }
-        for octant in 0..8 {
-            let part = cells / 2;
-            self.visit(
-                std::array::from_fn(|a| place[a] + part * (octant >> a & 1)),
-                part,
-            );
-        }
-    }
-
-    fn block(&mut self, place: Place) {
-        const POINTS: usize = BLOCK + 1;
-        let mut values = [0.0; POINTS * POINTS * POINTS];
-        let index = |[x, y, z]: Place| (z * POINTS + y) * POINTS + x;
-        for z in 0..POINTS {
-            for y in 0..POINTS {
-                for x in 0..POINTS {
-                    let at = [place[0] + x, place[1] + y, place[2] + z];
-                    values[index([x, y, z])] = self.body.distance(self.position(at));
-                }
-            }
-        }
-        for z in 0..BLOCK {
-            for y in 0..BLOCK {
-                for x in 0..BLOCK {
-                    let corners: [f64; 8] = std::array::from_fn(|mask| {
-                        values[index([x + (mask & 1), y + (mask >> 1 & 1), z + (mask >> 2)])]
-                    });
-                    let inside = corners.iter().filter(|&&value| value < 0.0).count();
-                    if inside % 8 != 0 {
-                        self.cube([place[0] + x, place[1] + y, place[2] + z], &corners);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Corners are numbered by the bits of their offset; a tetrahedron is a way from 0 to 7 that sets
-    /// one bit after the other.
-    fn cube(&mut self, place: Place, corners: &[f64; 8]) {
-        for (first, second, is_even) in [
-            (1, 2, true),
-            (2, 4, true),
-            (4, 1, true),
-            (2, 1, false),
-            (4, 2, false),
-            (1, 4, false),
-        ] {
-            self.tetrahedron(place, corners, [0, first, first | second, 7], is_even);
-        }
-    }
-
-    /// `is_even` says whether the four corners, in this order, are positively oriented.
-    fn tetrahedron(&mut self, place: Place, values: &[f64; 8], masks: [usize; 4], is_even: bool) {
-        let inside = masks.map(|mask| values[mask] < 0.0);
-        // An even reordering that puts the inside corners first leaves the orientation as it is.
-        let Some((order, count)) = inside_first(inside) else {
-            return;
-        };
-        let [a, b, c, d] = order.map(|i| masks[i]);
-        let mut cut = |from: usize, to: usize| self.vertex(place, values, from, to);
-        let corners = match count {
-            1 => [cut(a, b), cut(a, c), cut(a, d), 0],
-            2 => [cut(a, c), cut(a, d), cut(b, d), cut(b, c)],
-            _ => [cut(a, d), cut(b, d), cut(c, d), 0],
-        };
-        let [p, q, r, s] = corners;
-        let mut triangle = |p, q, r| {
-            self.mesh
-                .triangles
-                .push(if is_even { [p, q, r] } else { [p, r, q] });
-        };
-        triangle(p, q, r);
-        if count == 2 {
-            triangle(p, r, s);
-        }
-    }
-
-    /// The vertex on the edge between two corners of a cube, one of which is part of the other's bits.
-    fn vertex(&mut self, place: Place, values: &[f64; 8], from: usize, to: usize) -> u32 {
-        let (low, high) = (from & to, from | to);
-        let start: Place = std::array::from_fn(|a| place[a] + (low >> a & 1));
-        let direction = high ^ low;
-        let key = (start[2] as u64) << 43 | (start[1] as u64) << 23 | (start[0] as u64) << 3;
-        let key = key | direction as u64;
-        if let Some(&number) = self.numbers.get(&key) {
-            return number;
-        }
-        let end = std::array::from_fn(|a| start[a] + (direction >> a & 1));
-        let (p, q) = (self.position(start), self.position(end));
-        let at = self
-            .crossing(p, q, values[low], values[high])
-            .clamp(MARGIN, 1.0 - MARGIN);
-        let number = self
-            .mesh
-            .add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
-        self.numbers.insert(key, number);
-        number
-    }
-
-    /// Where between two points of different sides the distance is zero, by the Illinois variant of
-    /// false position.
-    fn crossing(&self, p: Vec3, q: Vec3, at_p: f64, at_q: f64) -> f64 {
-        let (mut low, mut high) = ((0.0, at_p), (1.0, at_q));
-        let mut at = 0.5;
-        for _ in 0..3 {
-            at = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let value = self
-                .body
-                .distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
-            if (value < 0.0) == (low.1 < 0.0) {
-                low = (at, value);
-                high.1 *= 0.5;
-            } else {
-                high = (at, value);
-                low.1 *= 0.5;
-            }
-        }
-        at
-    }
-}
-
-/// An even permutation of four corners that puts the inside ones first, and their number, 1 to 3.
-fn inside_first(inside: [bool; 4]) -> Option<([usize; 4], usize)> {
-    let mask = inside
-        .iter()
-        .enumerate()
-        .fold(0, |mask, (i, &is)| mask | usize::from(is) << i);
-    let order = match mask {
-        0b0001 => [0, 1, 2, 3],
-        0b0010 => [1, 2, 0, 3],
-        0b0100 => [2, 0, 1, 3],
-        0b1000 => [3, 0, 2, 1],
-        0b0011 => [0, 1, 2, 3],
-        0b0101 => [0, 2, 3, 1],
-        0b1001 => [0, 3, 1, 2],
-        0b0110 => [1, 2, 0, 3],
-        0b1010 => [1, 3, 2, 0],
-        0b1100 => [2, 3, 0, 1],
-        0b0111 => [0, 1, 2, 3],
-        0b1011 => [0, 3, 1, 2],
-        0b1101 => [0, 2, 3, 1],
-        0b1110 => [1, 3, 2, 0],
-        _ => return None,
-    };
-    Some((order, mask.count_ones() as usize))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn inside_corners_come_first_by_an_even_permutation() {
-        for mask in 1..15_usize {
-            let inside: [bool; 4] = std::array::from_fn(|i| mask >> i & 1 == 1);
-            let (order, count) = inside_first(inside).unwrap();
-            assert_eq!(count, mask.count_ones() as usize);
-            for (place, &corner) in order.iter().enumerate() {
-                assert_eq!(inside[corner], place < count, "mask {mask:04b}");
-            }
-            let mut seen = order;
-            seen.sort_unstable();
-            assert_eq!(seen, [0, 1, 2, 3]);
-            let inversions = (0..4)
-                .flat_map(|i| (i + 1..4).map(move |j| (i, j)))
-                .filter(|&(i, j)| order[i] > order[j])
-                .count();
-            assert_eq!(inversions % 2, 0, "mask {mask:04b}");
-        }
-        assert_eq!(inside_first([false; 4]), None);
-        assert_eq!(inside_first([true; 4]), None);
-    }
 
     struct Ball;
 

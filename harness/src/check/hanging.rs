@@ -1,7 +1,7 @@
 //! Hanging nodes: corners of leaves that lie inside an edge of a coarser leaf.
 
 use crate::octant::Octant;
-use crate::tree::{Handle, Hood, Kind, Tree, walk};
+use crate::tree::{GHOST, Handle, Hood, Kind, Tree, walk};
 
 /// Leaf edges by the hanging nodes on them.
 #[derive(Clone, Debug, Default)]
@@ -15,7 +15,11 @@ pub struct Counts {
 /// Counts over all edges of all leaves.
 pub fn count(tree: &Tree) -> Counts {
     let mut counts = Counts::default();
-    let mut leaf = |hood: &Hood, _: Kind| {
+    let mut leaf = |hood: &Hood, kind: Kind| {
+        if kind == GHOST {
+            // It may have been refined before it was deleted.
+            return;
+        }
         for axis in 0..3 {
             for corner in 0..4 {
                 let nodes = on_edge(tree, hood, axis, [corner & 1, corner >> 1]);

@@ -43,12 +43,18 @@ pub trait Comm {
 
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
-        self.all_gather(&[v]).iter().fold(0, |s, w| s.wrapping_add(w[0]))
+        self.all_gather(&[v])
+            .iter()
+            .fold(0, |s, w| s.wrapping_add(w[0]))
     }
 
     /// The greatest value of any rank. Collective.
     fn max(&self, v: u64) -> u64 {
-        self.all_gather(&[v]).iter().map(|w| w[0]).max().unwrap_or(v)
+        self.all_gather(&[v])
+            .iter()
+            .map(|w| w[0])
+            .max()
+            .unwrap_or(v)
     }
 
     /// Makes one rank's error every rank's: all return the error of the lowest rank that has one.
@@ -90,7 +96,11 @@ fn pack(e: &Error) -> Vec<u64> {
 }
 
 fn unpack(words: &[u64]) -> Error {
-    let bytes: Vec<u8> = words[2..].iter().flat_map(|w| w.to_le_bytes()).take(words[1] as usize).collect();
+    let bytes: Vec<u8> = words[2..]
+        .iter()
+        .flat_map(|w| w.to_le_bytes())
+        .take(words[1] as usize)
+        .collect();
     let text = String::from_utf8_lossy(&bytes).into_owned();
     match words[0] {
         2 => Error::Input(text),
@@ -106,7 +116,10 @@ pub(crate) struct Meter(Cell<Traffic>);
 impl Meter {
     pub(crate) fn count(&self, messages: u64, words: u64) {
         let t = self.0.get();
-        self.0.set(Traffic { messages: t.messages + messages, bytes: t.bytes + 8 * words });
+        self.0.set(Traffic {
+            messages: t.messages + messages,
+            bytes: t.bytes + 8 * words,
+        });
     }
 
     pub(crate) fn get(&self) -> Traffic {
@@ -132,7 +145,9 @@ impl Comm for Solo {
     }
 
     fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
-        to.into_iter().filter(|(_, words)| !words.is_empty()).collect()
+        to.into_iter()
+            .filter(|(_, words)| !words.is_empty())
+            .collect()
     }
 
     fn traffic(&self) -> Traffic {
@@ -146,7 +161,12 @@ mod tests {
 
     #[test]
     fn errors_survive_the_journey() {
-        for e in [Error::input("häßlich: 'x'"), Error::output("no space"), Error::Interrupted, Error::input("12345678")] {
+        for e in [
+            Error::input("häßlich: 'x'"),
+            Error::output("no space"),
+            Error::Interrupted,
+            Error::input("12345678"),
+        ] {
             assert_eq!(unpack(&pack(&e)), e);
         }
     }

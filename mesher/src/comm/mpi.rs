@@ -26,7 +26,11 @@ impl Mpi {
     /// If MPI was initialised before.
     pub fn start() -> Self {
         let universe = mpi::initialize().expect("MPI is initialised once");
-        Self { world: universe.world(), meter: Meter::default(), _universe: universe }
+        Self {
+            world: universe.world(),
+            meter: Meter::default(),
+            _universe: universe,
+        }
     }
 }
 
@@ -56,24 +60,35 @@ impl Comm for Mpi {
 
     fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
         let mut counts = vec![0u64; self.size()];
-        self.world.all_gather_into(&(mine.len() as u64), &mut counts[..]);
+        self.world
+            .all_gather_into(&(mine.len() as u64), &mut counts[..]);
         let longest = counts.iter().copied().max().unwrap_or(0) as usize;
-        let mut all: Vec<Vec<u64>> = counts.iter().map(|&c| Vec::with_capacity(c as usize)).collect();
+        let mut all: Vec<Vec<u64>> = counts
+            .iter()
+            .map(|&c| Vec::with_capacity(c as usize))
+            .collect();
         // The sum over ranks is what is counted in i32.
         let step = (CHUNK / self.size()).max(1);
         for at in (0..longest).step_by(step) {
             let part = |len: usize| len.saturating_sub(at).min(step);
             let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
-            let starts: Vec<i32> = lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
+            let starts: Vec<i32> = lengths
+                .iter()
+                .scan(0, |s, &n| Some(std::mem::replace(s, *s + n)))
+                .collect();
             let mut buffer = vec![0u64; lengths.iter().map(|&n| n as usize).sum()];
             let mine = &mine[at.min(mine.len())..][..part(mine.len())];
-            let mut target = mpi::datatype::PartitionMut::new(&mut buffer[..], &lengths[..], &starts[..]);
+            let mut target =
+                mpi::datatype::PartitionMut::new(&mut buffer[..], &lengths[..], &starts[..]);
             self.world.all_gather_varcount_into(mine, &mut target);
             for ((words, &start), &n) in all.iter_mut().zip(&starts).zip(&lengths) {
                 words.extend_from_slice(&buffer[start as usize..(start + n) as usize]);
             }
         }
-        self.meter.count(self.size() as u64 - 1, mine.len() as u64 * (self.size() as u64 - 1));
+        self.meter.count(
+            self.size() as u64 - 1,
+            mine.len() as u64 * (self.size() as u64 - 1),
+        );
         all
     }
 
@@ -83,19 +98,30 @@ impl Comm for Mpi {
         to.iter().for_each(|m| counts[m.0] = m.1.len() as u64);
         let mut coming = vec![0u64; self.size()];
         self.world.all_to_all_into(&counts[..], &mut coming[..]);
-        let mut received: Vec<(usize, Vec<u64>)> =
-            (0..self.size()).filter(|&r| r != me && coming[r] > 0).map(|r| (r, vec![0; coming[r] as usize])).collect();
+        let mut received: Vec<(usize, Vec<u64>)> = (0..self.size())
+            .filter(|&r| r != me && coming[r] > 0)
+            .map(|r| (r, vec![0; coming[r] as usize]))
+            .collect();
         mpi::request::scope(|scope| {
             let mut requests = Vec::new();
             for (from, words) in &mut received {
                 let process = self.world.process_at_rank(*from as i32);
-                requests.extend(words.chunks_mut(CHUNK).map(|c| process.immediate_receive_into(scope, c)));
+                requests.extend(
+                    words
+                        .chunks_mut(CHUNK)
+                        .map(|c| process.immediate_receive_into(scope, c)),
+                );
             }
             let mut sends = Vec::new();
             for (to, words) in to.iter().filter(|m| m.0 != me) {
                 let process = self.world.process_at_rank(*to as i32);
-                sends.extend(words.chunks(CHUNK).map(|c| process.immediate_send(scope, c)));
-                self.meter.count(u64::from(!words.is_empty()), words.len() as u64);
+                sends.extend(
+                    words
+                        .chunks(CHUNK)
+                        .map(|c| process.immediate_send(scope, c)),
+                );
+                self.meter
+                    .count(u64::from(!words.is_empty()), words.len() as u64);
             }
             requests.into_iter().for_each(|r| _ = r.wait());
             sends.into_iter().for_each(|r| _ = r.wait());

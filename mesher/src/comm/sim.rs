@@ -9,6 +9,9 @@ use std::any::Any;
 use std::cell::Cell;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 
+/// Words with the rank that they are for or from.
+type Messages = Vec<(usize, Vec<u64>)>;
+
 /// One rank of a simulated group.
 pub struct Sim {
     rank: usize,
@@ -37,7 +40,7 @@ struct State {
     /// What each rank has put into the call under way: its number, kind, and words by receiver.
     posted: Vec<Option<Post>>,
     /// What each rank takes out of it.
-    inbox: Vec<Option<Vec<(usize, Vec<u64>)>>>,
+    inbox: Vec<Option<Messages>>,
     random: u64,
     broken: bool,
 }
@@ -45,7 +48,7 @@ struct State {
 struct Post {
     call: u64,
     gather: bool,
-    words: Vec<(usize, Vec<u64>)>,
+    words: Messages,
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -73,7 +76,12 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
                 std::thread::Builder::new()
                     .stack_size(16 << 20)
                     .spawn_scoped(scope, move || {
-                        let sim = Sim { rank, world: world.clone(), meter: Meter::default(), calls: Cell::new(0) };
+                        let sim = Sim {
+                            rank,
+                            world: world.clone(),
+                            meter: Meter::default(),
+                            calls: Cell::new(0),
+                        };
                         sim.wait_for_turn();
                         let guard = Leaving(&sim);
                         let result = body(&sim);
@@ -86,11 +94,17 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
         threads.into_iter().map(|t| t.join()).collect()
     });
     let told = |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == ENDED);
-    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !told(p))) {
+    if let Some(at) = results
+        .iter()
+        .position(|r| r.as_ref().is_err_and(|p| !told(p)))
+    {
         let panic = results.into_iter().nth(at).and_then(Result::err);
         std::panic::resume_unwind(panic.expect("position found an error"));
     }
-    results.into_iter().map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
+    results
+        .into_iter()
+        .map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p)))
+        .collect()
 }
 
 const ENDED: &str = "ended because another simulated rank panicked";
@@ -122,9 +136,14 @@ impl State {
             return;
         }
         let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
-        let same = posts.iter().all(|p| p.call == posts[0].call && p.gather == posts[0].gather);
-        assert!(same, "ranks must make the same collective calls in the same order");
-        let mut inbox: Vec<Vec<(usize, Vec<u64>)>> = vec![Vec::new(); posts.len()];
+        let same = posts
+            .iter()
+            .all(|p| p.call == posts[0].call && p.gather == posts[0].gather);
+        assert!(
+            same,
+            "ranks must make the same collective calls in the same order"
+        );
+        let mut inbox: Vec<Messages> = vec![Vec::new(); posts.len()];
         for (from, post) in posts.into_iter().enumerate() {
             for (to, words) in post.words {
                 inbox[to].push((from, words));
@@ -149,7 +168,9 @@ impl Sim {
 
     /// Draws the rank that runs next.
     fn hand_on(&self, state: &mut State) {
-        let ready: Vec<usize> = (0..self.world.size).filter(|&r| state.doing[r] == Doing::Ready).collect();
+        let ready: Vec<usize> = (0..self.world.size)
+            .filter(|&r| state.doing[r] == Doing::Ready)
+            .collect();
         if !ready.is_empty() {
             state.running = ready[state.draw(ready.len())];
         } else if state.doing.contains(&Doing::Waiting) {
@@ -161,8 +182,14 @@ impl Sim {
 
     fn wait_for_turn(&self) {
         let mut state = self.lock();
-        while !(state.broken || state.running == self.rank && state.doing[self.rank] == Doing::Ready) {
-            state = self.world.turn.wait(state).unwrap_or_else(|p| p.into_inner());
+        while !(state.broken
+            || state.running == self.rank && state.doing[self.rank] == Doing::Ready)
+        {
+            state = self
+                .world
+                .turn
+                .wait(state)
+                .unwrap_or_else(|p| p.into_inner());
         }
         if state.broken {
             drop(state);
@@ -175,13 +202,19 @@ impl Sim {
         let sent = words.iter().filter(|m| m.0 != self.rank);
         sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
         let mut state = self.lock();
-        state.posted[self.rank] = Some(Post { call, gather, words });
+        state.posted[self.rank] = Some(Post {
+            call,
+            gather,
+            words,
+        });
         state.doing[self.rank] = Doing::Waiting;
         state.deliver();
         self.hand_on(&mut state);
         drop(state);
         self.wait_for_turn();
-        self.lock().inbox[self.rank].take().expect("a delivered call has an inbox for every rank")
+        self.lock().inbox[self.rank]
+            .take()
+            .expect("a delivered call has an inbox for every rank")
     }
 }
 
@@ -195,7 +228,10 @@ impl Comm for Sim {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
-        let mut all = self.call(true, (0..self.size()).map(|to| (to, mine.to_vec())).collect());
+        let mut all = self.call(
+            true,
+            (0..self.size()).map(|to| (to, mine.to_vec())).collect(),
+        );
         all.sort_unstable_by_key(|m| m.0);
         all.into_iter().map(|m| m.1).collect()
     }
@@ -217,7 +253,10 @@ mod tests {
     fn everyone_hears_everyone_whatever_the_seed() {
         for seed in 0..20 {
             let sums = run(7, seed, |c| {
-                let to = (0..c.size()).filter(|r| r % 2 == 0).map(|r| (r, vec![c.rank() as u64; 2])).collect();
+                let to = (0..c.size())
+                    .filter(|r| r % 2 == 0)
+                    .map(|r| (r, vec![c.rank() as u64; 2]))
+                    .collect();
                 let heard: u64 = c.exchange(to).iter().map(|m| m.1[0]).sum();
                 (c.sum(c.rank() as u64), heard)
             });
@@ -231,7 +270,13 @@ mod tests {
     #[test]
     fn orders_differ_by_seed_and_repeat_by_seed() {
         let order = |seed| {
-            run(6, seed, |c| c.exchange(vec![(0, vec![1])]).iter().map(|m| m.0).collect::<Vec<_>>()).swap_remove(0)
+            run(6, seed, |c| {
+                c.exchange(vec![(0, vec![1])])
+                    .iter()
+                    .map(|m| m.0)
+                    .collect::<Vec<_>>()
+            })
+            .swap_remove(0)
         };
         assert_eq!(order(3), order(3));
         assert!((0..10).any(|s| order(s) != order(3)));

@@ -51,7 +51,11 @@ impl Local {
         let mut count = 0;
         for (c, &up) in self.parent.iter().enumerate() {
             // A parent's number is never higher than its child's, so its class is known.
-            class.push(if up as usize == c { count } else { class[up as usize] });
+            class.push(if up as usize == c {
+                count
+            } else {
+                class[up as usize]
+            });
             count += u32::from(up as usize == c);
         }
         (class, count as usize)
@@ -92,10 +96,18 @@ struct Frame {
 pub fn join(nodes: &Nodes) -> Local {
     let mut w = Walk {
         nodes,
-        local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
+        local: Local {
+            parent: (0..nodes.component_count()).collect(),
+            faces: Vec::new(),
+        },
         way: Vec::new(),
     };
-    w.way.push(Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] });
+    w.way.push(Frame {
+        key: 0,
+        node: 0,
+        exists: 1,
+        across: [[Across::Nothing; 2]; 3],
+    });
     w.visit(0);
     w.local
 }
@@ -113,7 +125,9 @@ impl Walk<'_> {
         self.join_brick(l, &frame);
         let split = self.nodes.split(l, frame.node);
         for j in ones(u64::from(brick::parents(split))) {
-            let Some(child) = self.step_down(l, &frame, u64::from(j)) else { continue };
+            let Some(child) = self.step_down(l, &frame, u64::from(j)) else {
+                continue;
+            };
             self.way.push(child);
             self.visit(l + 1);
             self.way.pop();
@@ -134,7 +148,12 @@ impl Walk<'_> {
                 }
             }
         }
-        Some(Frame { key: frame.key << 3 | j, node, exists, across })
+        Some(Frame {
+            key: frame.key << 3 | j,
+            node,
+            exists,
+            across,
+        })
     }
 
     /// What lies across a face of child brick `j`.
@@ -176,16 +195,32 @@ impl Walk<'_> {
     }
 
     #[inline]
-    fn join_across(&mut self, l: Level, frame: &Frame, c: Component, faced: u64, axis: usize, up: usize) {
+    fn join_across(
+        &mut self,
+        l: Level,
+        frame: &Frame,
+        c: Component,
+        faced: u64,
+        axis: usize,
+        up: usize,
+    ) {
         let nodes = self.nodes;
-        let there = || neighbour(l - 2, frame.key, axis, up == 1).expect("a brick faces one inside the root");
+        let there = || {
+            neighbour(l - 2, frame.key, axis, up == 1).expect("a brick faces one inside the root")
+        };
         match frame.across[axis][up] {
             Across::Nothing => {}
             Across::Coarser => self.join_coarser(l, c, there(), faced, Some((axis, up))),
             Across::Remote(rank) => {
                 // What a top brick faces, the other rank sees itself.
                 if nodes.place(l, frame.node) == Place::Mine {
-                    self.local.faces.push(Face { rank, level: l, key: there(), component: c, bits: faced });
+                    self.local.faces.push(Face {
+                        rank,
+                        level: l,
+                        key: there(),
+                        component: c,
+                        bits: faced,
+                    });
                 }
             }
             Across::Here(n, exists) => {
@@ -206,7 +241,14 @@ impl Walk<'_> {
     /// Joins a component with the leaves coarser than level `l` that cover the octants `faced` of brick
     /// `key`, which is the brick on the way (`side` none) or its neighbour there.
     #[inline]
-    fn join_coarser(&mut self, l: Level, c: Component, key: u64, faced: u64, side: Option<(usize, usize)>) {
+    fn join_coarser(
+        &mut self,
+        l: Level,
+        c: Component,
+        key: u64,
+        faced: u64,
+        side: Option<(usize, usize)>,
+    ) {
         for j in ones(u64::from(brick::parents(faced))) {
             let mut code = key << 3 | u64::from(j);
             let mut m = l;

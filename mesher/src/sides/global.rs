@@ -16,13 +16,23 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 pub type Name = u64;
 
 /// Names for this rank's classes of joined components. Collective.
-pub fn names(nodes: &Nodes, faces: Vec<Face>, class: &[u32], classes: usize, comm: &dyn Comm) -> Vec<Name> {
+pub fn names(
+    nodes: &Nodes,
+    faces: Vec<Face>,
+    class: &[u32],
+    classes: usize,
+    comm: &dyn Comm,
+) -> Vec<Name> {
     let own = |class: u32| (comm.rank() as u64 + 1) << 40 | u64::from(class);
     if comm.size() == 1 {
         return (0..classes as u32).map(own).collect();
     }
     let mut pairs = across_ranks(nodes, faces, class, &own, comm);
-    pairs.extend((0..).zip(top_components(nodes)).map(|(top, c)| (top, own(class[c as usize]))));
+    pairs.extend(
+        (0..)
+            .zip(top_components(nodes))
+            .map(|(top, c)| (top, own(class[c as usize]))),
+    );
     let flat: Vec<u64> = pairs.into_iter().flat_map(|(a, b)| [a, b]).collect();
     let mut joined = Joined::default();
     for words in comm.all_gather(&flat) {
@@ -32,10 +42,18 @@ pub fn names(nodes: &Nodes, faces: Vec<Face>, class: &[u32], classes: usize, com
 }
 
 /// Pairs of names that are joined over a face between this rank's bricks and another's. Collective.
-fn across_ranks(nodes: &Nodes, faces: Vec<Face>, class: &[u32], own: &impl Fn(u32) -> Name, comm: &dyn Comm) -> BTreeSet<(Name, Name)> {
+fn across_ranks(
+    nodes: &Nodes,
+    faces: Vec<Face>,
+    class: &[u32],
+    own: &impl Fn(u32) -> Name,
+    comm: &dyn Comm,
+) -> BTreeSet<(Name, Name)> {
     let mut merged: BTreeMap<(usize, Level, u64, Name), u64> = BTreeMap::new();
     for f in faces {
-        *merged.entry((f.rank, f.level, f.key, own(class[f.component as usize]))).or_default() |= f.bits;
+        *merged
+            .entry((f.rank, f.level, f.key, own(class[f.component as usize])))
+            .or_default() |= f.bits;
     }
     let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size()];
     for ((rank, level, key, name), bits) in merged {

@@ -45,7 +45,13 @@ pub struct Ambiguous {
 
 /// Decides all sides. `facets` are this rank's share of the geometry, each facet on one rank.
 /// Collective.
-pub fn decide(tree: &Tree, share: &Ownership, facets: &[Facet], keep: Keep, comm: &dyn Comm) -> Sides {
+pub fn decide(
+    tree: &Tree,
+    share: &Ownership,
+    facets: &[Facet],
+    keep: Keep,
+    comm: &dyn Comm,
+) -> Sides {
     let nodes = nodes::Nodes::new(tree, share);
     let local = components::join(&nodes);
     let (class, classes) = local.classes();
@@ -62,7 +68,10 @@ pub fn decide(tree: &Tree, share: &Ownership, facets: &[Facet], keep: Keep, comm
     };
     for l in 0..LEVELS as Level {
         for (i, key) in nodes.keys(l) {
-            let within = nodes.components(l, i).filter(|c| inside[class[c.0 as usize] as usize]).fold(0, |w, c| w | c.1);
+            let within = nodes
+                .components(l, i)
+                .filter(|c| inside[class[c.0 as usize] as usize])
+                .fold(0, |w, c| w | c.1);
             let open = nodes.open(l, i);
             sides.inside[l as usize].push(key, if keep == Keep::All { within } else { 0 });
             sides.deleted[l as usize].push(

@@ -35,7 +35,12 @@ struct Grid {
 impl Grid {
     fn new(points: &[[i64; 3]], axis: usize) -> Self {
         let side_log2 = (points.len().max(1).ilog2() / 2).min(10);
-        let mut grid = Self { axis, side_log2, starts: vec![0; (1 << (2 * side_log2)) + 1], members: vec![0; points.len()] };
+        let mut grid = Self {
+            axis,
+            side_log2,
+            starts: vec![0; (1 << (2 * side_log2)) + 1],
+            members: vec![0; points.len()],
+        };
         for p in points {
             let s = grid.square_of(p);
             grid.starts[s + 1] += 1;
@@ -100,7 +105,9 @@ fn meets(f: &Facet, p: &[i64; 3], axis: usize) -> Option<bool> {
             return None;
         }
     }
-    let height: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(p[a] - v(0, a))).sum();
+    let height: i128 = (0..3)
+        .map(|a| i128::from(n[a]) * i128::from(p[a] - v(0, a)))
+        .sum();
     Some((height < 0) == (n[axis] > 0))
 }
 
@@ -119,8 +126,12 @@ mod tests {
                     v[(a + 2) % 3] = w;
                     v
                 };
-                out.push(Facet { v: [p(lo, lo), p(hi, lo), p(hi, hi)] });
-                out.push(Facet { v: [p(lo, lo), p(hi, hi), p(lo, hi)] });
+                out.push(Facet {
+                    v: [p(lo, lo), p(hi, lo), p(hi, hi)],
+                });
+                out.push(Facet {
+                    v: [p(lo, lo), p(hi, hi), p(lo, hi)],
+                });
             }
         }
         out
@@ -131,14 +142,26 @@ mod tests {
         let (lo, hi) = (1 << 20, 1 << 22);
         let facets = cube(lo, hi);
         let mut points = Vec::new();
-        let some = [1i64 << 19, (1 << 20) - 1, (1 << 20) + 1, 1 << 21, (1 << 22) - 1, (1 << 22) + 1, 1 << 23];
+        let some = [
+            1i64 << 19,
+            (1 << 20) - 1,
+            (1 << 20) + 1,
+            1 << 21,
+            (1 << 22) - 1,
+            (1 << 22) + 1,
+            1 << 23,
+        ];
         for x in some {
             for y in some {
                 points.extend(some.map(|z| [x, y, z]));
             }
         }
         // On the diagonal of every face, and in the planes of faces but off them.
-        points.extend([[1 << 20, 1 << 23, 1 << 21], [1 << 22, 1 << 19, 1 << 22], [1 << 20, 1 << 20, 1 << 19]]);
+        points.extend([
+            [1 << 20, 1 << 23, 1 << 21],
+            [1 << 22, 1 << 19, 1 << 22],
+            [1 << 20, 1 << 20, 1 << 19],
+        ]);
         for (p, odd) in points.iter().zip(parities(&facets, &points)) {
             let inside = p.iter().all(|c| (i64::from(lo)..i64::from(hi)).contains(c));
             assert_eq!(odd, if inside { 63 } else { 0 }, "{p:?}");

@@ -32,7 +32,13 @@ impl Candidate {
 }
 
 /// For each component of the whole tree its first leaves. Collective; the same on all ranks.
-pub fn candidates(nodes: &Nodes, class: &[u32], names: &[Name], share: &Ownership, comm: &dyn Comm) -> BTreeMap<Name, Vec<Candidate>> {
+pub fn candidates(
+    nodes: &Nodes,
+    class: &[u32],
+    names: &[Name],
+    share: &Ownership,
+    comm: &dyn Comm,
+) -> BTreeMap<Name, Vec<Candidate>> {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); names.len()];
     for l in 0..LEVELS as Level {
         for (n, key) in nodes.keys(l) {
@@ -42,15 +48,25 @@ pub fn candidates(nodes: &Nodes, class: &[u32], names: &[Name], share: &Ownershi
             for (c, bits) in nodes.components(l, n) {
                 let list = &mut first[class[c as usize] as usize];
                 let room = CANDIDATES - list.len();
-                list.extend(ones(bits).take(room).map(|bit| Candidate::new(l, key << 6 | u64::from(bit))));
+                list.extend(
+                    ones(bits)
+                        .take(room)
+                        .map(|bit| Candidate::new(l, key << 6 | u64::from(bit))),
+                );
             }
         }
     }
-    let flat: Vec<u64> = names.iter().zip(&first).flat_map(|(&n, list)| list.iter().flat_map(move |c| [n, c.0])).collect();
+    let flat: Vec<u64> = names
+        .iter()
+        .zip(&first)
+        .flat_map(|(&n, list)| list.iter().flat_map(move |c| [n, c.0]))
+        .collect();
     drop(first);
     let mut all: BTreeMap<Name, Vec<Candidate>> = BTreeMap::new();
     for words in comm.all_gather(&flat) {
-        words.chunks_exact(2).for_each(|w| all.entry(w[0]).or_default().push(Candidate(w[1])));
+        words
+            .chunks_exact(2)
+            .for_each(|w| all.entry(w[0]).or_default().push(Candidate(w[1])));
     }
     for list in all.values_mut() {
         list.sort_unstable();
@@ -70,19 +86,36 @@ pub struct Verdict {
 }
 
 /// Casts the rays, each rank against its share of the facets. Collective; the same on all ranks.
-pub fn decide(candidates: &BTreeMap<Name, Vec<Candidate>>, facets: &[Facet], comm: &dyn Comm) -> Verdict {
-    let mut verdict = Verdict { inside: HashSet::new(), ambiguous: None, rays: 0 };
+pub fn decide(
+    candidates: &BTreeMap<Name, Vec<Candidate>>,
+    facets: &[Facet],
+    comm: &dyn Comm,
+) -> Verdict {
+    let mut verdict = Verdict {
+        inside: HashSet::new(),
+        ambiguous: None,
+        rays: 0,
+    };
     // Components still open, with the number of their rays so far that say inside.
-    let mut open: Vec<(Name, &[Candidate], u32)> = candidates.iter().map(|(&n, list)| (n, list.as_slice(), 0)).collect();
+    let mut open: Vec<(Name, &[Candidate], u32)> = candidates
+        .iter()
+        .map(|(&n, list)| (n, list.as_slice(), 0))
+        .collect();
     for round in 0..CANDIDATES {
-        let points: Vec<[i64; 3]> = open.iter().filter_map(|c| c.1.get(round)).map(|c| c.centroid()).collect();
+        let points: Vec<[i64; 3]> = open
+            .iter()
+            .filter_map(|c| c.1.get(round))
+            .map(|c| c.centroid())
+            .collect();
         if points.is_empty() {
             break;
         }
         verdict.rays += 6 * points.len() as u64;
         let mut odd = xor_over_ranks(parities(facets, &points), comm).into_iter();
         open.retain_mut(|(name, list, votes)| {
-            let Some(rays) = (round < list.len()).then(|| odd.next()).flatten() else { return true };
+            let Some(rays) = (round < list.len()).then(|| odd.next()).flatten() else {
+                return true;
+            };
             if rays == 63 {
                 verdict.inside.insert(*name);
             }
@@ -91,8 +124,15 @@ pub fn decide(candidates: &BTreeMap<Name, Vec<Candidate>>, facets: &[Facet], com
         });
     }
     let first = open.iter().map(|c| c.1[0]).min();
-    verdict.ambiguous = first.map(|c| Ambiguous { count: open.len() as u64, example: c.centroid() });
-    verdict.inside.extend(open.iter().filter(|(_, list, votes)| *votes as usize > 3 * list.len()).map(|c| c.0));
+    verdict.ambiguous = first.map(|c| Ambiguous {
+        count: open.len() as u64,
+        example: c.centroid(),
+    });
+    verdict.inside.extend(
+        open.iter()
+            .filter(|(_, list, votes)| *votes as usize > 3 * list.len())
+            .map(|c| c.0),
+    );
     verdict
 }
 
@@ -104,5 +144,7 @@ fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     for theirs in comm.all_gather(&words) {
         total.iter_mut().zip(theirs).for_each(|(t, w)| *t ^= w);
     }
-    (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()
+    (0..mine.len())
+        .map(|i| (total[i / 8] >> (8 * (i % 8))) as u8)
+        .collect()
 }
