@@ -146,22 +146,11 @@ mod tests {
 
     #[test]
     fn lists_are_separated_by_commas() {
-        let words = [
-            "harness",
-            "verify",
-            "cube",
-            "--ranks",
-            "1,7",
-            "--require",
-            "mpi,p4est",
-        ];
+        let words = ["harness", "verify", "cube", "--ranks", "1,7", "--require", "mpi,p4est"];
         let Command::Verify(verify) = Arguments::try_parse_from(words).unwrap().command else {
             panic!()
         };
-        assert_eq!(
-            (verify.ranks, verify.require),
-            (vec![1, 7], vec![Need::Mpi, Need::P4est])
-        );
+        assert_eq!((verify.ranks, verify.require), (vec![1, 7], vec![Need::Mpi, Need::P4est]));
         assert!(Arguments::try_parse_from(["harness", "verify", "--ranks", "0"]).is_err());
         assert!(Arguments::try_parse_from(["harness", "verify", "--require", "luck"]).is_err());
     }

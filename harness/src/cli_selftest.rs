@@ -37,10 +37,7 @@ pub fn run(arguments: &SelftestArguments) -> u8 {
 type Failure = (u8, String);
 
 fn try_run(arguments: &SelftestArguments) -> Result<u8, Failure> {
-    let given = Given {
-        mesher: None,
-        reference: arguments.programs.reference.clone(),
-    };
+    let given = Given { mesher: None, reference: arguments.programs.reference.clone() };
     let programs = Programs::find(given);
     if !programs.reference.is_file() {
         let path = programs.reference.display();
@@ -50,11 +47,8 @@ fn try_run(arguments: &SelftestArguments) -> Result<u8, Failure> {
         ));
     }
     let scratch = tempfile::tempdir().map_err(|error| (EXIT_INPUT, error.to_string()))?;
-    let cases = if arguments.case.is_empty() {
-        built_in(scratch.path())?
-    } else {
-        arguments.case.clone()
-    };
+    let cases =
+        if arguments.case.is_empty() { built_in(scratch.path())? } else { arguments.case.clone() };
     let limit = Duration::from_secs(arguments.timeout);
     let made = cases.iter().enumerate().map(|(index, case)| {
         let place = scratch.path().join(format!("specimen-{index}"));
@@ -65,19 +59,13 @@ fn try_run(arguments: &SelftestArguments) -> Result<u8, Failure> {
     let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&specimens, &mutants));
     let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
     println!("{report}");
-    Ok(if report.holds() {
-        EXIT_HOLDS
-    } else {
-        EXIT_FAILED
-    })
+    Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
 }
 
 fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {
     let write = |(name, text): (&str, &str)| {
         let path = scratch.join(format!("{name}.toml"));
-        fs::write(&path, text)
-            .map(|()| path)
-            .map_err(|error| (EXIT_INPUT, error.to_string()))
+        fs::write(&path, text).map(|()| path).map_err(|error| (EXIT_INPUT, error.to_string()))
     };
     SPECIMENS.into_iter().map(write).collect()
 }
@@ -95,26 +83,10 @@ fn specimen(
         let logs = place.join(format!("{name}-logs"));
         fs::create_dir_all(&logs).map_err(|error| (EXIT_INPUT, error.to_string()))?;
         let out = place.join(name);
-        let files = Files {
-            case: path,
-            out: Some(&out),
-            json: None,
-            status: None,
-            ungraded,
-        };
-        let watch = Watch {
-            limit,
-            logs: &logs,
-            name: "reference",
-            status: None,
-        };
-        let done =
-            process::run(&mut mesher::reference(programs, &files), &watch).map_err(|error| {
-                (
-                    EXIT_MISSING,
-                    format!("the reference cannot be started: {error}"),
-                )
-            })?;
+        let files = Files { case: path, out: Some(&out), json: None, status: None, ungraded };
+        let watch = Watch { limit, logs: &logs, name: "reference", status: None };
+        let done = process::run(&mut mesher::reference(programs, &files), &watch)
+            .map_err(|error| (EXIT_MISSING, format!("the reference cannot be started: {error}")))?;
         let shown = path.display();
         match done.end {
             End::Exited(0) => {}
@@ -123,10 +95,7 @@ fn specimen(
             end => {
                 return Err((
                     EXIT_FAILED,
-                    format!(
-                        "the reference fails on {shown}: {end:?}, {}",
-                        done.first_error_line()
-                    ),
+                    format!("the reference fails on {shown}: {end:?}, {}", done.first_error_line()),
                 ));
             }
         }

@@ -31,27 +31,17 @@ fn run_audit(mesh: &Path, nodes_max: Option<usize>) -> u8 {
         return EXIT_INPUT;
     }
     let default = AuditOptions::default();
-    let options = AuditOptions {
-        nodes_max: nodes_max.unwrap_or(default.nodes_max),
-    };
+    let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let report = audit::audit(mesh, &options);
     println!("{report}");
-    if report.holds() {
-        EXIT_HOLDS
-    } else {
-        EXIT_FAILED
-    }
+    if report.holds() { EXIT_HOLDS } else { EXIT_FAILED }
 }
 
 fn run_diff(a: &Path, b: &Path) -> u8 {
     match diff::diff(a, b) {
         Ok(report) => {
             println!("{report}");
-            if report.same_leaves() {
-                EXIT_HOLDS
-            } else {
-                EXIT_FAILED
-            }
+            if report.same_leaves() { EXIT_HOLDS } else { EXIT_FAILED }
         }
         Err(error) => {
             eprintln!("harness: {error}");

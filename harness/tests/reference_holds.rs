@@ -56,7 +56,7 @@ fn settings() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4000))]
+    #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
     fn all_checks_hold(facets in prop_oneof![soup(), hull()], text in settings()) {

@@ -74,41 +74,19 @@ pub fn build(
     let heavy: Vec<bool> = leaves.iter().map(split).collect();
     let weights = partition::weigh(&leaves, &heavy, facets, rules, division.weights, comm);
     let owners = partition::assign(&leaves, &weights, division.partitioner, comm)?;
-    leaves
-        .iter_mut()
-        .zip(owners)
-        .for_each(|(b, owner)| b.owner = owner);
-    let mine = leaves
-        .iter()
-        .zip(&heavy)
-        .filter(|(b, heavy)| **heavy && b.owner == comm.rank());
-    let starts = mine
-        .map(|(b, _)| Start {
-            level: b.level,
-            code: b.code,
-        })
-        .collect();
+    leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
+    let mine = leaves.iter().zip(&heavy).filter(|(b, heavy)| **heavy && b.owner == comm.rank());
+    let starts = mine.map(|(b, _)| Start { level: b.level, code: b.code }).collect();
     let share = Ownership::new(comm.rank(), comm.size(), internal, leaves);
     share.check_invariants();
-    Ok(Base {
-        share,
-        top,
-        starts,
-        level_base,
-        work,
-    })
+    Ok(Base { share, top, starts, level_base, work })
 }
 
 /// What all facets and boxes ask to be split down to `level`: exact above it. Collective.
 fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree, Work) {
-    let boxes = rules.boxes.iter().map(|b| crate::lattice::ExtentBox {
-        level: b.level.min(level),
-        ..*b
-    });
-    let depth = Depth {
-        surface: rules.level_surface.min(level),
-        boxes: boxes.collect(),
-    };
+    let boxes =
+        rules.boxes.iter().map(|b| crate::lattice::ExtentBox { level: b.level.min(level), ..*b });
+    let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
     let (mine, work) = refine(&Filed::new(facets), &depth, &[Start { level: 0, code: 0 }]);
     let mut words = Vec::new();
     for sets in [&mine.split, &mine.crossing] {
@@ -123,10 +101,8 @@ fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree
         for sets in [&mut tree.split, &mut tree.crossing] {
             for set in &mut sets[..=level as usize] {
                 let count = at[0] as usize;
-                let bricks = at[1..1 + 2 * count].chunks_exact(2).map(|w| Brick {
-                    key: w[0],
-                    bits: w[1],
-                });
+                let bricks =
+                    at[1..1 + 2 * count].chunks_exact(2).map(|w| Brick { key: w[0], bits: w[1] });
                 *set = std::mem::take(set).union(BrickSet::from_unsorted(bricks.collect()));
                 at = &at[1 + 2 * count..];
             }
@@ -154,17 +130,9 @@ fn cut(marks: &Tree, level_base: Level, surface: Level) -> (PerLevel, Tree, Vec<
             internal[l] = marks.split[l].clone();
         }
         for b in Tree::exists(&marks.split, l as Level) {
-            let bits = if split_below {
-                b.bits & !marks.split[l].get(b.key)
-            } else {
-                b.bits
-            };
+            let bits = if split_below { b.bits & !marks.split[l].get(b.key) } else { b.bits };
             let codes = crate::brickset::ones(bits).map(|bit| b.key << 6 | u64::from(bit));
-            leaves.extend(codes.map(|code| BaseLeaf {
-                level: l as Level,
-                code,
-                owner: 0,
-            }));
+            leaves.extend(codes.map(|code| BaseLeaf { level: l as Level, code, owner: 0 }));
         }
     }
     leaves.sort_unstable_by_key(|b| start57(b.level, b.code));
@@ -183,23 +151,15 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
             if start57(b.level, b.code) >= end {
                 break;
             }
-            let there = b.level <= home.level()
-                || reaches(
-                    f,
-                    &Start {
-                        level: b.level,
-                        code: b.code,
-                    },
-                );
+            let there =
+                b.level <= home.level() || reaches(f, &Start { level: b.level, code: b.code });
             if there && std::mem::replace(&mut last[b.owner], i) != i {
                 packed[b.owner].push(*f);
             }
         }
     }
     let mut mine = std::mem::take(&mut packed[comm.rank()]);
-    let out = packed
-        .iter()
-        .map(|facets| facets.iter().flat_map(pack).collect());
+    let out = packed.iter().map(|facets| facets.iter().flat_map(pack).collect());
     for (_, words) in comm.exchange(out.enumerate().collect()) {
         mine.extend(words.chunks_exact(5).map(unpack));
     }
@@ -216,9 +176,7 @@ fn pack(f: &Facet) -> [u64; 5] {
 
 fn unpack(words: &[u64]) -> Facet {
     let at = |i: usize| (words[i / 2] >> (32 * (i % 2))) as u32 as i32;
-    Facet {
-        v: std::array::from_fn(|v| std::array::from_fn(|a| at(3 * v + a))),
-    }
+    Facet { v: std::array::from_fn(|v| std::array::from_fn(|a| at(3 * v + a))) }
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.
@@ -253,9 +211,7 @@ pub(crate) fn middle(f: &Facet) -> Option<u64> {
         let (lo, hi) = f.range(a);
         (lo + hi) / 2
     });
-    let inside = mid
-        .iter()
-        .all(|c: &i64| (0..crate::octant::ROOT_EDGE).contains(c));
+    let inside = mid.iter().all(|c: &i64| (0..crate::octant::ROOT_EDGE).contains(c));
     inside.then(|| {
         crate::octant::morton(mid.map(|c| (c >> (crate::octant::ROOT_BITS - LEVEL_MAX)) as u32))
     })
@@ -268,32 +224,19 @@ mod tests {
 
     #[test]
     fn facets_survive_the_journey() {
-        let f = Facet {
-            v: [
-                [-5, 1 << 28, 0],
-                [7, -(1 << 27), 3],
-                [i32::MAX, i32::MIN, -1],
-            ],
-        };
+        let f = Facet { v: [[-5, 1 << 28, 0], [7, -(1 << 27), 3], [i32::MAX, i32::MIN, -1]] };
         assert_eq!(unpack(&pack(&f)), f);
     }
 
     #[test]
     fn neighbours_of_a_uniform_base_tree() {
-        let leaves: Vec<BaseLeaf> = (0..64)
-            .map(|code| BaseLeaf {
-                level: 2,
-                code,
-                owner: 0,
-            })
-            .collect();
+        let leaves: Vec<BaseLeaf> =
+            (0..64).map(|code| BaseLeaf { level: 2, code, owner: 0 }).collect();
         let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
         assert_eq!(pairs.len(), 3 * 3 * 16);
         let apart = |a: usize, b: usize| -> i64 {
             let (p, q) = (position(a as u64), position(b as u64));
-            (0..3)
-                .map(|i| (i64::from(p[i]) - i64::from(q[i])).abs())
-                .sum()
+            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).abs()).sum()
         };
         assert!(pairs.iter().all(|&(a, b)| apart(a, b) == 1));
     }

@@ -101,11 +101,7 @@ pub const fn flood(seed: u64, within: u64) -> u64 {
 #[inline]
 pub const fn across(w: u64, axis: usize, up: bool) -> u64 {
     let shift = 9 << axis;
-    if up {
-        (w & AXES[axis][3]) >> shift
-    } else {
-        (w & AXES[axis][0]) << shift
-    }
+    if up { (w & AXES[axis][3]) >> shift } else { (w & AXES[axis][0]) << shift }
 }
 
 /// A brick's bits with x fastest, then y, then z, instead of Morton order.
@@ -157,10 +153,7 @@ mod tests {
             assert_eq!(parents(children(b)), b);
             assert_eq!(children(b).count_ones(), 8 * b.count_ones());
             for bit in 0..8 {
-                assert_eq!(
-                    byte(children(b), bit),
-                    if b >> bit & 1 == 1 { 0xff } else { 0 }
-                );
+                assert_eq!(byte(children(b), bit), if b >> bit & 1 == 1 { 0xff } else { 0 });
                 assert_eq!(parents(1 << (8 * bit + u64::from(b & 7))), 1 << bit);
             }
         }

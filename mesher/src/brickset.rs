@@ -34,10 +34,7 @@ impl BrickSet {
         match self.bricks.last_mut() {
             Some(last) if last.key == key => last.bits |= bits,
             last => {
-                assert!(
-                    last.is_none_or(|l| l.key < key),
-                    "bricks must be added in Morton order"
-                );
+                assert!(last.is_none_or(|l| l.key < key), "bricks must be added in Morton order");
                 self.bricks.push(Brick { key, bits });
             }
         }
@@ -61,17 +58,12 @@ impl BrickSet {
 
     /// Number of octants.
     pub fn count(&self) -> u64 {
-        self.bricks
-            .iter()
-            .map(|b| u64::from(b.bits.count_ones()))
-            .sum()
+        self.bricks.iter().map(|b| u64::from(b.bits.count_ones())).sum()
     }
 
     /// The bits of a brick, 0 where the set has none of it.
     pub fn get(&self, key: u64) -> u64 {
-        self.bricks
-            .binary_search_by_key(&key, |b| b.key)
-            .map_or(0, |i| self.bricks[i].bits)
+        self.bricks.binary_search_by_key(&key, |b| b.key).map_or(0, |i| self.bricks[i].bits)
     }
 
     /// Whether the octant with this Morton code is in the set.
@@ -92,13 +84,8 @@ impl BrickSet {
         if other.is_empty() {
             return self;
         }
-        let mut set = Self {
-            bricks: Vec::with_capacity(self.len().max(other.len())),
-        };
-        let (mut a, mut b) = (
-            self.bricks.iter().peekable(),
-            other.bricks.iter().peekable(),
-        );
+        let mut set = Self { bricks: Vec::with_capacity(self.len().max(other.len())) };
+        let (mut a, mut b) = (self.bricks.iter().peekable(), other.bricks.iter().peekable());
         while let Some(next) = match (a.peek(), b.peek()) {
             (Some(p), Some(q)) if p.key <= q.key => a.next(),
             (Some(_), None) => a.next(),
@@ -113,10 +100,7 @@ impl BrickSet {
     pub fn coarsen(&self) -> Self {
         let mut set = Self::default();
         for b in &self.bricks {
-            set.push(
-                b.key >> 3,
-                u64::from(brick::parents(b.bits)) << (8 * (b.key & 7)),
-            );
+            set.push(b.key >> 3, u64::from(brick::parents(b.bits)) << (8 * (b.key & 7)));
         }
         set
     }
@@ -126,31 +110,20 @@ impl BrickSet {
         self.bricks.iter().flat_map(|b| {
             (0..8).filter_map(move |j| {
                 let byte = brick::byte(b.bits, j);
-                (byte != 0).then(|| Brick {
-                    key: b.key << 3 | j,
-                    bits: brick::children(byte),
-                })
+                (byte != 0).then(|| Brick { key: b.key << 3 | j, bits: brick::children(byte) })
             })
         })
     }
 
     /// The codes of the set's octants in Morton order.
     pub fn codes(&self) -> impl Iterator<Item = u64> + '_ {
-        self.bricks
-            .iter()
-            .flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
+        self.bricks.iter().flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
     }
 
     /// Checks the invariants; called at the end of a phase in debug builds.
     pub fn check_invariants(&self) {
-        assert!(
-            self.bricks.windows(2).all(|w| w[0].key < w[1].key),
-            "keys must ascend"
-        );
-        assert!(
-            self.bricks.iter().all(|b| b.bits != 0),
-            "no brick may be empty"
-        );
+        assert!(self.bricks.windows(2).all(|w| w[0].key < w[1].key), "keys must ascend");
+        assert!(self.bricks.iter().all(|b| b.bits != 0), "no brick may be empty");
     }
 }
 
@@ -173,10 +146,7 @@ impl Cursor<'_> {
             let skip = step / 2 + near.partition_point(|b| b.key < key);
             self.rest = &self.rest[skip..];
         }
-        self.rest
-            .first()
-            .filter(|b| b.key == key)
-            .map_or(0, |b| b.bits)
+        self.rest.first().filter(|b| b.key == key).map_or(0, |b| b.bits)
     }
 }
 
@@ -198,13 +168,7 @@ mod tests {
 
     fn set(codes: &[u64]) -> BrickSet {
         BrickSet::from_unsorted(
-            codes
-                .iter()
-                .map(|c| Brick {
-                    key: c >> 6,
-                    bits: 1 << (c & 63),
-                })
-                .collect(),
+            codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect(),
         )
     }
 

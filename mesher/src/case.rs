@@ -92,16 +92,12 @@ impl Case {
             if v.is_finite() && v > 0.0 {
                 Ok(())
             } else {
-                Err(Error::input(format!(
-                    "{what} is {v}: give a positive number"
-                )))
+                Err(Error::input(format!("{what} is {v}: give a positive number")))
             }
         };
         positive("spacing_min", self.spacing_min)?;
         if self.layer_cells_min == 0 {
-            return Err(Error::input(
-                "layer_cells_min is 0: a layer has at least 1 cell",
-            ));
+            return Err(Error::input("layer_cells_min is 0: a layer has at least 1 cell"));
         }
         let root = match self.root {
             RootSpec::Exact(root) => root,
@@ -112,9 +108,7 @@ impl Case {
         };
         positive("the root's edge", root.edge)?;
         if !root.origin.iter().all(|c| c.is_finite()) {
-            return Err(Error::input(
-                "the root's origin is not finite: give three numbers",
-            ));
+            return Err(Error::input("the root's origin is not finite: give three numbers"));
         }
         let level_surface = root.level_of(self.spacing_min, "spacing_min")?;
         let boxes = self
@@ -153,11 +147,7 @@ impl BoxSpec {
         }
         let at = |p: [f64; 3]| std::array::from_fn(|a| root.quantise(a, p[a]).clamp(0, ROOT_EDGE));
         let level = root.level_of(self.spacing, &format!("box {number}: spacing"))?;
-        Ok(ExtentBox {
-            min: at(self.min),
-            max: at(self.max),
-            level,
-        })
+        Ok(ExtentBox { min: at(self.min), max: at(self.max), level })
     }
 }
 
@@ -177,10 +167,7 @@ impl File {
         };
         let root = match (self.root_scale, self.root) {
             (Some(_), Some(_)) => return Err(Error::input("give root_scale or [root], not both")),
-            (_, Some(r)) => RootSpec::Exact(Root {
-                origin: r.origin,
-                edge: r.edge,
-            }),
+            (_, Some(r)) => RootSpec::Exact(Root { origin: r.origin, edge: r.edge }),
             (scale, None) => RootSpec::Scale(scale.unwrap_or(ROOT_SCALE)),
         };
         let n = self.layer_cells_min.unwrap_or(i64::from(LAYER_CELLS_MIN));
@@ -204,9 +191,9 @@ impl File {
 
 /// One sentence for a malformed case file, with the nearest known key for an unknown one.
 fn explain(text: &str, e: &toml::de::Error) -> String {
-    let line = e.span().map_or(String::new(), |s| {
-        format!("line {}: ", text[..s.start].matches('\n').count() + 1)
-    });
+    let line = e
+        .span()
+        .map_or(String::new(), |s| format!("line {}: ", text[..s.start].matches('\n').count() + 1));
     let message = e.message().replace('\n', " ");
     let mut quoted = message.split('`').skip(1).step_by(2);
     let nearest = message.starts_with("unknown field").then(|| {
@@ -259,10 +246,7 @@ mod tests {
                 "geometry = \"a.stl\"\nspacing_min = 0.5\nlayer_cells_min = -1\n",
                 "layer_cells_min is -1",
             ),
-            (
-                "geometry = \"a.stl\"\nspacing_min = 0.5\nkeep = \"none\"\n",
-                "none",
-            ),
+            ("geometry = \"a.stl\"\nspacing_min = 0.5\nkeep = \"none\"\n", "none"),
             (
                 "geometry = \"a.stl\"\nspacing_min = 0.5\nroot_scale = 2.0\n[root]\norigin = [0,0,0]\nedge = 1\n",
                 "not both",
@@ -277,36 +261,15 @@ mod tests {
     #[test]
     fn rules_refuse_what_cannot_be_meshed() {
         let c = parse("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
-        let unit = Bounds {
-            lo: [0.0; 3],
-            hi: [1.0; 3],
-        };
+        let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
         assert_eq!(c.rules(&unit).unwrap().level_surface, 5);
         for spacing_min in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-9] {
-            assert!(
-                Case {
-                    spacing_min,
-                    ..c.clone()
-                }
-                .rules(&unit)
-                .is_err()
-            );
+            assert!(Case { spacing_min, ..c.clone() }.rules(&unit).is_err());
         }
         assert!(c.rules(&Bounds::EMPTY).is_err());
-        assert!(
-            Case {
-                layer_cells_min: 0,
-                ..c.clone()
-            }
-            .rules(&unit)
-            .is_err()
-        );
+        assert!(Case { layer_cells_min: 0, ..c.clone() }.rules(&unit).is_err());
         let boxed = |min: [f64; 3]| Case {
-            boxes: vec![BoxSpec {
-                min,
-                max: [1.0; 3],
-                spacing: 0.1,
-            }],
+            boxes: vec![BoxSpec { min, max: [1.0; 3], spacing: 0.1 }],
             ..c.clone()
         };
         assert!(boxed([0.0; 3]).rules(&unit).is_ok());

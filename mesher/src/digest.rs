@@ -81,9 +81,7 @@ pub struct Digests {
 
 impl Default for Digests {
     fn default() -> Self {
-        Self {
-            octants: vec![0; OCTANTS],
-        }
+        Self { octants: vec![0; OCTANTS] }
     }
 }
 
@@ -111,10 +109,7 @@ impl Digests {
 
     /// Adds another part's digests.
     pub fn merge(&mut self, other: &[u128]) {
-        self.octants
-            .iter_mut()
-            .zip(other)
-            .for_each(|(a, b)| *a = a.wrapping_add(*b));
+        self.octants.iter_mut().zip(other).for_each(|(a, b)| *a = a.wrapping_add(*b));
     }
 }
 
@@ -124,9 +119,8 @@ mod tests {
 
     #[test]
     fn sums_of_parts_are_the_sum_of_the_whole() {
-        let mut words: Vec<u64> = (0..5000u64)
-            .map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
-            .collect();
+        let mut words: Vec<u64> =
+            (0..5000u64).map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
         words.sort_unstable();
         let naive = words.iter().fold(0u128, |s, &w| s.wrapping_add(mix(w)));
         assert_eq!(digest(&words), naive);

@@ -92,12 +92,7 @@ impl Tile {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         let margin = radius.next_multiple_of(8);
         let side = TILE + 2 * margin;
-        Self {
-            radius,
-            margin,
-            side,
-            rows: vec![0; side * side],
-        }
+        Self { radius, margin, side, rows: vec![0; side * side] }
     }
 
     /// Adds a source brick.
@@ -146,20 +141,12 @@ impl Tile {
     /// Hands over the result and empties the tile.
     fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
-        let rows: Vec<u64> = if to_parents {
-            self.halved()
-        } else {
-            self.rows.clone()
-        };
+        let rows: Vec<u64> = if to_parents { self.halved() } else { self.rows.clone() };
         self.rows.fill(0);
         let side = self.side / scale;
         // The first brick of the padded tile, in bricks of the result's level.
         let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
-        let first = [
-            MARGIN / scale / 4,
-            self.margin / scale / 4,
-            self.margin / scale / 4,
-        ];
+        let first = [MARGIN / scale / 4, self.margin / scale / 4, self.margin / scale / 4];
         for bz in 0..side / 4 {
             for by in 0..side / 4 {
                 let at = |dy: usize, dz: usize| rows[(4 * bz + dz) * side + 4 * by + dy];
@@ -171,9 +158,8 @@ impl Tile {
                     if any >> (4 * bx) & 15 == 0 {
                         continue;
                     }
-                    let bits = (0..16).fold(0, |w, i| {
-                        w | (at(i & 3, i >> 2) >> (4 * bx) & 15) << (4 * i)
-                    });
+                    let bits =
+                        (0..16).fold(0, |w, i| w | (at(i & 3, i >> 2) >> (4 * bx) & 15) << (4 * i));
                     let b = [bx, by, bz];
                     let p = std::array::from_fn(|a| origin[a] + b[a] as i64 - first[a] as i64);
                     out.add(p, brick::from_rows(bits));
@@ -302,9 +288,7 @@ impl std::hash::Hasher for Spread {
         }
     }
     fn write_u64(&mut self, v: u64) {
-        self.0 = (self.0 ^ v)
-            .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-            .rotate_left(26);
+        self.0 = (self.0 ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
     }
 }
 
@@ -316,13 +300,7 @@ mod tests {
 
     fn set(codes: &BTreeSet<u64>) -> BrickSet {
         BrickSet::from_unsorted(
-            codes
-                .iter()
-                .map(|c| Brick {
-                    key: c >> 6,
-                    bits: 1 << (c & 63),
-                })
-                .collect(),
+            codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect(),
         )
     }
 

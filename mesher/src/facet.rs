@@ -107,11 +107,7 @@ pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
         wide += usize::from(first < last);
     }
     // A connected set that stays in one row of octants meets each that its extent meets.
-    if wide < 2 {
-        mask
-    } else {
-        mask & kernel::separated(f, corner, shift)
-    }
+    if wide < 2 { mask } else { mask & kernel::separated(f, corner, shift) }
 }
 
 /// The octants of level `l` in the brick at `corner` whose interior meets the box's.
@@ -372,9 +368,7 @@ mod tests {
     #[test]
     fn a_facet_in_a_face_plane_crosses_both_sides() {
         let h = edge(19) as i32;
-        let f = Facet {
-            v: [[h, 1, 1], [h, 2, 1], [h, 1, 2]],
-        };
+        let f = Facet { v: [[h, 1, 1], [h, 2, 1], [h, 1, 2]] };
         assert_eq!(crossed(&f, [0; 3], 19).count_ones(), 2);
         let point = Facet { v: [[h, h, h]; 3] };
         assert_eq!(crossed(&point, [0; 3], 19), 0xff);

@@ -37,14 +37,8 @@ pub fn grade(
     share: &Ownership,
     comm: &dyn Comm,
 ) -> (PerLevel, Work) {
-    let mut g = Gradation {
-        split: base.split.clone(),
-        base,
-        kept,
-        share,
-        comm,
-        work: Work::default(),
-    };
+    let mut g =
+        Gradation { split: base.split.clone(), base, kept, share, comm, work: Work::default() };
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer(rules.level_surface);
     }
@@ -92,21 +86,13 @@ impl Gradation<'_> {
         let mut deleted = self.kept.deleted(l).cursor();
         Tree::exists(&self.split, l)
             .filter(|b| self.share.answers_for(l, b.key))
-            .map(|b| Brick {
-                key: b.key,
-                bits: b.bits & !split.get(b.key) & !deleted.get(b.key),
-            })
+            .map(|b| Brick { key: b.key, bits: b.bits & !split.get(b.key) & !deleted.get(b.key) })
             .filter(|b| b.bits != 0)
             .collect()
     }
 
     fn reach(&mut self, l: Level, sources: &[Brick], radius: u32) -> BrickSet {
-        dilate_to_parents(
-            l,
-            sources.iter().copied(),
-            radius,
-            &mut self.work.words_dilated,
-        )
+        dilate_to_parents(l, sources.iter().copied(), radius, &mut self.work.words_dilated)
     }
 
     /// The paper's exchange of extent boxes: what was reached goes to whoever holds it, and is split

@@ -40,19 +40,14 @@ pub fn read(source: &Source, comm: &dyn Comm) -> Result<Share, Error> {
                 Some(total) => {
                     let (first, end) = slice(total, comm);
                     let facets = agree(comm, file.read(first, end))?;
-                    Share {
-                        facets,
-                        first,
-                        total,
-                    }
+                    Share { facets, first, total }
                 }
                 None => deal(comm, || file.read_text())?,
             }
         }
-        Source::Generated(g) => deal(comm, || {
-            g.facets()
-                .map_err(|e| Error::input(format!("[generator]: {e}")))
-        })?,
+        Source::Generated(g) => {
+            deal(comm, || g.facets().map_err(|e| Error::input(format!("[generator]: {e}"))))?
+        }
         Source::Given(facets) => deal(comm, || Ok(facets.clone()))?,
     };
     comm.agree(stl::check_finite(&share.facets, share.first))?;
@@ -67,26 +62,16 @@ fn slice(total: u64, comm: &dyn Comm) -> (u64, u64) {
 
 /// Rank 0 makes the facets and deals them out. Collective.
 fn deal(comm: &dyn Comm, make: impl FnOnce() -> Result<Vec<Facet>, Error>) -> Result<Share, Error> {
-    let made = if comm.rank() == 0 {
-        make()
-    } else {
-        Ok(Vec::new())
-    };
+    let made = if comm.rank() == 0 { make() } else { Ok(Vec::new()) };
     let facets = agree(comm, made)?;
     let total = comm.sum(facets.len() as u64);
     let (first, end) = slice(total, comm);
     if comm.size() == 1 {
-        return Ok(Share {
-            facets,
-            first,
-            total,
-        });
+        return Ok(Share { facets, first, total });
     }
     let out = if comm.rank() == 0 {
         let at = |r: usize| (u128::from(total) * r as u128 / comm.size() as u128) as usize;
-        (1..comm.size())
-            .map(|r| (r, pack(&facets[at(r)..at(r + 1)])))
-            .collect()
+        (1..comm.size()).map(|r| (r, pack(&facets[at(r)..at(r + 1)]))).collect()
     } else {
         Vec::new()
     };
@@ -94,17 +79,9 @@ fn deal(comm: &dyn Comm, make: impl FnOnce() -> Result<Vec<Facet>, Error>) -> Re
     let facets = if comm.rank() == 0 {
         facets[..end as usize].to_vec()
     } else {
-        heard
-            .iter()
-            .flat_map(|m| unpack(&m.1))
-            .take((end - first) as usize)
-            .collect()
+        heard.iter().flat_map(|m| unpack(&m.1)).take((end - first) as usize).collect()
     };
-    Ok(Share {
-        facets,
-        first,
-        total,
-    })
+    Ok(Share { facets, first, total })
 }
 
 /// Coordinates, two to the word.
@@ -137,9 +114,8 @@ mod tests {
         for total in [0usize, 1, 2, 5, 64, 101] {
             let facets: Vec<Facet> = (0..total).map(|i| [[i as f32, 0.5, -1.0]; 3]).collect();
             for ranks in [1, 2, 3, 7, 30] {
-                let shares = sim::run(ranks, 5, |c| {
-                    read(&Source::Given(facets.clone()), c).unwrap()
-                });
+                let shares =
+                    sim::run(ranks, 5, |c| read(&Source::Given(facets.clone()), c).unwrap());
                 assert!(shares.iter().all(|s| s.total == total as u64));
                 let all: Vec<Facet> = shares.iter().flat_map(|s| s.facets.clone()).collect();
                 assert_eq!(all, facets);

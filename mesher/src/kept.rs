@@ -34,18 +34,14 @@ impl<'a> Kept<'a> {
         if !self.any {
             return set;
         }
-        let mut finder = LeafFinder {
-            kept: self,
-            base,
-            last: None,
-        };
+        let mut finder = LeafFinder { kept: self, base, last: None };
         let mut deleted = self.deleted[l as usize].cursor();
         let mut above = (l > 0).then(|| base.split[l as usize - 1].cursor());
         let mut out = BrickSet::default();
         for b in set.bricks() {
-            let here = above.as_mut().map_or(1, |a| {
-                brick::children(brick::byte(a.get(b.key >> 3), b.key & 7))
-            });
+            let here = above
+                .as_mut()
+                .map_or(1, |a| brick::children(brick::byte(a.get(b.key >> 3), b.key & 7)));
             let mut bits = b.bits & here & !deleted.get(b.key);
             let coarse = brick::parents(b.bits & !here);
             for j in ones(u64::from(coarse)) {

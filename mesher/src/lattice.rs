@@ -24,10 +24,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// The bounds of nothing.
-    pub const EMPTY: Self = Self {
-        lo: [f64::INFINITY; 3],
-        hi: [f64::NEG_INFINITY; 3],
-    };
+    pub const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
 
     /// Bounds of facets, whose coordinates must be finite.
     pub fn of(facets: &[geometries::Facet]) -> Self {
@@ -39,10 +36,7 @@ impl Bounds {
                 hi[a] = hi[a].max(v[a]);
             }
         }
-        Self {
-            lo: lo.map(f64::from),
-            hi: hi.map(f64::from),
-        }
+        Self { lo: lo.map(f64::from), hi: hi.map(f64::from) }
     }
 
     /// Bounds of the union.
@@ -58,9 +52,7 @@ impl Root {
     /// The cube of `scale` longest edges of the bounds, centred on them. The order of the operations
     /// is part of the mesh's definition.
     pub fn around(bounds: &Bounds, scale: f64) -> Result<Self, Error> {
-        let longest = (0..3)
-            .map(|a| bounds.hi[a] - bounds.lo[a])
-            .fold(0.0, f64::max);
+        let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
         if longest <= 0.0 {
             return Err(Error::input(
                 "the geometry has no extent, so root_scale gives no root: set [root] with origin and edge",
@@ -119,14 +111,8 @@ impl Root {
                     .iter()
                     .any(|c: &f64| (c - ROOT_EDGE as f64 * 0.5).abs() > ROOT_EDGE as f64 * 1.5)
             };
-            let bad = facets
-                .iter()
-                .position(|f| f.iter().any(outside))
-                .unwrap_or(0);
-            let v = facets[bad]
-                .iter()
-                .find(|v| outside(v))
-                .unwrap_or(&facets[bad][0]);
+            let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
+            let v = facets[bad].iter().find(|v| outside(v)).unwrap_or(&facets[bad][0]);
             return Err(Error::input(format!(
                 "facet {} has a vertex at ({}, {}, {}), more than one root edge outside the root: enlarge or move the root",
                 first + bad as u64,
@@ -206,58 +192,30 @@ mod tests {
 
     #[test]
     fn a_spacing_means_that_size_or_smaller() {
-        let root = Root {
-            origin: [0.0; 3],
-            edge: 8.0,
-        };
-        for (s, l) in [
-            (9.0, 0),
-            (8.0, 0),
-            (7.9, 1),
-            (1.0, 3),
-            (0.99, 4),
-            (8.0 / 524_288.0, 19),
-        ] {
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        for (s, l) in [(9.0, 0), (8.0, 0), (7.9, 1), (1.0, 3), (0.99, 4), (8.0 / 524_288.0, 19)] {
             assert_eq!(root.level_of(s, "spacing").unwrap(), l, "{s}");
         }
         assert!(
-            root.level_of(1e-6, "spacing_min")
-                .unwrap_err()
-                .to_string()
-                .contains("spacing_min")
+            root.level_of(1e-6, "spacing_min").unwrap_err().to_string().contains("spacing_min")
         );
     }
 
     #[test]
     fn ties_round_to_even_and_far_vertices_name_their_facet() {
-        let root = Root {
-            origin: [0.0; 3],
-            edge: (ROOT_EDGE * 2) as f64,
-        };
+        let root = Root { origin: [0.0; 3], edge: (ROOT_EDGE * 2) as f64 };
         assert_eq!([1.0, 3.0, 5.0].map(|x| root.quantise(0, x)), [0, 2, 2]);
         let near = [[0.0f32; 3]; 3];
         let far = [[0.0; 3], [0.0; 3], [0.0, 3.1 * ROOT_EDGE as f32 * 2.0, 0.0]];
         assert_eq!(root.facets(&[near], 0).unwrap().len(), 1);
-        assert!(
-            root.facets(&[near, far], 40)
-                .unwrap_err()
-                .to_string()
-                .contains("facet 41")
-        );
+        assert!(root.facets(&[near, far], 40).unwrap_err().to_string().contains("facet 41"));
     }
 
     #[test]
     fn boxes_meet_by_interiors_only() {
-        let b = ExtentBox {
-            min: [0, 0, 0],
-            max: [4, 4, 4],
-            level: 3,
-        };
+        let b = ExtentBox { min: [0, 0, 0], max: [4, 4, 4], level: 3 };
         assert!(b.meets([3, 3, 3], 4) && !b.meets([4, 0, 0], 4));
-        let flat = ExtentBox {
-            max: [4, 4, 0],
-            ..b
-        };
+        let flat = ExtentBox { max: [4, 4, 0], ..b };
         assert!(!flat.meets([0, 0, 0], 4));
     }
 }

@@ -81,14 +81,7 @@ pub fn mesh(
 
 fn make_out(options: &Options, comm: &dyn Comm) -> Result<Option<OutDir>, Error> {
     let path = options.out.as_ref();
-    path.map(|p| {
-        if comm.rank() == 0 {
-            OutDir::make(p)
-        } else {
-            Ok(OutDir::join(p))
-        }
-    })
-    .transpose()
+    path.map(|p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) }).transpose()
 }
 
 fn mesh_into(
@@ -99,9 +92,9 @@ fn mesh_into(
     record: &mut Recorder,
 ) -> Result<Report, Error> {
     let (meshed, mut counters) = build(case, options, comm, record)?;
-    let (counts, written) = record.phase("leaves", || emit(&meshed, out, comm))?;
+    let (counts, written) = record.phase("leaves", comm, || emit(&meshed, out, comm))?;
     let Meshed { rules, sides, .. } = &meshed;
-    let finished = record.phase("finish", || {
+    let finished = record.phase("finish", comm, || {
         finish(rules, options.ungraded, counts, &written, sides, out, comm)
     });
     let (counts, digests, parts) = finished?;
@@ -168,20 +161,13 @@ fn build(
     record: &mut Recorder,
 ) -> Result<(Meshed, Counters), Error> {
     let mut counters = Counters::default();
-    let geometry = record.phase("read", || ingest::read(&case.source, comm))?;
-    let (rules, facets) = record.phase("quantise", || quantise(case, &geometry, comm))?;
+    let geometry = record.phase("read", comm, || ingest::read(&case.source, comm))?;
+    let (rules, facets) = record.phase("quantise", comm, || quantise(case, &geometry, comm))?;
     drop(geometry.facets);
-    let refined = refine(
-        &facets,
-        &rules,
-        &options.division,
-        comm,
-        record,
-        &mut counters,
-    )?;
+    let refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
     comm.agree(check_interrupt())?;
 
-    let sides = record.phase("sides", || {
+    let sides = record.phase("sides", comm, || {
         sides::decide(&refined.tree, &refined.share, &facets, rules.keep, comm)
     });
     drop(facets);
@@ -189,23 +175,14 @@ fn build(
 
     let graded = (!options.ungraded).then(|| {
         let kept = kept::Kept::new(&sides.deleted);
-        let (split, work) = record.phase("grade", || {
+        let (split, work) = record.phase("grade", comm, || {
             grade::grade(&refined.tree, &kept, &rules, &refined.share, comm)
         });
         counters.grade(&work);
         split
     });
     comm.agree(check_interrupt())?;
-    Ok((
-        Meshed {
-            facets: geometry.total,
-            rules,
-            refined,
-            sides,
-            graded,
-        },
-        counters,
-    ))
+    Ok((Meshed { facets: geometry.total, rules, refined, sides, graded }, counters))
 }
 
 /// The rules, and this rank's facets on the lattice. Collective.
@@ -215,18 +192,10 @@ fn quantise(
     comm: &dyn Comm,
 ) -> Result<(Rules, Vec<facet::Facet>), Error> {
     let mine = Bounds::of(&geometry.facets);
-    let words: Vec<u64> = mine
-        .lo
-        .iter()
-        .chain(&mine.hi)
-        .map(|c| c.to_bits())
-        .collect();
+    let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
     let bounds = comm.all_gather(&words).iter().fold(Bounds::EMPTY, |b, w| {
         let at = |i: usize| f64::from_bits(w[i]);
-        b.union(Bounds {
-            lo: [at(0), at(1), at(2)],
-            hi: [at(3), at(4), at(5)],
-        })
+        b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
     });
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(&geometry.facets, geometry.first))?;
@@ -249,38 +218,26 @@ fn refine(
     record: &mut Recorder,
     counters: &mut Counters,
 ) -> Result<Refined, Error> {
-    let depth = voxelise::Depth {
-        surface: rules.level_surface,
-        boxes: rules.boxes.clone(),
-    };
+    let depth = voxelise::Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     if comm.size() == 1 {
         let root = [voxelise::Start { level: 0, code: 0 }];
-        let (tree, work) = record.phase("refine", || {
+        let (tree, work) = record.phase("refine", comm, || {
             voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
         });
         counters.voxelise(&work);
-        return Ok(Refined {
-            tree,
-            share: Ownership::solo(),
-            level_base: 0,
-        });
+        return Ok(Refined { tree, share: Ownership::solo(), level_base: 0 });
     }
-    let base = record.phase("base tree", || base::build(facets, rules, division, comm))?;
+    let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
-    let filed = record.phase("route", || {
-        voxelise::Filed::new(&base::route(facets, &base.share, comm))
-    });
+    let filed = record
+        .phase("route", comm, || voxelise::Filed::new(&base::route(facets, &base.share, comm)));
     let (mut tree, work) =
-        record.phase("refine", || voxelise::refine(&filed, &depth, &base.starts));
+        record.phase("refine", comm, || voxelise::refine(&filed, &depth, &base.starts));
     counters.voxelise(&work);
-    record.phase("share top", || {
+    record.phase("share top", comm, || {
         share_top(&mut tree, base.top, &base.share, base.level_base, comm)
     });
-    Ok(Refined {
-        tree,
-        share: base.share,
-        level_base: base.level_base,
-    })
+    Ok(Refined { tree, share: base.share, level_base: base.level_base })
 }
 
 /// Makes the top bricks of a rank's tree those of the whole tree. Collective.
@@ -291,18 +248,11 @@ fn share_top(
     level_base: octant::Level,
     comm: &dyn Comm,
 ) {
-    for (sets, top) in [
-        (&mut tree.split, top.split),
-        (&mut tree.crossing, top.crossing),
-    ] {
+    for (sets, top) in [(&mut tree.split, top.split), (&mut tree.crossing, top.crossing)] {
         let pairs: Vec<_> = sets.iter_mut().map(std::mem::take).zip(top).collect();
         for ((l, set), (mine, top)) in (0..).zip(sets.iter_mut()).zip(pairs) {
             // Above, all is known from the base tree; below, bricks are one rank's alone.
-            let mine = if l == level_base + 1 {
-                share.scatter(l, mine, comm).0
-            } else {
-                mine
-            };
+            let mine = if l == level_base + 1 { share.scatter(l, mine, comm).0 } else { mine };
             *set = mine.union(top);
         }
     }
@@ -349,14 +299,9 @@ fn finish(
     let counts = counts.gather(comm);
     let (digests, parts) = write::gather(written, comm);
     let publish = || match out {
-        Some(out) if comm.rank() == 0 => out.manifest(&Manifest::new(
-            rules,
-            base,
-            &counts,
-            sides.ambiguous,
-            &digests,
-            &parts,
-        )),
+        Some(out) if comm.rank() == 0 => {
+            out.manifest(&Manifest::new(rules, base, &counts, sides.ambiguous, &digests, &parts))
+        }
         _ => Ok(()),
     };
     comm.agree(publish())?;

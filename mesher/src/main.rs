@@ -117,10 +117,7 @@ fn comm_choice(s: &str) -> Result<CommChoice, String> {
         (Some("mpi"), None, None) => Some(CommChoice::Mpi),
         (Some("sim"), Some(ranks), seed) => (|| {
             let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
-            Some(CommChoice::Sim {
-                ranks,
-                seed: seed.unwrap_or("1").parse().ok()?,
-            })
+            Some(CommChoice::Sim { ranks, seed: seed.unwrap_or("1").parse().ok()? })
         })(),
         _ => None,
     };
@@ -162,14 +159,9 @@ fn main() {
 
 /// Number of ranks that an MPI launcher has started, if one has.
 fn launched() -> Option<usize> {
-    [
-        "OMPI_COMM_WORLD_SIZE",
-        "PMI_SIZE",
-        "PMIX_SIZE",
-        "MPI_LOCALNRANKS",
-    ]
-    .iter()
-    .find_map(|v| std::env::var(v).ok()?.parse().ok())
+    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS"]
+        .iter()
+        .find_map(|v| std::env::var(v).ok()?.parse().ok())
 }
 
 fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
@@ -229,10 +221,7 @@ fn fail(e: &Error) -> i32 {
 /// One rank's run; returns the exit code, the same on all ranks.
 fn run(args: &Args, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
-    let status = args
-        .status
-        .as_ref()
-        .map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
+    let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);
     record.tell("start");
@@ -267,11 +256,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         Partitioner::Morton
     });
     let options = Options {
-        division: Division {
-            partitioner,
-            weights: args.weights,
-            level_base: args.level_base.0,
-        },
+        division: Division { partitioner, weights: args.weights, level_base: args.level_base.0 },
         ungraded: args.ungraded,
         out: args.out.clone(),
     };
@@ -286,10 +271,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
 
 fn case(args: &Args) -> Result<Case, Error> {
     let b = &args.body;
-    let is_case = args
-        .input
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let is_case = args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if is_case {
         let given = b.spacing_min.is_some()
             || b.layer_cells_min.is_some()
@@ -316,29 +298,19 @@ fn case(args: &Args) -> Result<Case, Error> {
         keep: b.keep.unwrap_or(Keep::Outside),
         keep_crossing: !b.drop_crossing,
         root: match b.root {
-            Some([x, y, z, edge]) => RootSpec::Exact(Root {
-                origin: [x, y, z],
-                edge,
-            }),
+            Some([x, y, z, edge]) => RootSpec::Exact(Root { origin: [x, y, z], edge }),
             None => RootSpec::Scale(b.root_scale.unwrap_or(ROOT_SCALE)),
         },
         boxes: b
             .boxes
             .iter()
-            .map(|v| BoxSpec {
-                min: [v[0], v[1], v[2]],
-                max: [v[3], v[4], v[5]],
-                spacing: v[6],
-            })
+            .map(|v| BoxSpec { min: [v[0], v[1], v[2]], max: [v[3], v[4], v[5]], spacing: v[6] })
             .collect(),
     })
 }
 
 fn write_json(path: &Path, report: &Report) -> Result<(), Error> {
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let write = || -> std::io::Result<()> {
         let mut file = tempfile::NamedTempFile::new_in(folder)?;
         serde_json::to_writer_pretty(&mut file, report)?;

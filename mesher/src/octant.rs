@@ -68,11 +68,7 @@ pub const fn morton(p: [u32; 3]) -> u64 {
 /// The position that a Morton code stands for.
 #[inline]
 pub const fn position(code: u64) -> [u32; 3] {
-    [
-        gather(code) as u32,
-        gather(code >> 1) as u32,
-        gather(code >> 2) as u32,
-    ]
+    [gather(code) as u32, gather(code >> 1) as u32, gather(code >> 2) as u32]
 }
 
 /// The Morton code at level 19 of the minimum corner of an octant of level `l <= 19`.

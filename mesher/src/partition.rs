@@ -70,9 +70,7 @@ fn boxed(b: &BaseLeaf, rules: &Rules) -> u64 {
     let (at, h) = (corner(b.level, b.code), edge(b.level));
     let volume = |e: &crate::lattice::ExtentBox| {
         let span = |a: usize| (e.max[a].min(at[a] + h) - e.min[a].max(at[a])).max(0);
-        (0..3)
-            .map(|a| (span(a) as u64).div_ceil(edge(e.level) as u64))
-            .product::<u64>()
+        (0..3).map(|a| (span(a) as u64).div_ceil(edge(e.level) as u64)).product::<u64>()
     };
     rules.boxes.iter().map(volume).max().unwrap_or(0)
 }
@@ -94,12 +92,7 @@ pub fn assign(
                 Ok(Vec::new())
             };
             let mine: Vec<u64> = agree(comm, made)?.into_iter().map(|o| o as u64).collect();
-            Ok(comm
-                .all_gather(&mine)
-                .concat()
-                .into_iter()
-                .map(|o| o as usize)
-                .collect())
+            Ok(comm.all_gather(&mine).concat().into_iter().map(|o| o as usize).collect())
         }
     }
 }
@@ -188,13 +181,8 @@ mod tests {
     #[cfg(feature = "metis")]
     #[test]
     fn metis_is_fair_however_heavy_the_leaves() {
-        let leaves: Vec<BaseLeaf> = (0..512)
-            .map(|code| BaseLeaf {
-                level: 3,
-                code,
-                owner: 0,
-            })
-            .collect();
+        let leaves: Vec<BaseLeaf> =
+            (0..512).map(|code| BaseLeaf { level: 3, code, owner: 0 }).collect();
         for weight in [1, 1 << 40] {
             let owners = metis_cuts(&leaves, &[weight; 512], 8).unwrap();
             for r in 0..8 {

@@ -1,5 +1,6 @@
 //! What a run took: time per phase, and where a rank is right now.
 
+use crate::comm::{Comm, Traffic};
 use crate::error::Error;
 use cpu_time::ThreadTime;
 use std::path::PathBuf;
@@ -11,11 +12,7 @@ pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// An error if the user asked the run to stop.
 pub fn check_interrupt() -> Result<(), Error> {
-    if INTERRUPTED.load(Ordering::Relaxed) {
-        Err(Error::Interrupted)
-    } else {
-        Ok(())
-    }
+    if INTERRUPTED.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// One phase on one rank.
@@ -25,8 +22,10 @@ pub struct Phase {
     pub name: &'static str,
     /// Time from its start to its end, in seconds.
     pub time_wall_s: f64,
-    /// CPU time of the rank's thread, in seconds.
+    /// CPU time of the rank's thread, in seconds, calls to other ranks included.
     pub time_cpu_s: f64,
+    /// What was sent in it, and the time in calls.
+    pub traffic: Traffic,
 }
 
 /// Times phases, in the order in which they run, and tells a status file which one that is.
@@ -41,30 +40,33 @@ impl Recorder {
     /// A recorder that keeps the name of the phase in the file `status`, if given, and on standard error
     /// if `progress`.
     pub fn new(status: Option<PathBuf>, progress: bool) -> Self {
-        Self {
-            phases: Vec::new(),
-            status,
-            progress,
-        }
+        Self { phases: Vec::new(), status, progress }
     }
 
     /// Runs and times a phase. A phase that runs several times adds up.
-    pub fn phase<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+    pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
         self.tell(name);
+        let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = work();
         let (time_wall_s, time_cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-        match self.phases.iter_mut().find(|p| p.name == name) {
-            Some(p) => {
-                p.time_wall_s += time_wall_s;
-                p.time_cpu_s += time_cpu_s;
-            }
-            None => self.phases.push(Phase {
+        let after = comm.traffic();
+        let at = self.phases.iter().position(|p| p.name == name).unwrap_or_else(|| {
+            self.phases.push(Phase {
                 name,
-                time_wall_s,
-                time_cpu_s,
-            }),
-        }
+                time_wall_s: 0.0,
+                time_cpu_s: 0.0,
+                traffic: Traffic::default(),
+            });
+            self.phases.len() - 1
+        });
+        let p = &mut self.phases[at];
+        p.time_wall_s += time_wall_s;
+        p.time_cpu_s += time_cpu_s;
+        p.traffic.messages += after.messages - before.messages;
+        p.traffic.bytes += after.bytes - before.bytes;
+        p.traffic.time_wall_s += after.time_wall_s - before.time_wall_s;
+        p.traffic.time_cpu_s += after.time_cpu_s - before.time_cpu_s;
         result
     }
 

@@ -4,7 +4,7 @@ use crate::comm::{Comm, Traffic};
 use crate::digest::{Digests, hex};
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level};
-use crate::record::{Recorder, peak_rss_bytes};
+use crate::record::{Phase, Recorder, peak_rss_bytes};
 use crate::sides::{Ambiguous, Sides};
 use crate::stream::Counts;
 use crate::{grade, voxelise};
@@ -33,10 +33,8 @@ const COUNTERS: [&str; 9] = [
 
 impl Counters {
     fn add(&mut self, name: &str, v: u64) {
-        let at = COUNTERS
-            .iter()
-            .position(|n| *n == name)
-            .expect("the counter has a name in the list");
+        let at =
+            COUNTERS.iter().position(|n| *n == name).expect("the counter has a name in the list");
         self.values[at] += v;
     }
 
@@ -73,9 +71,20 @@ pub struct PhaseEntry {
     pub name: String,
     /// Wall time by rank, in seconds.
     pub time_wall_s: Vec<f64>,
-    /// CPU time by rank, in seconds, waiting in MPI included where MPI spins.
+    /// CPU time by rank, in seconds, calls to other ranks included.
     pub time_cpu_s: Vec<f64>,
+    /// Wall time in calls to other ranks, waiting included, by rank, in seconds.
+    pub time_comm_wall_s: Vec<f64>,
+    /// CPU time in calls to other ranks, by rank, in seconds; waiting may spin.
+    pub time_comm_cpu_s: Vec<f64>,
+    /// Messages sent, by rank.
+    pub messages: Vec<u64>,
+    /// Bytes sent, by rank.
+    pub message_bytes: Vec<u64>,
 }
+
+/// Words that a phase takes in the gathering of the report.
+const PHASE_WORDS: usize = 6;
 
 /// A run's results. In JSON, under `schema`, `octree-mesher-run/1`.
 #[derive(Clone, Debug, Serialize)]
@@ -135,27 +144,29 @@ impl Report {
         counters.leaves(parts[comm.rank()][0]);
         let mut words = vec![peak_rss_bytes()];
         words.extend(counters.values);
-        words.extend(
-            record
-                .phases()
-                .iter()
-                .flat_map(|p| [p.time_wall_s.to_bits(), p.time_cpu_s.to_bits()]),
-        );
+        words.extend(record.phases().iter().flat_map(|p| {
+            let t = p.traffic;
+            let times =
+                [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s].map(f64::to_bits);
+            [times[0], times[1], times[2], times[3], t.messages, t.bytes] as [u64; PHASE_WORDS]
+        }));
         let all = comm.all_gather(&words);
         let column = |i: usize| all.iter().map(|w| w[i]).collect::<Vec<u64>>();
-        let seconds = |i: usize| {
-            all.iter()
-                .map(|w| f64::from_bits(w[i]))
-                .collect::<Vec<f64>>()
-        };
+        let seconds = |i: usize| all.iter().map(|w| f64::from_bits(w[i])).collect::<Vec<f64>>();
         let first = 1 + COUNTERS.len();
-        let phases: Vec<PhaseEntry> = (record.phases().iter().enumerate())
-            .map(|(i, p)| PhaseEntry {
+        let entry = |(i, p): (usize, &Phase)| {
+            let at = first + PHASE_WORDS * i;
+            PhaseEntry {
                 name: p.name.into(),
-                time_wall_s: seconds(first + 2 * i),
-                time_cpu_s: seconds(first + 2 * i + 1),
-            })
-            .collect();
+                time_wall_s: seconds(at),
+                time_cpu_s: seconds(at + 1),
+                time_comm_wall_s: seconds(at + 2),
+                time_comm_cpu_s: seconds(at + 3),
+                messages: column(at + 4),
+                message_bytes: column(at + 5),
+            }
+        };
+        let phases: Vec<PhaseEntry> = record.phases().iter().enumerate().map(entry).collect();
         let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
         let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
         let ambiguous: Option<Ambiguous> = sides.ambiguous;
@@ -180,11 +191,7 @@ impl Report {
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
             peak_rss_bytes: column(0),
             phases,
-            counters: COUNTERS
-                .iter()
-                .enumerate()
-                .map(|(i, n)| (*n, column(1 + i)))
-                .collect(),
+            counters: COUNTERS.iter().enumerate().map(|(i, n)| (*n, column(1 + i))).collect(),
         }
     }
 }
@@ -192,11 +199,7 @@ impl Report {
 /// Greatest over mean: 1 is perfect balance.
 fn imbalance(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    if mean > 0.0 {
-        values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean
-    } else {
-        1.0
-    }
+    if mean > 0.0 { values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean } else { 1.0 }
 }
 
 impl fmt::Display for Report {
@@ -218,12 +221,7 @@ impl fmt::Display for Report {
             grouped(inside),
             grouped(crossing)
         )?;
-        for (l, &n) in self
-            .cells_by_level
-            .iter()
-            .enumerate()
-            .filter(|(_, n)| **n > 0)
-        {
+        for (l, &n) in self.cells_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
             writeln!(
                 f,
                 "  level {l:>2}     {:>16}   edge {:e}",

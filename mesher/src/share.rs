@@ -51,37 +51,15 @@ pub struct Ownership {
 impl Ownership {
     /// The ownership of a single rank, whose base tree is the root.
     pub fn solo() -> Self {
-        Self::new(
-            0,
-            1,
-            per_level(),
-            vec![BaseLeaf {
-                level: 0,
-                code: 0,
-                owner: 0,
-            }],
-        )
+        Self::new(0, 1, per_level(), vec![BaseLeaf { level: 0, code: 0, owner: 0 }])
     }
 
     /// The ownership in which `leaves`, in Morton order, have their owners; `internal` are the octants
     /// above them.
     pub fn new(rank: usize, ranks: usize, internal: PerLevel, leaves: Vec<BaseLeaf>) -> Self {
-        let starts = leaves
-            .iter()
-            .map(|b| crate::octant::start57(b.level, b.code))
-            .collect();
-        let deepest = internal
-            .iter()
-            .rposition(|s| !s.is_empty())
-            .map_or(0, |l| l as Level + 1);
-        Self {
-            rank,
-            ranks,
-            internal,
-            leaves,
-            starts,
-            level_top: deepest + 1,
-        }
+        let starts = leaves.iter().map(|b| crate::octant::start57(b.level, b.code)).collect();
+        let deepest = internal.iter().rposition(|s| !s.is_empty()).map_or(0, |l| l as Level + 1);
+        Self { rank, ranks, internal, leaves, starts, level_top: deepest + 1 }
     }
 
     /// The base leaves in Morton order.
@@ -159,17 +137,8 @@ impl Ownership {
         }
         let sent = out.iter().map(|w| w.len() as u64 / 2).sum();
         let heard = comm.exchange(out.into_iter().enumerate().collect());
-        let more = heard
-            .iter()
-            .map(|m| &m.1)
-            .chain([&top])
-            .flat_map(|words| words.chunks_exact(2));
-        let more = more
-            .map(|w| Brick {
-                key: w[0],
-                bits: w[1],
-            })
-            .collect();
+        let more = heard.iter().map(|m| &m.1).chain([&top]).flat_map(|words| words.chunks_exact(2));
+        let more = more.map(|w| Brick { key: w[0], bits: w[1] }).collect();
         (mine.union(BrickSet::from_unsorted(more)), sent)
     }
 
@@ -187,9 +156,5 @@ impl Ownership {
 
 /// Level-19 Morton code of a brick's minimum corner.
 fn brick_start(l: Level, key: u64) -> u64 {
-    if l < 2 {
-        0
-    } else {
-        key << (3 * (LEVEL_MAX + 2 - l))
-    }
+    if l < 2 { 0 } else { key << (3 * (LEVEL_MAX + 2 - l)) }
 }

@@ -28,10 +28,7 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     let file = File::open(path).map_err(fail)?;
     let meta = file.metadata().map_err(fail)?;
     if meta.is_dir() {
-        return Err(Error::input(format!(
-            "{} is a directory: give an STL file",
-            path.display()
-        )));
+        return Err(Error::input(format!("{} is a directory: give an STL file", path.display())));
     }
     let length = meta.len();
     if length == 0 {
@@ -40,12 +37,7 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
             path.display()
         )));
     }
-    let mut stl = Stl {
-        path: path.to_owned(),
-        file,
-        length,
-        binary: None,
-    };
+    let mut stl = Stl { path: path.to_owned(), file, length, binary: None };
     if length >= HEADER {
         let mut count = [0; 4];
         stl.file.read_exact_at(&mut count, 80).map_err(fail)?;
@@ -71,9 +63,7 @@ impl Stl {
     /// Whether the file starts as text STL do and has no bytes that text has not.
     fn looks_like_text(&self) -> Result<bool, Error> {
         let mut head = vec![0; self.length.min(1024) as usize];
-        self.file
-            .read_exact_at(&mut head, 0)
-            .map_err(|e| self.fail(e))?;
+        self.file.read_exact_at(&mut head, 0).map_err(|e| self.fail(e))?;
         let text = head.trim_ascii_start();
         Ok(text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid") && !head.contains(&0))
     }
@@ -89,13 +79,7 @@ impl Stl {
             self.file
                 .read_exact_at(bytes, HEADER + RECORD * at)
                 .map_err(|e| self.fail(format!("{e} at facet {at}: export it again")))?;
-            out.extend(
-                bytes
-                    .as_chunks::<{ RECORD as usize }>()
-                    .0
-                    .iter()
-                    .map(record),
-            );
+            out.extend(bytes.as_chunks::<{ RECORD as usize }>().0.iter().map(record));
         }
         Ok(out)
     }
@@ -106,21 +90,14 @@ impl Stl {
             return Err(self.fail("is neither a binary STL nor one in text, which begins with \"solid\": give an STL file"));
         }
         let mut bytes = Vec::new();
-        self.file
-            .read_to_end(&mut bytes)
-            .map_err(|e| self.fail(e))?;
+        self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
         let mut facets = Vec::new();
         for (i, solid) in solids(&bytes).into_iter().enumerate() {
             let broken = |e: std::io::Error| {
-                self.fail(format!(
-                    "solid {} is malformed ({e}): export it again",
-                    i + 1
-                ))
+                self.fail(format!("solid {} is malformed ({e}): export it again", i + 1))
             };
-            let complete = solid
-                .lines()
-                .last()
-                .is_some_and(|l| l.trim_start().starts_with("endsolid"));
+            let complete =
+                solid.lines().last().is_some_and(|l| l.trim_start().starts_with("endsolid"));
             if !complete {
                 return Err(self.fail(format!(
                     "solid {} has no \"endsolid\": the file is truncated; export it again",
@@ -169,10 +146,8 @@ pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
     if flat.iter().map(|x| 0.0 * x).sum::<f32>() == 0.0 {
         return Ok(());
     }
-    let bad = facets
-        .iter()
-        .position(|f| !f.as_flattened().iter().all(|x| x.is_finite()))
-        .unwrap_or(0);
+    let bad =
+        facets.iter().position(|f| !f.as_flattened().iter().all(|x| x.is_finite())).unwrap_or(0);
     Err(Error::input(format!(
         "facet {} has a vertex that is not finite: {:?}: repair the geometry",
         first + bad as u64,
@@ -208,17 +183,9 @@ mod tests {
             two,
         ] {
             let facets = text(&s).unwrap_or_else(|e| panic!("{e}\n{s}"));
-            assert_eq!(
-                facets,
-                [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.1, 0.0]]; 2],
-                "{s}"
-            );
+            assert_eq!(facets, [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.1, 0.0]]; 2], "{s}");
         }
-        assert!(
-            text("solid nothing\nendsolid nothing\n")
-                .unwrap()
-                .is_empty()
-        );
+        assert!(text("solid nothing\nendsolid nothing\n").unwrap().is_empty());
     }
 
     #[test]
@@ -236,12 +203,7 @@ mod tests {
         }
         assert!(text(&plain.replace("1e-1", "1e99")).is_err());
         let bad = [[[0.0; 3]; 3], [[0.0, 1.0, f32::NAN]; 3]];
-        assert!(
-            check_finite(&bad, 7)
-                .unwrap_err()
-                .to_string()
-                .contains("facet 8")
-        );
+        assert!(check_finite(&bad, 7).unwrap_err().to_string().contains("facet 8"));
         assert!(check_finite(&bad[..1], 7).is_ok());
     }
 
@@ -265,15 +227,9 @@ mod tests {
             })
         };
         let facets = try_open(&bytes).unwrap();
-        assert_eq!(
-            facets[1],
-            [[15.0, 16.0, 17.0], [18.0, 19.0, 20.0], [21.0, 22.0, 23.0]]
-        );
+        assert_eq!(facets[1], [[15.0, 16.0, 17.0], [18.0, 19.0, 20.0], [21.0, 22.0, 23.0]]);
         for cut in [0, 1, 83, 84, 100, bytes.len() - 1] {
-            assert!(
-                matches!(try_open(&bytes[..cut]), Err(Error::Input(_))),
-                "cut at {cut}"
-            );
+            assert!(matches!(try_open(&bytes[..cut]), Err(Error::Input(_))), "cut at {cut}");
         }
         bytes.push(0);
         assert!(try_open(&bytes).is_err());

@@ -26,11 +26,7 @@ impl Counts {
     pub fn gather(&self, comm: &dyn crate::comm::Comm) -> Self {
         let mut sum = Self::default();
         for words in comm.all_gather(self.by_level.as_flattened()) {
-            sum.by_level
-                .as_flattened_mut()
-                .iter_mut()
-                .zip(words)
-                .for_each(|(s, w)| *s += w);
+            sum.by_level.as_flattened_mut().iter_mut().zip(words).for_each(|(s, w)| *s += w);
         }
         sum
     }
@@ -114,11 +110,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
         let (of, at) = (self.of, &mut self.levels[l as usize]);
-        let place = if of.share.answers_for(l, key) {
-            Place::Mine
-        } else {
-            of.share.place(l, key)
-        };
+        let place = if of.share.answers_for(l, key) { Place::Mine } else { of.share.place(l, key) };
         let split = at.split.get(key) & exists;
         let crossing = at.crossing.get(key) | crossing;
         let deleted = at.deleted.get(key);
@@ -137,14 +129,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         if place != Place::Mine {
             leaves = 0;
         }
-        Loaded {
-            key,
-            leaves,
-            split,
-            crossing,
-            inside,
-            place,
-        }
+        Loaded { key, leaves, split, crossing, inside, place }
     }
 
     /// Emits eight siblings and all that is below them.
@@ -156,11 +141,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         if split == 0 {
             self.count(l, leaves, crossing, inside);
             self.put(l, brick.key << 3 | j, leaves, crossing, inside);
-            return if self.buffer.len() >= CHUNK {
-                self.flush()
-            } else {
-                Ok(())
-            };
+            return if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) };
         }
         let below = |sides: u8| brick::children(sides & split);
         let child = self.load(
@@ -213,11 +194,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     }
 
     fn flush(&mut self) -> Result<(), E> {
-        let result = if self.buffer.is_empty() {
-            Ok(())
-        } else {
-            (self.sink)(&self.buffer)
-        };
+        let result = if self.buffer.is_empty() { Ok(()) } else { (self.sink)(&self.buffer) };
         self.buffer.clear();
         result
     }

@@ -34,10 +34,7 @@ pub struct Tree {
 
 impl Default for Tree {
     fn default() -> Self {
-        Self {
-            split: per_level(),
-            crossing: per_level(),
-        }
+        Self { split: per_level(), crossing: per_level() }
     }
 }
 
@@ -56,10 +53,7 @@ impl Tree {
 
     /// The deepest level at which something is split, plus one; 0 for a lone root.
     pub fn depth(&self) -> Level {
-        (0..LEVELS)
-            .rev()
-            .find(|&l| !self.split[l].is_empty())
-            .map_or(0, |l| l as Level + 1)
+        (0..LEVELS).rev().find(|&l| !self.split[l].is_empty()).map_or(0, |l| l as Level + 1)
     }
 
     /// Checks the invariants of a whole tree (on one rank).
@@ -73,19 +67,11 @@ impl Tree {
             for b in Self::exists(&self.split, l as Level) {
                 let (s, c) = (split.get(b.key), crossing.get(b.key));
                 assert_eq!(s & !b.bits, 0, "level {l}: split octants must exist");
-                assert_eq!(
-                    c & (!b.bits | s),
-                    0,
-                    "level {l}: crossing octants must be leaves"
-                );
+                assert_eq!(c & (!b.bits | s), 0, "level {l}: crossing octants must be leaves");
                 splits += u64::from(s.count_ones());
                 crossings += u64::from(c.count_ones());
             }
-            assert_eq!(
-                splits,
-                self.split[l].count(),
-                "level {l}: a split octant has no parent"
-            );
+            assert_eq!(splits, self.split[l].count(), "level {l}: a split octant has no parent");
             assert_eq!(
                 crossings,
                 self.crossing[l].count(),

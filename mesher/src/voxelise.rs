@@ -43,9 +43,7 @@ impl Home {
             return Some(Self(0));
         }
         let drop = 64 - differ.leading_zeros();
-        Some(Self(
-            morton(low.map(|p| p >> drop << drop)) << 5 | u64::from(LEVEL_MAX - drop),
-        ))
+        Some(Self(morton(low.map(|p| p >> drop << drop)) << 5 | u64::from(LEVEL_MAX - drop)))
     }
 
     /// Level of the home.
@@ -78,12 +76,7 @@ impl Filed {
     /// Files facets; those that miss the root are dropped.
     pub fn new(facets: &[Facet]) -> Self {
         let mut order: Vec<(Home, u32)> = Vec::with_capacity(facets.len());
-        order.extend(
-            facets
-                .iter()
-                .zip(0..)
-                .filter_map(|(f, i)| Some((Home::of(f)?, i))),
-        );
+        order.extend(facets.iter().zip(0..).filter_map(|(f, i)| Some((Home::of(f)?, i))));
         order.sort_unstable_by_key(|o| o.0);
         Self {
             homes: order.iter().map(|o| o.0).collect(),
@@ -190,10 +183,7 @@ impl Voxeliser<'_> {
         let residents = self.filed.residents(m, code);
         let begin = self.lists.len();
         self.lists.extend(straddlers);
-        let load = Load {
-            residents,
-            straddlers: begin..self.lists.len(),
-        };
+        let load = Load { residents, straddlers: begin..self.lists.len() };
         // Tests fall on levels with the parity of the surface level, so that one falls on it.
         let (l, key, allowed) = match (m, (self.surface ^ m) & 1) {
             (0, odd) => (odd, 0, brick::valid(odd)),
@@ -212,11 +202,8 @@ impl Voxeliser<'_> {
         let mut runs = [(0u32, 0u32); 64];
         let crossing =
             (self.test(&load, l, at) | self.settle(&load.residents, l, at, &mut runs)) & allowed;
-        let near: Vec<ExtentBox> = boxes
-            .iter()
-            .filter(|b| b.level >= l && box_mask(b, at, l) != 0)
-            .copied()
-            .collect();
+        let near: Vec<ExtentBox> =
+            boxes.iter().filter(|b| b.level >= l && box_mask(b, at, l) != 0).copied().collect();
         let asked = |least: Level| {
             near.iter()
                 .filter(|b| b.level > least)
@@ -225,27 +212,19 @@ impl Voxeliser<'_> {
                 & allowed
         };
         let split = if l < self.surface { crossing } else { 0 } | asked(l);
-        let exists = if l == 0 {
-            1
-        } else {
-            self.level_above(l, key, crossing, asked(l - 1))
-        };
+        let exists = if l == 0 { 1 } else { self.level_above(l, key, crossing, asked(l - 1)) };
         self.tree.split[l as usize].push(key, split);
         if l >= self.surface {
             self.tree.crossing[l as usize].push(key, crossing & exists & !split);
         }
         for bit in ones(split) {
             let begin = self.lists.len();
-            let reach = self.pairs[first_pair..]
-                .iter()
-                .filter(|p| p.1 >> bit & 1 == 1)
-                .map(|p| p.0);
+            let reach =
+                self.pairs[first_pair..].iter().filter(|p| p.1 >> bit & 1 == 1).map(|p| p.0);
             self.lists.extend(reach);
             let (from, to) = runs[bit as usize];
-            let load = Load {
-                residents: from as usize..to as usize,
-                straddlers: begin..self.lists.len(),
-            };
+            let load =
+                Load { residents: from as usize..to as usize, straddlers: begin..self.lists.len() };
             self.brick(l + 2, key << 6 | u64::from(bit), load, &near, u64::MAX);
             self.lists.truncate(begin);
         }

@@ -50,17 +50,11 @@ impl OutDir {
                 }
                 // Found out now rather than after the meshing.
                 NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
-                Ok(Self {
-                    path: path.to_owned(),
-                    made: false,
-                })
+                Ok(Self { path: path.to_owned(), made: false })
             }
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 std::fs::create_dir(path).map_err(|e| output(path, &e))?;
-                Ok(Self {
-                    path: path.to_owned(),
-                    made: true,
-                })
+                Ok(Self { path: path.to_owned(), made: true })
             }
             Err(e) => Err(output(path, &e)),
         }
@@ -68,10 +62,7 @@ impl OutDir {
 
     /// The same directory as another rank sees it.
     pub fn join(path: &Path) -> Self {
-        Self {
-            path: path.to_owned(),
-            made: false,
-        }
+        Self { path: path.to_owned(), made: false }
     }
 
     /// Starts this rank's part.
@@ -102,11 +93,7 @@ impl OutDir {
         }
         if self.made {
             // The other ranks' parts may still be there; they are the mesher's too.
-            for entry in std::fs::read_dir(&self.path)
-                .into_iter()
-                .flatten()
-                .flatten()
-            {
+            for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
                 let name = entry.file_name();
                 let name = name.to_string_lossy();
                 if name.starts_with("leaves-") || name.starts_with(".tmp") || name == MANIFEST {
@@ -123,11 +110,7 @@ impl OutDir {
             let mut file = NamedTempFile::new_in(&self.path)?;
             serde_json::to_writer_pretty(&mut file, manifest)?;
             file.write_all(b"\n")?;
-            publish(
-                file.as_file(),
-                || file.path().to_owned(),
-                &self.path.join(MANIFEST),
-            )?;
+            publish(file.as_file(), || file.path().to_owned(), &self.path.join(MANIFEST))?;
             let _ = file.into_temp_path().keep();
             File::open(&self.path)?.sync_all()
         };
@@ -166,20 +149,12 @@ impl Part {
     pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
         self.digests.add(words);
         self.leaves += words.len() as u64;
-        self.writer
-            .extend(words.iter().copied())
-            .map_err(|e| output(&self.path, &e))
+        self.writer.extend(words.iter().copied()).map_err(|e| output(&self.path, &e))
     }
 
     /// Completes the file and gives it its name.
     pub fn finish(self) -> Result<Written, Error> {
-        let Self {
-            path,
-            writer,
-            temporary,
-            digests,
-            leaves,
-        } = self;
+        let Self { path, writer, temporary, digests, leaves } = self;
         let close = || -> io::Result<()> {
             writer.finish()?;
             let file = File::options().write(true).open(&temporary)?;
@@ -289,10 +264,7 @@ impl Manifest {
             schema: "octree-leaf-set/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
             tree: if base { "base" } else { "final" },
-            root: RootEntry {
-                origin: rules.root.origin,
-                edge: rules.root.edge,
-            },
+            root: RootEntry { origin: rules.root.origin, edge: rules.root.edge },
             level_surface: rules.level_surface,
             layer_cells_min: rules.layer_cells_min,
             keep: rules.keep,
@@ -300,22 +272,14 @@ impl Manifest {
             boxes: rules
                 .boxes
                 .iter()
-                .map(|b| BoxEntry {
-                    min: b.min,
-                    max: b.max,
-                    level: b.level,
-                })
+                .map(|b| BoxEntry { min: b.min, max: b.max, level: b.level })
                 .collect(),
             leaves: counts.total(),
             leaves_by_level: counts.by_level[..=LEVEL_MAX as usize]
                 .iter()
                 .map(|l| l.iter().sum())
                 .collect(),
-            leaves_by_side: SideEntry {
-                outside: side(0),
-                inside: side(1),
-                crossing: side(2),
-            },
+            leaves_by_side: SideEntry { outside: side(0), inside: side(1), crossing: side(2) },
             components_ambiguous: AmbiguousEntry {
                 count: ambiguous.map_or(0, |a| a.count),
                 example: ambiguous.map(|a| rules.root.locate(a.example)),

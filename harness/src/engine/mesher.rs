@@ -21,11 +21,7 @@ pub struct Layout {
 impl fmt::Display for Layout {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let plural = if self.ranks == 1 { "" } else { "s" };
-        write!(
-            f,
-            "{} rank{plural}, {}, base {}",
-            self.ranks, self.partitioner, self.level_base
-        )
+        write!(f, "{} rank{plural}, {}, base {}", self.ranks, self.partitioner, self.level_base)
     }
 }
 
@@ -47,11 +43,9 @@ pub struct Files<'a> {
 impl Files<'_> {
     fn add_to(&self, command: &mut Command) {
         command.arg(self.case);
-        for (option, value) in [
-            ("--out", self.out),
-            ("--json", self.json),
-            ("--status", self.status),
-        ] {
+        for (option, value) in
+            [("--out", self.out), ("--json", self.json), ("--status", self.status)]
+        {
             if let Some(value) = value {
                 command.arg(option).arg(value);
             }
@@ -65,11 +59,7 @@ impl Files<'_> {
 /// The reference's command.
 pub fn reference(programs: &Programs, files: &Files) -> Command {
     let mut command = Command::new(&programs.reference);
-    Files {
-        status: None,
-        ..*files
-    }
-    .add_to(&mut command);
+    Files { status: None, ..*files }.add_to(&mut command);
     command
 }
 
@@ -90,13 +80,7 @@ pub fn parallel(
 ) -> Command {
     let mut command = mpi::command(&programs.mpirun, layout.ranks, &programs.mesher, shared);
     files.add_to(&mut command);
-    command.args([
-        "--comm",
-        "mpi",
-        "--quiet",
-        "--partitioner",
-        &layout.partitioner,
-    ]);
+    command.args(["--comm", "mpi", "--quiet", "--partitioner", &layout.partitioner]);
     command.args(["--level-base", &layout.level_base]);
     command
 }
@@ -176,20 +160,10 @@ mod tests {
             ungraded: true,
         };
         let words = |command: &Command| -> Vec<String> {
-            command
-                .get_args()
-                .map(|word| word.to_string_lossy().into_owned())
-                .collect()
+            command.get_args().map(|word| word.to_string_lossy().into_owned()).collect()
         };
-        assert_eq!(
-            words(&reference(&programs, &files)),
-            ["a.toml", "--out", "mesh", "--ungraded"]
-        );
-        let layout = Layout {
-            ranks: 3,
-            partitioner: "metis".into(),
-            level_base: "2".into(),
-        };
+        assert_eq!(words(&reference(&programs, &files)), ["a.toml", "--out", "mesh", "--ungraded"]);
+        let layout = Layout { ranks: 3, partitioner: "metis".into(), level_base: "2".into() };
         let parallel = words(&parallel(&programs, &files, &layout, &SharedMemory::new()));
         assert_eq!(parallel[..2], ["-n", "3"]);
         let expected = "a.toml --out mesh --status status --ungraded --comm mpi --quiet --partitioner metis --level-base 2";

@@ -14,12 +14,7 @@ pub struct SharedMemory(Option<TempDir>);
 impl SharedMemory {
     /// A new place; none where the machine has no `/dev/shm`, and OpenMPI then chooses for itself.
     pub fn new() -> Self {
-        Self(
-            tempfile::Builder::new()
-                .prefix("harness-")
-                .tempdir_in("/dev/shm")
-                .ok(),
-        )
+        Self(tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok())
     }
 }
 

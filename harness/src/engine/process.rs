@@ -47,25 +47,18 @@ impl Finished {
     /// The first line that the child printed as an error: where our own programs say what is wrong, and
     /// `mpirun` has much to say after them.
     pub fn first_error_line(&self) -> String {
-        self.error_lines()
-            .into_iter()
-            .next()
-            .unwrap_or_else(|| "it printed no error".to_owned())
+        self.error_lines().into_iter().next().unwrap_or_else(|| "it printed no error".to_owned())
     }
 
     /// The last line that the child printed as an error: where Python says what is wrong.
     pub fn last_error_line(&self) -> String {
-        self.error_lines()
-            .pop()
-            .unwrap_or_else(|| "it printed no error".to_owned())
+        self.error_lines().pop().unwrap_or_else(|| "it printed no error".to_owned())
     }
 
     /// Lines with at least one letter in them, so that rulers are none.
     fn error_lines(&self) -> Vec<String> {
         let text = fs::read_to_string(&self.stderr).unwrap_or_default();
-        let lines = text
-            .lines()
-            .filter(|line| line.contains(char::is_alphabetic));
+        let lines = text.lines().filter(|line| line.contains(char::is_alphabetic));
         lines.map(|line| line.trim().to_owned()).collect()
     }
 }
@@ -90,23 +83,14 @@ pub struct Watch<'a> {
 pub fn run(command: &mut Command, watch: &Watch) -> io::Result<Finished> {
     let stdout = watch.logs.join(format!("{}.stdout", watch.name));
     let stderr = watch.logs.join(format!("{}.stderr", watch.name));
-    command
-        .stdin(Stdio::null())
-        .stdout(File::create(&stdout)?)
-        .stderr(File::create(&stderr)?);
+    command.stdin(Stdio::null()).stdout(File::create(&stdout)?).stderr(File::create(&stderr)?);
     // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
     unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
     let start = Instant::now();
     let mut child = command.spawn()?;
     let (end, last_doing) = wait(&mut child, start, watch)?;
     kill_session(child.id());
-    Ok(Finished {
-        end,
-        time_wall_s: start.elapsed().as_secs_f64(),
-        stdout,
-        stderr,
-        last_doing,
-    })
+    Ok(Finished { end, time_wall_s: start.elapsed().as_secs_f64(), stdout, stderr, last_doing })
 }
 
 fn wait(
@@ -118,11 +102,7 @@ fn wait(
     loop {
         if let Some(status) = child.try_wait()? {
             // A Ctrl-C in a terminal may reach a child by other ways; its end is then no result.
-            let end = if interrupt::requested() {
-                End::Interrupted
-            } else {
-                end_of(status)
-            };
+            let end = if interrupt::requested() { End::Interrupted } else { end_of(status) };
             return Ok((end, Vec::new()));
         }
         if interrupt::requested() {
@@ -186,9 +166,7 @@ fn session_members(leader: u32) -> Vec<Pid> {
     let Ok(entries) = fs::read_dir("/proc") else {
         return Vec::new();
     };
-    let ids = entries
-        .flatten()
-        .filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+    let ids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     let of_session = ids.filter(|&id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
         session_and_life(&stat) == Some((leader, true))
@@ -201,10 +179,7 @@ fn session_and_life(stat: &str) -> Option<(u32, bool)> {
     // The name, in parentheses, may itself hold spaces and parentheses.
     let (_, rest) = stat.rsplit_once(") ")?;
     let fields: Vec<&str> = rest.split(' ').collect();
-    Some((
-        fields.get(3)?.parse().ok()?,
-        !matches!(*fields.first()?, "Z" | "X"),
-    ))
+    Some((fields.get(3)?.parse().ok()?, !matches!(*fields.first()?, "Z" | "X")))
 }
 
 /// What the ranks' status files say, in the order of ranks.
@@ -213,18 +188,10 @@ fn read_status(directory: &Path) -> Vec<(usize, String)> {
         return Vec::new();
     };
     let of_file = |path: PathBuf| {
-        let rank = path
-            .file_stem()?
-            .to_str()?
-            .strip_prefix("rank-")?
-            .parse()
-            .ok()?;
+        let rank = path.file_stem()?.to_str()?.strip_prefix("rank-")?.parse().ok()?;
         Some((rank, fs::read_to_string(&path).ok()?.trim().to_owned()))
     };
-    let mut status: Vec<_> = entries
-        .flatten()
-        .filter_map(|entry| of_file(entry.path()))
-        .collect();
+    let mut status: Vec<_> = entries.flatten().filter_map(|entry| of_file(entry.path())).collect();
     status.sort();
     status
 }
@@ -236,12 +203,7 @@ mod tests {
     fn shell(script: &str, limit_ms: u64) -> (Finished, tempfile::TempDir) {
         let logs = tempfile::tempdir().unwrap();
         let limit = Duration::from_millis(limit_ms);
-        let watch = Watch {
-            limit,
-            logs: logs.path(),
-            name: "child",
-            status: Some(logs.path()),
-        };
+        let watch = Watch { limit, logs: logs.path(), name: "child", status: Some(logs.path()) };
         let mut command = Command::new("sh");
         command.arg("-c").arg(script).current_dir(logs.path());
         (run(&mut command, &watch).unwrap(), logs)
@@ -269,10 +231,7 @@ mod tests {
         let script = "echo layer > rank-00001.txt; echo balance > rank-00000.txt; sleep 600";
         let (finished, _logs) = shell(script, 300);
         assert_eq!(finished.end, End::TimedOut);
-        assert_eq!(
-            finished.last_doing,
-            [(0, "balance".to_owned()), (1, "layer".to_owned())]
-        );
+        assert_eq!(finished.last_doing, [(0, "balance".to_owned()), (1, "layer".to_owned())]);
         assert!(finished.time_wall_s < 60.0);
     }
 
@@ -290,18 +249,12 @@ mod tests {
         assert_eq!(finished.end, End::Exited(0));
         let id = fs::read_to_string(logs.path().join("id")).unwrap();
         let stat = fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
-        assert!(
-            !session_and_life(&stat).is_some_and(|(_, alive)| alive),
-            "{stat}"
-        );
+        assert!(!session_and_life(&stat).is_some_and(|(_, alive)| alive), "{stat}");
     }
 
     #[test]
     fn session_is_read_past_a_name_with_parentheses() {
-        assert_eq!(
-            session_and_life("12 (a) b) S 1 12 77 0 -1"),
-            Some((77, true))
-        );
+        assert_eq!(session_and_life("12 (a) b) S 1 12 77 0 -1"), Some((77, true)));
         assert_eq!(session_and_life("12 (x) Z 1 12 77 0 -1"), Some((77, false)));
         assert_eq!(session_and_life(""), None);
     }

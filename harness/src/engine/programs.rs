@@ -64,16 +64,12 @@ fn repository(beside: &Path) -> PathBuf {
     }
     let here = env::current_dir().unwrap_or_default();
     let above = beside.ancestors().chain(here.ancestors());
-    let root = above
-        .into_iter()
-        .find(|place| place.join("harness/oracles/protocol.py").is_file());
+    let root = above.into_iter().find(|place| place.join("harness/oracles/protocol.py").is_file());
     root.map_or(here.clone(), Path::to_owned)
 }
 
 /// The first program of that name in the directories of `PATH`.
 pub fn on_path(name: &str) -> Option<PathBuf> {
     let path = env::var_os("PATH")?;
-    env::split_paths(&path)
-        .map(|place| place.join(name))
-        .find(|program| program.is_file())
+    env::split_paths(&path).map(|place| place.join(name)).find(|program| program.is_file())
 }

@@ -73,22 +73,13 @@ impl Question {
     ) -> Result<Answer, NoAnswer> {
         if !programs.python.is_file() {
             let python = programs.python.display();
-            return Err(NoAnswer::Missing(format!(
-                "there is no {python} (ci/setup makes it)"
-            )));
+            return Err(NoAnswer::Missing(format!("there is no {python} (ci/setup makes it)")));
         }
         let sides = self.place.join(format!("{oracle}.npy"));
         let mut command = Command::new(&programs.python);
-        command
-            .arg("-B")
-            .arg(programs.oracles.join(format!("{oracle}_sides.py")));
+        command.arg("-B").arg(programs.oracles.join(format!("{oracle}_sides.py")));
         command.args([&self.points, &self.body, &sides]);
-        let watch = Watch {
-            limit,
-            logs: &self.place,
-            name: oracle,
-            status: None,
-        };
+        let watch = Watch { limit, logs: &self.place, name: oracle, status: None };
         let failed = |why: String| NoAnswer::Failed(format!("{oracle} {why}"));
         let done = process::run(&mut command, &watch).map_err(|error| failed(error.to_string()))?;
         match done.end {
@@ -104,10 +95,7 @@ impl Question {
             End::Interrupted => return Err(NoAnswer::Interrupted),
         }
         let inside = read_sides(&sides, self.count).map_err(failed)?;
-        Ok(Answer {
-            name: oracle.to_owned(),
-            inside,
-        })
+        Ok(Answer { name: oracle.to_owned(), inside })
     }
 }
 
@@ -140,33 +128,22 @@ mod tests {
         let python = place.path().join("python");
         fs::write(&python, format!("#!/bin/sh\n{script}\n")).unwrap();
         fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).unwrap();
-        let programs = Programs {
-            python,
-            ..Programs::find(Default::default())
-        };
+        let programs = Programs { python, ..Programs::find(Default::default()) };
         let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        question
-            .ask("trimesh", &programs, Duration::from_millis(2000))
-            .map(|answer| answer.inside)
+        question.ask("trimesh", &programs, Duration::from_millis(2000)).map(|answer| answer.inside)
     }
 
     fn answering(bytes: &[u8]) -> String {
         let header = npy::header("|u1", &format!("({},)", bytes.len()));
-        let octal: String = [&header, bytes]
-            .concat()
-            .iter()
-            .map(|byte| format!("\\{byte:03o}"))
-            .collect();
+        let octal: String =
+            [&header, bytes].concat().iter().map(|byte| format!("\\{byte:03o}")).collect();
         format!("printf '{octal}' > \"$5\"")
     }
 
     #[test]
     fn question_and_answer_go_through_the_files() {
         let check = "[ $(wc -c < \"$3\") = 176 ] && [ $(wc -c < \"$4\") = 134 ] || exit 9";
-        assert_eq!(
-            ask(&format!("{check}\n{}", answering(&[1, 0]))),
-            Ok(vec![true, false])
-        );
+        assert_eq!(ask(&format!("{check}\n{}", answering(&[1, 0]))), Ok(vec![true, false]));
     }
 
     #[test]
@@ -182,18 +159,12 @@ mod tests {
     #[test]
     fn every_way_of_not_answering_has_its_sentence() {
         let failed = |why: &str| Err(NoAnswer::Failed(format!("trimesh {why}")));
-        assert_eq!(
-            ask("echo no module >&2; exit 3"),
-            Err(NoAnswer::Missing("no module".into()))
-        );
+        assert_eq!(ask("echo no module >&2; exit 3"), Err(NoAnswer::Missing("no module".into())));
         assert_eq!(ask("echo bang >&2; exit 1"), failed("exit 1: bang"));
         assert_eq!(ask("kill -11 $$"), failed("died of signal 11"));
         assert_eq!(ask("sleep 60"), failed("did not end within 2 s"));
         assert_eq!(ask(&answering(&[1])), failed("answered for 1 of 2 points"));
-        assert_eq!(
-            ask(&answering(&[1, 2])),
-            failed("gave side 2; there are 0 and 1")
-        );
+        assert_eq!(ask(&answering(&[1, 2])), failed("gave side 2; there are 0 and 1"));
         assert!(
             matches!(ask("exit 0"), Err(NoAnswer::Failed(why)) if why.contains("wrote no answer"))
         );
@@ -205,14 +176,10 @@ mod tests {
     #[test]
     fn without_python_the_oracle_is_missing() {
         let place = tempfile::tempdir().unwrap();
-        let programs = Programs {
-            python: "/nowhere/python".into(),
-            ..Programs::find(Default::default())
-        };
+        let programs =
+            Programs { python: "/nowhere/python".into(), ..Programs::find(Default::default()) };
         let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        let answer = question
-            .ask("open3d", &programs, Duration::from_secs(1))
-            .map(drop);
+        let answer = question.ask("open3d", &programs, Duration::from_secs(1)).map(drop);
         assert!(matches!(answer, Err(NoAnswer::Missing(why)) if why.contains("/nowhere/python")));
     }
 }

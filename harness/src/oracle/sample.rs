@@ -26,10 +26,7 @@ pub struct Sample {
 /// otherwise `most` of them.
 pub fn choose(case: &Case, base: &[u64], most: usize, seed: u64) -> Sample {
     let band = band(case);
-    let candidates = base
-        .iter()
-        .copied()
-        .filter(|&leaf| word::side(leaf) != Side::Crossing);
+    let candidates = base.iter().copied().filter(|&leaf| word::side(leaf) != Side::Crossing);
     let count = candidates.clone().count();
     // No facet touches the closed octant of a non-crossing leaf, so its centroid is at least half an
     // edge away from all of them.
@@ -41,17 +38,8 @@ pub fn choose(case: &Case, base: &[u64], most: usize, seed: u64) -> Sample {
         words.truncate(most);
         words.sort_unstable();
     }
-    let points = words
-        .iter()
-        .map(|&leaf| case.root.to_user(word::octant(leaf).centre()))
-        .collect();
-    Sample {
-        words,
-        points,
-        band,
-        in_band: in_band as u64,
-        candidates: count as u64,
-    }
+    let points = words.iter().map(|&leaf| case.root.to_user(word::octant(leaf).centre())).collect();
+    Sample { words, points, band, in_band: in_band as u64, candidates: count as u64 }
 }
 
 /// What single precision and the lattice may move a surface by, with room to spare. The oracles are
@@ -88,30 +76,16 @@ mod tests {
 
     /// The 512 octants of level 3, each side in turn.
     fn leaves() -> Vec<u64> {
-        let octant = |key: u64| Octant {
-            corner: word::corner_of(key << 48),
-            level: 3,
-        };
-        let leaf = |key: u64| Leaf {
-            octant: octant(key),
-            side: Side::ALL[(key % 3) as usize],
-        };
+        let octant = |key: u64| Octant { corner: word::corner_of(key << 48), level: 3 };
+        let leaf = |key: u64| Leaf { octant: octant(key), side: Side::ALL[(key % 3) as usize] };
         (0..512).map(|key| word::encode(&leaf(key))).collect()
     }
 
     #[test]
     fn all_where_they_are_few_and_never_a_crossing_one() {
         let sample = choose(&case(8.0, -4.0, BODY), &leaves(), 1000, 0);
-        assert_eq!(
-            (sample.words.len(), sample.candidates, sample.in_band),
-            (342, 342, 0)
-        );
-        assert!(
-            sample
-                .words
-                .iter()
-                .all(|&leaf| word::side(leaf) != Side::Crossing)
-        );
+        assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
+        assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));
         assert_eq!(sample.points[0], [-3.5; 3]);
     }
 

@@ -57,14 +57,9 @@ pub struct Count {
 
 /// Counts the votes.
 pub fn count(ballot: &Ballot) -> Count {
-    let dissent = |answer: &Answer| Dissent {
-        name: answer.name.clone(),
-        ..Dissent::default()
-    };
-    let mut count = Count {
-        dissents: ballot.oracles.iter().map(dissent).collect(),
-        ..Count::default()
-    };
+    let dissent = |answer: &Answer| Dissent { name: answer.name.clone(), ..Dissent::default() };
+    let mut count =
+        Count { dissents: ballot.oracles.iter().map(dissent).collect(), ..Count::default() };
     for (point, (&mesh, &exact)) in ballot.mesh.iter().zip(ballot.exact).enumerate() {
         count.exact_undecided += u64::from(exact.is_none());
         if exact == Some(!mesh) {
@@ -98,11 +93,7 @@ impl Count {
         }
         let named = |who: &str, at: &[usize]| {
             let first = points[*at.first()?];
-            let side = if ballot.mesh[at[0]] {
-                "inside"
-            } else {
-                "outside"
-            };
+            let side = if ballot.mesh[at[0]] { "inside" } else { "outside" };
             Some(format!(
                 "{who} against the mesh at {} points, first at {first:?}, there {side}",
                 at.len()
@@ -118,24 +109,15 @@ impl Count {
     pub fn notes(&self, ballot: &Ballot) -> Vec<String> {
         let all = ballot.mesh.len();
         let told = |dissent: &Dissent| {
-            let Dissent {
-                name,
-                points,
-                right,
-                wrong,
-            } = dissent;
+            let Dissent { name, points, right, wrong } = dissent;
             let undecided = points - right - wrong;
             format!(
                 "{name} differs from the mesh at {points} of {all} points: by exact rays right at {right}, \
                  wrong at {wrong}, rays differ at {undecided}"
             )
         };
-        let mut notes: Vec<String> = self
-            .dissents
-            .iter()
-            .filter(|d| d.points > 0)
-            .map(told)
-            .collect();
+        let mut notes: Vec<String> =
+            self.dissents.iter().filter(|d| d.points > 0).map(told).collect();
         if !ballot.watertight && !self.exact_against.is_empty() {
             notes.push(format!(
                 "the body is not watertight: at {} points all six rays differ from the side of the \
@@ -166,12 +148,8 @@ mod tests {
         watertight: bool,
     ) -> (Count, Option<String>, Vec<String>) {
         let oracles = answers(all);
-        let ballot = Ballot {
-            mesh: &[false, true, true],
-            exact: &exact,
-            oracles: &oracles,
-            watertight,
-        };
+        let ballot =
+            Ballot { mesh: &[false, true, true], exact: &exact, oracles: &oracles, watertight };
         let count = count(&ballot);
         let points = [[0.0; 3], [1.0; 3], [2.0; 3]];
         let (failure, notes) = (count.failure(&ballot, &points), count.notes(&ballot));
@@ -190,16 +168,8 @@ mod tests {
     #[test]
     fn one_oracle_that_is_wrong_is_told_and_does_no_harm() {
         let (count, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
-        let dissent = Dissent {
-            name: "oracle 1".into(),
-            points: 2,
-            right: 0,
-            wrong: 2,
-        };
-        assert_eq!(
-            (&count.dissents[1], count.disputed, failure),
-            (&dissent, 2, None)
-        );
+        let dissent = Dissent { name: "oracle 1".into(), points: 2, right: 0, wrong: 2 };
+        assert_eq!((&count.dissents[1], count.disputed, failure), (&dissent, 2, None));
         assert_eq!(notes.len(), 1);
         assert!(
             notes[0].starts_with("oracle 1 differs from the mesh at 2 of 3 points"),
@@ -224,11 +194,7 @@ mod tests {
         let no: &[u8] = &[1, 1, 1];
         let undecided = [None, Some(true), Some(true)];
         let (_, failure, _) = vote(undecided, [no, no, no], true);
-        assert!(
-            failure
-                .unwrap()
-                .starts_with("all oracles against the mesh at 1 points")
-        );
+        assert!(failure.unwrap().starts_with("all oracles against the mesh at 1 points"));
         assert_eq!(vote(undecided, [no, no, YES], true).1, None);
     }
 
@@ -238,10 +204,6 @@ mod tests {
         let no: &[u8] = &[1, 1, 0];
         let (count, failure, notes) = vote(exact, [no, no, no], false);
         assert_eq!((failure, count.exact_undecided, notes.len()), (None, 1, 4));
-        assert!(
-            notes[0].ends_with("right at 1, wrong at 0, rays differ at 1"),
-            "{}",
-            notes[0]
-        );
+        assert!(notes[0].ends_with("right at 1, wrong at 0, rays differ at 1"), "{}", notes[0]);
     }
 }

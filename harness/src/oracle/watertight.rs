@@ -15,9 +15,7 @@ pub fn is_watertight(facets: &[FacetLattice]) -> bool {
     let mut edges: Vec<_> = facets.iter().flat_map(sides).map(sorted).collect();
     edges.retain(|[a, b]| a != b);
     edges.sort_unstable();
-    edges
-        .chunk_by(|a, b| a == b)
-        .all(|same| same.len() % 2 == 0)
+    edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
 }
 
 #[cfg(test)]

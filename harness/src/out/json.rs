@@ -26,10 +26,8 @@ mod tests {
     fn outcomes_are_words() {
         let value: serde_json::Value = serde_json::from_str(&json(&sample())).unwrap();
         let checks = value["cases"][0]["checks"].as_array().unwrap();
-        let outcomes: Vec<_> = checks
-            .iter()
-            .map(|check| check["outcome"].as_str().unwrap())
-            .collect();
+        let outcomes: Vec<_> =
+            checks.iter().map(|check| check["outcome"].as_str().unwrap()).collect();
         assert_eq!(outcomes, ["pass", "fail", "left_out"]);
         assert_eq!(checks[2]["why"], "the engine is not built");
     }

@@ -79,9 +79,6 @@ mod tests {
         let TestCaseStatus::Skipped { message, .. } = &case.test_cases[2].status else {
             panic!("a check that was left out is skipped");
         };
-        assert_eq!(
-            message.as_ref().unwrap().as_str(),
-            "left out: the engine is not built"
-        );
+        assert_eq!(message.as_ref().unwrap().as_str(), "left out: the engine is not built");
     }
 }

@@ -1,15 +1,13 @@
 //! Markdown, for a CI system's summary page and for the demo's report.
 
-use super::table::{COLUMN_PAPER, COLUMNS, remarks, rows_of};
+use super::remarks::remarks;
+use super::table::{COLUMN_PAPER, COLUMNS, rows_of};
 use crate::verify::report::Report;
 
 /// The report as Markdown: verdict, table, remarks.
 pub fn markdown(report: &Report) -> String {
-    let titles: Vec<String> = COLUMNS
-        .iter()
-        .chain([&COLUMN_PAPER])
-        .map(|title| (*title).to_owned())
-        .collect();
+    let titles: Vec<String> =
+        COLUMNS.iter().chain([&COLUMN_PAPER]).map(|title| (*title).to_owned()).collect();
     let rule = vec!["---".to_owned(); titles.len()];
     let rows = report.cases.iter().flat_map(rows_of);
     let mut text = format!("## harness verify\n\n{}\n\n", report.verdict());
@@ -53,11 +51,7 @@ mod tests {
         let text = markdown(&sample());
         let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
         assert_eq!(rows.len(), 4);
-        assert!(
-            rows.iter()
-                .all(|row| row.matches(" |").count() == COLUMNS.len() + 1),
-            "{text}"
-        );
+        assert!(rows.iter().all(|row| row.matches(" |").count() == COLUMNS.len() + 1), "{text}");
     }
 
     #[test]

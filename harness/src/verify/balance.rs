@@ -40,10 +40,7 @@ impl CaseRun<'_> {
                 return self.add_results(
                     SUBJECT,
                     None,
-                    vec![crate::check::CheckResult {
-                        name: NAME,
-                        ..compared
-                    }],
+                    vec![crate::check::CheckResult { name: NAME, ..compared }],
                 );
             }
             Err(NoTree::Interrupted) => return,
@@ -59,18 +56,9 @@ impl CaseRun<'_> {
     /// The mesh of the same case with n = 1 and everything kept.
     fn mesh_plainly(&self) -> Result<Vec<u64>, Trouble> {
         let case = self.plain_case().map_err(Trouble::Failed)?;
-        let order = Order {
-            what: What::Serial,
-            case: &case,
-            name: "plain",
-            ungraded: false,
-            write: true,
-        };
-        Ok(self
-            .run(&order)?
-            .mesh
-            .map(|mesh| mesh.words)
-            .unwrap_or_default())
+        let order =
+            Order { what: What::Serial, case: &case, name: "plain", ungraded: false, write: true };
+        Ok(self.run(&order)?.mesh.map(|mesh| mesh.words).unwrap_or_default())
     }
 
     fn plain_case(&self) -> Result<PathBuf, String> {
@@ -86,12 +74,7 @@ impl CaseRun<'_> {
         let failed = |why: String| NoTree::Failed(why);
         let out = self.place.join("p4est");
         fs::create_dir_all(&out).map_err(|error| failed(error.to_string()))?;
-        let watch = Watch {
-            limit: self.options.limit,
-            logs: &out,
-            name: "p4est",
-            status: None,
-        };
+        let watch = Watch { limit: self.options.limit, logs: &out, name: "p4est", status: None };
         let mut command = p4est::command(&self.programs.p4est, base, &out);
         let done = process::run(&mut command, &watch).map_err(|error| failed(error.to_string()))?;
         match done.end {
@@ -99,10 +82,7 @@ impl CaseRun<'_> {
             End::Exited(EXIT_TOO_DEEP) => return Err(NoTree::TooDeep),
             End::Interrupted => return Err(NoTree::Interrupted),
             End::TimedOut => {
-                return Err(failed(format!(
-                    "did not end within {} s",
-                    watch.limit.as_secs()
-                )));
+                return Err(failed(format!("did not end within {} s", watch.limit.as_secs())));
             }
             End::Exited(code) => {
                 return Err(failed(format!("exit {code}: {}", done.first_error_line())));
@@ -117,9 +97,7 @@ impl CaseRun<'_> {
 
 /// The case file's text with n = 1 and everything kept, meaning the same from any directory.
 fn plain(text: &str, directory: &Path) -> Result<String, String> {
-    let mut case: Table = text
-        .parse()
-        .map_err(|error: toml::de::Error| error.to_string())?;
+    let mut case: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
     case.insert("layer_cells_min".into(), Value::Integer(1));
     case.insert("keep".into(), Value::String("all".into()));
     case.insert("keep_crossing".into(), Value::Boolean(true));

@@ -41,19 +41,8 @@ impl<'a> CaseRun<'a> {
         place: &'a Path,
         progress: &'a Progress,
     ) -> Self {
-        let report = CaseReport {
-            name: selected.name.clone(),
-            ..CaseReport::default()
-        };
-        Self {
-            selected,
-            options,
-            programs,
-            needs,
-            place,
-            progress,
-            report,
-        }
+        let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
+        Self { selected, options, programs, needs, place, progress, report }
     }
 
     /// All steps: serial meshes and their checks, ranks, oracles, p4est. A step whose ground is missing is
@@ -107,20 +96,14 @@ impl<'a> CaseRun<'a> {
     ) {
         for result in results {
             let check = Check::new(subject, result.name, outcome_of(&result));
-            let notes = Some(result.note)
-                .filter(|_| layout.is_none())
-                .filter(|note| !note.is_empty());
+            let notes =
+                Some(result.note).filter(|_| layout.is_none()).filter(|note| !note.is_empty());
             let counts = [
                 ("examined".to_owned(), result.examined),
                 ("findings".to_owned(), result.findings_total),
             ];
             let ranks = layout.map(|layout| layout.ranks);
-            let check = Check {
-                ranks,
-                figures: notes,
-                counts: counts.into(),
-                ..check
-            };
+            let check = Check { ranks, figures: notes, counts: counts.into(), ..check };
             self.add(check, layout);
         }
     }
@@ -133,13 +116,7 @@ impl<'a> CaseRun<'a> {
             Trouble::Input(why) => format!("it refuses the case: {why}"),
         };
         let check = Check::new(subject, RUNS, Outcome::Fail(why));
-        self.add(
-            Check {
-                ranks: layout.map(|layout| layout.ranks),
-                ..check
-            },
-            layout,
-        );
+        self.add(Check { ranks: layout.map(|layout| layout.ranks), ..check }, layout);
     }
 
     /// One line that a shell takes and that repeats the run of this layout, or the serial one.
@@ -155,11 +132,7 @@ impl<'a> CaseRun<'a> {
         let case = quoted(&self.selected.argument);
         let only = match layout {
             None => "--no-mpi".to_owned(),
-            Some(Layout {
-                ranks,
-                partitioner,
-                level_base,
-            }) => {
+            Some(Layout { ranks, partitioner, level_base }) => {
                 format!(
                     "--no-oracles --no-p4est --ranks {ranks} --partitioners {partitioner} --level-bases {level_base}"
                 )
@@ -176,15 +149,9 @@ fn outcome_of(result: &CheckResult) -> Outcome {
     if result.holds() {
         return Outcome::Pass;
     }
-    let mut told: Vec<&str> = result
-        .findings
-        .iter()
-        .map(|finding| finding.detail.as_str())
-        .collect();
-    let more = format!(
-        "and {} more",
-        result.findings_total - result.findings.len() as u64
-    );
+    let mut told: Vec<&str> =
+        result.findings.iter().map(|finding| finding.detail.as_str()).collect();
+    let more = format!("and {} more", result.findings_total - result.findings.len() as u64);
     if result.findings_total > result.findings.len() as u64 {
         told.push(&more);
     }

@@ -50,18 +50,14 @@ pub fn select(options: &Options, programs: &Programs) -> Result<Vec<Selected>, V
     }
     let mut selected: Vec<Selected> = Vec::new();
     for argument in &options.cases {
-        let mut one = match Path::new(argument)
-            .extension()
-            .is_some_and(|extension| extension == "toml")
-        {
-            true => of_path(argument)?,
-            false => of_name(argument, all()?)?,
-        };
+        let mut one =
+            match Path::new(argument).extension().is_some_and(|extension| extension == "toml") {
+                true => of_path(argument)?,
+                false => of_name(argument, all()?)?,
+            };
         // Directories of results bear the case's name, so two of one name must not meet.
-        let same = selected
-            .iter()
-            .filter(|other| other.path.file_stem() == one.path.file_stem())
-            .count();
+        let same =
+            selected.iter().filter(|other| other.path.file_stem() == one.path.file_stem()).count();
         if selected.iter().any(|other| other.name == one.name) {
             one.name = format!("{}-{}", one.name, same + 1);
         }
@@ -73,11 +69,7 @@ pub fn select(options: &Options, programs: &Programs) -> Result<Vec<Selected>, V
 fn of_path(argument: &str) -> Result<Selected, VerifyError> {
     let path = fs::canonicalize(argument)
         .map_err(|error| VerifyError::Input(format!("{argument}: {error}")))?;
-    let name = path
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     // A geometry that a user's own case names is not left out if it is not there: it is the user's error.
     Ok(Selected {
         name,
@@ -90,14 +82,12 @@ fn of_path(argument: &str) -> Result<Selected, VerifyError> {
 
 fn of_name(name: &str, all: Vec<Selected>) -> Result<Selected, VerifyError> {
     let names: Vec<String> = all.iter().map(|case| case.name.clone()).collect();
-    all.into_iter()
-        .find(|case| case.name == name)
-        .ok_or_else(|| {
-            VerifyError::Input(format!(
-                "no case {name} in the catalogue, which has {}",
-                names.join(", ")
-            ))
-        })
+    all.into_iter().find(|case| case.name == name).ok_or_else(|| {
+        VerifyError::Input(format!(
+            "no case {name} in the catalogue, which has {}",
+            names.join(", ")
+        ))
+    })
 }
 
 fn read(catalogue: &Path) -> Result<Vec<Selected>, VerifyError> {
@@ -108,13 +98,7 @@ fn read(catalogue: &Path) -> Result<Vec<Selected>, VerifyError> {
     let selected = |entry: Entry| {
         let path = directory.join(entry.file);
         let (argument, absent) = (entry.name.clone(), absent(&path));
-        Selected {
-            name: entry.name,
-            argument,
-            path,
-            size: Some(entry.size),
-            absent,
-        }
+        Selected { name: entry.name, argument, path, size: Some(entry.size), absent }
     };
     Ok(entries.cases.into_iter().map(selected).collect())
 }
@@ -147,67 +131,36 @@ mod tests {
             "[generator]\nshape = \"cube\"\nfacets = 12",
         )
         .unwrap();
-        fs::write(
-            place.path().join("jet.toml"),
-            "geometry = \"fetched/jet.stl\"",
-        )
-        .unwrap();
+        fs::write(place.path().join("jet.toml"), "geometry = \"fetched/jet.stl\"").unwrap();
         let cases = cases
             .iter()
             .map(|case| case.replace("HERE", &place.path().to_string_lossy()))
             .collect();
-        let options = Options {
-            cases,
-            sizes: sizes.to_vec(),
-            ..options()
-        };
-        let programs = Programs {
-            catalogue,
-            ..Programs::find(Default::default())
-        };
+        let options = Options { cases, sizes: sizes.to_vec(), ..options() };
+        let programs = Programs { catalogue, ..Programs::find(Default::default()) };
         let selected = select(&options, &programs).map_err(|error| error.to_string())?;
-        Ok(selected
-            .into_iter()
-            .map(|case| (case.name, case.absent.is_some()))
-            .collect())
+        Ok(selected.into_iter().map(|case| (case.name, case.absent.is_some())).collect())
     }
 
     fn named(cases: &[(&str, bool)]) -> Result<Vec<(String, bool)>, String> {
-        Ok(cases
-            .iter()
-            .map(|(name, absent)| ((*name).to_owned(), *absent))
-            .collect())
+        Ok(cases.iter().map(|(name, absent)| ((*name).to_owned(), *absent)).collect())
     }
 
     #[test]
     fn by_size_by_name_and_by_path() {
-        assert_eq!(
-            selecting(&[], &[Size::Small]),
-            named(&[("cube_small", false)])
-        );
+        assert_eq!(selecting(&[], &[Size::Small]), named(&[("cube_small", false)]));
         assert_eq!(selecting(&["jet"], &[Size::Small]), named(&[("jet", true)]));
         let paths = ["HERE/jet.toml", "cube_small", "HERE/cube_small.toml"];
         assert_eq!(
             selecting(&paths, &[]),
-            named(&[
-                ("jet", false),
-                ("cube_small", false),
-                ("cube_small-2", false)
-            ])
+            named(&[("jet", false), ("cube_small", false), ("cube_small-2", false)])
         );
     }
 
     #[test]
     fn what_is_no_case_is_named() {
         let unknown = selecting(&["cub"], &[]).unwrap_err();
-        assert_eq!(
-            unknown,
-            "no case cub in the catalogue, which has cube_small, jet"
-        );
-        assert!(
-            selecting(&["HERE/none.toml"], &[])
-                .unwrap_err()
-                .contains("none.toml")
-        );
+        assert_eq!(unknown, "no case cub in the catalogue, which has cube_small, jet");
+        assert!(selecting(&["HERE/none.toml"], &[]).unwrap_err().contains("none.toml"));
     }
 }

@@ -45,10 +45,7 @@ pub enum VerifyError {
 /// Only where it could not begin; what goes wrong later is in the report.
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyError> {
     let start = Instant::now();
-    for (program, path) in [
-        ("mesher", &programs.mesher),
-        ("reference", &programs.reference),
-    ] {
+    for (program, path) in [("mesher", &programs.mesher), ("reference", &programs.reference)] {
         if !path.is_file() {
             let path = path.display();
             return Err(VerifyError::Missing(format!(
@@ -65,14 +62,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
         if interrupt::requested() {
             break;
         }
-        cases.push(verify_case(
-            one,
-            options,
-            programs,
-            &mut needs,
-            &mut workplace,
-            &progress,
-        )?);
+        cases.push(verify_case(one, options, programs, &mut needs, &mut workplace, &progress)?);
     }
     progress.finish();
     let interrupted = interrupt::requested();
@@ -113,9 +103,7 @@ fn verify_case(
     let mut report = run.into_report();
     report.time_s = start.elapsed().as_secs_f64();
     let keep = options.keep || (report.failed() && !interrupt::requested());
-    report.kept = workplace
-        .leave(&place, keep)
-        .map(|kept| kept.display().to_string());
+    report.kept = workplace.leave(&place, keep).map(|kept| kept.display().to_string());
     if !report.failed() {
         report.repeat_with = None;
     }

@@ -44,10 +44,9 @@ impl Needs {
         };
         needs.p4est = match (options.p4est, programs.p4est.is_file()) {
             (false, _) => Some("--no-p4est was given".to_owned()),
-            (true, false) => Some(format!(
-                "there is no {} (ci/setup compiles it)",
-                programs.p4est.display()
-            )),
+            (true, false) => {
+                Some(format!("there is no {} (ci/setup compiles it)", programs.p4est.display()))
+            }
             (true, true) => None,
         };
         match options.oracles {
@@ -88,12 +87,7 @@ impl Needs {
     /// Everything that is missing, once each.
     pub fn missing(&self, options: &Options) -> Vec<Missing> {
         // One oracle that is missing is a vote that is missing.
-        let oracles = self
-            .oracles
-            .iter()
-            .chain(&self.oracles_absent)
-            .next()
-            .cloned();
+        let oracles = self.oracles.iter().chain(&self.oracles_absent).next().cloned();
         let geometries = match self.geometries.len() {
             0 => None,
             count => Some(format!(
@@ -123,52 +117,29 @@ fn probe_mpi(programs: &Programs, place: &Path) -> Result<(), String> {
         return Err("there is no mpirun on the PATH (ci/setup installs it)".to_owned());
     }
     let probe = tempfile::tempdir_in(place).map_err(|error| error.to_string())?;
-    let (case, json) = (
-        probe.path().join("probe.toml"),
-        probe.path().join("probe.json"),
-    );
+    let (case, json) = (probe.path().join("probe.toml"), probe.path().join("probe.json"));
     fs::write(&case, PROBE).map_err(|error| error.to_string())?;
-    let files = Files {
-        case: &case,
-        out: None,
-        json: Some(&json),
-        status: None,
-        ungraded: false,
-    };
-    let layout = Layout {
-        ranks: PROBE_RANKS,
-        partitioner: "morton".into(),
-        level_base: "auto".into(),
-    };
+    let files = Files { case: &case, out: None, json: Some(&json), status: None, ungraded: false };
+    let layout =
+        Layout { ranks: PROBE_RANKS, partitioner: "morton".into(), level_base: "auto".into() };
     let shared = SharedMemory::new();
     let mut command = mesher::parallel(programs, &files, &layout, &shared);
-    let watch = Watch {
-        limit: PROBE_LIMIT,
-        logs: probe.path(),
-        name: "mpi",
-        status: None,
-    };
+    let watch = Watch { limit: PROBE_LIMIT, logs: probe.path(), name: "mpi", status: None };
     let done = process::run(&mut command, &watch)
         .map_err(|error| format!("mpirun cannot be started: {error}"))?;
     match done.end {
         End::Exited(0) => {}
         End::TimedOut => {
-            return Err(format!(
-                "mpirun did not end within {} s",
-                PROBE_LIMIT.as_secs()
-            ));
+            return Err(format!("mpirun did not end within {} s", PROBE_LIMIT.as_secs()));
         }
         _ => {
-            return Err(format!(
-                "the mesher does not run on MPI: {}",
-                done.first_error_line()
-            ));
+            return Err(format!("the mesher does not run on MPI: {}", done.first_error_line()));
         }
     }
     match Record::read(&json)?.ranks {
         PROBE_RANKS => Ok(()),
-        ranks => Err(format!(
-            "the mesher sees {ranks} of {PROBE_RANKS} ranks: it was built without MPI"
-        )),
+        ranks => {
+            Err(format!("the mesher sees {ranks} of {PROBE_RANKS} ranks: it was built without MPI"))
+        }
     }
 }

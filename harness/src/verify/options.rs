@@ -89,11 +89,7 @@ impl Options {
             for partitioner in &self.partitioners {
                 for level_base in &self.level_bases {
                     let (partitioner, level_base) = (partitioner.clone(), level_base.clone());
-                    layouts.push(Layout {
-                        ranks,
-                        partitioner,
-                        level_base,
-                    });
+                    layouts.push(Layout { ranks, partitioner, level_base });
                 }
             }
         }

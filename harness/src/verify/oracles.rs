@@ -73,16 +73,10 @@ impl CaseRun<'_> {
 
 fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
     let parity = Parity::new(&case.facets_lattice);
-    let mesh: Vec<bool> = sample
-        .words
-        .iter()
-        .map(|&leaf| word::side(leaf) == Side::Inside)
-        .collect();
-    let exact: Vec<Option<bool>> = sample
-        .words
-        .iter()
-        .map(|&leaf| unanimous(&parity, leaf))
-        .collect();
+    let mesh: Vec<bool> =
+        sample.words.iter().map(|&leaf| word::side(leaf) == Side::Inside).collect();
+    let exact: Vec<Option<bool>> =
+        sample.words.iter().map(|&leaf| unanimous(&parity, leaf)).collect();
     let ballot = Ballot {
         mesh: &mesh,
         exact: &exact,
@@ -90,9 +84,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
         watertight: is_watertight(&case.facets_lattice),
     };
     let count = vote::count(&ballot);
-    let outcome = count
-        .failure(&ballot, &sample.points)
-        .map_or(Outcome::Pass, Outcome::Fail);
+    let outcome = count.failure(&ballot, &sample.points).map_or(Outcome::Pass, Outcome::Fail);
     let mut counts = BTreeMap::from([
         ("leaves".to_owned(), sample.candidates),
         ("points".to_owned(), sample.words.len() as u64),
@@ -100,10 +92,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
         ("watertight".to_owned(), u64::from(ballot.watertight)),
         ("disputed".to_owned(), count.disputed),
         ("exact_undecided".to_owned(), count.exact_undecided),
-        (
-            "exact_against_mesh".to_owned(),
-            count.exact_against.len() as u64,
-        ),
+        ("exact_against_mesh".to_owned(), count.exact_against.len() as u64),
     ]);
     for dissent in &count.dissents {
         counts.insert(format!("{}_differs", dissent.name), dissent.points);
@@ -120,11 +109,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
             ),
         );
     }
-    Check {
-        notes,
-        counts,
-        ..Check::new(SUBJECT, NAME, outcome)
-    }
+    Check { notes, counts, ..Check::new(SUBJECT, NAME, outcome) }
 }
 
 /// What the exact rays from a leaf's centroid say; nothing where they differ.

@@ -47,27 +47,16 @@ impl CaseRun<'_> {
         layout: &Layout,
     ) -> Result<(), Trouble> {
         self.progress.step(layout.to_string());
-        let name = format!(
-            "ranks-{}-{}-{}",
-            layout.ranks, layout.partitioner, layout.level_base
-        );
+        let name = format!("ranks-{}-{}-{}", layout.ranks, layout.partitioner, layout.level_base);
         let what = What::Ranks(layout);
-        let order = Order {
-            what,
-            case: &self.selected.path,
-            name: &name,
-            ungraded: false,
-            write: true,
-        };
+        let order =
+            Order { what, case: &self.selected.path, name: &name, ungraded: false, write: true };
         let done = self.run(&order)?;
         self.report().runs.push(done.run);
         self.add(Check::of_layout(layout, RUNS, Outcome::Pass), Some(layout));
         let Some(mesh) = done.mesh else { return Ok(()) };
         let subject = Subject::new(case, &mesh).with_reference(&meshes.mesh);
-        let mut results = vec![
-            check::manifest::check(&subject),
-            check::linear::check(&subject),
-        ];
+        let mut results = vec![check::manifest::check(&subject), check::linear::check(&subject)];
         results.extend(check::identical::check(&subject));
         let holds = results.iter().all(check::CheckResult::holds);
         self.add_results(&layout.to_string(), Some(layout), results);

@@ -65,10 +65,7 @@ impl Check {
 
     /// A check of one run on MPI.
     pub fn of_layout(layout: &Layout, name: impl Into<String>, outcome: Outcome) -> Self {
-        Self {
-            ranks: Some(layout.ranks),
-            ..Self::new(layout.to_string(), name, outcome)
-        }
+        Self { ranks: Some(layout.ranks), ..Self::new(layout.to_string(), name, outcome) }
     }
 
     /// Whether it failed.
@@ -233,11 +230,7 @@ impl Report {
     /// One sentence on the whole.
     pub fn verdict(&self) -> String {
         let all = self.cases.iter().flat_map(|case| &case.checks);
-        let Tally {
-            pass,
-            fail,
-            left_out,
-        } = all.collect();
+        let Tally { pass, fail, left_out } = all.collect();
         let cases = self.cases.len();
         let counts = format!("{cases} cases: {pass} checks hold, {fail} fail, {left_out} left out");
         let end = match self.exit_code() {
@@ -257,11 +250,7 @@ pub(crate) mod tests {
 
     /// A report with one of everything, for the tests of the output formats too.
     pub(crate) fn sample() -> Report {
-        let layout = Layout {
-            ranks: 4,
-            partitioner: "metis".into(),
-            level_base: "auto".into(),
-        };
+        let layout = Layout { ranks: 4, partitioner: "metis".into(), level_base: "auto".into() };
         let run = Run {
             program: "mesher".into(),
             layout: None,
@@ -270,11 +259,7 @@ pub(crate) mod tests {
             time_process_s: 0.2,
             peak_rss_bytes: 76_000,
         };
-        let on_ranks = Run {
-            layout: Some(layout.clone()),
-            time_wall_s: 0.05,
-            ..run.clone()
-        };
+        let on_ranks = Run { layout: Some(layout.clone()), time_wall_s: 0.05, ..run.clone() };
         let mut sides = Check::new("serial", "oracles", Outcome::Pass);
         sides.notes.push("open3d was wrong at 1 point".into());
         let case = CaseReport {
@@ -290,11 +275,7 @@ pub(crate) mod tests {
                     "same leaves",
                     Outcome::Fail("first difference <at> root".into()),
                 ),
-                Check::new(
-                    "p4est",
-                    "balance",
-                    Outcome::LeftOut("the engine is not built".into()),
-                ),
+                Check::new("p4est", "balance", Outcome::LeftOut("the engine is not built".into())),
             ],
             kept: Some("out/cube_small".into()),
             repeat_with: Some("harness verify cube_small --ranks 4".into()),

@@ -84,17 +84,10 @@ impl CaseRun<'_> {
         };
         let shared = SharedMemory::new();
         let mut command = self.command(order.what, &files, &shared);
-        let watch = Watch {
-            limit: self.options.limit,
-            logs: &place,
-            name: "run",
-            status: Some(&status),
-        };
+        let watch =
+            Watch { limit: self.options.limit, logs: &place, name: "run", status: Some(&status) };
         let finished = process::run(&mut command, &watch).map_err(|error| {
-            failed(format!(
-                "{:?} cannot be started: {error}",
-                command.get_program()
-            ))
+            failed(format!("{:?} cannot be started: {error}", command.get_program()))
         })?;
         judge(&finished, self.options.limit.as_secs())?;
         let record = Record::read(&json).map_err(failed)?;
@@ -106,11 +99,7 @@ impl CaseRun<'_> {
         if let Some(mesh) = &mesh {
             fits(&record, mesh).map_err(failed)?;
         }
-        Ok(Done {
-            run: run_of(order.what, &record, finished.time_wall_s),
-            mesh,
-            place,
-        })
+        Ok(Done { run: run_of(order.what, &record, finished.time_wall_s), mesh, place })
     }
 
     fn command(&self, what: What, files: &Files, shared: &SharedMemory) -> Command {
@@ -127,16 +116,13 @@ fn judge(finished: &Finished, limit_s: u64) -> Result<(), Trouble> {
     match finished.end {
         End::Exited(0) => Ok(()),
         End::Exited(EXIT_INPUT) => Err(Trouble::Input(finished.first_error_line())),
-        End::Exited(code) => Err(Trouble::Failed(format!(
-            "exit {code}: {}",
-            finished.first_error_line()
-        ))),
+        End::Exited(code) => {
+            Err(Trouble::Failed(format!("exit {code}: {}", finished.first_error_line())))
+        }
         End::Signalled(signal) => Err(Trouble::Failed(format!("died of signal {signal}"))),
         End::TimedOut => {
             let last = last_doing(&finished.last_doing);
-            Err(Trouble::Hung(format!(
-                "did not end within {limit_s} s and was killed; {last}"
-            )))
+            Err(Trouble::Hung(format!("did not end within {limit_s} s and was killed; {last}")))
         }
         End::Interrupted => Err(Trouble::Interrupted),
     }
@@ -195,15 +181,9 @@ mod tests {
 
     #[test]
     fn ranks_that_did_the_same_are_told_together() {
-        let status = [
-            (0, "layer 7".to_owned()),
-            (1, "balance".to_owned()),
-            (2, "layer 7".to_owned()),
-        ];
-        assert_eq!(
-            last_doing(&status),
-            "ranks 0, 2 were in: layer 7; rank 1 was in: balance"
-        );
+        let status =
+            [(0, "layer 7".to_owned()), (1, "balance".to_owned()), (2, "layer 7".to_owned())];
+        assert_eq!(last_doing(&status), "ranks 0, 2 were in: layer 7; rank 1 was in: balance");
         assert_eq!(last_doing(&[]), "no rank had said what it was doing");
     }
 }

@@ -31,11 +31,7 @@ impl CaseRun<'_> {
         let final_mesh = self.make("serial", What::Serial, "serial", false)?;
         let base = self.make("base tree", What::Serial, "base", true)?;
         let base_place = base.place.join("mesh");
-        let meshes = Meshes {
-            mesh: final_mesh.mesh?,
-            base: base.mesh?,
-            base_place,
-        };
+        let meshes = Meshes { mesh: final_mesh.mesh?, base: base.mesh?, base_place };
         self.report().leaves_base = meshes.base.words.len() as u64;
         let reference = self.reference(case, &meshes);
         self.progress.step("checks");
@@ -50,17 +46,8 @@ impl CaseRun<'_> {
 
     /// One run whose failure ends the case.
     fn make(&mut self, subject: &str, what: What, name: &str, ungraded: bool) -> Option<Done> {
-        self.progress.step(format!(
-            "{name}: {}",
-            if ungraded { "base tree" } else { "mesh" }
-        ));
-        let order = Order {
-            what,
-            case: &self.selected.path,
-            name,
-            ungraded,
-            write: true,
-        };
+        self.progress.step(format!("{name}: {}", if ungraded { "base tree" } else { "mesh" }));
+        let order = Order { what, case: &self.selected.path, name, ungraded, write: true };
         match self.run(&order) {
             Ok(done) => {
                 self.add(Check::new(subject, RUNS, Outcome::Pass), None);
@@ -100,27 +87,16 @@ impl CaseRun<'_> {
 
     /// The reference's final mesh, its base tree compared on the way.
     fn reference(&mut self, case: &Case, meshes: &Meshes) -> Option<LeafSet> {
-        let (cells, most) = (
-            meshes.mesh.words.len() as u64,
-            self.options.reference_cells_max,
-        );
+        let (cells, most) = (meshes.mesh.words.len() as u64, self.options.reference_cells_max);
         if cells > most {
             let why =
                 format!("{cells} cells are more than the {most} up to which the reference is run");
-            self.add(
-                Check::new("reference", "identical", Outcome::LeftOut(why)),
-                None,
-            );
+            self.add(Check::new("reference", "identical", Outcome::LeftOut(why)), None);
             return None;
         }
         let done = self.make("reference", What::Reference, "reference", false)?;
         self.report().runs.push(done.run);
-        let base = self.make(
-            "reference base tree",
-            What::Reference,
-            "reference-base",
-            true,
-        )?;
+        let base = self.make("reference base tree", What::Reference, "reference-base", true)?;
         let compared = identical::compare(&meshes.base.words, &base.mesh?.words, &case.root);
         self.add_results("base tree", None, vec![compared]);
         done.mesh

@@ -32,21 +32,11 @@ impl Workplace {
         if let Some(out) = &options.out {
             fs::create_dir_all(out).map_err(wrong)?;
             let root = fs::canonicalize(out).map_err(wrong)?;
-            return Ok(Self {
-                root,
-                temporary: None,
-                kept: false,
-            });
+            return Ok(Self { root, temporary: None, kept: false });
         }
-        let temporary = tempfile::Builder::new()
-            .prefix("harness-verify-")
-            .tempdir()
-            .map_err(wrong)?;
-        Ok(Self {
-            root: temporary.path().to_owned(),
-            temporary: Some(temporary),
-            kept: false,
-        })
+        let temporary =
+            tempfile::Builder::new().prefix("harness-verify-").tempdir().map_err(wrong)?;
+        Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary), kept: false })
     }
 
     /// The directory itself.
@@ -114,10 +104,7 @@ mod tests {
     #[test]
     fn an_earlier_result_is_replaced_and_anything_else_is_not() {
         let out = tempfile::tempdir().unwrap();
-        let options = Options {
-            out: Some(out.path().to_owned()),
-            ..options()
-        };
+        let options = Options { out: Some(out.path().to_owned()), ..options() };
         let workplace = Workplace::new(&options).unwrap();
         let place = workplace.enter("cube").unwrap();
         fs::write(place.join("mesh"), "").unwrap();

@@ -125,14 +125,7 @@ impl Fixture {
     /// Verifies the case on 2 and 3 ranks.
     pub fn verify(&self, options: &[&str]) -> Done {
         let case = self.path("case.toml");
-        let ours = [
-            "verify",
-            case.to_str().unwrap(),
-            "--ranks",
-            "2,3",
-            "--partitioners",
-            "morton",
-        ];
+        let ours = ["verify", case.to_str().unwrap(), "--ranks", "2,3", "--partitioners", "morton"];
         self.harness(&[&ours[..], &["--level-bases", "auto"], options].concat())
     }
 
@@ -152,18 +145,12 @@ impl Fixture {
             .env("PATH", path)
             .env("TMPDIR", self.path("tmp"))
             .env("HARNESS_ROOT", self.path("root"));
-        command
-            .env("HARNESS_PYTHON", "/nowhere/python")
-            .env("HARNESS_P4EST", "/nowhere/p4est");
+        command.env("HARNESS_PYTHON", "/nowhere/python").env("HARNESS_P4EST", "/nowhere/p4est");
         command.env("GITHUB_STEP_SUMMARY", self.path("summary.md"));
         let output = command.output().unwrap();
-        let told = [output.stdout, output.stderr]
-            .map(|bytes| String::from_utf8(bytes).unwrap())
-            .concat();
-        Done {
-            code: output.status.code().unwrap_or(-1),
-            told,
-        }
+        let told =
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+        Done { code: output.status.code().unwrap_or(-1), told }
     }
 
     /// What is left in the directory for temporary files.
@@ -173,8 +160,5 @@ impl Fixture {
 }
 
 fn entries(directory: &Path) -> Vec<PathBuf> {
-    fs::read_dir(directory)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect()
+    fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect()
 }

@@ -15,63 +15,29 @@ fn all_holds() {
     let done = fixture.verify(&["--no-mpi"]);
     assert_eq!(done.code, 0, "{}", done.told);
     assert!(done.told.contains("all hold"), "{}", done.told);
-    assert!(
-        fixture.left_behind().is_empty(),
-        "{:?}",
-        fixture.left_behind()
-    );
+    assert!(fixture.left_behind().is_empty(), "{:?}", fixture.left_behind());
 }
 
 #[test]
 fn what_was_not_done_is_said_in_every_form() {
     let fixture = Fixture::new();
     let done = fixture.verify(&["--no-mpi", "--junit", "junit.xml", "--json", "report.json"]);
-    assert!(
-        done.told
-            .contains("left out: mpi because --no-mpi was given"),
-        "{}",
-        done.told
-    );
-    assert!(
-        done.told.contains("left out: p4est because there is no"),
-        "{}",
-        done.told
-    );
+    assert!(done.told.contains("left out: mpi because --no-mpi was given"), "{}", done.told);
+    assert!(done.told.contains("left out: p4est because there is no"), "{}", done.told);
     let junit = Report::deserialize_from_str(&fixture.read("junit.xml")).unwrap();
-    let reasons: Vec<String> = junit.test_suites[0]
-        .test_cases
-        .iter()
-        .filter_map(skipped)
-        .collect();
+    let reasons: Vec<String> = junit.test_suites[0].test_cases.iter().filter_map(skipped).collect();
     assert_eq!(
-        reasons
-            .iter()
-            .filter(|why| *why == "left out: --no-mpi was given")
-            .count(),
+        reasons.iter().filter(|why| *why == "left out: --no-mpi was given").count(),
         1,
         "{reasons:?}"
     );
-    assert!(
-        reasons
-            .iter()
-            .any(|why| why.contains("ci/setup compiles it")),
-        "{reasons:?}"
-    );
+    assert!(reasons.iter().any(|why| why.contains("ci/setup compiles it")), "{reasons:?}");
     let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
     assert_eq!(json["schema"], "octree-verify/1");
     let checks = json["cases"][0]["checks"].as_array().unwrap();
-    assert_eq!(
-        checks
-            .iter()
-            .filter(|check| check["outcome"] == "left_out")
-            .count(),
-        reasons.len()
-    );
+    assert_eq!(checks.iter().filter(|check| check["outcome"] == "left_out").count(), reasons.len());
     let summary = fixture.read("summary.md");
-    assert!(
-        summary.contains("left out: mpi because --no-mpi was given"),
-        "{summary}"
-    );
+    assert!(summary.contains("left out: mpi because --no-mpi was given"), "{summary}");
 }
 
 fn skipped(test: &quick_junit::TestCase) -> Option<String> {
@@ -86,11 +52,7 @@ fn what_is_required_and_missing_is_exit_code_3() {
     let fixture = Fixture::new();
     let done = fixture.verify(&["--no-mpi", "--require", "p4est"]);
     assert_eq!(done.code, 3, "{}", done.told);
-    assert!(
-        done.told.contains("something required is missing"),
-        "{}",
-        done.told
-    );
+    assert!(done.told.contains("something required is missing"), "{}", done.told);
     fixture.write("mesher", "#!/bin/sh\n");
     fs::remove_file(fixture.path("mesher")).unwrap();
     let done = fixture.verify(&["--no-mpi"]);
@@ -105,18 +67,11 @@ fn what_is_required_and_missing_is_exit_code_3() {
 #[test]
 fn a_case_that_all_refuse_is_the_users_error() {
     let fixture = Fixture::new();
-    fixture.write(
-        "case.toml",
-        "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n",
-    );
+    fixture.write("case.toml", "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n");
     fixture.play("mesher", REFUSES);
     let done = fixture.verify(&["--no-mpi"]);
     assert_eq!(done.code, 2, "{}", done.told);
-    assert!(
-        done.told.contains("input: case: spacing_min is negative"),
-        "{}",
-        done.told
-    );
+    assert!(done.told.contains("input: case: spacing_min is negative"), "{}", done.told);
 }
 
 #[test]
@@ -125,29 +80,16 @@ fn a_case_that_the_mesher_alone_refuses_is_a_failure() {
     fixture.play("mesher", REFUSES);
     let done = fixture.verify(&["--no-mpi"]);
     assert_eq!(done.code, 1, "{}", done.told);
-    assert!(
-        done.told
-            .contains("it refuses the case: spacing_min is negative"),
-        "{}",
-        done.told
-    );
+    assert!(done.told.contains("it refuses the case: spacing_min is negative"), "{}", done.told);
 }
 
 #[test]
 fn a_case_at_fault_that_the_mesher_takes_is_a_failure() {
     let fixture = Fixture::new();
-    fixture.write(
-        "case.toml",
-        "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n",
-    );
+    fixture.write("case.toml", "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n");
     let done = fixture.verify(&["--no-mpi"]);
     assert_eq!(done.code, 1, "{}", done.told);
-    assert!(
-        done.told
-            .contains("the mesher takes a case that is at fault"),
-        "{}",
-        done.told
-    );
+    assert!(done.told.contains("the mesher takes a case that is at fault"), "{}", done.told);
 }
 
 #[test]
@@ -178,11 +120,7 @@ fn a_hang_is_killed_reported_and_kept() {
     let stat = format!("/proc/{}/stat", fixture.read("sleeper").trim());
     let asleep = fs::read_to_string(stat).is_ok_and(|stat| !stat.contains(") Z "));
     assert!(!asleep, "a process of the hung mesher is still there");
-    assert!(
-        fixture
-            .path("out/case/timed/status/rank-00001.txt")
-            .is_file()
-    );
+    assert!(fixture.path("out/case/timed/status/rank-00001.txt").is_file());
     for form in ["table.txt", "report.md", "junit.xml", "report.json"] {
         assert!(fixture.path("out").join(form).is_file(), "{form}");
     }
@@ -194,15 +132,11 @@ fn a_mesh_that_depends_on_ranks_is_found() {
     fixture.play_mpirun();
     let good = fixture.verify(&[]);
     assert_eq!(good.code, 0, "{}", good.told);
-    fixture.play(
-        "mesher",
-        &HOLDS.replace("from=", "[ \"$FAKE_RANKS\" = 3 ] && tree=other; from="),
-    );
+    fixture.play("mesher", &HOLDS.replace("from=", "[ \"$FAKE_RANKS\" = 3 ] && tree=other; from="));
     let done = fixture.verify(&["--json", "report.json", "--out", "out"]);
     assert_eq!(done.code, 1, "{}", done.told);
     assert!(
-        done.told
-            .contains("3 ranks, morton, base auto: identical: first difference"),
+        done.told.contains("3 ranks, morton, base auto: identical: first difference"),
         "{}",
         done.told
     );
@@ -217,11 +151,7 @@ fn a_mesh_that_depends_on_ranks_is_found() {
     assert_eq!(failed.map(|check| &check["ranks"]).collect::<Vec<_>>(), [3]);
     // The rank count that holds leaves nothing, the one that fails leaves its mesh.
     assert!(!fixture.path("out/case/ranks-2-morton-auto").exists());
-    assert!(
-        fixture
-            .path("out/case/ranks-3-morton-auto/mesh/mesh.json")
-            .is_file()
-    );
+    assert!(fixture.path("out/case/ranks-3-morton-auto/mesh/mesh.json").is_file());
 }
 
 #[test]
@@ -231,11 +161,7 @@ fn ranks_that_do_not_know_of_each_other_are_no_mpi() {
     fixture.play("mesher", &HOLDS.replace("$FAKE_RANKS", ""));
     let done = fixture.verify(&["--require", "mpi"]);
     assert_eq!(done.code, 3, "{}", done.told);
-    assert!(
-        done.told.contains("it was built without MPI"),
-        "{}",
-        done.told
-    );
+    assert!(done.told.contains("it was built without MPI"), "{}", done.told);
 }
 
 #[test]
@@ -243,12 +169,7 @@ fn a_record_that_is_not_the_mesh_s_is_found() {
     let fixture = Fixture::new();
     fixture.play("mesher", &HOLDS.replace("\"cells\": 1", "\"cells\": 2"));
     let done = fixture.verify(&["--no-mpi"]);
-    assert_eq!(
-        (done.code, done.told.contains("--json says 2 cells")),
-        (1, true),
-        "{}",
-        done.told
-    );
+    assert_eq!((done.code, done.told.contains("--json says 2 cells")), (1, true), "{}", done.told);
 }
 
 #[test]
@@ -259,8 +180,7 @@ fn a_case_whose_geometry_is_absent_is_left_out_unless_required() {
     let done = fixture.harness(&[&["verify"], &rest[..]].concat());
     assert_eq!(done.code, 0, "{}", done.told);
     assert!(
-        done.told
-            .contains("left out: jet: case: geometry because fetched/jet.stl is not here"),
+        done.told.contains("left out: jet: case: geometry because fetched/jet.stl is not here"),
         "{}",
         done.told
     );

@@ -12,15 +12,21 @@ pub mod mpi;
 pub mod sim;
 
 use crate::error::Error;
+use cpu_time::ThreadTime;
 use std::cell::Cell;
+use std::time::Instant;
 
-/// Messages and bytes that a rank has sent so far, to others only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What a rank has sent so far, to others only, and how long it was at it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traffic {
     /// Messages, one per receiver.
     pub messages: u64,
     /// Payload.
     pub bytes: u64,
+    /// Wall time in calls, waiting included.
+    pub time_wall_s: f64,
+    /// CPU time in calls.
+    pub time_cpu_s: f64,
 }
 
 /// A group of ranks.
@@ -43,18 +49,12 @@ pub trait Comm {
 
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
-        self.all_gather(&[v])
-            .iter()
-            .fold(0, |s, w| s.wrapping_add(w[0]))
+        self.all_gather(&[v]).iter().fold(0, |s, w| s.wrapping_add(w[0]))
     }
 
     /// The greatest value of any rank. Collective.
     fn max(&self, v: u64) -> u64 {
-        self.all_gather(&[v])
-            .iter()
-            .map(|w| w[0])
-            .max()
-            .unwrap_or(v)
+        self.all_gather(&[v]).iter().map(|w| w[0]).max().unwrap_or(v)
     }
 
     /// Makes one rank's error every rank's: all return the error of the lowest rank that has one.
@@ -96,11 +96,8 @@ fn pack(e: &Error) -> Vec<u64> {
 }
 
 fn unpack(words: &[u64]) -> Error {
-    let bytes: Vec<u8> = words[2..]
-        .iter()
-        .flat_map(|w| w.to_le_bytes())
-        .take(words[1] as usize)
-        .collect();
+    let bytes: Vec<u8> =
+        words[2..].iter().flat_map(|w| w.to_le_bytes()).take(words[1] as usize).collect();
     let text = String::from_utf8_lossy(&bytes).into_owned();
     match words[0] {
         2 => Error::Input(text),
@@ -109,17 +106,27 @@ fn unpack(words: &[u64]) -> Error {
     }
 }
 
-/// Counts what an implementation sends.
+/// Counts what an implementation sends, and times its calls.
 #[derive(Debug, Default)]
 pub(crate) struct Meter(Cell<Traffic>);
 
 impl Meter {
     pub(crate) fn count(&self, messages: u64, words: u64) {
         let t = self.0.get();
-        self.0.set(Traffic {
-            messages: t.messages + messages,
-            bytes: t.bytes + 8 * words,
-        });
+        self.0.set(Traffic { messages: t.messages + messages, bytes: t.bytes + 8 * words, ..t });
+    }
+
+    /// Runs and times a call.
+    pub(crate) fn call<T>(&self, body: impl FnOnce() -> T) -> T {
+        let (wall, cpu) = (Instant::now(), ThreadTime::now());
+        let result = body();
+        let t = self.0.get();
+        let (time_wall_s, time_cpu_s) = (
+            t.time_wall_s + wall.elapsed().as_secs_f64(),
+            t.time_cpu_s + cpu.elapsed().as_secs_f64(),
+        );
+        self.0.set(Traffic { time_wall_s, time_cpu_s, ..t });
+        result
     }
 
     pub(crate) fn get(&self) -> Traffic {
@@ -145,9 +152,7 @@ impl Comm for Solo {
     }
 
     fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
-        to.into_iter()
-            .filter(|(_, words)| !words.is_empty())
-            .collect()
+        to.into_iter().filter(|(_, words)| !words.is_empty()).collect()
     }
 
     fn traffic(&self) -> Traffic {

@@ -26,11 +26,7 @@ impl Mpi {
     /// If MPI was initialised before.
     pub fn start() -> Self {
         let universe = mpi::initialize().expect("MPI is initialised once");
-        Self {
-            world: universe.world(),
-            meter: Meter::default(),
-            _universe: universe,
-        }
+        Self { world: universe.world(), meter: Meter::default(), _universe: universe }
     }
 }
 
@@ -59,23 +55,32 @@ impl Comm for Mpi {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
+        self.meter.call(|| self.all_gather_untimed(mine))
+    }
+
+    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+        self.meter.call(|| self.exchange_untimed(to))
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.meter.get()
+    }
+}
+
+impl Mpi {
+    fn all_gather_untimed(&self, mine: &[u64]) -> Vec<Vec<u64>> {
         let mut counts = vec![0u64; self.size()];
-        self.world
-            .all_gather_into(&(mine.len() as u64), &mut counts[..]);
+        self.world.all_gather_into(&(mine.len() as u64), &mut counts[..]);
         let longest = counts.iter().copied().max().unwrap_or(0) as usize;
-        let mut all: Vec<Vec<u64>> = counts
-            .iter()
-            .map(|&c| Vec::with_capacity(c as usize))
-            .collect();
+        let mut all: Vec<Vec<u64>> =
+            counts.iter().map(|&c| Vec::with_capacity(c as usize)).collect();
         // The sum over ranks is what is counted in i32.
         let step = (CHUNK / self.size()).max(1);
         for at in (0..longest).step_by(step) {
             let part = |len: usize| len.saturating_sub(at).min(step);
             let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
-            let starts: Vec<i32> = lengths
-                .iter()
-                .scan(0, |s, &n| Some(std::mem::replace(s, *s + n)))
-                .collect();
+            let starts: Vec<i32> =
+                lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
             let mut buffer = vec![0u64; lengths.iter().map(|&n| n as usize).sum()];
             let mine = &mine[at.min(mine.len())..][..part(mine.len())];
             let mut target =
@@ -85,14 +90,11 @@ impl Comm for Mpi {
                 words.extend_from_slice(&buffer[start as usize..(start + n) as usize]);
             }
         }
-        self.meter.count(
-            self.size() as u64 - 1,
-            mine.len() as u64 * (self.size() as u64 - 1),
-        );
+        self.meter.count(self.size() as u64 - 1, mine.len() as u64 * (self.size() as u64 - 1));
         all
     }
 
-    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+    fn exchange_untimed(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
         let me = self.rank();
         let mut counts = vec![0u64; self.size()];
         to.iter().for_each(|m| counts[m.0] = m.1.len() as u64);
@@ -107,30 +109,19 @@ impl Comm for Mpi {
             for (from, words) in &mut received {
                 let process = self.world.process_at_rank(*from as i32);
                 requests.extend(
-                    words
-                        .chunks_mut(CHUNK)
-                        .map(|c| process.immediate_receive_into(scope, c)),
+                    words.chunks_mut(CHUNK).map(|c| process.immediate_receive_into(scope, c)),
                 );
             }
             let mut sends = Vec::new();
             for (to, words) in to.iter().filter(|m| m.0 != me) {
                 let process = self.world.process_at_rank(*to as i32);
-                sends.extend(
-                    words
-                        .chunks(CHUNK)
-                        .map(|c| process.immediate_send(scope, c)),
-                );
-                self.meter
-                    .count(u64::from(!words.is_empty()), words.len() as u64);
+                sends.extend(words.chunks(CHUNK).map(|c| process.immediate_send(scope, c)));
+                self.meter.count(u64::from(!words.is_empty()), words.len() as u64);
             }
             requests.into_iter().for_each(|r| _ = r.wait());
             sends.into_iter().for_each(|r| _ = r.wait());
         });
         received.extend(to.into_iter().filter(|m| m.0 == me && !m.1.is_empty()));
         received
-    }
-
-    fn traffic(&self) -> Traffic {
-        self.meter.get()
     }
 }

@@ -94,17 +94,11 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
         threads.into_iter().map(|t| t.join()).collect()
     });
     let told = |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == ENDED);
-    if let Some(at) = results
-        .iter()
-        .position(|r| r.as_ref().is_err_and(|p| !told(p)))
-    {
+    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !told(p))) {
         let panic = results.into_iter().nth(at).and_then(Result::err);
         std::panic::resume_unwind(panic.expect("position found an error"));
     }
-    results
-        .into_iter()
-        .map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p)))
-        .collect()
+    results.into_iter().map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
 }
 
 const ENDED: &str = "ended because another simulated rank panicked";
@@ -136,13 +130,8 @@ impl State {
             return;
         }
         let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
-        let same = posts
-            .iter()
-            .all(|p| p.call == posts[0].call && p.gather == posts[0].gather);
-        assert!(
-            same,
-            "ranks must make the same collective calls in the same order"
-        );
+        let same = posts.iter().all(|p| p.call == posts[0].call && p.gather == posts[0].gather);
+        assert!(same, "ranks must make the same collective calls in the same order");
         let mut inbox: Vec<Messages> = vec![Vec::new(); posts.len()];
         for (from, post) in posts.into_iter().enumerate() {
             for (to, words) in post.words {
@@ -168,9 +157,8 @@ impl Sim {
 
     /// Draws the rank that runs next.
     fn hand_on(&self, state: &mut State) {
-        let ready: Vec<usize> = (0..self.world.size)
-            .filter(|&r| state.doing[r] == Doing::Ready)
-            .collect();
+        let ready: Vec<usize> =
+            (0..self.world.size).filter(|&r| state.doing[r] == Doing::Ready).collect();
         if !ready.is_empty() {
             state.running = ready[state.draw(ready.len())];
         } else if state.doing.contains(&Doing::Waiting) {
@@ -185,11 +173,7 @@ impl Sim {
         while !(state.broken
             || state.running == self.rank && state.doing[self.rank] == Doing::Ready)
         {
-            state = self
-                .world
-                .turn
-                .wait(state)
-                .unwrap_or_else(|p| p.into_inner());
+            state = self.world.turn.wait(state).unwrap_or_else(|p| p.into_inner());
         }
         if state.broken {
             drop(state);
@@ -197,24 +181,22 @@ impl Sim {
         }
     }
 
-    fn call(&self, gather: bool, words: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+    fn call(&self, gather: bool, words: Messages) -> Messages {
+        self.meter.call(|| self.call_untimed(gather, words))
+    }
+
+    fn call_untimed(&self, gather: bool, words: Messages) -> Messages {
         let call = self.calls.replace(self.calls.get() + 1);
         let sent = words.iter().filter(|m| m.0 != self.rank);
         sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
         let mut state = self.lock();
-        state.posted[self.rank] = Some(Post {
-            call,
-            gather,
-            words,
-        });
+        state.posted[self.rank] = Some(Post { call, gather, words });
         state.doing[self.rank] = Doing::Waiting;
         state.deliver();
         self.hand_on(&mut state);
         drop(state);
         self.wait_for_turn();
-        self.lock().inbox[self.rank]
-            .take()
-            .expect("a delivered call has an inbox for every rank")
+        self.lock().inbox[self.rank].take().expect("a delivered call has an inbox for every rank")
     }
 }
 
@@ -228,10 +210,7 @@ impl Comm for Sim {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
-        let mut all = self.call(
-            true,
-            (0..self.size()).map(|to| (to, mine.to_vec())).collect(),
-        );
+        let mut all = self.call(true, (0..self.size()).map(|to| (to, mine.to_vec())).collect());
         all.sort_unstable_by_key(|m| m.0);
         all.into_iter().map(|m| m.1).collect()
     }
@@ -270,13 +249,8 @@ mod tests {
     #[test]
     fn orders_differ_by_seed_and_repeat_by_seed() {
         let order = |seed| {
-            run(6, seed, |c| {
-                c.exchange(vec![(0, vec![1])])
-                    .iter()
-                    .map(|m| m.0)
-                    .collect::<Vec<_>>()
-            })
-            .swap_remove(0)
+            run(6, seed, |c| c.exchange(vec![(0, vec![1])]).iter().map(|m| m.0).collect::<Vec<_>>())
+                .swap_remove(0)
         };
         assert_eq!(order(3), order(3));
         assert!((0..10).any(|s| order(s) != order(3)));

@@ -51,11 +51,7 @@ impl Local {
         let mut count = 0;
         for (c, &up) in self.parent.iter().enumerate() {
             // A parent's number is never higher than its child's, so its class is known.
-            class.push(if up as usize == c {
-                count
-            } else {
-                class[up as usize]
-            });
+            class.push(if up as usize == c { count } else { class[up as usize] });
             count += u32::from(up as usize == c);
         }
         (class, count as usize)
@@ -96,18 +92,10 @@ struct Frame {
 pub fn join(nodes: &Nodes) -> Local {
     let mut w = Walk {
         nodes,
-        local: Local {
-            parent: (0..nodes.component_count()).collect(),
-            faces: Vec::new(),
-        },
+        local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
         way: Vec::new(),
     };
-    w.way.push(Frame {
-        key: 0,
-        node: 0,
-        exists: 1,
-        across: [[Across::Nothing; 2]; 3],
-    });
+    w.way.push(Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] });
     w.visit(0);
     w.local
 }
@@ -148,12 +136,7 @@ impl Walk<'_> {
                 }
             }
         }
-        Some(Frame {
-            key: frame.key << 3 | j,
-            node,
-            exists,
-            across,
-        })
+        Some(Frame { key: frame.key << 3 | j, node, exists, across })
     }
 
     /// What lies across a face of child brick `j`.

@@ -28,11 +28,7 @@ pub fn names(
         return (0..classes as u32).map(own).collect();
     }
     let mut pairs = across_ranks(nodes, faces, class, &own, comm);
-    pairs.extend(
-        (0..)
-            .zip(top_components(nodes))
-            .map(|(top, c)| (top, own(class[c as usize]))),
-    );
+    pairs.extend((0..).zip(top_components(nodes)).map(|(top, c)| (top, own(class[c as usize]))));
     let flat: Vec<u64> = pairs.into_iter().flat_map(|(a, b)| [a, b]).collect();
     let mut joined = Joined::default();
     for words in comm.all_gather(&flat) {
@@ -51,9 +47,8 @@ fn across_ranks(
 ) -> BTreeSet<(Name, Name)> {
     let mut merged: BTreeMap<(usize, Level, u64, Name), u64> = BTreeMap::new();
     for f in faces {
-        *merged
-            .entry((f.rank, f.level, f.key, own(class[f.component as usize])))
-            .or_default() |= f.bits;
+        *merged.entry((f.rank, f.level, f.key, own(class[f.component as usize]))).or_default() |=
+            f.bits;
     }
     let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size()];
     for ((rank, level, key, name), bits) in merged {

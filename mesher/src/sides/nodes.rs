@@ -38,10 +38,7 @@ struct LevelNodes {
 impl Nodes {
     /// Links the bricks of a base tree.
     pub fn new(tree: &Tree, share: &Ownership) -> Self {
-        let mut nodes = Self {
-            levels: Vec::with_capacity(LEVELS),
-            masks: Vec::new(),
-        };
+        let mut nodes = Self { levels: Vec::with_capacity(LEVELS), masks: Vec::new() };
         for l in 0..LEVELS as Level {
             let level = nodes.build(tree, share, l);
             nodes.levels.push(level);
@@ -57,11 +54,7 @@ impl Nodes {
         let mut children = 0;
         for b in Tree::exists(&tree.split, l) {
             let remote = !share.answers_for(l, b.key) && share.place(l, b.key) != Place::Top;
-            let (s, c) = if remote {
-                (0, 0)
-            } else {
-                (split.get(b.key), crossing.get(b.key))
-            };
+            let (s, c) = if remote { (0, 0) } else { (split.get(b.key), crossing.get(b.key)) };
             let open = if remote { 0 } else { b.bits & !s & !c };
             out.keys.push(b.key);
             out.open.push(open);
@@ -112,11 +105,7 @@ impl Nodes {
     /// Split octants of a node.
     #[inline]
     pub fn split(&self, l: Level, n: Node) -> u64 {
-        self.levels[l as usize]
-            .split
-            .get(n as usize)
-            .copied()
-            .unwrap_or(0)
+        self.levels[l as usize].split.get(n as usize).copied().unwrap_or(0)
     }
 
     /// The child of node `n` whose brick is octant group `j`, if that group is split further.
@@ -128,20 +117,13 @@ impl Nodes {
             return None;
         }
         let before = (brick::parents(split) & ((1u16 << j) - 1) as u8).count_ones();
-        Some((
-            self.levels[l as usize].first_child[n as usize] + before,
-            brick::children(byte),
-        ))
+        Some((self.levels[l as usize].first_child[n as usize] + before, brick::children(byte)))
     }
 
     /// Whose the node's brick is.
     #[inline]
     pub fn place(&self, l: Level, n: Node) -> Place {
-        self.levels[l as usize]
-            .places
-            .get(n as usize)
-            .copied()
-            .unwrap_or(Place::Mine)
+        self.levels[l as usize].places.get(n as usize).copied().unwrap_or(Place::Mine)
     }
 
     /// Components of a node with their octants.
@@ -149,19 +131,13 @@ impl Nodes {
     pub fn components(&self, l: Level, n: Node) -> impl Iterator<Item = (Component, u64)> + '_ {
         let starts = &self.levels[l as usize].components;
         let range = starts[n as usize]..starts[n as usize + 1];
-        range.clone().zip(
-            self.masks[range.start as usize..range.end as usize]
-                .iter()
-                .copied(),
-        )
+        range.clone().zip(self.masks[range.start as usize..range.end as usize].iter().copied())
     }
 
     /// The component of the leaf `bit` of a node; none if that leaf crosses the surface.
     #[inline]
     pub fn component_of(&self, l: Level, n: Node, bit: u64) -> Option<Component> {
-        self.components(l, n)
-            .find(|c| c.1 >> bit & 1 == 1)
-            .map(|c| c.0)
+        self.components(l, n).find(|c| c.1 >> bit & 1 == 1).map(|c| c.0)
     }
 
     /// The components that the octants `bits` of brick `key` of level `l` touch: of leaves of that level,

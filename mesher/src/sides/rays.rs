@@ -105,9 +105,7 @@ fn meets(f: &Facet, p: &[i64; 3], axis: usize) -> Option<bool> {
             return None;
         }
     }
-    let height: i128 = (0..3)
-        .map(|a| i128::from(n[a]) * i128::from(p[a] - v(0, a)))
-        .sum();
+    let height: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(p[a] - v(0, a))).sum();
     Some((height < 0) == (n[axis] > 0))
 }
 
@@ -126,12 +124,8 @@ mod tests {
                     v[(a + 2) % 3] = w;
                     v
                 };
-                out.push(Facet {
-                    v: [p(lo, lo), p(hi, lo), p(hi, hi)],
-                });
-                out.push(Facet {
-                    v: [p(lo, lo), p(hi, hi), p(lo, hi)],
-                });
+                out.push(Facet { v: [p(lo, lo), p(hi, lo), p(hi, hi)] });
+                out.push(Facet { v: [p(lo, lo), p(hi, hi), p(lo, hi)] });
             }
         }
         out

@@ -49,9 +49,7 @@ pub fn candidates(
                 let list = &mut first[class[c as usize] as usize];
                 let room = CANDIDATES - list.len();
                 list.extend(
-                    ones(bits)
-                        .take(room)
-                        .map(|bit| Candidate::new(l, key << 6 | u64::from(bit))),
+                    ones(bits).take(room).map(|bit| Candidate::new(l, key << 6 | u64::from(bit))),
                 );
             }
         }
@@ -64,9 +62,7 @@ pub fn candidates(
     drop(first);
     let mut all: BTreeMap<Name, Vec<Candidate>> = BTreeMap::new();
     for words in comm.all_gather(&flat) {
-        words
-            .chunks_exact(2)
-            .for_each(|w| all.entry(w[0]).or_default().push(Candidate(w[1])));
+        words.chunks_exact(2).for_each(|w| all.entry(w[0]).or_default().push(Candidate(w[1])));
     }
     for list in all.values_mut() {
         list.sort_unstable();
@@ -91,22 +87,13 @@ pub fn decide(
     facets: &[Facet],
     comm: &dyn Comm,
 ) -> Verdict {
-    let mut verdict = Verdict {
-        inside: HashSet::new(),
-        ambiguous: None,
-        rays: 0,
-    };
+    let mut verdict = Verdict { inside: HashSet::new(), ambiguous: None, rays: 0 };
     // Components still open, with the number of their rays so far that say inside.
-    let mut open: Vec<(Name, &[Candidate], u32)> = candidates
-        .iter()
-        .map(|(&n, list)| (n, list.as_slice(), 0))
-        .collect();
+    let mut open: Vec<(Name, &[Candidate], u32)> =
+        candidates.iter().map(|(&n, list)| (n, list.as_slice(), 0)).collect();
     for round in 0..CANDIDATES {
-        let points: Vec<[i64; 3]> = open
-            .iter()
-            .filter_map(|c| c.1.get(round))
-            .map(|c| c.centroid())
-            .collect();
+        let points: Vec<[i64; 3]> =
+            open.iter().filter_map(|c| c.1.get(round)).map(|c| c.centroid()).collect();
         if points.is_empty() {
             break;
         }
@@ -124,14 +111,10 @@ pub fn decide(
         });
     }
     let first = open.iter().map(|c| c.1[0]).min();
-    verdict.ambiguous = first.map(|c| Ambiguous {
-        count: open.len() as u64,
-        example: c.centroid(),
-    });
+    verdict.ambiguous =
+        first.map(|c| Ambiguous { count: open.len() as u64, example: c.centroid() });
     verdict.inside.extend(
-        open.iter()
-            .filter(|(_, list, votes)| *votes as usize > 3 * list.len())
-            .map(|c| c.0),
+        open.iter().filter(|(_, list, votes)| *votes as usize > 3 * list.len()).map(|c| c.0),
     );
     verdict
 }
@@ -144,7 +127,5 @@ fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     for theirs in comm.all_gather(&words) {
         total.iter_mut().zip(theirs).for_each(|(t, w)| *t ^= w);
     }
-    (0..mine.len())
-        .map(|i| (total[i / 8] >> (8 * (i % 8))) as u8)
-        .collect()
+    (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()
 }

@@ -39,15 +39,8 @@ impl Small {
 
     pub fn reference_case(&self) -> reference::Case {
         reference::Case {
-            facets: self
-                .facets
-                .iter()
-                .map(|f| f.map(|v| v.map(f64::from)))
-                .collect(),
-            root: reference::Root {
-                origin: self.root.origin,
-                edge: self.root.edge,
-            },
+            facets: self.facets.iter().map(|f| f.map(|v| v.map(f64::from))).collect(),
+            root: reference::Root { origin: self.root.origin, edge: self.root.edge },
             spacing_min: self.spacing_min,
             layer_cells_min: self.layer_cells_min,
             keep: match self.keep {
@@ -59,11 +52,7 @@ impl Small {
             boxes: self
                 .boxes
                 .iter()
-                .map(|b| reference::BoxSpec {
-                    min: b.min,
-                    max: b.max,
-                    spacing: b.spacing,
-                })
+                .map(|b| reference::BoxSpec { min: b.min, max: b.max, spacing: b.spacing })
                 .collect(),
         }
     }
@@ -71,31 +60,21 @@ impl Small {
     /// Leaf words by the reference.
     pub fn reference(&self, ungraded: bool) -> Vec<u64> {
         let case = self.reference_case();
-        let mesh = if ungraded {
-            reference::base_tree(&case)
-        } else {
-            reference::mesh(&case)
-        };
+        let mesh = if ungraded { reference::base_tree(&case) } else { reference::mesh(&case) };
         mesh.expect("the case is good").words
     }
 
     /// Leaf words by the mesher on one rank.
     pub fn solo(&self, ungraded: bool) -> Vec<u64> {
-        words(
-            &self.mesher_case(),
-            &options(division(Partitioner::Morton, None), ungraded),
-            &Solo,
-        )
-        .expect("the case is good")
-        .0
+        words(&self.mesher_case(), &options(division(Partitioner::Morton, None), ungraded), &Solo)
+            .expect("the case is good")
+            .0
     }
 
     /// Leaf words by the mesher on simulated ranks, merged; each rank's must be sorted.
     pub fn ranks(&self, ranks: usize, seed: u64, division: Division, ungraded: bool) -> Vec<u64> {
         let parts = sim::run(ranks, seed, |c| {
-            words(&self.mesher_case(), &options(division, ungraded), c)
-                .expect("the case is good")
-                .0
+            words(&self.mesher_case(), &options(division, ungraded), c).expect("the case is good").0
         });
         assert!(parts.iter().all(|p| p.is_sorted()), "parts must be sorted");
         let mut all = parts.concat();
@@ -105,19 +84,11 @@ impl Small {
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
-    Division {
-        partitioner,
-        weights: Weights::Area,
-        level_base,
-    }
+    Division { partitioner, weights: Weights::Area, level_base }
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {
-    Options {
-        division,
-        ungraded,
-        out: None,
-    }
+    Options { division, ungraded, out: None }
 }
 
 /// The first differing leaf, as people can read it.
@@ -132,11 +103,7 @@ pub fn first_difference(a: &[u64], b: &[u64]) -> String {
             )
         })
     };
-    let at = a
-        .iter()
-        .zip(b)
-        .position(|(x, y)| x != y)
-        .unwrap_or(a.len().min(b.len()));
+    let at = a.iter().zip(b).position(|(x, y)| x != y).unwrap_or(a.len().min(b.len()));
     format!(
         "{} and {} leaves; first difference at {at}: {} against {}",
         a.len(),
@@ -174,12 +141,7 @@ pub fn cuboid(lo: [f32; 3], hi: [f32; 3]) -> Vec<Facet> {
 }
 
 fn tetrahedron(v: [[f32; 3]; 4]) -> Vec<Facet> {
-    vec![
-        [v[0], v[1], v[2]],
-        [v[0], v[3], v[1]],
-        [v[0], v[2], v[3]],
-        [v[1], v[3], v[2]],
-    ]
+    vec![[v[0], v[1], v[2]], [v[0], v[3], v[1]], [v[0], v[2], v[3]], [v[1], v[3], v[2]]]
 }
 
 /// A coordinate: anywhere in and around the root, or on the lattice of level 6, or of level 3.
@@ -203,11 +165,7 @@ pub fn closed() -> impl Strategy<Value = Vec<Facet>> {
         let hi: [i32; 3] = std::array::from_fn(|a| (lo[a] + d[a]).min(63));
         cuboid(lo.map(|c| c as f32), hi.map(|c| c as f32))
     });
-    let sphere = (
-        20usize..400,
-        4.0f32..28.0,
-        [20.0f32..44.0, 20.0f32..44.0, 20.0f32..44.0],
-    )
+    let sphere = (20usize..400, 4.0f32..28.0, [20.0f32..44.0, 20.0f32..44.0, 20.0f32..44.0])
         .prop_map(|(facets, r, c)| {
             let text = format!("shape = \"sphere\"\nfacets = {facets}\n");
             let g: geometries::Generator = toml::from_str(&text).expect("a sphere");
@@ -244,11 +202,7 @@ fn extent_box() -> impl Strategy<Value = (BoxSpec, u32)> {
     (point(), [0.5f64..20.0, 0.5f64..20.0, 0.5f64..20.0], 1u32..8).prop_map(|(p, d, level)| {
         let min = p.map(f64::from);
         // Small boxes may be finer than the surface.
-        let level = if d.iter().product::<f64>() > 1000.0 {
-            level.min(6)
-        } else {
-            level
-        };
+        let level = if d.iter().product::<f64>() > 1000.0 { level.min(6) } else { level };
         (
             BoxSpec {
                 min,
@@ -265,35 +219,21 @@ pub fn small(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value =
     let keep = prop_oneof![2 => Just(Keep::Outside), 2 => Just(Keep::Inside), 1 => Just(Keep::All)];
     let boxes = prop_oneof![3 => Just(vec![]), 2 => prop::collection::vec(extent_box(), 1..3)];
     let odd_root = prop_oneof![3 => Just(None), 1 => ([-9.0f64..3.0, -9.0f64..3.0, -9.0f64..3.0], 65.0f64..90.0).prop_map(Some)];
-    (
-        facets,
-        0u32..=6,
-        1.0f64..1.99,
-        1u32..=10,
-        keep,
-        any::<bool>(),
-        boxes,
-        odd_root,
+    (facets, 0u32..=6, 1.0f64..1.99, 1u32..=10, keep, any::<bool>(), boxes, odd_root).prop_map(
+        |(facets, level, slack, layer_cells_min, keep, keep_crossing, boxes, odd_root)| {
+            let root = odd_root.map_or(Root { origin: [0.0; 3], edge: 64.0 }, |(origin, edge)| {
+                Root { origin, edge }
+            });
+            let spacing_min = root.edge / f64::from(1 << level) * slack;
+            Small {
+                facets,
+                root,
+                spacing_min,
+                layer_cells_min,
+                keep,
+                keep_crossing,
+                boxes: boxes.into_iter().map(|b| b.0).collect(),
+            }
+        },
     )
-        .prop_map(
-            |(facets, level, slack, layer_cells_min, keep, keep_crossing, boxes, odd_root)| {
-                let root = odd_root.map_or(
-                    Root {
-                        origin: [0.0; 3],
-                        edge: 64.0,
-                    },
-                    |(origin, edge)| Root { origin, edge },
-                );
-                let spacing_min = root.edge / f64::from(1 << level) * slack;
-                Small {
-                    facets,
-                    root,
-                    spacing_min,
-                    layer_cells_min,
-                    keep,
-                    keep_crossing,
-                    boxes: boxes.into_iter().map(|b| b.0).collect(),
-                }
-            },
-        )
 }
