@@ -162,12 +162,7 @@ impl Generator {
         let least = shapes::facets_least(self.shape);
         if self.facets < least || self.facets > FACETS_MOST {
             let (shape, facets, most) = (self.shape, self.facets, FACETS_MOST);
-            return Err(GeneratorError::FacetsWrong {
-                shape,
-                facets,
-                least,
-                most,
-            });
+            return Err(GeneratorError::FacetsWrong { shape, facets, least, most });
         }
         let mut mesh = shapes::draw(self)?;
         mesh.translate(self.centre.unwrap_or([0.0; 3]));
@@ -189,11 +184,7 @@ impl Generator {
         if value.is_finite() && value > 0.0 {
             return Ok(value);
         }
-        Err(GeneratorError::SizeWrong {
-            key,
-            value,
-            want: "must be positive and finite".into(),
-        })
+        Err(GeneratorError::SizeWrong { key, value, want: "must be positive and finite".into() })
     }
 
     /// Sizes that were given, by key.
@@ -217,11 +208,7 @@ impl Generator {
         let known = shapes::sizes(self.shape);
         if let Some(key) = self.sizes_given().find(|key| !known.contains(key)) {
             let known = known.join(", ");
-            return Err(GeneratorError::SizeForeign {
-                shape: self.shape,
-                key,
-                known,
-            });
+            return Err(GeneratorError::SizeForeign { shape: self.shape, key, known });
         }
         match self.centre.iter().flatten().find(|x| !x.is_finite()) {
             None => Ok(()),

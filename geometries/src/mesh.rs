@@ -68,8 +68,7 @@ impl Mesh {
     pub(crate) fn append(&mut self, other: &Mesh) {
         let first = u32::try_from(self.vertices.len()).expect("facets are limited to 2^31");
         self.vertices.extend(&other.vertices);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
     }
 
     /// Turns the surface inside out.
@@ -121,11 +120,8 @@ impl Mesh {
     fn split_longest(&mut self, wanted: usize) {
         let chosen = edges::longest(self, wanted.saturating_mul(3));
         // An edge is known by its facet that runs upward along it; look up the one that runs downward.
-        let slots: HashMap<u64, usize, EdgeHasher> = chosen
-            .iter()
-            .enumerate()
-            .map(|(slot, edge)| (edge.key, slot))
-            .collect();
+        let slots: HashMap<u64, usize, EdgeHasher> =
+            chosen.iter().enumerate().map(|(slot, edge)| (edge.key, slot)).collect();
         let mut down = vec![usize::MAX; chosen.len()];
         for (facet, half) in halves(&self.triangles) {
             if half.is_down()
@@ -152,15 +148,8 @@ impl Mesh {
         let middle = self.add_vertex(std::array::from_fn(|a| (p[a] + q[a]) * 0.5));
         for facet in facets {
             let whole = self.triangles[facet];
-            let part = |keep: u32| {
-                whole.map(|v| {
-                    if v != keep && ends.contains(&v) {
-                        middle
-                    } else {
-                        v
-                    }
-                })
-            };
+            let part =
+                |keep: u32| whole.map(|v| if v != keep && ends.contains(&v) { middle } else { v });
             self.triangles[facet] = part(ends[0]);
             self.triangles.push(part(ends[1]));
         }
@@ -181,8 +170,7 @@ impl Mesh {
 
     /// The first broken invariant, if any.
     pub fn fault(&self) -> Option<MeshFault> {
-        self.fault_of_area()
-            .or_else(|| edges::fault(&self.triangles))
+        self.fault_of_area().or_else(|| edges::fault(&self.triangles))
     }
 }
 
@@ -212,24 +200,15 @@ mod tests {
     fn faults_are_found() {
         let mut open = tetrahedron();
         open.triangles.pop();
-        assert!(matches!(
-            open.fault(),
-            Some(MeshFault::EdgeUnmatched { .. })
-        ));
+        assert!(matches!(open.fault(), Some(MeshFault::EdgeUnmatched { .. })));
 
         let mut flipped = tetrahedron();
         flipped.triangles[2].swap(0, 1);
-        assert!(matches!(
-            flipped.fault(),
-            Some(MeshFault::EdgeUnmatched { .. })
-        ));
+        assert!(matches!(flipped.fault(), Some(MeshFault::EdgeUnmatched { .. })));
 
         let mut doubled = tetrahedron();
         doubled.triangles.extend(doubled.triangles.clone());
-        assert!(matches!(
-            doubled.fault(),
-            Some(MeshFault::EdgeUnmatched { .. })
-        ));
+        assert!(matches!(doubled.fault(), Some(MeshFault::EdgeUnmatched { .. })));
 
         let mut flat = tetrahedron();
         flat.vertices[3] = [1e-60, 1e-60, 1e-60];

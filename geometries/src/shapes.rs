@@ -56,11 +56,7 @@ fn pitch_finest(longest: f64, facets: usize, count: impl Fn(f64) -> usize) -> f6
     let (mut fine, mut coarse) = (longest / (facets as f64 + 1.0), longest);
     for _ in 0..100 {
         let middle = (fine + coarse) * 0.5;
-        if count(middle) > facets {
-            fine = middle
-        } else {
-            coarse = middle
-        }
+        if count(middle) > facets { fine = middle } else { coarse = middle }
     }
     coarse
 }

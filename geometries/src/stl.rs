@@ -9,10 +9,7 @@ use crate::Facet;
 /// decide by it are not misled.
 pub fn write_stl_binary(facets: &[Facet], mut to: impl Write) -> io::Result<()> {
     let count = u32::try_from(facets.len()).map_err(|_| {
-        io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "binary STL counts facets in 32 bits",
-        )
+        io::Error::new(io::ErrorKind::InvalidInput, "binary STL counts facets in 32 bits")
     })?;
     let mut header = [b' '; 80];
     header[..30].copy_from_slice(b"binary STL, generated surface.");
@@ -20,9 +17,7 @@ pub fn write_stl_binary(facets: &[Facet], mut to: impl Write) -> io::Result<()> 
     to.write_all(&count.to_le_bytes())?;
     for facet in facets {
         let mut record = [0u8; 50];
-        let numbers = normal(facet)
-            .into_iter()
-            .chain(facet.iter().flatten().copied());
+        let numbers = normal(facet).into_iter().chain(facet.iter().flatten().copied());
         for (place, number) in record.chunks_exact_mut(4).zip(numbers) {
             place.copy_from_slice(&number.to_le_bytes());
         }
@@ -39,11 +34,7 @@ fn normal(facet: &Facet) -> [f32; 3] {
         along(1, b) * along(2, c) - along(1, c) * along(2, b)
     });
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    if length > 0.0 {
-        n.map(|x| (x / length) as f32)
-    } else {
-        [0.0; 3]
-    }
+    if length > 0.0 { n.map(|x| (x / length) as f32) } else { [0.0; 3] }
 }
 
 #[cfg(test)]
@@ -62,10 +53,7 @@ mod tests {
             .chunks_exact(4)
             .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
             .collect();
-        assert_eq!(
-            numbers,
-            [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 0.0, 3.0, 1.0]
-        );
+        assert_eq!(numbers, [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 0.0, 3.0, 1.0]);
     }
 
     #[test]

@@ -129,12 +129,7 @@ fn every_case_file_is_in_the_catalogue_and_the_other_way_round() {
     assert_eq!(listed.len(), entries.len(), "a case is listed twice");
     for entry in &entries {
         assert_eq!(entry.file, format!("{}.toml", entry.name));
-        for text in [
-            &entry.about,
-            &entry.origin,
-            &entry.licence,
-            &entry.oracle_notes,
-        ] {
+        for text in [&entry.about, &entry.origin, &entry.licence, &entry.oracle_notes] {
             assert!(!text.is_empty(), "{}", entry.name);
         }
     }
@@ -144,43 +139,20 @@ fn every_case_file_is_in_the_catalogue_and_the_other_way_round() {
 fn every_case_file_is_well_formed_and_says_whence_it_is() {
     for Entry { file, .. } in catalogue() {
         let case: Case = read(&file);
-        assert!(
-            case.geometry.is_some() != case.generator.is_some(),
-            "{file}: one of the two"
-        );
-        assert!(
-            case.root.is_none() || case.root_scale.is_none(),
-            "{file}: one of the two at most"
-        );
-        let lengths = case
-            .boxes
-            .iter()
-            .map(|b| b.spacing)
-            .chain([case.spacing_min]);
-        for length in lengths
-            .chain(case.root_scale)
-            .chain(case.root.iter().map(|r| r.edge))
-        {
+        assert!(case.geometry.is_some() != case.generator.is_some(), "{file}: one of the two");
+        assert!(case.root.is_none() || case.root_scale.is_none(), "{file}: one of the two at most");
+        let lengths = case.boxes.iter().map(|b| b.spacing).chain([case.spacing_min]);
+        for length in lengths.chain(case.root_scale).chain(case.root.iter().map(|r| r.edge)) {
             assert!(length.is_finite() && length > 0.0, "{file}: {length}");
         }
-        assert!(
-            case.root
-                .is_none_or(|r| r.origin.iter().all(|x| x.is_finite())),
-            "{file}"
-        );
+        assert!(case.root.is_none_or(|r| r.origin.iter().all(|x| x.is_finite())), "{file}");
         for ExtentBox { min, max, .. } in &case.boxes {
             assert!((0..3).all(|a| min[a] < max[a]), "{file}: {min:?} {max:?}");
         }
         assert!(case.layer_cells_min.is_none_or(|n| n >= 1), "{file}");
         let text = std::fs::read_to_string(here(&file)).unwrap();
-        let header: Vec<&str> = text
-            .lines()
-            .take_while(|line| line.starts_with("# "))
-            .collect();
-        assert!(
-            header.iter().any(|line| line.contains("Origin: ")),
-            "{file}: no origin"
-        );
+        let header: Vec<&str> = text.lines().take_while(|line| line.starts_with("# ")).collect();
+        assert!(header.iter().any(|line| line.contains("Origin: ")), "{file}: no origin");
     }
 }
 
@@ -190,9 +162,7 @@ fn every_generator_can_be_drawn() {
         let case: Case = read(&entry.file);
         if let Some(generator) = case.generator {
             assert!(!entry.fetched);
-            let drawn = generator
-                .facets()
-                .unwrap_or_else(|e| panic!("{}: {e}", entry.file));
+            let drawn = generator.facets().unwrap_or_else(|e| panic!("{}: {e}", entry.file));
             assert_eq!(drawn.len(), generator.facets, "{}", entry.file);
         }
     }
@@ -210,22 +180,11 @@ fn every_geometry_is_here_or_fetched_as_the_table_says() {
         };
         let fetched = geometry.strip_prefix("fetched/");
         assert_eq!(entry.fetched, fetched.is_some(), "{}", entry.name);
-        let name = fetched
-            .unwrap_or(&geometry)
-            .strip_suffix(".stl")
-            .unwrap()
-            .to_owned();
+        let name = fetched.unwrap_or(&geometry).strip_suffix(".stl").unwrap().to_owned();
         assert!(entry.name.starts_with(&name), "{}", entry.name);
-        assert!(
-            sources.contains(&format!("| `{name}.stl` |")),
-            "SOURCES.md lacks {name}"
-        );
+        assert!(sources.contains(&format!("| `{name}.stl` |")), "SOURCES.md lacks {name}");
         if fetched.is_some() {
-            assert_eq!(
-                entry.package.as_ref(),
-                Some(&table[&name].package),
-                "{name}"
-            );
+            assert_eq!(entry.package.as_ref(), Some(&table[&name].package), "{name}");
             assert_eq!(entry.sha256.as_ref(), Some(&table[&name].sha256), "{name}");
         } else {
             assert!(here(&geometry).is_file(), "{geometry}");
@@ -233,14 +192,9 @@ fn every_geometry_is_here_or_fetched_as_the_table_says() {
         }
         met.insert(name);
     }
-    let kept = names(".", ".stl")
-        .into_iter()
-        .map(|name| name.replace(".stl", ""));
+    let kept = names(".", ".stl").into_iter().map(|name| name.replace(".stl", ""));
     let all: BTreeSet<String> = table.keys().cloned().chain(kept).collect();
-    assert_eq!(
-        met, all,
-        "a geometry without a case, or the other way round"
-    );
+    assert_eq!(met, all, "a geometry without a case, or the other way round");
     assert_eq!(all.len(), 18);
 }
 
@@ -250,38 +204,22 @@ fn sizes_are_what_they_are_called_and_parameters_vary() {
     let mut keeps = BTreeSet::new();
     for entry in catalogue() {
         let case: Case = read(&entry.file);
-        let cells = entry
-            .cells_about
-            .unwrap_or_else(|| panic!("{}: no cells", entry.name));
+        let cells = entry.cells_about.unwrap_or_else(|| panic!("{}: no cells", entry.name));
         let (low, high) = match entry.size {
             Size::Small => (1, 31_000),
             Size::Medium => (100_000, 2_000_000),
             Size::Large => (10_000_000, 2_000_000_000),
         };
-        assert!(
-            (low..high).contains(&cells),
-            "{}: {cells} cells",
-            entry.name
-        );
+        assert!((low..high).contains(&cells), "{}: {cells} cells", entry.name);
         assert!(entry.inside.is_some(), "{}", entry.name);
         if entry.size == Size::Small {
             layers.insert(case.layer_cells_min.unwrap_or(4));
             keeps.insert(case.keep.unwrap_or(Keep::Outside));
         }
         if case.keep == Some(Keep::Inside) {
-            assert!(
-                entry.inside == Some(Inside::Some),
-                "{}: nothing to keep",
-                entry.name
-            );
+            assert!(entry.inside == Some(Inside::Some), "{}: nothing to keep", entry.name);
         }
     }
-    assert!(
-        layers.is_superset(&BTreeSet::from([1, 2, 3, 4, 5, 6, 10])),
-        "{layers:?}"
-    );
-    assert_eq!(
-        keeps,
-        BTreeSet::from([Keep::Outside, Keep::Inside, Keep::All])
-    );
+    assert!(layers.is_superset(&BTreeSet::from([1, 2, 3, 4, 5, 6, 10])), "{layers:?}");
+    assert_eq!(keeps, BTreeSet::from([Keep::Outside, Keep::Inside, Keep::All]));
 }

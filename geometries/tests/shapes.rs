@@ -35,9 +35,7 @@ fn weld(facets: &[Facet]) -> (usize, Vec<[usize; 3]>) {
             facet.map(|vertex| {
                 let next = numbers.len();
                 // Adding zero makes one of the two zeros, which are equal but not the same bits.
-                *numbers
-                    .entry(vertex.map(|x| (x + 0.0).to_bits()))
-                    .or_insert(next)
+                *numbers.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert(next)
             })
         })
         .collect();
@@ -83,21 +81,12 @@ fn fingerprint(facets: &[Facet]) -> u64 {
 fn assert_closed(facets: &[Facet], what: &str) -> i64 {
     let (vertices, triangles) = weld(facets);
     for (i, facet) in facets.iter().enumerate() {
-        assert!(
-            area_vector(facet) != [0.0; 3],
-            "{what}: facet {i} has no area: {facet:?}"
-        );
+        assert!(area_vector(facet) != [0.0; 3], "{what}: facet {i} has no area: {facet:?}");
     }
     let edges = directed_edges(&triangles);
     for (&(a, b), &times) in &edges {
-        assert_eq!(
-            times, 1,
-            "{what}: an edge is run along twice in one direction"
-        );
-        assert!(
-            edges.contains_key(&(b, a)),
-            "{what}: an edge has one facet only"
-        );
+        assert_eq!(times, 1, "{what}: an edge is run along twice in one direction");
+        assert!(edges.contains_key(&(b, a)), "{what}: an edge has one facet only");
     }
     assert!(volume(facets) > 0.0, "{what}: inside out");
     vertices as i64 - edges.len() as i64 / 2 + triangles.len() as i64
@@ -128,10 +117,7 @@ fn few_facets_are_enough() {
         let drawn = facets(shape, least);
         assert_eq!(drawn.len(), least);
         assert_closed(&drawn, &format!("{shape:?}"));
-        let error = Generator::new(shape, least - 1)
-            .facets()
-            .unwrap_err()
-            .to_string();
+        let error = Generator::new(shape, least - 1).facets().unwrap_err().to_string();
         assert!(error.contains(&format!("at least {least}")), "{error}");
         for more in [least + 1, least + 2, 2 * least, 3 * least + 8] {
             let drawn = facets(shape, more);
@@ -145,16 +131,8 @@ fn few_facets_are_enough() {
 fn volumes_are_those_of_the_textbook() {
     let cases = [
         ("shape = 'cube'\nfacets = 1000\nedge = 2", 8.0, 1e-12),
-        (
-            "shape = 'plate'\nfacets = 1000\nlength = 2\nwidth = 1\nthickness = 0.25",
-            0.5,
-            1e-12,
-        ),
-        (
-            "shape = 'sphere'\nfacets = 20000\nradius = 2",
-            4.0 / 3.0 * PI * 8.0,
-            1e-3,
-        ),
+        ("shape = 'plate'\nfacets = 1000\nlength = 2\nwidth = 1\nthickness = 0.25", 0.5, 1e-12),
+        ("shape = 'sphere'\nfacets = 20000\nradius = 2", 4.0 / 3.0 * PI * 8.0, 1e-3),
         (
             "shape = 'torus'\nfacets = 20000\nradius = 2\nradius_tube = 0.5",
             TAU * 2.0 * PI * 0.25,
@@ -173,10 +151,7 @@ fn volumes_are_those_of_the_textbook() {
     ];
     for (text, expected, tolerance) in cases {
         let found = volume(&table(text).facets().unwrap());
-        assert!(
-            (found / expected - 1.0).abs() < tolerance,
-            "{text}: {found}, not {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < tolerance, "{text}: {found}, not {expected}");
     }
 }
 
@@ -184,9 +159,7 @@ fn volumes_are_those_of_the_textbook() {
 fn bounds(facets: &[Facet]) -> [[f32; 2]; 3] {
     std::array::from_fn(|a| {
         let along = facets.iter().flatten().map(|v| v[a]);
-        along.fold([f32::MAX, f32::MIN], |[low, high], x| {
-            [low.min(x), high.max(x)]
-        })
+        along.fold([f32::MAX, f32::MIN], |[low, high], x| [low.min(x), high.max(x)])
     })
 }
 
@@ -210,10 +183,7 @@ fn aircraft_are_as_long_as_asked_and_converge_with_the_number_of_facets() {
         let [low, high] = bounds(&generator.facets().unwrap())[axis];
         assert!((high - low - 3.0).abs() < 1e-6);
         let [coarse, fine, finer] = [10_000, 100_000, 400_000].map(|n| volume(&facets(shape, n)));
-        assert!(
-            coarse > fine && fine > finer,
-            "coarser is stouter: {coarse} {fine} {finer}"
-        );
+        assert!(coarse > fine && fine > finer, "coarser is stouter: {coarse} {fine} {finer}");
         assert!(fine / finer < 1.25, "{fine} {finer}");
     }
 }
@@ -244,58 +214,22 @@ fn wrong_tables_are_refused_with_the_reason() {
         Err(error) => error.to_string(),
     };
     for (text, reason) in [
-        (
-            "shape = 'sphere'\nfacets = 100\nradios = 1",
-            "unknown field `radios`",
-        ),
-        (
-            "shape = 'sphere'\nfacets = 100\nthickness = 1",
-            "no size `thickness`; it has radius",
-        ),
+        ("shape = 'sphere'\nfacets = 100\nradios = 1", "unknown field `radios`"),
+        ("shape = 'sphere'\nfacets = 100\nthickness = 1", "no size `thickness`; it has radius"),
         ("shape = 'ball'\nfacets = 100", "unknown variant `ball`"),
         ("shape = 'sphere'", "missing field `facets`"),
         ("shape = 'sphere'\nfacets = -1", "invalid value"),
-        (
-            "shape = 'sphere'\nfacets = 100\nradius = -1",
-            "must be positive and finite",
-        ),
-        (
-            "shape = 'sphere'\nfacets = 100\nradius = nan",
-            "must be positive and finite",
-        ),
-        (
-            "shape = 'sphere'\nfacets = 100\nradius = inf",
-            "must be positive and finite",
-        ),
-        (
-            "shape = 'sphere'\nfacets = 100\ncentre = [0, inf, 0]",
-            "must be finite",
-        ),
-        (
-            "shape = 'torus'\nfacets = 100\nradius_tube = 1",
-            "less than radius",
-        ),
-        (
-            "shape = 'nested_spheres'\nfacets = 100\nradius_inner = 0.5",
-            "less than radius",
-        ),
-        (
-            "shape = 'pipe'\nfacets = 100\nradius_bend = 0.1",
-            "must exceed radius",
-        ),
+        ("shape = 'sphere'\nfacets = 100\nradius = -1", "must be positive and finite"),
+        ("shape = 'sphere'\nfacets = 100\nradius = nan", "must be positive and finite"),
+        ("shape = 'sphere'\nfacets = 100\nradius = inf", "must be positive and finite"),
+        ("shape = 'sphere'\nfacets = 100\ncentre = [0, inf, 0]", "must be finite"),
+        ("shape = 'torus'\nfacets = 100\nradius_tube = 1", "less than radius"),
+        ("shape = 'nested_spheres'\nfacets = 100\nradius_inner = 0.5", "less than radius"),
+        ("shape = 'pipe'\nfacets = 100\nradius_bend = 0.1", "must exceed radius"),
         ("shape = 'pipe'\nfacets = 100\nangle = 200", "at most 180"),
-        (
-            "shape = 'sphere'\nfacets = 99999999999999",
-            "at most 2147483648",
-        ),
-        (
-            "shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]",
-            "has no area as f32",
-        ),
-        (
-            "shape = 'sphere'\nfacets = 100\nradius = 1e300",
-            "has no area as f32",
-        ),
+        ("shape = 'sphere'\nfacets = 99999999999999", "at most 2147483648"),
+        ("shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]", "has no area as f32"),
+        ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "has no area as f32"),
     ] {
         let message = refused(text);
         assert!(message.contains(reason), "{text}\n{message}");

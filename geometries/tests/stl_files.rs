@@ -21,33 +21,22 @@ fn bytes(directory: &str, name: &str) -> Vec<u8> {
 
 /// Whether a file is as long as binary STL with its count would be.
 fn is_binary(data: &[u8]) -> bool {
-    let count = data
-        .get(80..84)
-        .map(|b| u32::from_le_bytes(b.try_into().unwrap()));
+    let count = data.get(80..84).map(|b| u32::from_le_bytes(b.try_into().unwrap()));
     count.is_some_and(|count| data.len() as u64 == 84 + 50 * u64::from(count))
 }
 
 fn coordinates_binary(data: &[u8]) -> Vec<f32> {
     let records = data[84..].chunks_exact(50);
     let numbers = records.flat_map(|record| record[12..48].chunks_exact(4));
-    numbers
-        .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
-        .collect()
+    numbers.map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
 /// Takes what follows each word "vertex" but on the lines of names: no more than these files need.
 fn coordinates_text(data: &[u8]) -> Vec<f32> {
-    let text: String = data
-        .iter()
-        .map(|&b| char::from(b).to_ascii_lowercase())
-        .collect();
-    let lines = text
-        .split(['\r', '\n'])
-        .map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let text: String = data.iter().map(|&b| char::from(b).to_ascii_lowercase()).collect();
+    let lines = text.split(['\r', '\n']).map(|line| line.split_whitespace().collect::<Vec<_>>());
     let vertices = lines.filter(|words| words.first() == Some(&"vertex"));
-    vertices
-        .flat_map(|words| [1, 2, 3].map(|i| words[i].parse().unwrap()))
-        .collect()
+    vertices.flat_map(|words| [1, 2, 3].map(|i| words[i].parse().unwrap())).collect()
 }
 
 #[test]
@@ -71,11 +60,8 @@ fn tricky_files_hold_the_same_facets() {
     for name in files("tricky") {
         let data = bytes("tricky", &name);
         assert_eq!(is_binary(&data), name.starts_with("binary"), "{name}");
-        let found = if is_binary(&data) {
-            coordinates_binary(&data)
-        } else {
-            coordinates_text(&data)
-        };
+        let found =
+            if is_binary(&data) { coordinates_binary(&data) } else { coordinates_text(&data) };
         assert_eq!(found, expected, "{name}");
     }
 }
@@ -86,13 +72,8 @@ fn bad_files_are_bad_in_one_way_each() {
     for name in files("bad") {
         let data = bytes("bad", &name);
         // Those that have the length of binary STL have it so that only a number is wrong.
-        let has_wrong_number = || {
-            coordinates_binary(&data)
-                .iter()
-                .filter(|x| !x.is_finite())
-                .count()
-                == 1
-        };
+        let has_wrong_number =
+            || coordinates_binary(&data).iter().filter(|x| !x.is_finite()).count() == 1;
         assert!(!is_binary(&data) || has_wrong_number(), "{name}");
         assert_ne!(data, good);
     }

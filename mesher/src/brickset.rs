@@ -96,6 +96,16 @@ impl BrickSet {
         set
     }
 
+    /// The octants that are not in `other`.
+    pub fn without(&self, other: &Self) -> Self {
+        let mut there = other.cursor();
+        let mut rest = Self::default();
+        for b in &self.bricks {
+            rest.push(b.key, b.bits & !there.get(b.key));
+        }
+        rest
+    }
+
     /// The parents of the set's octants.
     pub fn coarsen(&self) -> Self {
         let mut set = Self::default();

@@ -28,20 +28,22 @@ pub type Words = u64;
 
 /// The parents, at level `l - 1`, of all octants of level `l` within `radius` of a source, octants
 /// outside the root left out. Sources come in Morton order.
-pub fn dilate_to_parents(
-    l: Level,
-    sources: impl Iterator<Item = Brick>,
-    radius: u32,
-    words: &mut Words,
-) -> BrickSet {
+pub fn dilate_to_parents(l: Level, sources: impl Iterator<Item = Brick>, radius: u32, words: &mut Words) -> BrickSet {
     let odd = dilate_tiles(l, sources, (radius & 1) as usize, true, words);
-    dilate(l - 1, odd, radius / 2, words)
+    match radius / 2 {
+        0 => odd,
+        half => dilate(l - 1, odd.bricks().iter().copied(), half, words),
+    }
 }
 
-/// All octants of level `l` within `radius` of one in the set, octants outside the root left out.
-pub fn dilate(l: Level, mut set: BrickSet, radius: u32, words: &mut Words) -> BrickSet {
+/// All octants of level `l` within `radius` of a source, octants outside the root left out. Sources
+/// come in Morton order.
+pub fn dilate(l: Level, sources: impl Iterator<Item = Brick>, radius: u32, words: &mut Words) -> BrickSet {
     // Further than the root is wide, nothing more is reached.
     let mut left = radius.min(1 << l) as usize;
+    let step = left.min(MARGIN);
+    let mut set = dilate_tiles(l, sources, step, false, words);
+    left -= step;
     while left > 0 && !set.is_empty() {
         let step = left.min(MARGIN);
         set = dilate_tiles(l, set.bricks().iter().copied(), step, false, words);
@@ -85,6 +87,8 @@ struct Tile {
     /// Rows along y and along z.
     side: usize,
     rows: Vec<u64>,
+    /// The rows after the passes along x and y; scratch.
+    spread: Vec<u64>,
 }
 
 impl Tile {
@@ -92,7 +96,7 @@ impl Tile {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         let margin = radius.next_multiple_of(8);
         let side = TILE + 2 * margin;
-        Self { radius, margin, side, rows: vec![0; side * side] }
+        Self { radius, margin, side, rows: vec![0; side * side], spread: vec![0; side * side] }
     }
 
     /// Adds a source brick.
@@ -113,36 +117,68 @@ impl Tile {
     /// Dilates what was put in, along x, then y, then z.
     fn dilate(&mut self, words: &mut Words) {
         *words += self.rows.len() as u64;
-        let (r, side) = (self.radius, self.side);
-        if r == 0 {
+        if self.radius == 0 {
             return;
         }
-        for row in &mut self.rows {
-            *row = dilate_row(*row, r);
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the features that the function is compiled for were just detected.
+            return unsafe { self.dilate_avx512() };
+        } else if is_x86_feature_detected!("avx2") {
+            // SAFETY: as above.
+            return unsafe { self.dilate_avx2() };
         }
-        // Sources are in the middle: the first and last `margin` rows are still empty, and results
-        // stay within them.
-        let mut spread = vec![0u64; self.rows.len()];
-        for s in 0..=2 * r {
-            let from = r - r.min(s);
-            let to = s.saturating_sub(r);
-            let n = self.rows.len() - from.max(to);
-            or_into(&mut spread[to..to + n], &self.rows[from..from + n]);
+        self.dilate_portable();
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+    fn dilate_avx512(&mut self) {
+        self.dilate_portable();
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn dilate_avx2(&mut self) {
+        self.dilate_portable();
+    }
+
+    /// Sources are in the middle, so only the rows that results can be in are touched.
+    #[inline(always)]
+    fn dilate_portable(&mut self) {
+        let (r, m, side) = (self.radius, self.margin, self.side);
+        let spread = &mut self.spread;
+        for z in m..m + TILE {
+            let rows = &mut self.rows[z * side..(z + 1) * side];
+            for row in &mut rows[m..m + TILE] {
+                *row = dilate_row(*row, r);
+            }
+            let out = &mut spread[z * side..(z + 1) * side];
+            out.copy_from_slice(rows);
+            for s in 1..=r {
+                or_into(&mut out[m - s..m - s + TILE], &rows[m..m + TILE]);
+                or_into(&mut out[m + s..m + s + TILE], &rows[m..m + TILE]);
+            }
         }
-        self.rows.fill(0);
-        for s in 0..=2 * r {
-            let from = (r - r.min(s)) * side;
-            let to = s.saturating_sub(r) * side;
-            let n = spread.len() - from.max(to);
-            or_into(&mut self.rows[to..to + n], &spread[from..from + n]);
+        for z in m - r..m + TILE + r {
+            let (first, last) = ((z - r.min(z)).max(m), (z + r).min(m + TILE - 1));
+            let rows = &mut self.rows[z * side..(z + 1) * side];
+            for from in first..=last {
+                or_into(rows, &spread[from * side..(from + 1) * side]);
+            }
         }
     }
 
     /// Hands over the result and empties the tile.
     fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
-        let rows: Vec<u64> = if to_parents { self.halved() } else { self.rows.clone() };
-        self.rows.fill(0);
+        let halved;
+        let rows = if to_parents {
+            halved = self.halved();
+            &halved
+        } else {
+            &self.rows
+        };
         let side = self.side / scale;
         // The first brick of the padded tile, in bricks of the result's level.
         let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
@@ -166,6 +202,7 @@ impl Tile {
                 }
             }
         }
+        self.rows.fill(0);
     }
 
     /// Rows of the parents: pairs along all three axes ored together.
@@ -326,7 +363,7 @@ mod tests {
             let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
             let mut words = 0;
             let grown = naive(l, &codes, i64::from(r));
-            let got = dilate(l, set(&codes), r, &mut words);
+            let got = dilate(l, set(&codes).bricks().iter().copied(), r, &mut words);
             prop_assert!(got.codes().eq(grown.iter().copied()));
             let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
             let got = dilate_to_parents(l, set(&codes).bricks().iter().copied(), r, &mut words);

@@ -6,11 +6,27 @@
 //! split where that is in the kept region; and the same again with one cell and one level coarser,
 //! for balance. An octant that splits needs split ancestors; they are added when the sweep comes to
 //! their level, which is before anything reads that level.
+//!
+//! # Whole groups
+//! Most sources are whole groups of eight siblings, and a group's reach in parents is the parent's,
+//! dilated by half the radius rounded up: an eighth of the work. It is exact even where some of the siblings
+//! are split, as long as nothing below the parent is deleted and the level is not deeper than the
+//! surface's:
+//! - *Balance.* Say a split sibling touches an unsplit kept octant Q two levels up. The leaf below it that
+//!   touches Q is kept and finer than the sibling, so an earlier step has split Q: nothing is added.
+//! - *Layer.* Say a split sibling's enlarged box meets an unsplit kept octant at a point y. Go straight
+//!   from the sibling to y, and look at the last stretch in the kept region. It starts in a leaf
+//!   finer than this level: below the sibling, or in a crossing leaf, as only those part deleted from kept.
+//!   It ends in one coarser. Kept leaves that touch differ by one level down to here, so the stretch
+//!   passes a leaf of this very level, a source, which is nearer to y than the sibling: nothing is added.
+//!
+//! The others, *impure* parents, above which something was deleted, and levels of boxes finer than
+//! the surface, where a box may look through a deleted body, go leaf by leaf.
 
-use crate::brick::Brick;
+use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::comm::Comm;
-use crate::dilate::{Words, dilate_to_parents};
+use crate::dilate::{Words, dilate, dilate_to_parents};
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::octant::Level;
@@ -30,28 +46,29 @@ pub struct Work {
 
 /// Refines the kept part of `base` until layers are thick enough and touching leaves differ by at most
 /// one level. Collective. Returns the split sets of the graded tree.
-pub fn grade(
-    base: &Tree,
-    kept: &Kept,
-    rules: &Rules,
-    share: &Ownership,
-    comm: &dyn Comm,
-) -> (PerLevel, Work) {
-    let mut g =
-        Gradation { split: base.split.clone(), base, kept, share, comm, work: Work::default() };
+pub fn grade(base: &Tree, kept: &Kept, rules: &Rules, share: &Ownership, comm: &dyn Comm) -> (PerLevel, Work) {
+    let surface = rules.level_surface;
+    let mut g = Gradation {
+        split: base.split.clone(),
+        impure: BrickSet::default(),
+        base,
+        kept,
+        surface,
+        share,
+        comm,
+        work: Work::default(),
+    };
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
-        g.extra_layer(rules.level_surface);
+        g.extra_layer();
     }
     for l in (1..=rules.level_deepest()).rev() {
         g.close(l);
         if rules.layer_cells_min > 1 {
-            let sources = g.sources(l);
-            let reached = g.reach(l, &sources, rules.layer_cells_min - 1);
+            let reached = g.reach(l, rules.layer_cells_min - 1);
             g.split_where_kept(l - 1, reached);
         }
         if l > 1 {
-            let sources = g.sources(l);
-            let touched = g.reach(l, &sources, 1).coarsen();
+            let touched = g.reach(l, 1).coarsen();
             g.split_where_kept(l - 2, touched);
         }
     }
@@ -60,39 +77,65 @@ pub fn grade(
 
 struct Gradation<'a> {
     split: PerLevel,
+    /// Octants, of the level above the sweep's, below which something was deleted.
+    impure: BrickSet,
     base: &'a Tree,
     kept: &'a Kept<'a>,
+    surface: Level,
     share: &'a Ownership,
     comm: &'a dyn Comm,
     work: Work,
 }
 
 impl Gradation<'_> {
-    /// Splits the parents of what is split at level `l`. Collective where bricks are shared: a rank's own
-    /// brick may have its parents in a top brick.
+    /// Splits the parents of what is split at level `l`, and marks those that are impure. Collective
+    /// where bricks are shared: a rank's own brick may have its parents in a top brick.
     fn close(&mut self, l: Level) {
         let above = self.split[l as usize].coarsen();
         let there = std::mem::take(&mut self.split[l as usize - 1]);
-        let mut fresh = without(&above, &there);
+        let mut fresh = above.without(&there);
+        let mut impure = std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone()).coarsen();
         if self.share.is_shared(l - 1) {
             fresh = self.share.scatter(l - 1, fresh, self.comm).0;
+            impure = self.share.scatter(l - 1, impure, self.comm).0;
         }
         self.split[l as usize - 1] = there.union(fresh);
+        self.impure = impure;
     }
 
-    /// Kept leaves of level `l` in bricks that this rank answers for.
-    fn sources(&self, l: Level) -> Vec<Brick> {
+    /// The parents, of level `l - 1`, that the kept leaves of level `l` in bricks that this rank answers
+    /// for reach within `radius` cells.
+    fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
+        if l > self.surface {
+            let mut words = 0;
+            let reached = dilate_to_parents(l, self.leaves(l, |_| u64::MAX), radius, &mut words);
+            self.work.words_dilated += words;
+            return reached;
+        }
+        let mut impure = self.impure.cursor();
+        let pure = (self.split[l as usize - 1].bricks().iter())
+            .filter(|b| self.share.answers_for(l - 1, b.key))
+            .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
+            .filter(|b| b.bits != 0);
+        let mut words = 0;
+        let whole = dilate(l - 1, pure, radius.div_ceil(2), &mut words);
+        let mut impure = self.impure.cursor();
+        let leaves = self.leaves(l, |key| brick::children(brick::byte(impure.get(key >> 3), key & 7)));
+        let rest = dilate_to_parents(l, leaves, radius, &mut words);
+        self.work.words_dilated += words;
+        whole.union(rest)
+    }
+
+    /// Kept leaves of level `l` in bricks that this rank answers for, as far as `within` lets them through.
+    fn leaves(&self, l: Level, mut within: impl FnMut(u64) -> u64) -> impl Iterator<Item = Brick> {
         let mut split = self.split[l as usize].cursor();
         let mut deleted = self.kept.deleted(l).cursor();
         Tree::exists(&self.split, l)
-            .filter(|b| self.share.answers_for(l, b.key))
-            .map(|b| Brick { key: b.key, bits: b.bits & !split.get(b.key) & !deleted.get(b.key) })
+            .filter(move |b| self.share.answers_for(l, b.key))
+            .map(move |b| Brick { key: b.key, bits: b.bits & within(b.key) })
             .filter(|b| b.bits != 0)
-            .collect()
-    }
-
-    fn reach(&mut self, l: Level, sources: &[Brick], radius: u32) -> BrickSet {
-        dilate_to_parents(l, sources.iter().copied(), radius, &mut self.work.words_dilated)
+            .map(move |b| Brick { key: b.key, bits: b.bits & !split.get(b.key) & !deleted.get(b.key) })
+            .filter(|b| b.bits != 0)
     }
 
     /// The paper's exchange of extent boxes: what was reached goes to whoever holds it, and is split
@@ -101,10 +144,8 @@ impl Gradation<'_> {
         let (reached, sent) = self.share.scatter(l, reached, self.comm);
         self.work.bricks_sent += sent;
         let before = std::mem::take(&mut self.split[l as usize]);
-        let fresh = self.kept.only(self.base, l, without(&reached, &before));
-        self.work.octants_split += fresh
-            .bricks()
-            .iter()
+        let fresh = self.kept.only(self.base, l, reached.without(&before));
+        self.work.octants_split += (fresh.bricks().iter())
             .filter(|b| self.share.answers_for(l, b.key))
             .map(|b| u64::from(b.bits.count_ones()))
             .sum::<u64>();
@@ -113,30 +154,19 @@ impl Gradation<'_> {
 
     /// The layer of finest cells that a mesh without crossing leaves starts from: kept regions of the
     /// surface level's size that touch a crossing leaf. Collective.
-    fn extra_layer(&mut self, surface: Level) {
+    fn extra_layer(&mut self) {
+        let surface = self.surface;
         if surface == 0 {
             return;
         }
         for m in (surface..self.base.crossing.len() as Level).rev() {
-            let leaves: Vec<Brick> = (self.base.crossing[m as usize].bricks().iter())
-                .filter(|b| self.share.answers_for(m, b.key))
-                .copied()
-                .collect();
-            let mut touched = self.reach(m, &leaves, 1);
+            let leaves = self.base.crossing[m as usize].bricks().iter().copied();
+            let leaves = leaves.filter(|b| self.share.answers_for(m, b.key));
+            let mut touched = dilate_to_parents(m, leaves, 1, &mut self.work.words_dilated);
             for _ in surface..m {
                 touched = touched.coarsen();
             }
             self.split_where_kept(surface - 1, touched);
         }
     }
-}
-
-/// The octants of `set` that are not in `other`.
-fn without(set: &BrickSet, other: &BrickSet) -> BrickSet {
-    let mut there = other.cursor();
-    let mut rest = BrickSet::default();
-    for b in set.bricks() {
-        rest.push(b.key, b.bits & !there.get(b.key));
-    }
-    rest
 }

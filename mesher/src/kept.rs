@@ -4,10 +4,9 @@
 //! if everything is kept.
 
 use crate::brick::{self, Brick};
-use crate::brickset::{BrickSet, ones};
-use crate::octant::{LEVEL_MAX, Level, start57};
+use crate::brickset::BrickSet;
+use crate::octant::Level;
 use crate::tree::{PerLevel, Tree};
-use std::ops::Range;
 
 /// The kept region of a base tree, by what was deleted.
 #[derive(Clone, Copy, Debug)]
@@ -28,28 +27,28 @@ impl<'a> Kept<'a> {
         &self.deleted[l as usize]
     }
 
-    /// The octants of `set`, of level `l`, that lie in a kept leaf of the base tree. Octants that are
-    /// split in the base tree are not expected.
+    /// The octants of `set`, of level `l`, that lie in a kept leaf of the base tree or are split in it.
+    ///
+    /// An octant whose parent is split in the base tree is one of its octants, and is looked up. The
+    /// others are kept where their parents are: so the question goes up, level by level, for ever
+    /// fewer octants, and each level's sets are read once in order.
     pub fn only(&self, base: &Tree, l: Level, set: BrickSet) -> BrickSet {
-        if !self.any {
+        if !self.any || set.is_empty() {
             return set;
         }
-        let mut finder = LeafFinder { kept: self, base, last: None };
         let mut deleted = self.deleted[l as usize].cursor();
-        let mut above = (l > 0).then(|| base.split[l as usize - 1].cursor());
         let mut out = BrickSet::default();
+        if l == 0 {
+            set.bricks().iter().for_each(|b| out.push(b.key, b.bits & !deleted.get(b.key)));
+            return out;
+        }
+        let parents = set.coarsen().without(&base.split[l as usize - 1]);
+        let parents = self.only(base, l - 1, parents);
+        let (mut below_leaf, mut split) = (parents.cursor(), base.split[l as usize - 1].cursor());
         for b in set.bricks() {
-            let here = above
-                .as_mut()
-                .map_or(1, |a| brick::children(brick::byte(a.get(b.key >> 3), b.key & 7)));
-            let mut bits = b.bits & here & !deleted.get(b.key);
-            let coarse = brick::parents(b.bits & !here);
-            for j in ones(u64::from(coarse)) {
-                if finder.is_kept(l - 1, b.key << 3 | u64::from(j)) {
-                    bits |= b.bits & 0xff << (8 * j);
-                }
-            }
-            out.push(b.key, bits);
+            let of = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
+            let here = of(split.get(b.key >> 3)) & !deleted.get(b.key);
+            out.push(b.key, b.bits & (here | of(below_leaf.get(b.key >> 3))));
         }
         out
     }
@@ -68,47 +67,5 @@ impl<'a> Kept<'a> {
                 );
             }
         }
-    }
-}
-
-/// Finds the base-tree leaf that an octant lies in. Octants asked for one after the other mostly
-/// lie in the same one, so the last answer is tried first.
-struct LeafFinder<'a> {
-    kept: &'a Kept<'a>,
-    base: &'a Tree,
-    last: Option<(Range<u64>, bool)>,
-}
-
-impl LeafFinder<'_> {
-    /// Whether the leaf that holds the unsplit octant `code` of level `l` is kept.
-    fn is_kept(&mut self, l: Level, code: u64) -> bool {
-        let at = start57(l, code);
-        if let Some((range, kept)) = &self.last
-            && range.contains(&at)
-        {
-            return *kept;
-        }
-        // The leaf is the coarsest ancestor that is not split; ancestors above it are.
-        let (mut split, mut leaf) = (None, l);
-        while split.is_none_or(|s| s + 1 < leaf) {
-            // Look near the octant first: most leaves that gradation asks for are small.
-            let try_at = match split {
-                Some(s) => s + (leaf - s) / 2,
-                None if leaf == 0 => break,
-                None => leaf - leaf.clamp(1, 2),
-            };
-            if self.base.split[try_at as usize].contains(code >> (3 * (l - try_at))) {
-                split = Some(try_at);
-            } else {
-                leaf = try_at;
-            }
-        }
-        let code = code >> (3 * (l - leaf));
-        let kept = !self.kept.deleted[leaf as usize].contains(code);
-        self.last = Some((
-            start57(leaf, code)..start57(leaf, code) + (1 << (3 * (LEVEL_MAX - leaf))),
-            kept,
-        ));
-        kept
     }
 }

@@ -5,10 +5,10 @@ mod support;
 
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
-use support::{division, small, soup};
+use support::{config, division, small, soup};
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, max_shrink_iters: 300, ..ProptestConfig::default() })]
+    #![proptest_config(config(300))]
 
     #[test]
     fn on_one_rank(case in small(soup())) {

@@ -62,10 +62,7 @@ fn generator(arguments: &Arguments) -> Result<Generator, String> {
     }
     let shape = arguments.shape.as_deref().unwrap_or_default();
     let facets = arguments.facets.unwrap_or_default();
-    let mut table = format!(
-        "shape = \"{}\"\nfacets = {facets}\n",
-        shape.escape_default()
-    );
+    let mut table = format!("shape = \"{}\"\nfacets = {facets}\n", shape.escape_default());
     for size in &arguments.size {
         let (key, value) = size.split_once('=').ok_or("--size takes KEY=VALUE")?;
         table += &format!("{key} = {value}\n");

@@ -27,15 +27,7 @@ impl Half {
 /// Every facet's three runs, with the facet's index.
 pub(super) fn halves(triangles: &[[u32; 3]]) -> impl Iterator<Item = (usize, Half)> {
     triangles.iter().enumerate().flat_map(|(facet, t)| {
-        (0..3).map(move |i| {
-            (
-                facet,
-                Half {
-                    from: t[i],
-                    to: t[(i + 1) % 3],
-                },
-            )
-        })
+        (0..3).map(move |i| (facet, Half { from: t[i], to: t[(i + 1) % 3] }))
     })
 }
 
@@ -61,11 +53,7 @@ pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
     };
     let mut edges: Vec<Edge> = halves(&mesh.triangles)
         .filter(|(_, half)| !half.is_down())
-        .map(|(facet_up, half)| Edge {
-            key: half.key(),
-            facet_up,
-            square: square(half),
-        })
+        .map(|(facet_up, half)| Edge { key: half.key(), facet_up, square: square(half) })
         .collect();
     let order = |a: &Edge, b: &Edge| b.square.total_cmp(&a.square).then(a.key.cmp(&b.key));
     if number < edges.len() {
@@ -79,9 +67,8 @@ pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
 /// The first directed edge that is not matched by exactly one in the opposite direction.
 pub(super) fn fault(triangles: &[[u32; 3]]) -> Option<MeshFault> {
     // The direction goes into the lowest place of the sort, so that a sound edge is a pair (up, down).
-    let mut runs: Vec<(u64, bool)> = halves(triangles)
-        .map(|(_, half)| (half.key(), half.is_down()))
-        .collect();
+    let mut runs: Vec<(u64, bool)> =
+        halves(triangles).map(|(_, half)| (half.key(), half.is_down())).collect();
     runs.sort_unstable();
     let is_sound = |pair: &[(u64, bool)]| matches!(pair, [(k, false), (l, true)] if k == l);
     let mut pairs = runs.chunks(2);
@@ -93,9 +80,7 @@ pub(super) fn fault(triangles: &[[u32; 3]]) -> Option<MeshFault> {
     })?;
     let (key, is_down) = wrong[0];
     let [low, high] = [(key >> 32) as u32, key as u32];
-    Some(MeshFault::EdgeUnmatched {
-        edge: if is_down { [high, low] } else { [low, high] },
-    })
+    Some(MeshFault::EdgeUnmatched { edge: if is_down { [high, low] } else { [low, high] } })
 }
 
 /// Hashes one u64 by a multiplication: edges are looked up by the million.
@@ -111,9 +96,7 @@ impl Hasher for KeyHasher {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        bytes
-            .iter()
-            .for_each(|&byte| self.write_u64(u64::from(byte)));
+        bytes.iter().for_each(|&byte| self.write_u64(u64::from(byte)));
     }
 
     fn write_u64(&mut self, key: u64) {

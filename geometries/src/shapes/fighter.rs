@@ -20,11 +20,7 @@ pub(super) struct Fighter {
 }
 
 fn section(leading: f64, trailing: f64, thickness_half: f64) -> Section {
-    Section {
-        leading,
-        trailing,
-        thickness_half,
-    }
+    Section { leading, trailing, thickness_half }
 }
 
 impl Body for Fighter {
@@ -90,12 +86,8 @@ impl Body for Fighter {
 
     fn distance(&self, [x, y, z]: Vec3) -> f64 {
         let p = [x, y.abs(), z];
-        let nearest = |cones: &[RoundCone]| {
-            cones
-                .iter()
-                .map(|c| c.distance(p))
-                .fold(f64::INFINITY, f64::min)
-        };
+        let nearest =
+            |cones: &[RoundCone]| cones.iter().map(|c| c.distance(p)).fold(f64::INFINITY, f64::min);
         let nose = blend(nearest(&self.nose), nearest(&self.canopy), 0.012);
         let nose = blend(nose, self.chine.distance(p), 0.03);
         let duct = rounded_box(p, [0.470, 0.076, -0.004], [0.200, 0.034, 0.037], 0.010);

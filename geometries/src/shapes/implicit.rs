@@ -35,14 +35,9 @@ pub(super) fn draw<B: Body>(of: &Generator) -> Result<Mesh, GeneratorError> {
     let mut mesh = fit::<B>(of.facets);
     let bounds: [[f64; 2]; 3] = std::array::from_fn(|a| {
         let along = mesh.vertices.iter().map(|p| p[a]);
-        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
-            [low.min(x), high.max(x)]
-        })
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
     });
-    let longest = bounds
-        .iter()
-        .map(|[low, high]| high - low)
-        .fold(0.0, f64::max);
+    let longest = bounds.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     let middle = (bounds[0][0] + bounds[0][1]) * 0.5;
     let scale = length / longest;
     for p in &mut mesh.vertices {

@@ -32,25 +32,12 @@ impl CentreLine {
         let straight = of.size("length", of.length, radius * 5.0)?;
         let wrong = |key, value, want| Err(GeneratorError::SizeWrong { key, value, want });
         if radius_bend <= radius {
-            return wrong(
-                "radius_bend",
-                radius_bend,
-                format!("must exceed radius = {radius}"),
-            );
+            return wrong("radius_bend", radius_bend, format!("must exceed radius = {radius}"));
         }
         if angle > 180.0 {
-            return wrong(
-                "angle",
-                angle,
-                "must be at most 180, or the straights may meet".into(),
-            );
+            return wrong("angle", angle, "must be at most 180, or the straights may meet".into());
         }
-        Ok(Self {
-            radius,
-            radius_bend,
-            angle: angle * (TAU / 360.0),
-            straight,
-        })
+        Ok(Self { radius, radius_bend, angle: angle * (TAU / 360.0), straight })
     }
 
     fn bend(&self) -> f64 {
@@ -124,11 +111,7 @@ fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
         let ([x, y], [away_x, away_y]) = line.frame(divisions, step);
         for i in 0..divisions.around {
             let (sin, cos) = libm::sincos(TAU * i as f64 / divisions.around as f64);
-            mesh.add_vertex([
-                x + reach * cos * away_x,
-                y + reach * cos * away_y,
-                reach * sin,
-            ]);
+            mesh.add_vertex([x + reach * cos * away_x, y + reach * cos * away_y, reach * sin]);
         }
         rings += 1;
     }
@@ -150,8 +133,7 @@ fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
     });
     for i in 0..divisions.around {
         mesh.triangles.push([inlet, number(0, i), number(0, i + 1)]);
-        mesh.triangles
-            .push([outlet, number(rings - 1, i + 1), number(rings - 1, i)]);
+        mesh.triangles.push([outlet, number(rings - 1, i + 1), number(rings - 1, i)]);
     }
     mesh
 }

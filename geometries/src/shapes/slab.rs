@@ -23,12 +23,7 @@ pub(super) fn plate(of: &Generator) -> Result<Mesh, GeneratorError> {
 
 fn slab(sizes: [f64; 3], facets: usize) -> Mesh {
     let divisions = divisions(sizes, facets);
-    let mut drawing = Drawing {
-        sizes,
-        divisions,
-        mesh: Mesh::default(),
-        numbers: HashMap::new(),
-    };
+    let mut drawing = Drawing { sizes, divisions, mesh: Mesh::default(), numbers: HashMap::new() };
     for axis in 0..3 {
         drawing.face(axis, false);
         drawing.face(axis, true);
@@ -69,8 +64,7 @@ impl Drawing {
                     self.vertex(place)
                 });
                 let [p, q, r, s] = corners;
-                self.mesh
-                    .add_quad(if high { [p, q, r, s] } else { [p, s, r, q] });
+                self.mesh.add_quad(if high { [p, q, r, s] } else { [p, s, r, q] });
             }
         }
     }

@@ -36,17 +36,8 @@ impl RoundCone {
         let square = dot(along, along);
         let shrink = radius_from - radius_to;
         let square_side = square - shrink * shrink;
-        assert!(
-            square_side > 0.0,
-            "one end of a round cone swallows the other"
-        );
-        Self {
-            from,
-            along,
-            radius: [radius_from, radius_to],
-            square,
-            square_side,
-        }
+        assert!(square_side > 0.0, "one end of a round cone swallows the other");
+        Self { from, along, radius: [radius_from, radius_to], square, square_side }
     }
 
     /// After Inigo Quilez's exact distance to a round cone.
@@ -105,20 +96,11 @@ impl Panel {
         radius_least: f64,
     ) -> Self {
         let [from, to] = sections;
-        let slope = (to.leading - from.leading)
-            .abs()
-            .max((to.trailing - from.trailing).abs())
+        let slope = (to.leading - from.leading).abs().max((to.trailing - from.trailing).abs())
             + (to.thickness_half - from.thickness_half).abs();
         let slope = slope / span;
         let shrink = 1.0 / (1.0 + slope * slope).sqrt();
-        Self {
-            root,
-            along,
-            span,
-            sections,
-            radius_least,
-            shrink,
-        }
+        Self { root, along, span, sections, radius_least, shrink }
     }
 
     pub(super) fn distance(&self, p: Vec3) -> f64 {
@@ -159,11 +141,7 @@ fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) 
         (q * q + off * off).sqrt() - radius
     };
     if length <= (from - to).abs() {
-        return if from > to {
-            circle(0, from)
-        } else {
-            circle(1, to)
-        };
+        return if from > to { circle(0, from) } else { circle(1, to) };
     }
     let sin = (from - to) / length;
     let cos = (1.0 - sin * sin).sqrt();
@@ -213,16 +191,8 @@ mod tests {
     #[test]
     fn no_distance_is_steeper_than_one() {
         let cone = RoundCone::new([-0.5, 0.1, 0.0], 0.3, [0.6, 0.0, 0.2], 0.1);
-        let root = Section {
-            leading: -0.6,
-            trailing: 0.6,
-            thickness_half: 0.1,
-        };
-        let tip = Section {
-            leading: 0.4,
-            trailing: 0.7,
-            thickness_half: 0.02,
-        };
+        let root = Section { leading: -0.6, trailing: 0.6, thickness_half: 0.1 };
+        let tip = Section { leading: 0.4, trailing: 0.7, thickness_half: 0.02 };
         let panel = Panel::new([0.0, 0.1], [0.6, 0.8], 1.0, [root, tip], 0.01);
         let chunk = |p| rounded_box(p, [0.1; 3], [0.5, 0.3, 0.2], 0.1);
         assert!(steepest(|p| cone.distance(p)) < 1.0 + 1e-9);
@@ -247,11 +217,7 @@ mod tests {
 
     #[test]
     fn a_panel_ends_where_it_says() {
-        let section = Section {
-            leading: 0.0,
-            trailing: 1.0,
-            thickness_half: 0.05,
-        };
+        let section = Section { leading: 0.0, trailing: 1.0, thickness_half: 0.05 };
         let panel = Panel::new([0.0; 2], [1.0, 0.0], 2.0, [section; 2], 0.001);
         assert!(panel.distance([0.0, 1.0, 0.0]).abs() < 1e-12);
         assert!(panel.distance([1.0, 1.0, 0.0]).abs() < 1e-12);

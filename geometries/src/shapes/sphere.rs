@@ -16,11 +16,7 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
     let radius_inner = of.size("radius_inner", of.radius_inner, radius * 0.5)?;
     if radius_inner >= radius {
         let (value, want) = (radius_inner, format!("must be less than radius = {radius}"));
-        return Err(GeneratorError::SizeWrong {
-            key: "radius_inner",
-            value,
-            want,
-        });
+        return Err(GeneratorError::SizeWrong { key: "radius_inner", value, want });
     }
     // Facets of about one size on both.
     let (outer, inner) = (radius * radius, radius_inner * radius_inner);
@@ -35,12 +31,7 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
 /// The finest geodesic sphere of at most so many facets: 20 for each square of the frequency.
 fn geodesic(radius: f64, facets: usize) -> Mesh {
     let frequency = (facets / 20).isqrt().max(1);
-    let mut drawing = Drawing {
-        radius,
-        frequency,
-        mesh: Mesh::default(),
-        numbers: HashMap::new(),
-    };
+    let mut drawing = Drawing { radius, frequency, mesh: Mesh::default(), numbers: HashMap::new() };
     for corners in ICOSAHEDRON {
         drawing.face(corners);
     }
@@ -108,13 +99,8 @@ impl Drawing {
     }
 
     fn vertex(&mut self, corners: [usize; 3], weights: [usize; 3]) -> u32 {
-        let mut key = [0, 1, 2].map(|c| {
-            if weights[c] == 0 {
-                (0, 0)
-            } else {
-                (corners[c], weights[c])
-            }
-        });
+        let mut key =
+            [0, 1, 2].map(|c| if weights[c] == 0 { (0, 0) } else { (corners[c], weights[c]) });
         key.sort_unstable();
         if let Some(&number) = self.numbers.get(&key) {
             return number;

@@ -11,11 +11,7 @@ pub(super) fn torus(of: &Generator) -> Result<Mesh, GeneratorError> {
     let radius_tube = of.size("radius_tube", of.radius_tube, radius * 0.2)?;
     if radius_tube >= radius {
         let (value, want) = (radius_tube, format!("must be less than radius = {radius}"));
-        return Err(GeneratorError::SizeWrong {
-            key: "radius_tube",
-            value,
-            want,
-        });
+        return Err(GeneratorError::SizeWrong { key: "radius_tube", value, want });
     }
     let around = |radius: f64, pitch: f64| ((TAU * radius / pitch) as usize).max(3);
     let divisions = |pitch| (around(radius, pitch), around(radius_tube, pitch));
@@ -36,12 +32,7 @@ pub(super) fn torus(of: &Generator) -> Result<Mesh, GeneratorError> {
     let number = |i: usize, j: usize| ((i % ring) * tube + j % tube) as u32;
     for i in 0..ring {
         for j in 0..tube {
-            mesh.add_quad([
-                number(i, j),
-                number(i + 1, j),
-                number(i + 1, j + 1),
-                number(i, j + 1),
-            ]);
+            mesh.add_quad([number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]);
         }
     }
     Ok(mesh)

@@ -19,11 +19,7 @@ pub(super) struct Uav {
 }
 
 fn section(leading: f64, trailing: f64, thickness_half: f64) -> Section {
-    Section {
-        leading,
-        trailing,
-        thickness_half,
-    }
+    Section { leading, trailing, thickness_half }
 }
 
 impl Body for Uav {
@@ -76,19 +72,13 @@ impl Body for Uav {
 
     fn distance(&self, [x, y, z]: Vec3) -> f64 {
         let p = [x, y.abs(), z];
-        let nearest = |cones: &[RoundCone]| {
-            cones
-                .iter()
-                .map(|c| c.distance(p))
-                .fold(f64::INFINITY, f64::min)
-        };
+        let nearest =
+            |cones: &[RoundCone]| cones.iter().map(|c| c.distance(p)).fold(f64::INFINITY, f64::min);
         let hull = blend(nearest(&self.hull), self.ball.distance(p), 0.006);
         let wing = self
             .pylons
             .iter()
-            .fold(self.wing.distance(p), |sum, pylon| {
-                blend(sum, pylon.distance(p), 0.003)
-            });
+            .fold(self.wing.distance(p), |sum, pylon| blend(sum, pylon.distance(p), 0.003));
         let wing = blend(wing, nearest(&self.stores), 0.002);
         let tail = self.tail.distance(p).min(self.fin.distance(p));
         blend(blend(hull, wing, 0.010), tail, 0.006)

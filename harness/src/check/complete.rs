@@ -8,7 +8,8 @@
 
 use std::fmt::Write;
 
-use super::{CheckResult, Subject, Terms, contact};
+use super::contact::{self, Contacts};
+use super::{CheckResult, Subject, Terms};
 use crate::manifest::Keep;
 use crate::octant::Octant;
 use crate::tree::{HOLES, Handle, Kind, Tree};
@@ -68,11 +69,12 @@ pub fn check_holes(tree: &Tree, terms: &Terms) -> CheckResult {
         }
         return result;
     }
-    contact::visit(tree, &[HOLES], &mut |hood, kind, across| {
-        if across & HOLES != 0 && !terms.may_face_hole(kind, hood.octant.level) {
+    let matters = |kind: Kind, level: u8| !terms.may_face_hole(kind, level);
+    Contacts { tree, sought: HOLES, matters: &matters }.visit(&mut |octant, kind, across| {
+        if across & HOLES != 0 {
             result.find_with(|| {
-                let side = contact::name(1 << kind);
-                format!("the {side} leaf {} has a hole across a face", hood.octant.describe(&terms.root))
+                let (side, leaf) = (contact::name(1 << kind), octant.describe(&terms.root));
+                format!("the {side} leaf {leaf} has a hole across a face")
             });
         }
     });

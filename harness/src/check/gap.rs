@@ -27,38 +27,46 @@ pub struct Gap<'a> {
 impl Gap<'_> {
     /// Looks at every split octant and reports those too near to a coarse leaf.
     pub fn check(&self, result: &mut CheckResult) {
-        let mut trail = Trail::new(self.tree);
-        self.visit(&mut trail, result);
+        self.children(&mut Trail::new(self.tree), result);
     }
 
-    fn visit(&self, trail: &mut Trail, result: &mut CheckResult) {
-        let Hood { octant, .. } = *trail.here();
-        let (at, level) = (trail.here().centre(), octant.level);
-        let Some(margin) = (self.margin)(level).filter(|_| at.is_node()) else {
+    /// Looks at the split children of where the walk is, first all at once: mostly that is enough.
+    fn children(&self, trail: &mut Trail, result: &mut CheckResult) {
+        let (at, octant) = (trail.here().centre(), trail.here().octant);
+        let level = octant.level + 1;
+        let Some(margin) = (self.margin)(level) else {
             return;
         };
-        let nearby = trail.coarsest_nearby(self.tree, margin, level);
-        if nearby < level {
-            self.confirm(trail, at, octant, margin, result);
-        }
-        if self.tree.finest_level(at, level) <= nearby.saturating_add(1) {
+        let split = trail.children(self.tree, Handle::is_node);
+        if split == 0 {
             return;
         }
-        for digit in 0..8 {
-            if self.tree.child(at, digit, level).is_node() {
+        let region = Region::around_children(&octant, split, margin);
+        let nearby = trail.coarsest_nearby(self.tree, margin, &region, level);
+        for digit in (0..8).filter(|d| split >> d & 1 == 1) {
+            let child = self.tree.child(at, digit, octant.level);
+            // What is near a child is near all of them, and what is near a grandchild is near the child.
+            let deep = self.tree.finest_level(child, level) > nearby.max(level) + 1;
+            if nearby < level || deep {
                 trail.descend(self.tree, digit);
-                self.visit(trail, result);
+                if nearby < level {
+                    self.confirm(trail, child, margin, result);
+                }
+                if deep {
+                    self.children(trail, result);
+                }
                 trail.ascend();
             }
         }
     }
 
     /// Where parts of the octant are holes, only what is left of it counts.
-    fn confirm(&self, trail: &Trail, at: Handle, octant: Octant, margin: i64, result: &mut CheckResult) {
+    fn confirm(&self, trail: &Trail, at: Handle, margin: i64, result: &mut CheckResult) {
         let split = trail.here().octant;
-        solid_parts(self.tree, at, octant, &mut |part| {
-            let found = trail.search(self.tree, margin, &Region::around(&part, margin));
-            if let Some(coarse) = found.leaf(self.tree).filter(|c| c.level < split.level) {
+        solid_parts(self.tree, at, split, &mut |part| {
+            let region = Region::around(&part, margin);
+            let found = trail.search(self.tree, margin, &region, split.level);
+            if let Some(coarse) = found.leaf(self.tree) {
                 result.find_with(|| {
                     let (what, part) = (self.what, part.describe(self.root));
                     format!("{what}: {part} is refined beyond level {}, but near it is a leaf, {}",
@@ -99,6 +107,13 @@ impl Trail {
         &self.hoods.last().expect("a walk begins at the root").0
     }
 
+    /// The children here that are wanted, one bit for each digit.
+    pub fn children(&self, tree: &Tree, wanted: impl Fn(Handle) -> bool) -> u8 {
+        let Hood { octant, .. } = *self.here();
+        let of = |d| tree.child(self.here().centre(), d, octant.level);
+        (0..8).filter(|&d| wanted(of(d))).fold(0, |all, d| all | 1 << d)
+    }
+
     /// On to a child.
     pub fn descend(&mut self, tree: &Tree, digit: u8) {
         let hood = self.here().child(tree, digit);
@@ -116,18 +131,15 @@ impl Trail {
         self.hoods.iter().rev().find(fits).unwrap_or(&self.hoods[0])
     }
 
-    /// Level of the coarsest leaf within this distance, or something coarser: exact unless it is at
-    /// least `enough`.
-    pub fn coarsest_nearby(&self, tree: &Tree, margin: i64, enough: u8) -> u8 {
+    /// Level of the coarsest leaf in a region that is at most `margin` around here, exact where it is
+    /// coarser than `enough`; else a level from `enough` up to that.
+    pub fn coarsest_nearby(&self, tree: &Tree, margin: i64, region: &Region, enough: u8) -> u8 {
         let (_, coarsest) = self.wide(margin);
-        if *coarsest >= enough {
-            return *coarsest;
-        }
-        self.search(tree, margin, &Region::around(&self.here().octant, margin)).level
+        if *coarsest >= enough { *coarsest } else { self.search(tree, margin, region, enough).level }
     }
 
-    /// The coarsest leaf in a region that is at most `margin` around here.
-    pub fn search(&self, tree: &Tree, margin: i64, region: &Region) -> Coarsest {
-        self.wide(margin).0.coarsest_within(tree, region)
+    /// The coarsest leaf in a region that is at most `margin` around here, if coarser than `enough`.
+    pub fn search(&self, tree: &Tree, margin: i64, region: &Region, enough: u8) -> Coarsest {
+        self.wide(margin).0.coarsest_within(tree, region, enough)
     }
 }

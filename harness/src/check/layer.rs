@@ -10,7 +10,7 @@
 use super::gap::{Gap, Trail};
 use super::{CheckResult, Subject, Terms, contact};
 use crate::manifest::Keep;
-use crate::octant::{CELLS_PER_EDGE, Octant};
+use crate::octant::CELLS_PER_EDGE;
 use crate::tree::{GHOST, Kind, Kinds, Region, Tree};
 use crate::word::Side;
 
@@ -33,7 +33,7 @@ pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     };
     let what = &format!("a layer is thinner than {n} cells");
     Gap { tree, root: &terms.root, margin: &margin, what }.check(&mut result);
-    around_surface(tree, &mut Trail::new(tree), terms, &mut result);
+    Insulation { tree, terms }.children(&mut Trail::new(tree), &mut result);
     result
 }
 
@@ -59,39 +59,51 @@ impl Terms {
 
 const SURFACE: Kinds = 1 << Side::Crossing as u8 | 1 << GHOST;
 
-/// Every crossing leaf is insulated from leaves coarser than the surface. What is insulated as a whole
-/// is not looked into.
-fn around_surface(tree: &Tree, trail: &mut Trail, terms: &Terms, result: &mut CheckResult) {
-    let (at, octant) = (trail.here().centre(), trail.here().octant);
-    let (level, surface) = (octant.level, terms.level_surface);
-    if tree.kinds(at) & SURFACE == 0 {
-        return;
-    }
-    let margin = match at.as_leaf() {
-        Some(kind) => terms.insulation(kind, level),
-        None => terms.insulation(Side::Crossing as Kind, surface),
-    };
-    // Crossing leaves coarser than the surface are for `spacing` to report.
-    if margin == 0 || trail.coarsest_nearby(tree, margin, surface) >= surface {
-        return;
-    }
-    if at.is_node() {
-        for digit in 0..8 {
-            trail.descend(tree, digit);
-            around_surface(tree, trail, terms, result);
-            trail.ascend();
-        }
-    } else if level >= surface {
-        report(tree, trail, margin, octant, terms, result);
-    }
+/// Every crossing leaf is insulated from leaves coarser than the surface.
+struct Insulation<'a> {
+    tree: &'a Tree,
+    terms: &'a Terms,
 }
 
-fn report(tree: &Tree, trail: &Trail, margin: i64, octant: Octant, terms: &Terms, result: &mut CheckResult) {
-    result.find_with(|| {
-        let found = trail.search(tree, margin, &Region::around(&octant, margin)).leaf(tree);
-        let coarse = found.map_or_else(String::new, |c| c.describe(&terms.root));
-        let (what, cells) = (contact::name(SURFACE), margin / cell(octant.level));
-        format!("around a {what} leaf, {}, within {cells} cells is coarser than the surface {coarse}",
-                octant.describe(&terms.root))
-    });
+impl Insulation<'_> {
+    /// Looks at the children of where the walk is, first all at once: what is insulated as a whole is
+    /// not looked into.
+    fn children(&self, trail: &mut Trail, result: &mut CheckResult) {
+        let (tree, surface) = (self.tree, self.terms.level_surface);
+        let (at, octant) = (trail.here().centre(), trail.here().octant);
+        let most = self.terms.insulation(Side::Crossing as Kind, surface);
+        let near = trail.children(tree, |child| tree.kinds(child) & SURFACE != 0);
+        if near == 0 || most == 0 {
+            return;
+        }
+        let region = Region::around_children(&octant, near, most);
+        if trail.coarsest_nearby(tree, most, &region, surface) >= surface {
+            return;
+        }
+        for digit in (0..8).filter(|d| near >> d & 1 == 1) {
+            let child = tree.child(at, digit, octant.level);
+            trail.descend(tree, digit);
+            match child.as_leaf() {
+                // Crossing leaves coarser than the surface are for `spacing` to report.
+                Some(kind) if octant.level + 1 >= surface => self.leaf(trail, kind, result),
+                Some(_) => {}
+                None => self.children(trail, result),
+            }
+            trail.ascend();
+        }
+    }
+
+    fn leaf(&self, trail: &Trail, kind: Kind, result: &mut CheckResult) {
+        let (octant, surface) = (trail.here().octant, self.terms.level_surface);
+        let margin = self.terms.insulation(kind, octant.level);
+        let found = trail.search(self.tree, margin, &Region::around(&octant, margin), surface);
+        if let Some(coarse) = found.leaf(self.tree) {
+            result.find_with(|| {
+                let (what, cells) = (contact::name(1 << kind), margin / cell(octant.level));
+                let (leaf, coarse) =
+                    (octant.describe(&self.terms.root), coarse.describe(&self.terms.root));
+                format!("within {cells} cells of the {what} leaf {leaf}, coarser than the surface: {coarse}")
+            });
+        }
+    }
 }

@@ -8,12 +8,13 @@
 //! oracles are for that.
 
 use super::components::{self, Component};
-use super::{CheckResult, Subject, Terms, contact, crossing, identical};
+use super::contact::{self, Contacts};
+use super::{CheckResult, Subject, Terms, crossing, identical};
 use crate::leafset::LeafSet;
 use crate::manifest::Ambiguous;
 use crate::octant::Octant;
 use crate::parity::Parity;
-use crate::tree::{Handle, Tree};
+use crate::tree::{Handle, Kind, Tree};
 use crate::word::{self, Side};
 
 const NAME: &str = "sides";
@@ -40,10 +41,11 @@ pub fn check(subject: &Subject) -> CheckResult {
 pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     let mut result = CheckResult::new(NAME);
     unwanted(tree, tree.root(), Octant::ROOT, terms, &mut result);
-    let (outside, inside) = (1 << Side::Outside as u8, 1 << Side::Inside as u8);
-    contact::visit(tree, &[outside, inside], &mut |hood, kind, across| {
-        if 1 << kind == outside && across & inside != 0 {
-            let leaf = hood.octant.describe(&terms.root);
+    let inside = 1 << Side::Inside as u8;
+    let matters = |kind: Kind, _: u8| kind == Side::Outside as Kind;
+    Contacts { tree, sought: inside, matters: &matters }.visit(&mut |outside, _, across| {
+        if across & inside != 0 {
+            let leaf = outside.describe(&terms.root);
             result.find_with(|| format!("an inside leaf shares a face with the outside leaf {leaf}"));
         }
     });

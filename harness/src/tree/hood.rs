@@ -70,6 +70,13 @@ impl Hood {
         Self { octant: self.octant.child(digit), around }
     }
 
+    /// What lies across a child's face: on the low (-1) or high (1) side of an axis.
+    pub fn across(&self, tree: &Tree, digit: u8, axis: usize, by: i32) -> Handle {
+        let place = (SELF as i32 + by * [1, 3, 9][axis]) as usize;
+        let (place, at) = DESCENT[usize::from(digit)][place];
+        tree.child(self.around[usize::from(place)], at, self.octant.level)
+    }
+
     /// The hood of any octant, by descent from the root.
     pub fn at(tree: &Tree, octant: Octant) -> Self {
         let mut hood = Self::root(tree);
@@ -95,9 +102,4 @@ impl Hood {
         self.around.iter().fold(NO_LEAF, |c, &h| c.min(tree.coarsest_level(h, level)))
     }
 
-    /// The leaf that holds the place at this offset and is at least as coarse as the octant.
-    pub fn leaf_at(&self, tree: &Tree, by: [i32; 3]) -> Option<Octant> {
-        let cell = self.octant.neighbour(by)?.corner;
-        tree.locate(cell).map(|(octant, _)| octant)
-    }
 }

@@ -1,6 +1,6 @@
 //! How coarse the leaves near an octant are.
 
-use super::{Handle, Hood, NO_LEAF, OFFSETS, Tree};
+use super::{Handle, Hood, OFFSETS, Tree};
 use crate::octant::Octant;
 
 /// An open box, in level-19 cells.
@@ -18,6 +18,20 @@ impl Region {
         Self { low, high: low.map(|c| c + edge + 2 * margin) }
     }
 
+    /// The smallest box around some children of an octant, enlarged on every side. Bit `d` of `digits`
+    /// stands for the child with that digit.
+    pub fn around_children(of: &Octant, digits: u8, margin: i64) -> Self {
+        let half = i64::from(of.edge()) / 2;
+        // Children on the low and on the high side of each axis.
+        const LOW: [u8; 3] = [0x55, 0x33, 0x0f];
+        let skip = |side: u8| if digits & side == 0 { half } else { 0 };
+        let Self { low, high } = Self::around(of, margin);
+        Self {
+            low: std::array::from_fn(|a| low[a] + skip(LOW[a])),
+            high: std::array::from_fn(|a| high[a] - skip(!LOW[a])),
+        }
+    }
+
     /// Whether an octant's inside meets the box.
     fn meets(&self, corner: [i64; 3], edge: i64) -> bool {
         (0..3).all(|a| corner[a] < self.high[a] && self.low[a] < corner[a] + edge)
@@ -27,24 +41,25 @@ impl Region {
 /// The coarsest leaf found, by level and by a level-19 cell of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Coarsest {
-    /// Its level; [`NO_LEAF`] if there is none.
+    /// Its level, or that which is enough.
     pub level: u8,
-    cell: [i64; 3],
+    cell: Option<[i64; 3]>,
 }
 
 impl Coarsest {
     /// The leaf itself.
     pub fn leaf(&self, tree: &Tree) -> Option<Octant> {
-        let cell = self.cell.map(|c| u32::try_from(c).expect("a leaf lies in the root"));
-        if self.level >= NO_LEAF { None } else { tree.locate(cell).map(|(octant, _)| octant) }
+        let cell = self.cell?.map(|c| u32::try_from(c).expect("a leaf lies in the root"));
+        tree.locate(cell).map(|(octant, _)| octant)
     }
 }
 
 impl Hood {
-    /// The coarsest leaf, ghosts aside, whose inside meets the region: exact where the region lies
-    /// within the 27 places, or this is the root.
-    pub fn coarsest_within(&self, tree: &Tree, region: &Region) -> Coarsest {
-        let mut found = Coarsest { level: NO_LEAF, cell: [0; 3] };
+    /// The coarsest leaf, ghosts aside, whose inside meets the region, if it is coarser than level
+    /// `enough`; else a level of `enough` and no leaf. Exact where the region lies within the 27 places,
+    /// or this is the root.
+    pub fn coarsest_within(&self, tree: &Tree, region: &Region, enough: u8) -> Coarsest {
+        let mut found = Coarsest { level: enough, cell: None };
         let edge = i64::from(self.octant.edge());
         for (&at, by) in self.around.iter().zip(&OFFSETS) {
             let corner: [i64; 3] =
@@ -63,7 +78,7 @@ fn search(tree: &Tree, at: Handle, corner: [i64; 3], level: u8, region: &Region,
         return;
     }
     if !at.is_node() {
-        *found = Coarsest { level: coarsest, cell: corner };
+        *found = Coarsest { level: coarsest, cell: Some(corner) };
         return;
     }
     for digit in 0..8u8 {

@@ -138,7 +138,13 @@ impl<'a> CaseRun<'a> {
                 )
             }
         };
-        format!("{program} verify {case} {only} --keep")
+        let beside = |name: &str| self.programs.harness.with_file_name(name);
+        let given = [("mesher", &self.programs.mesher), ("reference", &self.programs.reference)];
+        let elsewhere = given.into_iter().filter(|(name, path)| beside(name) != **path);
+        let programs = elsewhere
+            .map(|(name, path)| format!(" --{name} {}", quoted(&path.to_string_lossy())))
+            .collect::<String>();
+        format!("{program} verify {case} {only} --keep{programs}")
     }
 }
 

@@ -10,6 +10,7 @@ pub mod catalogue;
 pub mod needs;
 pub mod options;
 pub mod oracles;
+pub mod outcome;
 pub mod progress;
 pub mod ranks;
 pub mod report;

@@ -37,11 +37,11 @@ const PROBE_LIMIT: Duration = Duration::from_secs(60);
 impl Needs {
     /// Tries what the options ask for.
     pub fn probe(options: &Options, programs: &Programs, place: &Path) -> Self {
-        let mut needs = Self::default();
-        needs.mpi = match options.mpi {
+        let mpi = match options.mpi {
             true => probe_mpi(programs, place).err(),
             false => Some("--no-mpi was given".to_owned()),
         };
+        let mut needs = Self { mpi, ..Self::default() };
         needs.p4est = match (options.p4est, programs.p4est.is_file()) {
             (false, _) => Some("--no-p4est was given".to_owned()),
             (true, false) => {

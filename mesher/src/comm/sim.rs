@@ -24,7 +24,8 @@ pub struct Sim {
 struct World {
     size: usize,
     state: Mutex<State>,
-    turn: Condvar,
+    /// One per rank, so that handing the token on wakes one thread and not all.
+    turns: Vec<Condvar>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -67,7 +68,7 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
             random: seed ^ 0x9e37_79b9_7f4a_7c15,
             broken: false,
         }),
-        turn: Condvar::new(),
+        turns: (0..size).map(|_| Condvar::new()).collect(),
     });
     let results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..size)
@@ -161,11 +162,14 @@ impl Sim {
             (0..self.world.size).filter(|&r| state.doing[r] == Doing::Ready).collect();
         if !ready.is_empty() {
             state.running = ready[state.draw(ready.len())];
+            self.world.turns[state.running].notify_one();
         } else if state.doing.contains(&Doing::Waiting) {
             // Some wait for a call that those who are done will never make.
             state.broken = true;
         }
-        self.world.turn.notify_all();
+        if state.broken {
+            self.world.turns.iter().for_each(Condvar::notify_one);
+        }
     }
 
     fn wait_for_turn(&self) {
@@ -173,7 +177,7 @@ impl Sim {
         while !(state.broken
             || state.running == self.rank && state.doing[self.rank] == Doing::Ready)
         {
-            state = self.world.turn.wait(state).unwrap_or_else(|p| p.into_inner());
+            state = self.world.turns[self.rank].wait(state).unwrap_or_else(|p| p.into_inner());
         }
         if state.broken {
             drop(state);

@@ -7,8 +7,11 @@ use mesher::comm::{Solo, sim};
 use mesher::ingest::Source;
 use mesher::lattice::{Keep, Root};
 use mesher::partition::{Partitioner, Weights};
+use mesher::sides::Ambiguous;
 use mesher::{Options, words};
 use proptest::prelude::*;
+
+pub mod symmetry;
 
 pub type Facet = [[f32; 3]; 3];
 
@@ -73,13 +76,94 @@ impl Small {
 
     /// Leaf words by the mesher on simulated ranks, merged; each rank's must be sorted.
     pub fn ranks(&self, ranks: usize, seed: u64, division: Division, ungraded: bool) -> Vec<u64> {
-        let parts = sim::run(ranks, seed, |c| {
-            words(&self.mesher_case(), &options(division, ungraded), c).expect("the case is good").0
+        self.outcome(&Run { ranks, seed, division }, ungraded).words
+    }
+
+    /// What the mesher makes of the case when it is run like this.
+    pub fn outcome(&self, run: &Run, ungraded: bool) -> Outcome {
+        let options = options(run.division, ungraded);
+        let case = self.mesher_case();
+        let parts = sim::run(run.ranks, run.seed, |c| {
+            words(&case, &options, c).expect("the case is good")
         });
-        assert!(parts.iter().all(|p| p.is_sorted()), "parts must be sorted");
-        let mut all = parts.concat();
-        all.sort_unstable();
-        all
+        let ambiguous = parts[0].1;
+        assert!(parts.iter().all(|p| p.1 == ambiguous), "ranks must agree on what is ambiguous");
+        assert!(parts.iter().all(|p| p.0.is_sorted()), "parts must be sorted");
+        let mut words: Vec<u64> = parts.into_iter().flat_map(|p| p.0).collect();
+        words.sort_unstable();
+        Outcome { words, ambiguous }
+    }
+
+    /// The nearest case on a root of edge 64 at the origin whose coordinates are multiples of 1/128: they
+    /// are lattice points, and remain so, as f32 too, when they are mirrored, moved by as much, or
+    /// halved.
+    pub fn on_lattice(mut self) -> Self {
+        let near = |x: f32| (x * 128.0).round() / 128.0;
+        self.facets.iter_mut().for_each(|f| *f = f.map(|v| v.map(near)));
+        for b in &mut self.boxes {
+            let near = |x: f64| (x * 128.0).round() / 128.0;
+            (b.min, b.max) = (b.min.map(near), b.max.map(near));
+        }
+        self.spacing_min *= 64.0 / self.root.edge;
+        self.root = Root { origin: [0.0; 3], edge: 64.0 };
+        self
+    }
+
+    /// The case with other facets.
+    pub fn with(&self, facets: Vec<Facet>) -> Self {
+        Self { facets, ..self.clone() }
+    }
+}
+
+/// How to run the mesher: nothing of it may change the mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    pub ranks: usize,
+    pub seed: u64,
+    pub division: Division,
+}
+
+impl Run {
+    pub const SOLO: Self = Self {
+        ranks: 1,
+        seed: 0,
+        division: Division {
+            partitioner: Partitioner::Morton,
+            weights: Weights::Area,
+            level_base: None,
+        },
+    };
+}
+
+/// What the mesher made of a case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    pub words: Vec<u64>,
+    pub ambiguous: Option<Ambiguous>,
+}
+
+/// Runs of all kinds, on few ranks mostly.
+pub fn run() -> impl Strategy<Value = Run> {
+    let ranks = prop_oneof![2 => Just(1usize), 4 => 2usize..9, 1 => 9usize..65];
+    let partitioner = prop_oneof![Just(Partitioner::Metis), Just(Partitioner::Morton)];
+    let weights = prop_oneof![Just(Weights::Area), Just(Weights::Unit)];
+    let level_base = prop_oneof![1 => Just(None), 2 => (0u32..6).prop_map(Some)];
+    (ranks, any::<u64>(), partitioner, weights, level_base).prop_map(
+        |(ranks, seed, partitioner, weights, level_base)| Run {
+            ranks,
+            seed,
+            division: Division { partitioner, weights, level_base },
+        },
+    )
+}
+
+/// As many cases as asked for by `PROPTEST_CASES`, else `cases`.
+pub fn config(cases: u32) -> ProptestConfig {
+    let asked = std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok());
+    ProptestConfig {
+        cases: asked.unwrap_or(cases),
+        max_shrink_iters: 300,
+        ..ProptestConfig::default()
     }
 }
 

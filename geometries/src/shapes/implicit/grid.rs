@@ -79,10 +79,7 @@ impl<B: Body> Drawing<B> {
         }
         for octant in 0..8 {
             let part = cells / 2;
-            self.visit(
-                std::array::from_fn(|a| place[a] + part * (octant >> a & 1)),
-                part,
-            );
+            self.visit(std::array::from_fn(|a| place[a] + part * (octant >> a & 1)), part);
         }
     }
 
@@ -116,14 +113,9 @@ impl<B: Body> Drawing<B> {
     /// Corners are numbered by the bits of their offset; a tetrahedron is a way from 0 to 7 that sets
     /// one bit after the other.
     fn cube(&mut self, place: Place, corners: &[f64; 8]) {
-        for (first, second, is_even) in [
-            (1, 2, true),
-            (2, 4, true),
-            (4, 1, true),
-            (2, 1, false),
-            (4, 2, false),
-            (1, 4, false),
-        ] {
+        for (first, second, is_even) in
+            [(1, 2, true), (2, 4, true), (4, 1, true), (2, 1, false), (4, 2, false), (1, 4, false)]
+        {
             self.tetrahedron(place, corners, [0, first, first | second, 7], is_even);
         }
     }
@@ -144,9 +136,7 @@ impl<B: Body> Drawing<B> {
         };
         let [p, q, r, s] = corners;
         let mut triangle = |p, q, r| {
-            self.mesh
-                .triangles
-                .push(if is_even { [p, q, r] } else { [p, r, q] });
+            self.mesh.triangles.push(if is_even { [p, q, r] } else { [p, r, q] });
         };
         triangle(p, q, r);
         if count == 2 {
@@ -166,12 +156,8 @@ impl<B: Body> Drawing<B> {
         }
         let end = std::array::from_fn(|a| start[a] + (direction >> a & 1));
         let (p, q) = (self.position(start), self.position(end));
-        let at = self
-            .crossing(p, q, values[low], values[high])
-            .clamp(MARGIN, 1.0 - MARGIN);
-        let number = self
-            .mesh
-            .add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
+        let at = self.crossing(p, q, values[low], values[high]).clamp(MARGIN, 1.0 - MARGIN);
+        let number = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
         self.numbers.insert(key, number);
         number
     }
@@ -183,9 +169,7 @@ impl<B: Body> Drawing<B> {
         let mut at = 0.5;
         for _ in 0..3 {
             at = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let value = self
-                .body
-                .distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
+            let value = self.body.distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
             if (value < 0.0) == (low.1 < 0.0) {
                 low = (at, value);
                 high.1 *= 0.5;
@@ -200,10 +184,7 @@ impl<B: Body> Drawing<B> {
 
 /// An even permutation of four corners that puts the inside ones first, and their number, 1 to 3.
 fn inside_first(inside: [bool; 4]) -> Option<([usize; 4], usize)> {
-    let mask = inside
-        .iter()
-        .enumerate()
-        .fold(0, |mask, (i, &is)| mask | usize::from(is) << i);
+    let mask = inside.iter().enumerate().fold(0, |mask, (i, &is)| mask | usize::from(is) << i);
     let order = match mask {
         0b0001 => [0, 1, 2, 3],
         0b0010 => [1, 2, 0, 3],

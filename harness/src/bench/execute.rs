@@ -1,0 +1,245 @@
+//! Runs a program once and reads what it says of itself.
+
+use super::entry::{Comm, Phase, Run, Setup, Spread};
+use super::launcher::Launcher;
+use super::machine;
+use crate::engine::process::{self, End, Watch};
+use crate::engine::programs::Programs;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+/// What every run of a session has in common.
+#[derive(Debug)]
+pub struct Runner<'a> {
+    /// Where programs are.
+    pub programs: &'a Programs,
+    /// How ranks are started.
+    pub launcher: &'a Launcher,
+    /// A run is killed after this.
+    pub limit: Duration,
+    /// Directory for the runs' files.
+    pub place: &'a Path,
+}
+
+/// Why there is no result.
+#[derive(Debug)]
+pub enum Failed {
+    /// The user asked the harness to end.
+    Interrupted,
+    /// The program did not do what it should, in a sentence.
+    Because(String),
+}
+
+/// A program's `--json`, as far as it has it: the reference knows neither ranks nor phases.
+#[derive(Debug, Deserialize)]
+struct Told {
+    #[serde(default)]
+    facets: u64,
+    cells: u64,
+    digest: String,
+    time_wall_s: f64,
+    peak_rss_bytes: OneOrMany,
+    #[serde(default)]
+    phases: Vec<PhaseTold>,
+    #[serde(default)]
+    counters: BTreeMap<String, Vec<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum OneOrMany {
+    One(f64),
+    Many(Vec<f64>),
+}
+
+#[derive(Debug, Deserialize)]
+struct PhaseTold {
+    name: String,
+    time_wall_s: Vec<f64>,
+    time_cpu_s: Vec<f64>,
+    time_comm_wall_s: Vec<f64>,
+    time_comm_cpu_s: Vec<f64>,
+    messages: Vec<f64>,
+    message_bytes: Vec<f64>,
+}
+
+impl PhaseTold {
+    /// CPU time outside calls to other ranks, by rank. The clocks' ticks may make a difference negative.
+    fn useful_s(&self) -> Vec<f64> {
+        self.time_cpu_s.iter().zip(&self.time_comm_cpu_s).map(|(all, comm)| (all - comm).max(0.0)).collect()
+    }
+}
+
+impl Runner<'_> {
+    /// Runs `setup` on the case file `case`.
+    ///
+    /// # Errors
+    /// Where that gives no result.
+    pub fn run(&self, setup: &Setup, case: &Path, repeat: usize, warm_up: bool) -> Result<Run, Failed> {
+        let json = self.place.join("run.json");
+        let _ = std::fs::remove_file(&json);
+        let mut command = self.command(setup, case);
+        command.arg("--json").arg(&json);
+        let shown = shown(&command, self.place);
+        let watch = Watch { limit: self.limit, logs: self.place, name: "run", status: None };
+        let finished = process::run(&mut command, &watch)
+            .map_err(|error| Failed::Because(format!("it could not be started: {error}")))?;
+        match finished.end {
+            End::Exited(0) => {}
+            End::Interrupted => return Err(Failed::Interrupted),
+            End::TimedOut => {
+                return Err(Failed::Because(format!("killed after {} s", self.limit.as_secs())));
+            }
+            End::Exited(code) => {
+                let why = format!("it ended with code {code}: {}", finished.first_error_line());
+                return Err(Failed::Because(why));
+            }
+            End::Signalled(signal) => {
+                return Err(Failed::Because(format!("it was ended by signal {signal}")));
+            }
+        }
+        let told = std::fs::read_to_string(&json).map_err(|error| error.to_string());
+        let told = told.and_then(|text| serde_json::from_str::<Told>(&text).map_err(|e| e.to_string()));
+        let told = told.map_err(|error| Failed::Because(format!("its --json cannot be read: {error}")))?;
+        let mut run = of_told(setup.clone(), &told);
+        (run.repeat, run.warm_up, run.command) = (repeat, warm_up, shown);
+        run.time_launch_s = finished.time_wall_s;
+        run.oversubscribed = setup.comm == Comm::Mpi && setup.ranks > machine::cores();
+        Ok(run)
+    }
+
+    fn command(&self, setup: &Setup, case: &Path) -> Command {
+        if setup.engine == "reference" {
+            let mut command = Command::new(&self.programs.reference);
+            command.arg(case);
+            return command;
+        }
+        let mesher = &self.programs.mesher;
+        let (mut command, comm) = match setup.comm {
+            Comm::Solo => (Command::new(mesher), "solo".to_owned()),
+            Comm::Sim => (Command::new(mesher), format!("sim:{}", setup.ranks)),
+            Comm::Mpi => (self.launcher.command(setup.ranks, mesher), "mpi".to_owned()),
+        };
+        command.arg(case).args(["--quiet", "--comm", &comm]);
+        for (option, value) in [("--partitioner", &setup.partitioner), ("--weights", &setup.weights)] {
+            if !value.is_empty() {
+                command.args([option, value]);
+            }
+        }
+        command
+    }
+
+    /// Runs the ping-pong on two ranks; what it prints.
+    ///
+    /// # Errors
+    /// One sentence, where it is not there or does not run.
+    pub fn ping_pong(&self) -> Result<String, String> {
+        let program = self.programs.mesher.with_file_name("pingpong");
+        if !program.is_file() {
+            return Err(format!("{} is not there: build the mesher with --features mpi", program.display()));
+        }
+        let mut command = self.launcher.command(2, &program);
+        let watch = Watch { limit: Duration::from_secs(120), logs: self.place, name: "pingpong", status: None };
+        let finished = process::run(&mut command, &watch).map_err(|error| error.to_string())?;
+        match finished.end {
+            End::Exited(0) => std::fs::read_to_string(&finished.stdout).map_err(|error| error.to_string()),
+            _ => Err(format!("the ping-pong failed: {}", finished.first_error_line())),
+        }
+    }
+}
+
+/// A run as a program tells it; what the harness knows of it is the caller's to add.
+fn of_told(setup: Setup, told: &Told) -> Run {
+    let mut useful_s = vec![0.0; setup.ranks];
+    for phase in &told.phases {
+        useful_s.iter_mut().zip(phase.useful_s()).for_each(|(sum, u)| *sum += u);
+    }
+    if told.phases.is_empty() {
+        useful_s = vec![told.time_wall_s];
+    }
+    let phase = |p: &PhaseTold| Phase {
+        name: p.name.clone(),
+        useful_s: Spread::of(&p.useful_s()),
+        wall_s: Spread::of(&p.time_wall_s),
+        comm_s: Spread::of(&p.time_comm_wall_s),
+        messages: Spread::of(&p.messages),
+        message_bytes: Spread::of(&p.message_bytes),
+    };
+    let peak = match &told.peak_rss_bytes {
+        OneOrMany::One(bytes) => vec![*bytes],
+        // One process holds all simulated ranks, and each tells its peak.
+        OneOrMany::Many(bytes) if setup.comm == Comm::Sim => {
+            vec![bytes.iter().copied().fold(0.0, f64::max)]
+        }
+        OneOrMany::Many(bytes) => bytes.clone(),
+    };
+    Run {
+        repeat: 0,
+        warm_up: false,
+        oversubscribed: false,
+        command: String::new(),
+        facets: told.facets,
+        cells: told.cells,
+        digest: told.digest.clone(),
+        time_wall_s: told.time_wall_s,
+        time_launch_s: 0.0,
+        peak_rss_bytes: Spread::of(&peak),
+        useful_s: Spread::of(&useful_s),
+        phases: told.phases.iter().map(phase).collect(),
+        counters: told.counters.iter().map(|(name, v)| (name.clone(), Spread::of(v))).collect(),
+        setup,
+    }
+}
+
+/// A command line for people, with the directories of programs and of this session's files left out.
+fn shown(command: &Command, place: &Path) -> String {
+    let word = |w: &std::ffi::OsStr| {
+        let path = Path::new(w);
+        let local = path.strip_prefix(place).ok().or_else(|| path.is_absolute().then(|| Path::new(path.file_name().unwrap_or(w))));
+        local.unwrap_or(path).to_string_lossy().into_owned()
+    };
+    std::iter::once(command.get_program()).chain(command.get_args()).map(word).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pop;
+    use super::*;
+
+    const TOLD: &str = r#"{"schema": "octree-mesher-run/1", "facets": 12, "cells": 80, "digest": "00", "ranks": 2,
+        "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
+        "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0], "time_comm_wall_s": [1.0, 1.0],
+          "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
+
+    fn setup(comm: Comm, ranks: usize) -> Setup {
+        Setup { ranks, comm, ..pop::tests::run(comm, 1, &[("a", &[0.0])]).setup }
+    }
+
+    #[test]
+    fn useful_time_is_cpu_time_outside_calls() {
+        let told: Told = serde_json::from_str(TOLD).unwrap();
+        let run = of_told(setup(Comm::Mpi, 2), &told);
+        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
+        assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
+        // All simulated ranks live in one process.
+        assert_eq!(of_told(setup(Comm::Sim, 2), &told).peak_rss_bytes.sum, 70.0);
+    }
+
+    #[test]
+    fn a_program_without_phases_has_its_wall_time() {
+        let text = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#;
+        let run = of_told(setup(Comm::Solo, 1), &serde_json::from_str(text).unwrap());
+        assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.5, 9.0));
+    }
+
+    #[test]
+    fn a_shown_command_names_no_place_of_the_machine() {
+        let mut command = Command::new("/opt/bin/mpirun");
+        command.args(["-n", "2", "/opt/bin/mesher", "/tmp/x/uav.toml"]);
+        assert_eq!(shown(&command, Path::new("/tmp/x")), "mpirun -n 2 mesher uav.toml");
+    }
+}

@@ -1,0 +1,221 @@
+//! Runs of the same setup together: what is said of a measurement is said of all its repetitions.
+
+use super::entry::{Comm, Line, Network, Run, Setup, What};
+use super::network::ASSUMED;
+use super::pop::{self, Efficiency};
+use super::stats::{Median, median};
+
+/// The repetitions of one run.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// What was run.
+    pub setup: Setup,
+    /// The runs, warm-ups left out, in the order in which they were made.
+    pub runs: Vec<Run>,
+    /// Time, measured or projected (see [`pop::time_s`]).
+    pub time_s: Median,
+}
+
+impl Group {
+    /// The run whose time is nearest to the median: what is said of single ranks is said of it.
+    pub fn typical(&self, network: &Network) -> &Run {
+        let off = |run: &&Run| (pop::time_s(run, network) - self.time_s.value).abs();
+        self.runs.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a group has runs")
+    }
+
+    /// Cells of the mesh.
+    pub fn cells(&self) -> u64 {
+        self.runs[0].cells
+    }
+
+    /// Cells per second and rank.
+    pub fn rate(&self) -> f64 {
+        self.cells() as f64 / self.time_s.value / self.setup.ranks as f64
+    }
+
+    /// Median of peak memory over cells.
+    pub fn bytes_per_cell(&self) -> Median {
+        let values: Vec<f64> =
+            self.runs.iter().map(|r| r.peak_rss_bytes.sum / r.cells.max(1) as f64).collect();
+        median(&values).expect("a group has runs")
+    }
+
+    /// Whether more ranks than cores shared the machine.
+    pub fn oversubscribed(&self) -> bool {
+        self.runs.iter().any(|r| r.oversubscribed)
+    }
+
+    /// How the time was come by, in a word.
+    pub fn how(&self) -> &'static str {
+        match self.setup.comm {
+            Comm::Sim => "projected",
+            _ if self.oversubscribed() => "oversubscribed",
+            _ => "measured",
+        }
+    }
+
+    /// Efficiencies of the typical run against the typical one of `reference`.
+    pub fn efficiency(&self, reference: &Group, network: &Network) -> Efficiency {
+        pop::efficiency(self.typical(network), reference.typical(network), network)
+    }
+}
+
+/// What lines say, in groups.
+#[derive(Clone, Debug)]
+pub struct Groups {
+    /// In the order of their first runs.
+    pub all: Vec<Group>,
+    /// The last network that was measured or given.
+    pub network: Network,
+}
+
+impl Groups {
+    /// Groups the runs among lines.
+    pub fn of(lines: &[Line]) -> Self {
+        let mut network = ASSUMED;
+        let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
+        for line in lines {
+            match &line.what {
+                What::Network(n) => network = *n,
+                What::Run(run) if !run.warm_up => {
+                    match by_setup.iter_mut().find(|(setup, _)| *setup == run.setup) {
+                        Some((_, runs)) => runs.push((**run).clone()),
+                        None => by_setup.push((run.setup.clone(), vec![(**run).clone()])),
+                    }
+                }
+                _ => {}
+            }
+        }
+        let group = |(setup, runs): (Setup, Vec<Run>)| {
+            let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, &network)).collect();
+            Some(Group { setup, time_s: median(&times)?, runs })
+        };
+        Self { all: by_setup.into_iter().filter_map(group).collect(), network }
+    }
+
+    /// The groups of an experiment on one case, in the order of `key`.
+    pub fn series<K: PartialOrd>(
+        &self,
+        wanted: impl Fn(&Setup) -> bool,
+        key: impl Fn(&Group) -> K,
+    ) -> Vec<&Group> {
+        let mut found: Vec<&Group> = self.all.iter().filter(|g| wanted(&g.setup)).collect();
+        found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+        found
+    }
+
+    /// What a group's efficiency is against: the same on fewest ranks; in weak scaling with another spacing.
+    pub fn reference(&self, group: &Group) -> &Group {
+        let (s, weak) = (&group.setup, group.setup.experiment == "weak");
+        let same = |o: &&Group| {
+            let o = &o.setup;
+            let mesh = o.case == s.case && o.layer_cells_min == s.layer_cells_min && o.engine == s.engine;
+            let size = if weak { o.experiment == "weak" } else { o.spacing_min == s.spacing_min };
+            mesh && size
+        };
+        let rank = |o: &&Group| {
+            // The same way of running if there is one on as few ranks, then the same experiment.
+            (o.setup.ranks, o.setup.comm != s.comm, o.setup.experiment != s.experiment)
+        };
+        let candidates = self.all.iter().filter(same).filter(|o| {
+            weak || o.setup.ranks == 1 || o.setup.comm == s.comm && o.setup.experiment == s.experiment
+        });
+        candidates.min_by_key(rank).unwrap_or_else(|| {
+            self.all.iter().find(|o| o.setup == *s).expect("a group is among its groups")
+        })
+    }
+
+    /// Projection against measurement: pairs of the same mesh on as many ranks, both on cores of their own.
+    pub fn projections(&self) -> Vec<Projection<'_>> {
+        let pair = |sim: &'_ Group| {
+            let found = self.all.iter().find(|m| {
+                m.setup.comm == Comm::Mpi
+                    && !m.oversubscribed()
+                    && Setup { comm: Comm::Mpi, ..sim.setup.clone() } == m.setup
+            });
+            found.map(|m| m.setup.clone())
+        };
+        let sims = self.all.iter().filter(|g| g.setup.comm == Comm::Sim);
+        sims.filter_map(|sim| {
+            let setup = pair(sim)?;
+            let measured = self.all.iter().find(|m| m.setup == setup)?;
+            Some(Projection { sim, measured })
+        })
+        .collect()
+    }
+}
+
+/// A projected time and the measured one.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection<'a> {
+    /// Simulated ranks.
+    pub sim: &'a Group,
+    /// The same on MPI.
+    pub measured: &'a Group,
+}
+
+impl Projection<'_> {
+    /// How much longer the projection is, as a fraction; negative where it is shorter.
+    pub fn error(&self) -> f64 {
+        self.sim.time_s.value / self.measured.time_s.value - 1.0
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::super::entry::SCHEMA;
+    use super::super::pop::tests::run;
+    use super::*;
+
+    pub(crate) fn line(what: What) -> Line {
+        Line { schema: SCHEMA.into(), session: "s".into(), time_utc: "t".into(), what }
+    }
+
+    fn line_of(run: Run) -> Line {
+        line(What::Run(Box::new(run)))
+    }
+
+    fn free() -> Line {
+        line(What::Network(Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true }))
+    }
+
+    #[test]
+    fn repetitions_come_together_and_warm_ups_stay_out() {
+        let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
+        cold.warm_up = true;
+        let lines = [
+            free(),
+            line_of(cold),
+            line_of(run(Comm::Sim, 9, &[("a", &[1.0, 1.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[9.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[2.0, 2.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[7.0, 2.0])])),
+        ];
+        let groups = Groups::of(&lines);
+        assert_eq!(groups.all.len(), 2);
+        let two = &groups.all[0];
+        assert_eq!((two.time_s.value, two.time_s.count, two.how()), (2.0, 3, "projected"));
+        assert_eq!(two.typical(&groups.network).useful_s.sum, 4.0);
+        let reference = groups.reference(two);
+        assert_eq!(reference.setup.ranks, 1);
+        let e = two.efficiency(reference, &groups.network);
+        assert!((e.global() - 9.0 / 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn projections_are_held_against_the_same_mesh_on_as_many_ranks() {
+        let mut crowd = run(Comm::Mpi, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])]);
+        crowd.oversubscribed = true;
+        let lines = [
+            free(),
+            line_of(run(Comm::Sim, 9, &[("a", &[1.1, 1.0])])),
+            line_of(run(Comm::Mpi, 9, &[("a", &[1.0, 1.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])])),
+            line_of(crowd),
+        ];
+        let groups = Groups::of(&lines);
+        let pairs = groups.projections();
+        assert_eq!(pairs.len(), 1);
+        assert!((pairs[0].error() - 0.1).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,97 @@
+//! The machine that numbers come from, as far as it tells.
+
+use super::entry::Machine;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Describes this machine; `mpirun` is the launcher's program, `place` a directory of the repository.
+pub fn describe(mpirun: &Path, place: &Path) -> Machine {
+    Machine {
+        cpu: cpu(&fs::read_to_string("/proc/cpuinfo").unwrap_or_default()),
+        cores: cores(),
+        memory_bytes: memory_bytes(&fs::read_to_string("/proc/meminfo").unwrap_or_default()),
+        kernel: fs::read_to_string("/proc/sys/kernel/osrelease")
+            .map_or_else(|_| std::env::consts::OS.to_owned(), |r| format!("Linux {}", r.trim())),
+        mpi: first_line(Command::new(mpirun).arg("--version")),
+        compiler: first_line(Command::new("rustc").arg("--version")),
+        commit: commit(place),
+    }
+}
+
+/// Cores that this process may use.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
+}
+
+/// Runnable processes, averaged over the last minute; nothing where the system does not tell.
+pub fn load_average() -> f64 {
+    let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    text.split(' ').next().and_then(|w| w.parse().ok()).unwrap_or(0.0)
+}
+
+fn cpu(cpuinfo: &str) -> String {
+    let value = |key: &str| {
+        let line = cpuinfo.lines().find(|l| l.split(':').next().is_some_and(|k| k.trim() == key))?;
+        Some(line.split_once(':')?.1.trim().to_owned())
+    };
+    // A virtual machine may hide the name; family and model still tell the generation.
+    let number = |key| value(key).unwrap_or_else(|| "?".into());
+    match value("model name") {
+        Some(name) if !name.eq_ignore_ascii_case("unknown") => format!(
+            "{name} (family {}, model {})", number("cpu family"), number("model")
+        ),
+        _ => format!("unnamed (family {}, model {})", number("cpu family"), number("model")),
+    }
+}
+
+fn memory_bytes(meminfo: &str) -> u64 {
+    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemTotal:"));
+    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
+}
+
+fn commit(place: &Path) -> String {
+    let git = |arguments: &[&str]| {
+        let mut command = Command::new("git");
+        command.arg("-C").arg(place).args(arguments);
+        output(&mut command)
+    };
+    match git(&["rev-parse", "--short=12", "HEAD"]) {
+        Some(commit) => {
+            let clean = git(&["status", "--porcelain", "--untracked-files=no"])
+                .is_some_and(|changes| changes.trim().is_empty());
+            format!("{}{}", commit.trim(), if clean { "" } else { "-dirty" })
+        }
+        None => String::new(),
+    }
+}
+
+fn first_line(command: &mut Command) -> String {
+    let text = output(command).unwrap_or_default();
+    text.lines().next().unwrap_or_default().trim().to_owned()
+}
+
+fn output(command: &mut Command) -> Option<String> {
+    let out = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
+    out.status.success().then(|| String::from_utf8_lossy(&out.stdout).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_processor_is_named_as_well_as_possible() {
+        let text = "processor\t: 0\ncpu family\t: 6\nmodel\t\t: 85\nmodel name\t: A Chip @ 2 GHz\n";
+        assert_eq!(cpu(text), "A Chip @ 2 GHz (family 6, model 85)");
+        assert_eq!(cpu(&text.replace("A Chip @ 2 GHz", "unknown")), "unnamed (family 6, model 85)");
+        assert_eq!(memory_bytes("MemTotal:       16 kB\nMemFree: 1 kB\n"), 16_384);
+    }
+
+    #[test]
+    fn this_machine_says_something() {
+        let machine = describe(Path::new("no-such-launcher"), Path::new("."));
+        assert!(machine.cores > 0 && machine.mpi.is_empty() && !machine.kernel.is_empty());
+    }
+}

@@ -1,0 +1,80 @@
+//! What a message costs: measured by a ping-pong through the launcher, or given.
+
+use super::entry::Network;
+use serde::Deserialize;
+
+/// Assumed where nothing was measured or given: a current cluster interconnect.
+pub const ASSUMED: Network =
+    Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
+
+/// What the program `pingpong` prints.
+#[derive(Debug, Deserialize)]
+struct PingPong {
+    /// `octree-pingpong/1`.
+    schema: String,
+    /// Sizes, and the median time of one way.
+    points: Vec<Point>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Point {
+    bytes: f64,
+    time_s: f64,
+}
+
+/// Reads what the ping-pong printed: latency from the smallest message, bandwidth from the largest.
+///
+/// # Errors
+/// One sentence, where it is not what it should be.
+pub fn parse(text: &str) -> Result<Network, String> {
+    let told: PingPong =
+        serde_json::from_str(text).map_err(|error| format!("the ping-pong printed no result: {error}"))?;
+    if told.schema != "octree-pingpong/1" {
+        return Err(format!("the ping-pong's schema is {}", told.schema));
+    }
+    let smallest = told.points.iter().min_by(|a, b| a.bytes.total_cmp(&b.bytes));
+    let largest = told.points.iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes));
+    match (smallest, largest) {
+        (Some(s), Some(l)) if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => Ok(Network {
+            latency_s: s.time_s,
+            bandwidth_bytes_per_s: (l.bytes - s.bytes) / (l.time_s - s.time_s),
+            measured: true,
+        }),
+        _ => Err("the ping-pong's times do not grow with the messages".to_owned()),
+    }
+}
+
+/// Reads `LATENCY_SECONDS,BYTES_PER_SECOND`.
+///
+/// # Errors
+/// What should have been given.
+pub fn given(text: &str) -> Result<Network, String> {
+    let values: Vec<f64> = text.split(',').filter_map(|w| w.trim().parse().ok()).collect();
+    match values[..] {
+        [latency_s, bandwidth_bytes_per_s] if latency_s >= 0.0 && bandwidth_bytes_per_s > 0.0 => {
+            Ok(Network { latency_s, bandwidth_bytes_per_s, measured: false })
+        }
+        _ => Err("give a latency in seconds and a bandwidth in bytes per second, as in 2e-6,1e10".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ping_pong_is_read() {
+        let text = r#"{"schema": "octree-pingpong/1", "points": [{"bytes": 0, "time_s": 1e-6}, {"bytes": 1000000, "time_s": 1.01e-4}]}"#;
+        let n = parse(text).unwrap();
+        assert_eq!(n.latency_s, 1e-6);
+        assert!((n.bandwidth_bytes_per_s / 1e10 - 1.0).abs() < 1e-9);
+        assert!(parse("{}").is_err());
+        assert!(parse(&text.replace("1.01e-4", "1e-7")).unwrap_err().contains("grow"));
+    }
+
+    #[test]
+    fn constants_may_be_given() {
+        assert_eq!(given("1e-6, 2e9").unwrap().bandwidth_bytes_per_s, 2e9);
+        assert!(given("1e-6").is_err() && given("1,0").is_err());
+    }
+}

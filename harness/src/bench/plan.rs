@@ -1,0 +1,280 @@
+//! What is run: experiments, and the two presets.
+
+use super::entry::Comm;
+use std::fmt;
+
+/// A question that a set of runs answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum Experiment {
+    /// The same mesh on more and more ranks.
+    Strong,
+    /// As many cells per rank on more and more ranks; the spacing is chosen so.
+    Weak,
+    /// The spacing halved again and again.
+    Spacing,
+    /// The same spacing with more and more cells per layer.
+    Layers,
+    /// What a base leaf weighs, and who cuts the base tree.
+    Weights,
+}
+
+impl fmt::Display for Experiment {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Strong => "strong",
+            Self::Weak => "weak",
+            Self::Spacing => "spacing",
+            Self::Layers => "layers",
+            Self::Weights => "weights",
+        })
+    }
+}
+
+/// How much time may be spent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Preset {
+    /// Every experiment and every figure, in minutes on 2 cores.
+    Small,
+    /// The paper's sizes and beyond: 100 M and 1e9 cells, 1,024 simulated ranks.
+    Full,
+}
+
+/// A number of ranks and how they talk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Layout {
+    /// How they talk.
+    pub comm: Comm,
+    /// How many.
+    pub ranks: usize,
+}
+
+/// One experiment on one case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Study {
+    /// The question.
+    pub experiment: Experiment,
+    /// The case's name in the catalogue, or a case file.
+    pub case: String,
+    /// Cells to choose the spacing for: of the mesh (strong, weights), per rank (weak), of the largest mesh
+    /// (spacing), at n = 4 (layers). None: the case's own spacing.
+    pub cells: Option<u64>,
+    /// Values of n; empty for the case's own.
+    pub layers: Vec<u32>,
+    /// Ranks of the runs.
+    pub layouts: Vec<Layout>,
+    /// Weights and partitioners, each with each.
+    pub weights: Vec<String>,
+    /// See `weights`.
+    pub partitioners: Vec<String>,
+    /// Repetitions of every run, the warm-up not counted.
+    pub repeats: usize,
+}
+
+/// What the command line may change in the studies of a preset.
+#[derive(Clone, Debug, Default)]
+pub struct Wishes {
+    /// Cases instead of the preset's.
+    pub cases: Vec<String>,
+    /// Experiments instead of all.
+    pub experiments: Vec<Experiment>,
+    /// Ranks of simulated runs.
+    pub ranks: Vec<usize>,
+    /// Ranks of runs on MPI.
+    pub ranks_mpi: Vec<usize>,
+    /// See [`Study::cells`].
+    pub cells: Vec<u64>,
+    /// See [`Study::layers`].
+    pub layers: Vec<u32>,
+    /// Weights of the experiment of that name.
+    pub weights: Vec<String>,
+    /// Partitioners of it.
+    pub partitioners: Vec<String>,
+    /// Repetitions.
+    pub repeats: Option<usize>,
+}
+
+const MILLION: u64 = 1_000_000;
+
+/// The studies of a preset as the command line changes them.
+pub fn studies(preset: Preset, wishes: &Wishes) -> Vec<Study> {
+    let wanted = |s: &Study| wishes.experiments.is_empty() || wishes.experiments.contains(&s.experiment);
+    let mut of_preset: Vec<Study> = match preset {
+        Preset::Small => small(),
+        Preset::Full => full(),
+    };
+    of_preset.retain(wanted);
+    if !wishes.cases.is_empty() {
+        of_preset = on_cases(of_preset, &wishes.cases);
+    }
+    if !wishes.cells.is_empty() {
+        of_preset = with_cells(of_preset, &wishes.cells);
+    }
+    for study in &mut of_preset {
+        change(study, wishes);
+    }
+    of_preset
+}
+
+/// The first study of every experiment, for every case.
+fn on_cases(studies: Vec<Study>, cases: &[String]) -> Vec<Study> {
+    let mut out: Vec<Study> = Vec::new();
+    for case in cases {
+        for study in &studies {
+            let made = |s: &Study| s.experiment == study.experiment && s.case == *case;
+            if !out.iter().any(made) {
+                out.push(Study { case: case.clone(), ..study.clone() });
+            }
+        }
+    }
+    out
+}
+
+/// The first study of every experiment and case, for every size.
+fn with_cells(studies: Vec<Study>, cells: &[u64]) -> Vec<Study> {
+    let mut out: Vec<Study> = Vec::new();
+    for study in studies {
+        for &cells in cells {
+            let made = |s: &Study| {
+                s.experiment == study.experiment && s.case == study.case && s.cells == Some(cells)
+            };
+            if !out.iter().any(made) {
+                out.push(Study { cells: Some(cells), ..study.clone() });
+            }
+        }
+    }
+    out
+}
+
+fn change(study: &mut Study, wishes: &Wishes) {
+    if !wishes.ranks.is_empty() || !wishes.ranks_mpi.is_empty() {
+        let scales = matches!(study.experiment, Experiment::Strong | Experiment::Weak);
+        if scales {
+            study.layouts = layouts(&wishes.ranks, &wishes.ranks_mpi);
+        } else if study.experiment == Experiment::Weights && !wishes.ranks.is_empty() {
+            study.layouts = layouts(&wishes.ranks, &[]);
+        }
+    }
+    if !wishes.layers.is_empty() && study.experiment == Experiment::Layers {
+        study.layers.clone_from(&wishes.layers);
+    }
+    if !wishes.weights.is_empty() {
+        study.weights.clone_from(&wishes.weights);
+    }
+    if !wishes.partitioners.is_empty() {
+        study.partitioners.clone_from(&wishes.partitioners);
+    }
+    study.repeats = wishes.repeats.unwrap_or(study.repeats);
+}
+
+fn small() -> Vec<Study> {
+    let scaling = layouts(&[1, 2, 4, 8, 16, 32, 64], &[1, 2, 4]);
+    vec![
+        study(Experiment::Strong, "uav-large", 4 * MILLION, &scaling, 6),
+        study(Experiment::Weak, "uav-large", MILLION / 4, &layouts(&[1, 4, 16, 64], &[1, 2]), 3),
+        study(Experiment::Spacing, "uav-large", 8 * MILLION, &layouts(&[], &[1, 2]), 6),
+        study(Experiment::Layers, "uav-large", 2 * MILLION, &layouts(&[], &[1, 2]), 6),
+        study(Experiment::Weights, "uav-large", 4 * MILLION, &layouts(&[64], &[]), 3),
+        study(Experiment::Weights, "fighter-large", 4 * MILLION, &layouts(&[64], &[]), 3),
+    ]
+}
+
+fn full() -> Vec<Study> {
+    let to_64 = layouts(&[1, 2, 4, 8, 16, 32, 64], &[1, 2, 4, 8, 16, 32, 64]);
+    let to_1024 = layouts(&[1, 4, 16, 64, 256, 1024], &[1, 2]);
+    let mut all = vec![
+        study(Experiment::Strong, "uav-large", 50 * MILLION, &to_64, 6),
+        study(Experiment::Strong, "uav-large", 100 * MILLION, &to_64, 3),
+        study(Experiment::Strong, "uav-large", 1000 * MILLION, &to_1024, 3),
+        study(Experiment::Strong, "fighter-large", 100 * MILLION, &to_64, 3),
+        study(Experiment::Weak, "uav-large", MILLION, &to_1024, 3),
+        study(Experiment::Spacing, "uav-large", 1600 * MILLION, &layouts(&[], &[1, 2]), 3),
+        study(Experiment::Layers, "uav-large", 20 * MILLION, &layouts(&[], &[1, 2]), 6),
+    ];
+    for case in ["uav-large", "fighter-large"] {
+        for cells in [100 * MILLION, 1000 * MILLION] {
+            all.push(study(Experiment::Weights, case, cells, &layouts(&[64], &[]), 1));
+        }
+    }
+    all
+}
+
+fn study(experiment: Experiment, case: &str, cells: u64, layouts: &[Layout], repeats: usize) -> Study {
+    let words = |all: &[&str]| all.iter().map(|w| (*w).to_owned()).collect::<Vec<String>>();
+    let layers = match experiment {
+        Experiment::Layers => vec![1, 2, 3, 4, 6, 8, 12, 16],
+        _ => Vec::new(),
+    };
+    let (weights, partitioners) = match experiment {
+        Experiment::Weights => (words(&["unit", "area", "rehearsal"]), words(&["metis", "morton"])),
+        // The mesher's own choice.
+        _ => (words(&[""]), words(&[""])),
+    };
+    let (case, layouts) = (case.to_owned(), layouts.to_vec());
+    Study { experiment, case, cells: Some(cells), layers, layouts, weights, partitioners, repeats }
+}
+
+/// Simulated runs, then runs on MPI.
+fn layouts(sim: &[usize], mpi: &[usize]) -> Vec<Layout> {
+    let of = |comm: Comm| move |&ranks: &usize| Layout { comm, ranks };
+    sim.iter().map(of(Comm::Sim)).chain(mpi.iter().map(of(Comm::Mpi))).collect()
+}
+
+/// Reads rank counts: `1,2,7`, or `1..64` for the powers of two.
+///
+/// # Errors
+/// What should have been given.
+pub fn ranks(text: &str) -> Result<Vec<usize>, String> {
+    let wrong = || "give rank counts as in 1,2,7 or 1..64, the latter for powers of two".to_owned();
+    let number = |word: &str| word.trim().parse::<usize>().ok().filter(|r| (1..=65_536).contains(r));
+    let mut all = Vec::new();
+    for word in text.split(',') {
+        match word.split_once("..") {
+            Some((from, to)) => {
+                let (from, to) = (number(from).ok_or_else(wrong)?, number(to).ok_or_else(wrong)?);
+                all.extend(std::iter::successors(Some(from), |r| Some(r * 2)).take_while(|&r| r <= to));
+            }
+            None => all.push(number(word).ok_or_else(wrong)?),
+        }
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_are_lists_and_powers_of_two() {
+        assert_eq!(ranks("1..64").unwrap(), [1, 2, 4, 8, 16, 32, 64]);
+        assert_eq!(ranks("1, 7,16..40").unwrap(), [1, 7, 16, 32]);
+        assert!(ranks("0").is_err() && ranks("a..4").is_err() && ranks("").is_err());
+    }
+
+    #[test]
+    fn wishes_change_a_preset() {
+        let wishes = Wishes {
+            experiments: vec![Experiment::Strong],
+            cases: vec!["cube".into(), "ball".into()],
+            cells: vec![1000, 2000],
+            ranks: vec![1, 3],
+            repeats: Some(9),
+            ..Wishes::default()
+        };
+        let all = studies(Preset::Full, &wishes);
+        assert_eq!(all.len(), 4);
+        assert_eq!((all[0].case.as_str(), all[0].cells), ("cube", Some(1000)));
+        assert_eq!(all[0].layouts, layouts(&[1, 3], &[]));
+        assert_eq!((all[3].repeats, all[3].layers.len()), (9, 0));
+    }
+
+    #[test]
+    fn presets_ask_every_question() {
+        for preset in [Preset::Small, Preset::Full] {
+            let mut asked: Vec<Experiment> =
+                studies(preset, &Wishes::default()).iter().map(|s| s.experiment).collect();
+            asked.sort();
+            asked.dedup();
+            assert_eq!(asked.len(), 5);
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The record: a file of JSON lines to which every result is appended at once.
+//!
+//! Invariants: a line is written with one call under an exclusive lock, so that two runs at a time do not
+//! mix; what an interruption or a full disk cut short is one broken line, which the next writer ends and
+//! readers report and pass over; nothing is ever rewritten.
+
+use super::entry::{Line, SCHEMA, What};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// A record opened for appending.
+#[derive(Debug)]
+pub struct Record {
+    file: File,
+    path: PathBuf,
+    session: String,
+}
+
+impl Record {
+    /// Opens a record, making it and its directory where they are absent, for a session of its own.
+    ///
+    /// # Errors
+    /// Where that is not possible.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        if let Some(directory) = path.parent() {
+            std::fs::create_dir_all(directory)?;
+        }
+        let file = OpenOptions::new().create(true).append(true).read(true).open(path)?;
+        let session = format!("{}-{}", utc(SystemTime::now()), std::process::id());
+        Ok(Self { file, path: path.to_owned(), session })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Appends a line, and returns it.
+    ///
+    /// # Errors
+    /// Where it could not be written whole.
+    pub fn append(&mut self, what: What) -> io::Result<Line> {
+        let line = Line {
+            schema: SCHEMA.to_owned(),
+            session: self.session.clone(),
+            time_utc: utc(SystemTime::now()),
+            what,
+        };
+        let mut text = serde_json::to_vec(&line)?;
+        text.push(b'\n');
+        self.file.lock()?;
+        let written = self.append_locked(text);
+        self.file.unlock()?;
+        written.map(|()| line)
+    }
+
+    fn append_locked(&mut self, mut text: Vec<u8>) -> io::Result<()> {
+        if !self.ends_with_line()? {
+            text.insert(0, b'\n');
+        }
+        self.file.write_all(&text)?;
+        self.file.sync_data()
+    }
+
+    /// Whether the file is empty or ends with a line's end.
+    fn ends_with_line(&mut self) -> io::Result<bool> {
+        if self.file.seek(SeekFrom::End(0))? == 0 {
+            return Ok(true);
+        }
+        self.file.seek(SeekFrom::End(-1))?;
+        let mut last = [0];
+        self.file.read_exact(&mut last)?;
+        Ok(last[0] == b'\n')
+    }
+}
+
+/// What a record says.
+#[derive(Clone, Debug, Default)]
+pub struct Content {
+    /// Its lines, in the order in which they were written.
+    pub lines: Vec<Line>,
+    /// Lines, from 1, that are not of the schema, and why.
+    pub broken: Vec<(usize, String)>,
+}
+
+/// Reads a record.
+///
+/// # Errors
+/// Where it cannot be read at all.
+pub fn read(path: &Path) -> io::Result<Content> {
+    let mut content = Content::default();
+    for (i, text) in std::fs::read_to_string(path)?.lines().enumerate() {
+        match serde_json::from_str::<Line>(text) {
+            _ if text.trim().is_empty() => {}
+            Ok(line) if line.schema == SCHEMA => content.lines.push(line),
+            Ok(line) => content.broken.push((i + 1, format!("its schema is {}", line.schema))),
+            Err(error) => content.broken.push((i + 1, error.to_string())),
+        }
+    }
+    Ok(content)
+}
+
+/// A time as `2026-01-31T12:00:00Z`.
+fn utc(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, of_day) = (seconds / 86_400, seconds % 86_400);
+    let (year, month, day) = civil(days);
+    let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+}
+
+/// Year, month and day of a day since 1970, in the Gregorian calendar. Years begin in March here, so that
+/// the leap day comes last (Hinnant, "chrono-Compatible Low-Level Date Algorithms").
+fn civil(days: u64) -> (u64, u64, u64) {
+    let z = days + 719_468;
+    let (era, of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let march_based = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * march_based + 2) / 5 + 1;
+    let month = if march_based < 10 { march_based + 3 } else { march_based - 9 };
+    (year_of_era + era * 400 + u64::from(month <= 2), month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::entry::Network;
+    use super::*;
+
+    fn network(latency_s: f64) -> What {
+        What::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, measured: false })
+    }
+
+    #[test]
+    fn two_writers_at_a_time_lose_and_mix_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("deeper/record.jsonl");
+        std::thread::scope(|scope| {
+            for writer in 0..4 {
+                let path = &path;
+                scope.spawn(move || {
+                    let mut record = Record::open(path).unwrap();
+                    (0..50).for_each(|i| _ = record.append(network(f64::from(writer * 50 + i))).unwrap());
+                });
+            }
+        });
+        let content = read(&path).unwrap();
+        assert!(content.broken.is_empty(), "{:?}", content.broken);
+        let mut seen: Vec<u64> = Vec::new();
+        for line in content.lines {
+            let What::Network(n) = line.what else { panic!() };
+            seen.push(n.latency_s as u64);
+        }
+        seen.sort_unstable();
+        assert_eq!(seen, (0..200).collect::<Vec<u64>>());
+    }
+
+    #[test]
+    fn an_interrupted_line_costs_itself_only() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("record.jsonl");
+        Record::open(&path).unwrap().append(network(1.0)).unwrap();
+        let mut text = std::fs::read_to_string(&path).unwrap();
+        text.push_str(&text.clone()[..20]);
+        std::fs::write(&path, &text).unwrap();
+        Record::open(&path).unwrap().append(network(2.0)).unwrap();
+        let content = read(&path).unwrap();
+        assert_eq!((content.lines.len(), content.broken.len()), (2, 1));
+        assert_eq!(content.broken[0].0, 2);
+    }
+
+    #[test]
+    fn another_schema_is_not_guessed_at() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("record.jsonl");
+        Record::open(&path).unwrap().append(network(1.0)).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap().replace("bench/1", "bench/9");
+        std::fs::write(&path, text).unwrap();
+        assert!(read(&path).unwrap().broken[0].1.contains("octree-bench/9"));
+    }
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        assert_eq!(civil(0), (1970, 1, 1));
+        assert_eq!(civil(11_016), (2000, 2, 29));
+        assert_eq!(civil(20_777), (2026, 11, 20));
+        assert_eq!(utc(UNIX_EPOCH + std::time::Duration::from_secs(86_399)), "1970-01-01T23:59:59Z");
+    }
+}

@@ -1,0 +1,119 @@
+//! The spacing that gives a wanted number of cells, found by meshing coarser.
+//!
+//! Cells follow a power of the spacing, close to -2 where they fill layers around a surface. The power is
+//! taken from the two finest meshes so far, each a few times finer than the last.
+
+/// Close enough, as a fraction of the cells wanted.
+const TOLERANCE: f64 = 0.02;
+/// A mesh at least this fraction of the wanted one tells enough.
+const ENOUGH: f64 = 0.1;
+/// Finer by this factor in cells at most, as a guess from afar may be far off.
+const STEP: f64 = 40.0;
+
+/// Meshes made so far, of one case and one n: spacing and cells.
+#[derive(Clone, Debug, Default)]
+pub struct Sizes(Vec<(f64, f64)>);
+
+impl Sizes {
+    /// The spacing for about `cells`. `mesh` makes a mesh and counts its cells; `coarse` is a spacing to begin with.
+    ///
+    /// # Errors
+    /// Those of `mesh`.
+    pub fn spacing<E>(
+        &mut self,
+        cells: f64,
+        coarse: f64,
+        mut mesh: impl FnMut(f64) -> Result<u64, E>,
+    ) -> Result<f64, E> {
+        for _ in 0..8 {
+            if let Some(spacing) = self.known(cells) {
+                return Ok(spacing);
+            }
+            let next = match self.finest_below(cells) {
+                None => coarse,
+                Some((spacing, count)) => spacing / ((cells / count).min(STEP)).powf(1.0 / self.power(cells)),
+            };
+            let count = mesh(next)?.max(1) as f64;
+            self.0.push((next, count));
+            self.0.sort_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        Ok(self.guess(cells))
+    }
+
+    /// The spacing, if meshes near enough were made.
+    fn known(&self, cells: f64) -> Option<f64> {
+        if let Some(hit) = self.0.iter().find(|m| (m.1 / cells - 1.0).abs() < TOLERANCE) {
+            return Some(hit.0);
+        }
+        let near = self.0.iter().filter(|m| m.1 / cells > ENOUGH && m.1 / cells < 1.0 / ENOUGH).count();
+        let below = self.0.iter().filter(|m| m.1 < cells / ENOUGH).count();
+        (near > 0 && below > 1).then(|| self.guess(cells))
+    }
+
+    fn guess(&self, cells: f64) -> f64 {
+        let nearest = self.0.iter().min_by(|a, b| {
+            (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs())
+        });
+        nearest.map_or(1.0, |m| m.0 * (m.1 / cells).powf(1.0 / self.power(cells)))
+    }
+
+    fn finest_below(&self, cells: f64) -> Option<(f64, f64)> {
+        self.0.iter().rev().find(|m| m.1 < cells).copied().or(self.0.first().copied())
+    }
+
+    /// Power p in cells ~ spacing^-p, from the two meshes nearest to the wanted one.
+    fn power(&self, cells: f64) -> f64 {
+        let mut near = self.0.clone();
+        near.sort_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
+        match near[..] {
+            [a, b, ..] if a.0 != b.0 => {
+                ((a.1 / b.1).ln() / (b.0 / a.0).ln()).clamp(1.0, 3.0)
+            }
+            _ => 2.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spacing_is_found_by_meshes_that_are_smaller() {
+        let truth = |s: f64| (3.0 / (s * s) + 50.0 / s + 700.0) as u64;
+        for wanted in [5e4, 3e6, 1e9] {
+            let mut sizes = Sizes::default();
+            let mut most = 0;
+            let mesh = |s: f64| {
+                most = most.max(truth(s));
+                Ok::<u64, ()>(truth(s))
+            };
+            let spacing = sizes.spacing(wanted, 0.2, mesh).unwrap();
+            let error = truth(spacing) as f64 / wanted - 1.0;
+            assert!(error.abs() < 0.05, "{wanted}: {error}");
+            assert!(most as f64 <= wanted * 1.1, "{most}");
+        }
+    }
+
+    #[test]
+    fn what_is_known_is_not_meshed_again() {
+        let mut sizes = Sizes::default();
+        let mut count = 0;
+        let mut ask = |cells| {
+            let mesh = |s: f64| {
+                count += 1;
+                Ok::<u64, ()>((1.0 / (s * s)) as u64)
+            };
+            sizes.spacing(cells, 0.1, mesh).unwrap();
+            count
+        };
+        let first = ask(1e6);
+        assert_eq!(ask(1e6), first);
+        assert_eq!(ask(5e5), first);
+    }
+
+    #[test]
+    fn errors_are_passed_on() {
+        assert_eq!(Sizes::default().spacing(1e6, 0.1, |_| Err("no")), Err("no"));
+    }
+}

@@ -1,0 +1,96 @@
+//! Medians and how well they are known, without assuming any distribution: times have none that is known.
+//!
+//! The interval of a median is between two order statistics: that the true median lies below the k-th
+//! smallest of n independent values has the probability that a fair coin falls heads fewer than k times
+//! in n throws (Le Boudec, "Performance Evaluation", theorem 2.1; Hoefler and Belli, SC15, rule 5).
+
+/// Coverage that is aimed at.
+const COVERAGE: f64 = 0.95;
+
+/// A median, and an interval that contains the true one with a known probability.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Median {
+    /// Middle value; mean of the two in the middle of an even number.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Probability that the interval contains the true median: 95 % or more from six values on, less
+    /// for fewer, whose whole range it then is.
+    pub coverage: f64,
+    /// Number of values.
+    pub count: usize,
+}
+
+/// The median of some values; none of none.
+pub fn median(values: &[f64]) -> Option<Median> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    if n == 0 {
+        return None;
+    }
+    let value = (sorted[(n - 1) / 2] + sorted[n / 2]) * 0.5;
+    // The narrowest interval that covers enough; the whole range where none does.
+    let cut = (0..n.div_ceil(2)).rev().find(|&k| coverage(n, k) >= COVERAGE).unwrap_or(0);
+    let (low, high) = (sorted[cut], sorted[n - 1 - cut]);
+    Some(Median { value, low, high, coverage: coverage(n, cut), count: n })
+}
+
+/// Probability that the true median lies between the values number `cut` from either end, from 0.
+fn coverage(n: usize, cut: usize) -> f64 {
+    let mut term = 0.5f64.powi(n as i32);
+    let mut below = 0.0;
+    for k in 0..=cut {
+        below += term;
+        term *= (n - k) as f64 / (k + 1) as f64;
+    }
+    (1.0 - 2.0 * below).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_those_of_the_table() {
+        // Le Boudec, table A.1: the 95 % interval's order statistics, from 1.
+        for (n, low, high, covers) in
+            [(6, 1, 6, 0.969), (8, 1, 8, 0.992), (9, 2, 8, 0.961), (15, 4, 12, 0.965), (31, 10, 22, 0.971)]
+        {
+            let values: Vec<f64> = (1..=n).map(f64::from).collect();
+            let m = median(&values).unwrap();
+            assert_eq!((m.low, m.high), (f64::from(low), f64::from(high)), "n = {n}");
+            assert!((m.coverage - covers).abs() < 1e-3, "n = {n}: {}", m.coverage);
+        }
+    }
+
+    #[test]
+    fn few_values_give_their_range_and_say_how_little_that_is_worth() {
+        let m = median(&[3.0, 1.0, 2.0]).unwrap();
+        assert_eq!((m.value, m.low, m.high, m.coverage, m.count), (2.0, 1.0, 3.0, 0.75, 3));
+        let one = median(&[5.0]).unwrap();
+        assert_eq!((one.low, one.high, one.coverage), (5.0, 5.0, 0.0));
+        assert_eq!(median(&[4.0, 2.0]).unwrap().value, 3.0);
+        assert!(median(&[]).is_none());
+    }
+
+    #[test]
+    fn the_interval_covers_as_often_as_it_says() {
+        // Uniform values from a fixed generator; the true median is one half.
+        let mut state = 1u64;
+        let mut draw = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let rounds = 4000;
+        let holds = |m: Median| m.low <= 0.5 && 0.5 <= m.high;
+        let hits = (0..rounds).filter(|_| {
+            let values: Vec<f64> = (0..9).map(|_| draw()).collect();
+            holds(median(&values).unwrap())
+        });
+        let share = hits.count() as f64 / f64::from(rounds);
+        assert!((share - 0.961).abs() < 0.015, "{share}");
+    }
+}

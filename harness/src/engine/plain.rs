@@ -1,0 +1,107 @@
+//! A case in its plainest form: an STL file and an exact root, which every mesher can read.
+//!
+//! Invariant: what is written means the same mesh as what was read, to the last bit. Vertices stay the
+//! f32 that they are, and the root that `root_scale` means is written out.
+
+use crate::case::{Case, Facet};
+use std::fmt::Write as _;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// A case whose body is in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlainCase {
+    /// The case file but for the body.
+    pub table: Table,
+    /// The body.
+    pub facets: Vec<Facet>,
+}
+
+impl PlainCase {
+    /// Reads a case file and the body that it names or generates.
+    ///
+    /// # Errors
+    /// One sentence, where it is no case.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let case = Case::read(path).map_err(|error| error.to_string())?;
+        let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
+        let mut table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
+        for key in ["geometry", "generator", "root_scale"] {
+            table.remove(key);
+        }
+        let floats =
+            |values: &[f64]| Value::Array(values.iter().map(|&v| Value::Float(v)).collect());
+        let mut root = Table::new();
+        root.insert("origin".into(), floats(&case.root.origin));
+        root.insert("edge".into(), Value::Float(case.root.edge));
+        table.insert("root".into(), Value::Table(root));
+        Ok(Self { table, facets: case.facets })
+    }
+
+    /// Writes `case.toml` and `body.stl` into an existing directory; the path of the case file. The body
+    /// is written as text where it is small enough to be read.
+    ///
+    /// # Errors
+    /// Where a file could not be written.
+    pub fn write(&self, directory: &Path) -> io::Result<PathBuf> {
+        let mut table = Table::new();
+        table.insert("geometry".into(), Value::String("body.stl".into()));
+        table.extend(self.table.clone());
+        let body = directory.join("body.stl");
+        match self.facets.len() <= FACETS_AS_TEXT {
+            true => fs::write(body, ascii(&self.facets))?,
+            false => geometries::write_stl_binary(
+                &self.facets,
+                io::BufWriter::new(fs::File::create(body)?),
+            )?,
+        }
+        let path = directory.join("case.toml");
+        let text = toml::to_string(&table).expect("a case is representable in TOML");
+        fs::write(&path, text)?;
+        Ok(path)
+    }
+}
+
+const FACETS_AS_TEXT: usize = 1000;
+
+/// Numbers are the shortest that read back as the same f32.
+fn ascii(facets: &[Facet]) -> String {
+    let mut text = "solid body\n".to_owned();
+    for facet in facets {
+        text.push_str("facet normal 0 0 0\n outer loop\n");
+        for [x, y, z] in facet {
+            // Writing into a string cannot fail.
+            let _ = writeln!(text, "  vertex {x} {y} {z}");
+        }
+        text.push_str(" endloop\nendfacet\n");
+    }
+    text.push_str("endsolid body\n");
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CASE: &str = "spacing_min = 0.3\nkeep = \"all\"\nroot_scale = 3.7\n[generator]\nshape = \"sphere\"\n\
+                        facets = FACETS\n[[box]]\nmin = [0.1, 0.0, 0.0]\nmax = [0.7, 0.3, 0.9]\nspacing = 0.1\n";
+
+    #[test]
+    fn the_plain_case_means_the_same() {
+        for facets in ["20", "5000"] {
+            let place = tempfile::tempdir().unwrap();
+            let path = place.path().join("given.toml");
+            fs::write(&path, CASE.replace("FACETS", facets)).unwrap();
+            let given = Case::read(&path).unwrap();
+            let plain = PlainCase::read(&path).unwrap().write(place.path()).unwrap();
+            let plain = Case::read(&plain).unwrap();
+            assert_eq!(
+                (plain.facets, plain.root, plain.boxes),
+                (given.facets, given.root, given.boxes)
+            );
+            assert_eq!(plain.level_surface, given.level_surface);
+        }
+    }
+}

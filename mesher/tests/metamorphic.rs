@@ -1,0 +1,277 @@
+//! Changes of the input whose effect on the mesh is known exactly, each on whatever ranks.
+#![allow(missing_docs)]
+
+mod support;
+
+use mesher::base::Division;
+use mesher::lattice::{Keep, Root};
+use mesher::partition::{Partitioner, Weights};
+use proptest::prelude::*;
+use support::symmetry::Symmetry;
+use support::{Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup};
+
+/// Asserts that both have the same leaves, and the same to say of ambiguous components.
+macro_rules! assert_equal {
+    ($a:expr, $b:expr) => {
+        let (a, b) = (&$a, &$b);
+        prop_assert!(a.words == b.words, "{}", first_difference(&a.words, &b.words));
+        prop_assert_eq!(a.ambiguous, b.ambiguous);
+    };
+}
+
+/// The facet's four quarters. Exact where coordinates are even lattice points.
+fn quarters([a, b, c]: &Facet) -> [Facet; 4] {
+    let middle = |p: &[f32; 3], q: &[f32; 3]| std::array::from_fn(|i| (p[i] + q[i]) * 0.5);
+    let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+    [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]]
+}
+
+/// A scale, by a power of two.
+fn scaled(case: &Small, power: i32) -> Small {
+    let (narrow, wide) = (2f32.powi(power), 2f64.powi(power));
+    let mut image =
+        case.with(case.facets.iter().map(|f| f.map(|v| v.map(|c| c * narrow))).collect());
+    image.spacing_min *= wide;
+    image.root = Root { origin: case.root.origin.map(|c| c * wide), edge: case.root.edge * wide };
+    for b in &mut image.boxes {
+        (b.min, b.max) = (b.min.map(|c| c * wide), b.max.map(|c| c * wide));
+        b.spacing *= wide;
+    }
+    image
+}
+
+/// A move, root and all.
+fn moved(case: &Small, by: [i32; 3]) -> Small {
+    let shift = |v: [f32; 3]| std::array::from_fn(|a| v[a] + by[a] as f32);
+    let mut image = case.with(case.facets.iter().map(|f| f.map(shift)).collect());
+    let shift = |v: [f64; 3]| std::array::from_fn(|a| v[a] + f64::from(by[a]));
+    image.root.origin = shift(case.root.origin);
+    for b in &mut image.boxes {
+        (b.min, b.max) = (shift(b.min), shift(b.max));
+    }
+    image
+}
+
+/// The words with every leaf that is inside made one that is outside.
+fn all_outside(words: &[u64]) -> Vec<u64> {
+    words.iter().map(|w| if w & 3 == 1 { w & !3 } else { *w }).collect()
+}
+
+proptest! {
+    #![proptest_config(config(120))]
+
+    /// Which facet comes first, and so which rank reads it, does not matter.
+    #[test]
+    fn shuffled_facets_give_the_same_mesh(
+        (case, order) in small(soup()).prop_flat_map(|c| {
+            let facets = Just(c.facets.clone()).prop_shuffle();
+            (Just(c), facets)
+        }),
+        run in run(),
+    ) {
+        let shuffled = case.with(order);
+        assert_equal!(shuffled.outcome(&run, true), case.outcome(&Run::SOLO, true));
+        assert_equal!(shuffled.outcome(&run, false), case.outcome(&Run::SOLO, false));
+    }
+
+    /// Nor does the orientation of any of them.
+    #[test]
+    fn flipped_facets_give_the_same_mesh(
+        case in small(soup()),
+        which in any::<u64>(),
+        run in run(),
+    ) {
+        let turn = |(i, f): (usize, &Facet)| match which >> (2 * i % 64) & 3 {
+            0 => *f,
+            1 => [f[1], f[2], f[0]],
+            2 => [f[0], f[2], f[1]],
+            _ => [f[2], f[1], f[0]],
+        };
+        let turned = case.with(case.facets.iter().enumerate().map(turn).collect());
+        assert_equal!(turned.outcome(&run, true), case.outcome(&Run::SOLO, true));
+        assert_equal!(turned.outcome(&run, false), case.outcome(&Run::SOLO, false));
+    }
+
+    /// Every ray meets every facet twice, so nothing is inside; what is crossed stays the same, and
+    /// so does all that follows from it.
+    #[test]
+    fn duplicated_facets_leave_nothing_inside(
+        case in small(soup()),
+        reversed in any::<bool>(),
+        run in run(),
+    ) {
+        let twins = case.facets.iter().map(|f| if reversed { [f[0], f[2], f[1]] } else { *f });
+        let twice = case.with(case.facets.iter().copied().chain(twins).collect());
+
+        let base = twice.outcome(&run, true);
+        let want = all_outside(&case.outcome(&Run::SOLO, true).words);
+        prop_assert!(base.words == want, "{}", first_difference(&base.words, &want));
+        prop_assert_eq!(base.ambiguous, None);
+
+        let all = Small { keep: Keep::All, ..case.clone() };
+        let want = all_outside(&all.outcome(&Run::SOLO, false).words);
+        for keep in [Keep::All, Keep::Outside] {
+            let got = Small { keep, ..twice.clone() }.outcome(&run, false).words;
+            prop_assert!(got == want, "{:?}: {}", keep, first_difference(&got, &want));
+        }
+
+        // Without boxes all crossing leaves are of one level, so gradation has nothing to do.
+        let alone = Small { keep: Keep::Inside, keep_crossing: true, boxes: vec![], ..twice };
+        let mut want = alone.outcome(&Run::SOLO, true).words;
+        want.retain(|w| w & 3 == 2);
+        let got = alone.outcome(&run, false).words;
+        prop_assert!(got == want, "{:?}: {}", alone.keep, first_difference(&got, &want));
+    }
+
+    /// A facet is its four quarters, for crossing and for rays.
+    #[test]
+    fn quartered_facets_give_the_same_mesh(
+        case in small(soup()).prop_map(Small::on_lattice),
+        run in run(),
+    ) {
+        let four = case.with(case.facets.iter().flat_map(quarters).collect());
+        assert_equal!(four.outcome(&run, true), case.outcome(&Run::SOLO, true));
+        assert_equal!(four.outcome(&run, false), case.outcome(&Run::SOLO, false));
+    }
+
+    /// On a closed body all rays agree, whichever way they are moved, so the mesh turns with it.
+    #[test]
+    fn turned_bodies_give_the_turned_mesh(
+        case in small(closed()).prop_map(Small::on_lattice),
+        which in 0usize..48,
+        run in run(),
+    ) {
+        let symmetry = Symmetry::all().nth(which).expect("there are 48");
+        let turned = symmetry.case(&case);
+        for ungraded in [true, false] {
+            let (got, straight) = (turned.outcome(&run, ungraded), case.outcome(&Run::SOLO, ungraded));
+            let want = symmetry.words(&straight.words);
+            prop_assert!(got.words == want, "{}", first_difference(&got.words, &want));
+            prop_assert_eq!((got.ambiguous, straight.ambiguous), (None, None));
+        }
+    }
+
+    /// Crossing knows nothing of rays: it turns with any soup.
+    #[test]
+    fn turned_soups_are_crossed_alike(
+        case in small(soup()).prop_map(Small::on_lattice),
+        which in 0usize..48,
+        run in run(),
+    ) {
+        let symmetry = Symmetry::all().nth(which).expect("there are 48");
+        let crossing = |words: Vec<u64>| -> Vec<u64> {
+            words.into_iter().filter(|w| w & 3 == 2).collect()
+        };
+        let got = crossing(symmetry.case(&case).outcome(&run, true).words);
+        let want = crossing(symmetry.words(&case.outcome(&Run::SOLO, true).words));
+        prop_assert!(got == want, "{}", first_difference(&got, &want));
+    }
+
+    /// A power of two changes no digit, whatever the root.
+    #[test]
+    fn dyadic_scaling_gives_the_same_mesh(
+        case in small(soup()),
+        power in -60i32..60,
+        run in run(),
+    ) {
+        let image = scaled(&case, power);
+        assert_equal!(image.outcome(&run, false), case.outcome(&Run::SOLO, false));
+    }
+
+    /// Nor does a move that is exact.
+    #[test]
+    fn moving_everything_gives_the_same_mesh(
+        case in small(soup()).prop_map(Small::on_lattice),
+        by in [-200i32..200, -200i32..200, -200i32..200],
+        run in run(),
+    ) {
+        let image = moved(&case, by);
+        assert_equal!(image.outcome(&run, true), case.outcome(&Run::SOLO, true));
+        assert_equal!(image.outcome(&run, false), case.outcome(&Run::SOLO, false));
+    }
+
+    /// A layer as thick as the root is as thick as can be.
+    #[test]
+    fn layers_thicker_than_the_root_change_nothing_more(
+        case in small(soup()),
+        more in prop_oneof![65u32..300, Just(u32::MAX), Just(u32::MAX - 1)],
+        run in run(),
+    ) {
+        let case = Small { boxes: vec![], layer_cells_min: 65, ..case };
+        let thicker = Small { layer_cells_min: more, ..case.clone() };
+        assert_equal!(thicker.outcome(&run, false), case.outcome(&Run::SOLO, false));
+    }
+}
+
+/// A body without symmetries of its own, with a box finer than its surface and one coarser.
+fn crooked() -> Small {
+    let mut facets = cuboid([9.0, 17.0, 30.0], [21.5, 40.0, 33.0]);
+    facets.extend(cuboid([20.0, 18.25, 10.5], [50.0, 22.0, 31.0]));
+    let boxed = |min, max, spacing| mesher::case::BoxSpec { min, max, spacing };
+    Small {
+        facets,
+        root: Root { origin: [0.0; 3], edge: 64.0 },
+        spacing_min: 2.0,
+        layer_cells_min: 2,
+        keep: Keep::Outside,
+        keep_crossing: true,
+        boxes: vec![
+            boxed([8.0, 16.0, 29.0], [10.0, 18.5, 31.0], 0.5),
+            boxed([40.0, 2.0, 3.0], [60.0, 30.0, 9.0], 4.0),
+        ],
+    }
+}
+
+#[test]
+fn all_48_symmetries_of_one_body() {
+    for (keep, keep_crossing) in [(Keep::Outside, true), (Keep::Inside, true), (Keep::All, false)] {
+        let case = Small { keep, keep_crossing, ..crooked() };
+        let straight = case.outcome(&Run::SOLO, false).words;
+        assert!(straight.len() > 100, "{keep:?}: {} leaves say little", straight.len());
+        let mut images = std::collections::BTreeSet::new();
+        for symmetry in Symmetry::all() {
+            let got = symmetry.case(&case).outcome(&Run::SOLO, false).words;
+            let want = symmetry.words(&straight);
+            assert!(got == want, "{symmetry:?}: {}", first_difference(&got, &want));
+            images.insert(got);
+        }
+        assert_eq!(images.len(), 48, "the body must have no symmetry of its own");
+    }
+}
+
+/// Every way to divide the work, ranks without base leaves included.
+#[test]
+fn every_division_gives_the_same_mesh() {
+    let leaky = Small { facets: crooked().facets[1..].to_vec(), keep: Keep::All, ..crooked() };
+    let hollow = Small { keep: Keep::Inside, keep_crossing: false, ..crooked() };
+    let boxes_alone = Small { facets: vec![], ..crooked() };
+    let lone_leaf = Small { facets: vec![], boxes: vec![], ..crooked() };
+    for (name, case) in
+        [("leaky", leaky), ("hollow", hollow), ("boxes alone", boxes_alone), ("lone leaf", lone_leaf)]
+    {
+        for ungraded in [true, false] {
+            let want = case.outcome(&Run::SOLO, ungraded);
+            for run in divisions() {
+                let got = case.outcome(&run, ungraded);
+                let difference = || first_difference(&got.words, &want.words);
+                assert!(got == want, "{name}, ungraded {ungraded}, {run:?}: {}", difference());
+            }
+        }
+    }
+}
+
+fn divisions() -> impl Iterator<Item = Run> {
+    let levels = [None, Some(0), Some(1), Some(2), Some(4), Some(6), Some(19)];
+    let ways = [Partitioner::Metis, Partitioner::Morton]
+        .into_iter()
+        .flat_map(|p| [Weights::Unit, Weights::Area].map(|w| (p, w)));
+    ways.flat_map(move |(partitioner, weights)| {
+        levels.into_iter().flat_map(move |level_base| {
+            [(2, 1), (3, 2), (8, 3), (8, 4), (33, 5)].map(move |(ranks, seed)| Run {
+                ranks,
+                seed,
+                division: Division { partitioner, weights, level_base },
+            })
+        })
+    })
+}
