@@ -131,7 +131,8 @@ impl Case {
         let mut boxes = Vec::new();
         for (i, b) in file.boxes.iter().enumerate() {
             positive("box spacing", b.spacing)?;
-            let ordered = |a: usize| b.min[a] < b.max[a] && b.min[a].is_finite() && b.max[a].is_finite();
+            let ordered =
+                |a: usize| b.min[a] < b.max[a] && b.min[a].is_finite() && b.max[a].is_finite();
             if !(0..3).all(ordered) {
                 return Err(format!("box {i}: min must be below max in every axis, and finite"));
             }
@@ -267,7 +268,8 @@ mod tests {
                     [[box]]\nmin = [-4.0, 1.0, 2.0]\nmax = [4.0, 99.0, 3.0]\nspacing = 0.3";
         let case = Case::from_parts(text, vec![]).unwrap();
         let unit = 1 << 24;
-        let want = ExtentBox { min: [0, unit, 2 * unit], max: [4 * unit, 8 * unit, 3 * unit], level: 5 };
+        let want =
+            ExtentBox { min: [0, unit, 2 * unit], max: [4 * unit, 8 * unit, 3 * unit], level: 5 };
         assert_eq!(case.boxes, [want]);
         assert_eq!(case.level_deepest(), 5);
     }
@@ -279,7 +281,10 @@ mod tests {
         assert!(why("spacing_min = -1.0").contains("spacing_min"));
         assert!(why("spacing_min = 1e-9").contains("deeper"));
         assert!(why("spacing_min = 1.0\nlayer_cells_min = 0").contains("layer_cells_min"));
-        assert!(why("spacing_min = 1.0\nroot_scale = 2.0\n[root]\norigin=[0.0,0.0,0.0]\nedge=1.0").contains("exclude"));
+        assert!(
+            why("spacing_min = 1.0\nroot_scale = 2.0\n[root]\norigin=[0.0,0.0,0.0]\nedge=1.0")
+                .contains("exclude")
+        );
         assert!(Case::from_parts("spacing_min = 1.0", vec![]).unwrap_err().contains("extent"));
         let far = "spacing_min = 1.0\n[root]\norigin = [9.0, 9.0, 9.0]\nedge = 2.0";
         assert!(why(far).contains("facet 0"));

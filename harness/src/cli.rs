@@ -1,5 +1,6 @@
 //! What may be said on the command line.
 
+use crate::cli_bench::BenchArguments;
 use clap::{Args, Parser, Subcommand};
 use harness::verify::options::{Need, Size};
 use std::path::PathBuf;
@@ -23,6 +24,10 @@ pub enum Command {
     Verify(Box<VerifyArguments>),
     /// Corrupts correct meshes in every way of a catalogue; each must be caught by the check meant for it
     Selftest(SelftestArguments),
+    /// Holds a candidate against a baseline: correctness, exact counters, instructions, time
+    Gate(Box<crate::cli_gate::GateArguments>),
+    /// Measures: strong and weak scaling, spacing, layers, weights; every result is appended to a record
+    Bench(Box<BenchArguments>),
     /// Checks a leaf-set directory of any size by itself
     Audit {
         /// The leaf-set directory

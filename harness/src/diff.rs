@@ -48,7 +48,9 @@ impl fmt::Display for DiffReport {
         write!(f, "the leaves differ in {count} of 512 level-3 octants: {paths}{more}")?;
         match &self.leaf {
             Some(leaf) => write!(f, "\n{leaf}"),
-            None => write!(f, "\nthe leaves there are the same: a manifest is not true to its files"),
+            None => {
+                write!(f, "\nthe leaves there are the same: a manifest is not true to its files")
+            }
         }
     }
 }
@@ -56,7 +58,8 @@ impl fmt::Display for DiffReport {
 /// Compares two leaf-set directories.
 pub fn diff(a: &Path, b: &Path) -> Result<DiffReport, ReadError> {
     let (a, b) = (leafset::open(a)?, leafset::open(b)?);
-    let mut report = DiffReport { fields: fields(&a.manifest, &b.manifest), ..DiffReport::default() };
+    let mut report =
+        DiffReport { fields: fields(&a.manifest, &b.manifest), ..DiffReport::default() };
     let digests = a.manifest.octant_digests.iter().zip(&b.manifest.octant_digests).enumerate();
     let differ: Vec<usize> = digests.filter(|(_, (x, y))| x != y).map(|(i, _)| i).collect();
     report.octants = differ.iter().map(|&i| level_3(i)).collect();

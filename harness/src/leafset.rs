@@ -87,8 +87,8 @@ pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
 /// Reads the manifest alone.
 pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
     let path = dir.join(manifest::FILE);
-    let text = fs::read_to_string(&path)
-        .map_err(|source| ReadError::Io { path: path.clone(), source })?;
+    let text =
+        fs::read_to_string(&path).map_err(|source| ReadError::Io { path: path.clone(), source })?;
     let manifest: Manifest = serde_json::from_str(&text)
         .map_err(|e| ReadError::Manifest { path: path.clone(), why: e.to_string() })?;
     let wrong = |why| Err(ReadError::Manifest { path, why });

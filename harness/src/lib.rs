@@ -7,23 +7,25 @@
 //! - [`check`]: a file per promise; [`audit`](mod@audit): those that need no more than the leaves, at any size;
 //! - [`diff`](mod@diff): where two meshes differ; [`selftest`]: the checks themselves put to the test.
 
+pub mod audit;
+pub mod bench;
 pub mod case;
 pub mod check;
+pub mod diff;
 pub mod digest;
+pub mod engine;
+pub mod gate;
 pub mod lattice;
 pub mod leafset;
 pub mod manifest;
 pub mod npy;
 pub mod octant;
+pub mod oracle;
+pub mod out;
 pub mod parity;
+pub mod selftest;
 pub mod stl;
 pub mod tree;
 pub mod triangle;
-pub mod word;
-pub mod audit;
-pub mod diff;
-pub mod selftest;
-pub mod engine;
-pub mod oracle;
-pub mod out;
 pub mod verify;
+pub mod word;

@@ -1,6 +1,8 @@
 //! harness: verifies meshes and the programs that make them. `harness --help` says how.
 
 mod cli;
+mod cli_bench;
+mod cli_gate;
 mod cli_selftest;
 mod cli_verify;
 
@@ -18,6 +20,8 @@ fn main() -> ExitCode {
     interrupt::install();
     let code = match arguments.command {
         Command::Verify(arguments) => cli_verify::run(*arguments),
+        Command::Gate(arguments) => cli_gate::run(*arguments),
+        Command::Bench(arguments) => cli_bench::run(*arguments),
         Command::Selftest(arguments) => cli_selftest::run(&arguments),
         Command::Audit { mesh, nodes_max } => run_audit(&mesh, nodes_max),
         Command::Diff { a, b } => run_diff(&a, &b),

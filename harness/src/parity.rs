@@ -157,7 +157,8 @@ impl Grid {
 
     /// Facets whose projection may hold this point.
     fn at(&self, point: [i64; 2]) -> &[u32] {
-        let cell: [i64; 2] = std::array::from_fn(|a| (point[a] - self.low[a]).div_euclid(self.width[a]));
+        let cell: [i64; 2] =
+            std::array::from_fn(|a| (point[a] - self.low[a]).div_euclid(self.width[a]));
         if cell.iter().any(|c| !(0..self.cells).contains(c)) {
             return &[];
         }
@@ -169,6 +170,8 @@ impl Grid {
 /// Bounding box of a facet's projection.
 fn bounds(facet: &FacetLattice, axis: usize) -> ([i64; 2], [i64; 2]) {
     let corners = facet.map(|v| project(v, axis));
-    let pick = |f: fn(i64, i64) -> i64| std::array::from_fn(|a| corners.iter().map(|c| c[a]).reduce(f).expect("three"));
+    let pick = |f: fn(i64, i64) -> i64| {
+        std::array::from_fn(|a| corners.iter().map(|c| c[a]).reduce(f).expect("three"))
+    };
     (pick(i64::min), pick(i64::max))
 }

@@ -52,7 +52,7 @@ fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
     let mut vertices = Vec::new();
     let mut solids = 0;
     let mut lines = text.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty());
-    if !lines.clone().next().is_some_and(|l| first_word(l) == "solid") {
+    if lines.clone().next().is_none_or(|l| first_word(l) != "solid") {
         return Err(wrong("it does not begin with `solid`"));
     }
     for line in &mut lines {
@@ -83,7 +83,8 @@ fn vertices_of(line: &str, vertices: &mut Vec<[f32; 3]>) -> Result<(), StlError>
                 *c = text.parse().map_err(|_| wrong(&format!("{text:?} is no coordinate")))?;
             }
             vertices.push(vertex);
-        } else if word.parse::<f64>().is_err() && !SKIPPED.iter().any(|s| word.eq_ignore_ascii_case(s))
+        } else if word.parse::<f64>().is_err()
+            && !SKIPPED.iter().any(|s| word.eq_ignore_ascii_case(s))
         {
             return Err(wrong(&format!("{word:?} has no place in it")));
         }
@@ -139,8 +140,14 @@ mod tests {
 
     #[test]
     fn what_is_no_stl_is_refused() {
-        for text in ["", "hello", "solid a\nfacet", "solid a\nvertex 1 2\nendsolid",
-                     "solid a\nvertex 1 2 3\nendsolid", "solid a\nbanana\nendsolid"] {
+        for text in [
+            "",
+            "hello",
+            "solid a\nfacet",
+            "solid a\nvertex 1 2\nendsolid",
+            "solid a\nvertex 1 2 3\nendsolid",
+            "solid a\nbanana\nendsolid",
+        ] {
             assert!(of(text.as_bytes()).is_err(), "{text:?}");
         }
     }

@@ -41,7 +41,8 @@ impl Triangle {
         }
         // The box's corners nearest to and farthest along the normal: if the plane passes by, so does the triangle.
         let (near, far) = self.diagonal(low, high);
-        let (below, above) = (dot(self.normal, near) - self.height, dot(self.normal, far) - self.height);
+        let (below, above) =
+            (dot(self.normal, near) - self.height, dot(self.normal, far) - self.height);
         if below > 0 || above < 0 {
             return false;
         }

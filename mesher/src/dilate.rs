@@ -28,7 +28,12 @@ pub type Words = u64;
 
 /// The parents, at level `l - 1`, of all octants of level `l` within `radius` of a source, octants
 /// outside the root left out. Sources come in Morton order.
-pub fn dilate_to_parents(l: Level, sources: impl Iterator<Item = Brick>, radius: u32, words: &mut Words) -> BrickSet {
+pub fn dilate_to_parents(
+    l: Level,
+    sources: impl Iterator<Item = Brick>,
+    radius: u32,
+    words: &mut Words,
+) -> BrickSet {
     let odd = dilate_tiles(l, sources, (radius & 1) as usize, true, words);
     match radius / 2 {
         0 => odd,
@@ -38,7 +43,12 @@ pub fn dilate_to_parents(l: Level, sources: impl Iterator<Item = Brick>, radius:
 
 /// All octants of level `l` within `radius` of a source, octants outside the root left out. Sources
 /// come in Morton order.
-pub fn dilate(l: Level, sources: impl Iterator<Item = Brick>, radius: u32, words: &mut Words) -> BrickSet {
+pub fn dilate(
+    l: Level,
+    sources: impl Iterator<Item = Brick>,
+    radius: u32,
+    words: &mut Words,
+) -> BrickSet {
     // Further than the root is wide, nothing more is reached.
     let mut left = radius.min(1 << l) as usize;
     let step = left.min(MARGIN);
@@ -185,17 +195,13 @@ impl Tile {
         let first = [MARGIN / scale / 4, self.margin / scale / 4, self.margin / scale / 4];
         for bz in 0..side / 4 {
             for by in 0..side / 4 {
-                let at = |dy: usize, dz: usize| rows[(4 * bz + dz) * side + 4 * by + dy];
-                let any = (0..16).fold(0, |any, i| any | at(i & 3, i >> 2));
-                if any == 0 {
+                let mut four_by_four: [u64; 16] =
+                    std::array::from_fn(|i| rows[(4 * bz + (i >> 2)) * side + 4 * by + (i & 3)]);
+                if four_by_four.iter().fold(0, |any, row| any | row) == 0 {
                     continue;
                 }
-                for bx in 0..16 / scale {
-                    if any >> (4 * bx) & 15 == 0 {
-                        continue;
-                    }
-                    let bits =
-                        (0..16).fold(0, |w, i| w | (at(i & 3, i >> 2) >> (4 * bx) & 15) << (4 * i));
+                transpose(&mut four_by_four);
+                for (bx, &bits) in four_by_four.iter().enumerate().filter(|b| *b.1 != 0) {
                     let b = [bx, by, bz];
                     let p = std::array::from_fn(|a| origin[a] + b[a] as i64 - first[a] as i64);
                     out.add(p, brick::from_rows(bits));
@@ -216,6 +222,23 @@ impl Tile {
             }
         }
         out
+    }
+}
+
+/// Makes the four bits `j` of row `i` the four bits `i` of row `j`: from 16 rows of 16 bricks to 16 bricks.
+#[inline]
+fn transpose(rows: &mut [u64; 16]) {
+    for (step, low) in [
+        (8, u64::MAX >> 32),
+        (4, 0x0000_ffff_0000_ffff),
+        (2, 0x00ff_00ff_00ff_00ff),
+        (1, 0x0f0f_0f0f_0f0f_0f0f),
+    ] {
+        for i in (0..16).filter(|i| i & step == 0) {
+            let t = (rows[i] >> (4 * step) ^ rows[i + step]) & low;
+            rows[i + step] ^= t;
+            rows[i] ^= t << (4 * step);
+        }
     }
 }
 
@@ -368,6 +391,20 @@ mod tests {
             let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
             let got = dilate_to_parents(l, set(&codes).bricks().iter().copied(), r, &mut words);
             prop_assert!(got.codes().eq(parents.iter().copied()));
+        }
+    }
+
+    #[test]
+    fn every_nibble_is_transposed() {
+        for (i, j) in (0..16).flat_map(|i| (0..16).map(move |j| (i, j))) {
+            let mut rows = [0; 16];
+            rows[i] = 0b1011 << (4 * j);
+            transpose(&mut rows);
+            assert!(
+                rows.iter()
+                    .enumerate()
+                    .all(|(k, &r)| r == if k == j { 0b1011 << (4 * i) } else { 0 })
+            );
         }
     }
 

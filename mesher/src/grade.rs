@@ -46,7 +46,13 @@ pub struct Work {
 
 /// Refines the kept part of `base` until layers are thick enough and touching leaves differ by at most
 /// one level. Collective. Returns the split sets of the graded tree.
-pub fn grade(base: &Tree, kept: &Kept, rules: &Rules, share: &Ownership, comm: &dyn Comm) -> (PerLevel, Work) {
+pub fn grade(
+    base: &Tree,
+    kept: &Kept,
+    rules: &Rules,
+    share: &Ownership,
+    comm: &dyn Comm,
+) -> (PerLevel, Work) {
     let surface = rules.level_surface;
     let mut g = Gradation {
         split: base.split.clone(),
@@ -94,7 +100,8 @@ impl Gradation<'_> {
         let above = self.split[l as usize].coarsen();
         let there = std::mem::take(&mut self.split[l as usize - 1]);
         let mut fresh = above.without(&there);
-        let mut impure = std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone()).coarsen();
+        let mut impure =
+            std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone()).coarsen();
         if self.share.is_shared(l - 1) {
             fresh = self.share.scatter(l - 1, fresh, self.comm).0;
             impure = self.share.scatter(l - 1, impure, self.comm).0;
@@ -120,7 +127,8 @@ impl Gradation<'_> {
         let mut words = 0;
         let whole = dilate(l - 1, pure, radius.div_ceil(2), &mut words);
         let mut impure = self.impure.cursor();
-        let leaves = self.leaves(l, |key| brick::children(brick::byte(impure.get(key >> 3), key & 7)));
+        let leaves =
+            self.leaves(l, |key| brick::children(brick::byte(impure.get(key >> 3), key & 7)));
         let rest = dilate_to_parents(l, leaves, radius, &mut words);
         self.work.words_dilated += words;
         whole.union(rest)
@@ -134,7 +142,10 @@ impl Gradation<'_> {
             .filter(move |b| self.share.answers_for(l, b.key))
             .map(move |b| Brick { key: b.key, bits: b.bits & within(b.key) })
             .filter(|b| b.bits != 0)
-            .map(move |b| Brick { key: b.key, bits: b.bits & !split.get(b.key) & !deleted.get(b.key) })
+            .map(move |b| Brick {
+                key: b.key,
+                bits: b.bits & !split.get(b.key) & !deleted.get(b.key),
+            })
             .filter(|b| b.bits != 0)
     }
 

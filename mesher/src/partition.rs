@@ -109,22 +109,23 @@ fn morton_cuts(weights: &[u64], ranks: usize) -> Vec<usize> {
     weights.iter().map(&mut owner).collect()
 }
 
-/// Fewest base leaves per rank that METIS is asked to cut.
+/// Fewest base leaves per rank that METIS is asked to cut, of as many equal ones as they amount to.
 #[cfg(feature = "metis")]
 const LEAVES_PER_RANK_METIS: usize = 8;
 
 #[cfg(feature = "metis")]
 fn metis_cuts(leaves: &[BaseLeaf], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
     // METIS bisects again and again, and complains on standard output about parts that get nothing:
-    // with hardly more leaves than ranks, the curve's cuts serve as well.
-    if leaves.len() < LEAVES_PER_RANK_METIS * ranks {
+    // with hardly more leaves than ranks, or few that hold nearly all, the curve's cuts serve as well.
+    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
+    let even: f64 = weights.iter().map(|&w| (w as f64 / total as f64).powi(2)).sum();
+    if ((LEAVES_PER_RANK_METIS * ranks) as f64) * even > 1.0 {
         return Ok(morton_cuts(weights, ranks));
     }
     let starts: Vec<u64> = leaves.iter().map(|b| start57(b.level, b.code)).collect();
     let pairs = face_neighbours(leaves, |s| starts.partition_point(|&t| t <= s) - 1);
     let (xadj, adjncy) = adjacency(leaves.len(), &pairs);
     // METIS counts in i32 and puts nearly all in one part when the sum overflows, saying nothing.
-    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
     let scale = |w: u64| (u128::from(w) * (1 << 30) / total.max(1 << 30)).max(1) as metis::Idx;
     let scaled: Vec<metis::Idx> = weights.iter().map(|&w| scale(w)).collect();
     let mut parts = vec![0 as metis::Idx; leaves.len()];

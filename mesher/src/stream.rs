@@ -66,7 +66,7 @@ impl Leaves<'_> {
         let mut walk = Walk {
             levels: levels.collect(),
             of: self,
-            buffer: Vec::with_capacity(CHUNK + 8),
+            buffer: Vec::with_capacity(CHUNK + 512),
             counts: Counts::default(),
             sink,
         };
@@ -129,67 +129,62 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         if place != Place::Mine {
             leaves = 0;
         }
+        let inside = inside & !crossing;
+        let counts = &mut self.counts.by_level[l as usize];
+        let of = |side: u64| u64::from((leaves & side).count_ones());
+        counts[Side::Crossing as usize] += of(crossing);
+        counts[Side::Inside as usize] += of(inside);
+        counts[Side::Outside as usize] += of(!(crossing | inside));
         Loaded { key, leaves, split, crossing, inside, place }
     }
 
     /// Emits eight siblings and all that is below them.
     fn group(&mut self, l: Level, brick: &Loaded, j: u64) -> Result<(), E> {
         let split = brick::byte(brick.split, j);
-        let leaves = brick::byte(brick.leaves, j);
-        let crossing = brick::byte(brick.crossing, j);
-        let inside = brick::byte(brick.inside, j) & !crossing;
+        let parent = brick.key << 3 | j;
         if split == 0 {
-            self.count(l, leaves, crossing, inside);
-            self.put(l, brick.key << 3 | j, leaves, crossing, inside);
+            self.put(l, parent, brick, j, 0xff);
             return if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) };
         }
-        let below = |sides: u8| brick::children(sides & split);
+        let below = |sides: u64| brick::children(brick::byte(sides, j) & split);
         let child = self.load(
             l + 1,
-            brick.key << 3 | j,
+            parent,
             brick::children(split),
-            below(crossing),
-            below(inside),
+            below(brick.crossing),
+            below(brick.inside),
         );
-        if matches!(child.place, Place::Remote(_)) {
-            self.count(l, leaves, crossing, inside);
-            self.put(l, brick.key << 3 | j, leaves, crossing, inside);
-            return Ok(());
-        }
-        self.count(l, leaves, crossing, inside);
+        let remote = matches!(child.place, Place::Remote(_));
         for o in 0..8 {
-            if split >> o & 1 == 1 {
+            if split >> o & 1 == 0 {
+                self.put(l, parent, brick, j, 1 << o);
+            } else if child.split == 0 {
+                // Most bricks of the finest level: no call per group.
+                self.put(l + 1, parent << 3 | o, &child, o, 0xff);
+            } else if !remote {
                 self.group(l + 1, &child, o)?;
-            } else {
-                self.put(l, brick.key << 3 | j, leaves & 1 << o, crossing, inside);
             }
         }
-        Ok(())
+        if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) }
     }
 
+    /// Words of the leaves among the children of octant `parent` of level `l - 1`, which are byte `j` of
+    /// a brick, as far as `within` lets them through.
     #[inline]
-    fn count(&mut self, l: Level, leaves: u8, crossing: u8, inside: u8) {
-        let counts = &mut self.counts.by_level[l as usize];
-        let of = |sides: u8| u64::from((leaves & sides).count_ones());
-        counts[Side::Crossing as usize] += of(crossing);
-        counts[Side::Inside as usize] += of(inside);
-        counts[Side::Outside as usize] += of(!(crossing | inside));
-    }
-
-    /// Words of the leaves among the children of octant `parent` of level `l - 1`.
-    #[inline]
-    fn put(&mut self, l: Level, parent: u64, leaves: u8, crossing: u8, inside: u8) {
-        // Octant bit 0 of the lone root is not a child of anything; its code is 0 all the same.
+    fn put(&mut self, l: Level, parent: u64, brick: &Loaded, j: u64, within: u8) {
+        let leaves = brick::byte(brick.leaves, j) & within;
+        let (crossing, inside) = (brick::byte(brick.crossing, j), brick::byte(brick.inside, j));
+        // The lone root is not a child of anything; its code is 0 all the same.
         let base = start57(l, parent << 3) << 7 | u64::from(l) << 2;
         let step = start57(l, 1) << 7;
         let side = |o: u32| u64::from(crossing >> o & 1) << 1 | u64::from(inside >> o & 1);
-        if leaves == 0xff {
-            self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| {
-                (base + o as u64 * step) | side(o as u32)
-            }));
-        } else {
-            self.buffer
-                .extend(ones(u64::from(leaves)).map(|o| (base + u64::from(o) * step) | side(o)));
+        let word = |o: u32| (base + u64::from(o) * step) | side(o);
+        match (leaves, crossing | inside) {
+            (0xff, 0) => {
+                self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| base + o as u64 * step))
+            }
+            (0xff, _) => self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| word(o as u32))),
+            _ => self.buffer.extend(ones(u64::from(leaves)).map(word)),
         }
     }
 

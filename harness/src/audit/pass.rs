@@ -97,7 +97,9 @@ impl<'a> State<'a> {
             if self.building {
                 match self.builder.push(w) {
                     Ok(()) => self.last = w,
-                    Err(why) => linear::refused("", why, w, self.last, &self.root, &mut self.linear),
+                    Err(why) => {
+                        linear::refused("", why, w, self.last, &self.root, &mut self.linear)
+                    }
                 }
             }
         }
@@ -124,7 +126,8 @@ impl<'a> State<'a> {
         let capacity = (!fits).then(|| {
             let mut result = CheckResult::new(CAPACITY);
             let nodes = options.nodes_max;
-            result.find(format!("more than {nodes} distinct octants: allow more to check the tree"));
+            result
+                .find(format!("more than {nodes} distinct octants: allow more to check the tree"));
             result
         });
         let tree = fits.then(|| self.builder.finish());

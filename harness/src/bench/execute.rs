@@ -69,7 +69,11 @@ struct PhaseTold {
 impl PhaseTold {
     /// CPU time outside calls to other ranks, by rank. The clocks' ticks may make a difference negative.
     fn useful_s(&self) -> Vec<f64> {
-        self.time_cpu_s.iter().zip(&self.time_comm_cpu_s).map(|(all, comm)| (all - comm).max(0.0)).collect()
+        self.time_cpu_s
+            .iter()
+            .zip(&self.time_comm_cpu_s)
+            .map(|(all, comm)| (all - comm).max(0.0))
+            .collect()
     }
 }
 
@@ -78,7 +82,13 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// Where that gives no result.
-    pub fn run(&self, setup: &Setup, case: &Path, repeat: usize, warm_up: bool) -> Result<Run, Failed> {
+    pub fn run(
+        &self,
+        setup: &Setup,
+        case: &Path,
+        repeat: usize,
+        warm_up: bool,
+    ) -> Result<Run, Failed> {
         let json = self.place.join("run.json");
         let _ = std::fs::remove_file(&json);
         let mut command = self.command(setup, case);
@@ -102,8 +112,10 @@ impl Runner<'_> {
             }
         }
         let told = std::fs::read_to_string(&json).map_err(|error| error.to_string());
-        let told = told.and_then(|text| serde_json::from_str::<Told>(&text).map_err(|e| e.to_string()));
-        let told = told.map_err(|error| Failed::Because(format!("its --json cannot be read: {error}")))?;
+        let told =
+            told.and_then(|text| serde_json::from_str::<Told>(&text).map_err(|e| e.to_string()));
+        let told =
+            told.map_err(|error| Failed::Because(format!("its --json cannot be read: {error}")))?;
         let mut run = of_told(setup.clone(), &told);
         (run.repeat, run.warm_up, run.command) = (repeat, warm_up, shown);
         run.time_launch_s = finished.time_wall_s;
@@ -124,7 +136,9 @@ impl Runner<'_> {
             Comm::Mpi => (self.launcher.command(setup.ranks, mesher), "mpi".to_owned()),
         };
         command.arg(case).args(["--quiet", "--comm", &comm]);
-        for (option, value) in [("--partitioner", &setup.partitioner), ("--weights", &setup.weights)] {
+        for (option, value) in
+            [("--partitioner", &setup.partitioner), ("--weights", &setup.weights)]
+        {
             if !value.is_empty() {
                 command.args([option, value]);
             }
@@ -139,13 +153,23 @@ impl Runner<'_> {
     pub fn ping_pong(&self) -> Result<String, String> {
         let program = self.programs.mesher.with_file_name("pingpong");
         if !program.is_file() {
-            return Err(format!("{} is not there: build the mesher with --features mpi", program.display()));
+            return Err(format!(
+                "{} is not there: build the mesher with --features mpi",
+                program.display()
+            ));
         }
         let mut command = self.launcher.command(2, &program);
-        let watch = Watch { limit: Duration::from_secs(120), logs: self.place, name: "pingpong", status: None };
+        let watch = Watch {
+            limit: Duration::from_secs(120),
+            logs: self.place,
+            name: "pingpong",
+            status: None,
+        };
         let finished = process::run(&mut command, &watch).map_err(|error| error.to_string())?;
         match finished.end {
-            End::Exited(0) => std::fs::read_to_string(&finished.stdout).map_err(|error| error.to_string()),
+            End::Exited(0) => {
+                std::fs::read_to_string(&finished.stdout).map_err(|error| error.to_string())
+            }
             _ => Err(format!("the ping-pong failed: {}", finished.first_error_line())),
         }
     }
@@ -198,10 +222,17 @@ fn of_told(setup: Setup, told: &Told) -> Run {
 fn shown(command: &Command, place: &Path) -> String {
     let word = |w: &std::ffi::OsStr| {
         let path = Path::new(w);
-        let local = path.strip_prefix(place).ok().or_else(|| path.is_absolute().then(|| Path::new(path.file_name().unwrap_or(w))));
+        let local = path
+            .strip_prefix(place)
+            .ok()
+            .or_else(|| path.is_absolute().then(|| Path::new(path.file_name().unwrap_or(w))));
         local.unwrap_or(path).to_string_lossy().into_owned()
     };
-    std::iter::once(command.get_program()).chain(command.get_args()).map(word).collect::<Vec<_>>().join(" ")
+    std::iter::once(command.get_program())
+        .chain(command.get_args())
+        .map(word)
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 #[cfg(test)]

@@ -109,7 +109,8 @@ impl Groups {
         let (s, weak) = (&group.setup, group.setup.experiment == "weak");
         let same = |o: &&Group| {
             let o = &o.setup;
-            let mesh = o.case == s.case && o.layer_cells_min == s.layer_cells_min && o.engine == s.engine;
+            let mesh =
+                o.case == s.case && o.layer_cells_min == s.layer_cells_min && o.engine == s.engine;
             let size = if weak { o.experiment == "weak" } else { o.spacing_min == s.spacing_min };
             mesh && size
         };
@@ -118,7 +119,8 @@ impl Groups {
             (o.setup.ranks, o.setup.comm != s.comm, o.setup.experiment != s.experiment)
         };
         let candidates = self.all.iter().filter(same).filter(|o| {
-            weak || o.setup.ranks == 1 || o.setup.comm == s.comm && o.setup.experiment == s.experiment
+            weak || o.setup.ranks == 1
+                || o.setup.comm == s.comm && o.setup.experiment == s.experiment
         });
         candidates.min_by_key(rank).unwrap_or_else(|| {
             self.all.iter().find(|o| o.setup == *s).expect("a group is among its groups")

@@ -23,7 +23,9 @@ impl Launcher {
         let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
         match words.iter().any(|w| w.contains(RANKS)) {
             true => Ok(Self { words }),
-            false => Err(format!("`{text}` does not say where the number of ranks goes: write {RANKS} there")),
+            false => Err(format!(
+                "`{text}` does not say where the number of ranks goes: write {RANKS} there"
+            )),
         }
     }
 
@@ -36,7 +38,11 @@ impl Launcher {
     pub fn is_found(&self) -> bool {
         let program = Path::new(&self.words[0]);
         let named = program.components().count() == 1;
-        if named { crate::engine::programs::on_path(&self.words[0]).is_some() } else { program.is_file() }
+        if named {
+            crate::engine::programs::on_path(&self.words[0]).is_some()
+        } else {
+            program.is_file()
+        }
     }
 
     /// The command that runs `program` on `ranks`; its arguments are the caller's to add.

@@ -32,15 +32,16 @@ pub fn load_average() -> f64 {
 
 fn cpu(cpuinfo: &str) -> String {
     let value = |key: &str| {
-        let line = cpuinfo.lines().find(|l| l.split(':').next().is_some_and(|k| k.trim() == key))?;
+        let line =
+            cpuinfo.lines().find(|l| l.split(':').next().is_some_and(|k| k.trim() == key))?;
         Some(line.split_once(':')?.1.trim().to_owned())
     };
     // A virtual machine may hide the name; family and model still tell the generation.
     let number = |key| value(key).unwrap_or_else(|| "?".into());
     match value("model name") {
-        Some(name) if !name.eq_ignore_ascii_case("unknown") => format!(
-            "{name} (family {}, model {})", number("cpu family"), number("model")
-        ),
+        Some(name) if !name.eq_ignore_ascii_case("unknown") => {
+            format!("{name} (family {}, model {})", number("cpu family"), number("model"))
+        }
         _ => format!("unnamed (family {}, model {})", number("cpu family"), number("model")),
     }
 }

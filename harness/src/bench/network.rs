@@ -27,19 +27,21 @@ struct Point {
 /// # Errors
 /// One sentence, where it is not what it should be.
 pub fn parse(text: &str) -> Result<Network, String> {
-    let told: PingPong =
-        serde_json::from_str(text).map_err(|error| format!("the ping-pong printed no result: {error}"))?;
+    let told: PingPong = serde_json::from_str(text)
+        .map_err(|error| format!("the ping-pong printed no result: {error}"))?;
     if told.schema != "octree-pingpong/1" {
         return Err(format!("the ping-pong's schema is {}", told.schema));
     }
     let smallest = told.points.iter().min_by(|a, b| a.bytes.total_cmp(&b.bytes));
     let largest = told.points.iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes));
     match (smallest, largest) {
-        (Some(s), Some(l)) if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => Ok(Network {
-            latency_s: s.time_s,
-            bandwidth_bytes_per_s: (l.bytes - s.bytes) / (l.time_s - s.time_s),
-            measured: true,
-        }),
+        (Some(s), Some(l)) if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => {
+            Ok(Network {
+                latency_s: s.time_s,
+                bandwidth_bytes_per_s: (l.bytes - s.bytes) / (l.time_s - s.time_s),
+                measured: true,
+            })
+        }
         _ => Err("the ping-pong's times do not grow with the messages".to_owned()),
     }
 }
@@ -54,7 +56,10 @@ pub fn given(text: &str) -> Result<Network, String> {
         [latency_s, bandwidth_bytes_per_s] if latency_s >= 0.0 && bandwidth_bytes_per_s > 0.0 => {
             Ok(Network { latency_s, bandwidth_bytes_per_s, measured: false })
         }
-        _ => Err("give a latency in seconds and a bandwidth in bytes per second, as in 2e-6,1e10".into()),
+        _ => {
+            Err("give a latency in seconds and a bandwidth in bytes per second, as in 2e-6,1e10"
+                .into())
+        }
     }
 }
 

@@ -91,13 +91,18 @@ pub struct Wishes {
     pub partitioners: Vec<String>,
     /// Repetitions.
     pub repeats: Option<usize>,
+    /// No runs on MPI.
+    pub no_mpi: bool,
+    /// Serial runs only, for a program that knows no ranks.
+    pub serial: bool,
 }
 
 const MILLION: u64 = 1_000_000;
 
 /// The studies of a preset as the command line changes them.
 pub fn studies(preset: Preset, wishes: &Wishes) -> Vec<Study> {
-    let wanted = |s: &Study| wishes.experiments.is_empty() || wishes.experiments.contains(&s.experiment);
+    let wanted =
+        |s: &Study| wishes.experiments.is_empty() || wishes.experiments.contains(&s.experiment);
     let mut of_preset: Vec<Study> = match preset {
         Preset::Small => small(),
         Preset::Full => full(),
@@ -112,6 +117,8 @@ pub fn studies(preset: Preset, wishes: &Wishes) -> Vec<Study> {
     for study in &mut of_preset {
         change(study, wishes);
     }
+    // What is left without runs asks nothing.
+    of_preset.retain(|study| !study.layouts.is_empty());
     of_preset
 }
 
@@ -152,6 +159,18 @@ fn change(study: &mut Study, wishes: &Wishes) {
             study.layouts = layouts(&wishes.ranks, &wishes.ranks_mpi);
         } else if study.experiment == Experiment::Weights && !wishes.ranks.is_empty() {
             study.layouts = layouts(&wishes.ranks, &[]);
+        }
+    }
+    if wishes.no_mpi {
+        // A serial run stands for the measured one.
+        let serial = study.layouts.iter().any(|l| l.comm == Comm::Mpi);
+        study.layouts.retain(|l| l.comm != Comm::Mpi);
+        study.layouts.extend(serial.then_some(Layout { comm: Comm::Solo, ranks: 1 }));
+    }
+    if wishes.serial {
+        study.layouts = vec![Layout { comm: Comm::Solo, ranks: 1 }];
+        if matches!(study.experiment, Experiment::Weak | Experiment::Weights) {
+            study.layouts.clear();
         }
     }
     if !wishes.layers.is_empty() && study.experiment == Experiment::Layers {
@@ -198,7 +217,13 @@ fn full() -> Vec<Study> {
     all
 }
 
-fn study(experiment: Experiment, case: &str, cells: u64, layouts: &[Layout], repeats: usize) -> Study {
+fn study(
+    experiment: Experiment,
+    case: &str,
+    cells: u64,
+    layouts: &[Layout],
+    repeats: usize,
+) -> Study {
     let words = |all: &[&str]| all.iter().map(|w| (*w).to_owned()).collect::<Vec<String>>();
     let layers = match experiment {
         Experiment::Layers => vec![1, 2, 3, 4, 6, 8, 12, 16],
@@ -225,13 +250,16 @@ fn layouts(sim: &[usize], mpi: &[usize]) -> Vec<Layout> {
 /// What should have been given.
 pub fn ranks(text: &str) -> Result<Vec<usize>, String> {
     let wrong = || "give rank counts as in 1,2,7 or 1..64, the latter for powers of two".to_owned();
-    let number = |word: &str| word.trim().parse::<usize>().ok().filter(|r| (1..=65_536).contains(r));
+    let number =
+        |word: &str| word.trim().parse::<usize>().ok().filter(|r| (1..=65_536).contains(r));
     let mut all = Vec::new();
     for word in text.split(',') {
         match word.split_once("..") {
             Some((from, to)) => {
                 let (from, to) = (number(from).ok_or_else(wrong)?, number(to).ok_or_else(wrong)?);
-                all.extend(std::iter::successors(Some(from), |r| Some(r * 2)).take_while(|&r| r <= to));
+                all.extend(
+                    std::iter::successors(Some(from), |r| Some(r * 2)).take_while(|&r| r <= to),
+                );
             }
             None => all.push(number(word).ok_or_else(wrong)?),
         }
@@ -265,6 +293,18 @@ mod tests {
         assert_eq!((all[0].case.as_str(), all[0].cells), ("cube", Some(1000)));
         assert_eq!(all[0].layouts, layouts(&[1, 3], &[]));
         assert_eq!((all[3].repeats, all[3].layers.len()), (9, 0));
+    }
+
+    #[test]
+    fn without_mpi_a_serial_run_stands_for_it() {
+        let no_mpi = Wishes { no_mpi: true, ..Wishes::default() };
+        let all = studies(Preset::Small, &no_mpi);
+        assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm != Comm::Mpi));
+        assert!(all.iter().all(|s| !s.layouts.is_empty()));
+        let serial = Wishes { serial: true, ..Wishes::default() };
+        let all = studies(Preset::Small, &serial);
+        assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Solo && l.ranks == 1));
+        assert!(all.iter().all(|s| s.experiment != Experiment::Weights));
     }
 
     #[test]

@@ -53,8 +53,7 @@ impl Efficiency {
 
 /// What a rank's messages cost by the model.
 pub fn messages_s(phase: &Phase, network: &Network) -> f64 {
-    phase.messages.max * network.latency_s
-        + phase.message_bytes.max / network.bandwidth_bytes_per_s
+    phase.messages.max * network.latency_s + phase.message_bytes.max / network.bandwidth_bytes_per_s
 }
 
 /// The critical path: phases end when their slowest rank ends, and messages cost what the model says.
@@ -87,7 +86,12 @@ pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
 }
 
 /// The efficiencies of one phase against the same one of the reference run, if that has it.
-pub fn phase_efficiency(run: &Run, phase: &Phase, reference: &Run, network: &Network) -> Efficiency {
+pub fn phase_efficiency(
+    run: &Run,
+    phase: &Phase,
+    reference: &Run,
+    network: &Network,
+) -> Efficiency {
     let time_s = match run.setup.comm {
         Comm::Sim => phase.useful_s.max + messages_s(phase, network),
         Comm::Mpi | Comm::Solo => phase.wall_s.max,

@@ -142,7 +142,9 @@ mod tests {
                 let path = &path;
                 scope.spawn(move || {
                     let mut record = Record::open(path).unwrap();
-                    (0..50).for_each(|i| _ = record.append(network(f64::from(writer * 50 + i))).unwrap());
+                    (0..50).for_each(|i| {
+                        _ = record.append(network(f64::from(writer * 50 + i))).unwrap()
+                    });
                 });
             }
         });
@@ -186,6 +188,9 @@ mod tests {
         assert_eq!(civil(0), (1970, 1, 1));
         assert_eq!(civil(11_016), (2000, 2, 29));
         assert_eq!(civil(20_777), (2026, 11, 20));
-        assert_eq!(utc(UNIX_EPOCH + std::time::Duration::from_secs(86_399)), "1970-01-01T23:59:59Z");
+        assert_eq!(
+            utc(UNIX_EPOCH + std::time::Duration::from_secs(86_399)),
+            "1970-01-01T23:59:59Z"
+        );
     }
 }

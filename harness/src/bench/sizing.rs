@@ -31,7 +31,9 @@ impl Sizes {
             }
             let next = match self.finest_below(cells) {
                 None => coarse,
-                Some((spacing, count)) => spacing / ((cells / count).min(STEP)).powf(1.0 / self.power(cells)),
+                Some((spacing, count)) => {
+                    spacing / ((cells / count).min(STEP)).powf(1.0 / self.power(cells))
+                }
             };
             let count = mesh(next)?.max(1) as f64;
             self.0.push((next, count));
@@ -45,15 +47,17 @@ impl Sizes {
         if let Some(hit) = self.0.iter().find(|m| (m.1 / cells - 1.0).abs() < TOLERANCE) {
             return Some(hit.0);
         }
-        let near = self.0.iter().filter(|m| m.1 / cells > ENOUGH && m.1 / cells < 1.0 / ENOUGH).count();
+        let near =
+            self.0.iter().filter(|m| m.1 / cells > ENOUGH && m.1 / cells < 1.0 / ENOUGH).count();
         let below = self.0.iter().filter(|m| m.1 < cells / ENOUGH).count();
         (near > 0 && below > 1).then(|| self.guess(cells))
     }
 
     fn guess(&self, cells: f64) -> f64 {
-        let nearest = self.0.iter().min_by(|a, b| {
-            (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs())
-        });
+        let nearest = self
+            .0
+            .iter()
+            .min_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
         nearest.map_or(1.0, |m| m.0 * (m.1 / cells).powf(1.0 / self.power(cells)))
     }
 
@@ -66,9 +70,7 @@ impl Sizes {
         let mut near = self.0.clone();
         near.sort_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
         match near[..] {
-            [a, b, ..] if a.0 != b.0 => {
-                ((a.1 / b.1).ln() / (b.0 / a.0).ln()).clamp(1.0, 3.0)
-            }
+            [a, b, ..] if a.0 != b.0 => ((a.1 / b.1).ln() / (b.0 / a.0).ln()).clamp(1.0, 3.0),
             _ => 2.0,
         }
     }

@@ -56,9 +56,13 @@ mod tests {
     #[test]
     fn intervals_are_those_of_the_table() {
         // Le Boudec, table A.1: the 95 % interval's order statistics, from 1.
-        for (n, low, high, covers) in
-            [(6, 1, 6, 0.969), (8, 1, 8, 0.992), (9, 2, 8, 0.961), (15, 4, 12, 0.965), (31, 10, 22, 0.971)]
-        {
+        for (n, low, high, covers) in [
+            (6, 1, 6, 0.969),
+            (8, 1, 8, 0.992),
+            (9, 2, 8, 0.961),
+            (15, 4, 12, 0.965),
+            (31, 10, 22, 0.971),
+        ] {
             let values: Vec<f64> = (1..=n).map(f64::from).collect();
             let m = median(&values).unwrap();
             assert_eq!((m.low, m.high), (f64::from(low), f64::from(high)), "n = {n}");
@@ -81,7 +85,9 @@ mod tests {
         // Uniform values from a fixed generator; the true median is one half.
         let mut state = 1u64;
         let mut draw = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         let rounds = 4000;

@@ -35,8 +35,10 @@ impl Base {
     /// One sentence, where the case is at fault or the directory cannot be written.
     pub fn read(path: &Path, directory: &Path) -> Result<Self, String> {
         let case = Case::read(path).map_err(|error| error.to_string())?;
-        let text = fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let mut table: Table = text.parse().map_err(|error| format!("{}: {error}", path.display()))?;
+        let text =
+            fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let mut table: Table =
+            text.parse().map_err(|error| format!("{}: {error}", path.display()))?;
         let stl = directory.join(format!("{}.stl", case.name));
         let write = || {
             let file = BufWriter::new(fs::File::create(&stl)?);
@@ -59,6 +61,11 @@ impl Base {
         })
     }
 
+    /// A spacing that gives a mesh of no more than some thousand cells, to begin with.
+    pub fn coarse(&self) -> f64 {
+        self.spacing_min.max(self.edge / 512.0)
+    }
+
     /// Writes the case with this spacing and n; where it is.
     ///
     /// # Errors
@@ -72,8 +79,10 @@ impl Base {
         of_root.insert("origin".into(), Value::Array(origin.map(Value::from).to_vec()));
         of_root.insert("edge".into(), edge.into());
         table.insert("root".into(), of_root.into());
-        let path = self.directory.join(format!("{}-{spacing_min:e}-{layer_cells_min}.toml", self.name));
-        fs::write(&path, table.to_string()).map_err(|error| format!("{}: {error}", path.display()))?;
+        let path =
+            self.directory.join(format!("{}-{spacing_min:e}-{layer_cells_min}.toml", self.name));
+        fs::write(&path, table.to_string())
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(path)
     }
 }

@@ -21,7 +21,10 @@ pub fn check(subject: &Subject) -> CheckResult {
     result.examined = subject.mesh.words.len() as u64;
     let counts = hanging::count(tree);
     if let Some(edge) = &counts.worst {
-        result.find(format!("more than one hanging node on an edge of {}", edge.describe(&subject.terms.root)));
+        result.find(format!(
+            "more than one hanging node on an edge of {}",
+            edge.describe(&subject.terms.root)
+        ));
     }
     let [none, one, more] = counts.edges;
     let _ = write!(result.note, "leaf edges with 0, 1, more hanging nodes: {none}, {one}, {more}");

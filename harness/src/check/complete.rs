@@ -22,7 +22,8 @@ pub fn check(subject: &Subject) -> CheckResult {
     let tree = subject.tree();
     let mut result = match subject.tree_base() {
         Some(base) => {
-            let mut pair = Pair { tree, base, terms: &subject.terms, result: CheckResult::new(NAME) };
+            let mut pair =
+                Pair { tree, base, terms: &subject.terms, result: CheckResult::new(NAME) };
             pair.compare(tree.root(), base.root(), Octant::ROOT);
             pair.result
         }

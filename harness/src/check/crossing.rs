@@ -54,7 +54,9 @@ fn inherited(subject: &Subject, base: &[u64], result: &mut CheckResult) {
         if says_crossing(w) != says_crossing(from) {
             let side = word::side(from);
             let root = &subject.terms.root;
-            result.find_with(|| format!("in a T0 leaf that is {side} lies a {}", identical::tell(w, root)));
+            result.find_with(|| {
+                format!("in a T0 leaf that is {side} lies a {}", identical::tell(w, root))
+            });
         }
     }
 }
@@ -84,7 +86,8 @@ fn alone(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
         if crossed && !says_crossing(words[i]) {
             result.find_with(|| format!("a facet crosses the {}", identical::tell(words[i], root)));
         } else if says_crossing(words[i]) && !crossed && !descends {
-            result.find_with(|| format!("no facet crosses the {}", identical::tell(words[i], root)));
+            result
+                .find_with(|| format!("no facet crosses the {}", identical::tell(words[i], root)));
         }
     });
 }

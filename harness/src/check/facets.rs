@@ -27,7 +27,8 @@ impl Facets {
     /// Visits every octant that holds leaves, parents first, and tells whether a facet crosses it.
     /// The words are sorted leaves without overlap.
     pub fn walk(&self, words: &[u64], visit: &mut dyn FnMut(Visit, &Octant, bool)) {
-        let all: Vec<u32> = (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect();
+        let all: Vec<u32> =
+            (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect();
         self.descend(words, 0, Octant::ROOT, &all, visit);
     }
 

@@ -69,8 +69,11 @@ impl Gap<'_> {
             if let Some(coarse) = found.leaf(self.tree) {
                 result.find_with(|| {
                     let (what, part) = (self.what, part.describe(self.root));
-                    format!("{what}: {part} is refined beyond level {}, but near it is a leaf, {}",
-                            split.level, coarse.describe(self.root))
+                    format!(
+                        "{what}: {part} is refined beyond level {}, but near it is a leaf, {}",
+                        split.level,
+                        coarse.describe(self.root)
+                    )
                 });
                 return false;
             }
@@ -80,13 +83,19 @@ impl Gap<'_> {
 }
 
 /// Visits the largest octants without holes; stops when told to, and says so.
-fn solid_parts(tree: &Tree, at: Handle, octant: Octant, visit: &mut dyn FnMut(Octant) -> bool) -> bool {
+fn solid_parts(
+    tree: &Tree,
+    at: Handle,
+    octant: Octant,
+    visit: &mut dyn FnMut(Octant) -> bool,
+) -> bool {
     let kinds = tree.kinds(at);
     if kinds & HOLES == 0 {
         return kinds == 0 || visit(octant);
     }
     !at.is_node()
-        || (0..8).all(|d| solid_parts(tree, tree.child(at, d, octant.level), octant.child(d), visit))
+        || (0..8)
+            .all(|d| solid_parts(tree, tree.child(at, d, octant.level), octant.child(d), visit))
 }
 
 /// The hoods from the root down to where a walk is.
@@ -107,11 +116,14 @@ impl Trail {
         &self.hoods.last().expect("a walk begins at the root").0
     }
 
-    /// The children here that are wanted, one bit for each digit.
+    /// The children here that are wanted, one bit for each digit. A leaf has none.
     pub fn children(&self, tree: &Tree, wanted: impl Fn(Handle) -> bool) -> u8 {
-        let Hood { octant, .. } = *self.here();
-        let of = |d| tree.child(self.here().centre(), d, octant.level);
-        (0..8).filter(|&d| wanted(of(d))).fold(0, |all, d| all | 1 << d)
+        let (at, level) = (self.here().centre(), self.here().octant.level);
+        if !at.is_node() {
+            return 0;
+        }
+        let fit = (0..8).filter(|&d| wanted(tree.child(at, d, level)));
+        fit.fold(0, |all, d| all | 1 << d)
     }
 
     /// On to a child.
@@ -135,7 +147,11 @@ impl Trail {
     /// coarser than `enough`; else a level from `enough` up to that.
     pub fn coarsest_nearby(&self, tree: &Tree, margin: i64, region: &Region, enough: u8) -> u8 {
         let (_, coarsest) = self.wide(margin);
-        if *coarsest >= enough { *coarsest } else { self.search(tree, margin, region, enough).level }
+        if *coarsest >= enough {
+            *coarsest
+        } else {
+            self.search(tree, margin, region, enough).level
+        }
     }
 
     /// The coarsest leaf in a region that is at most `margin` around here, if coarser than `enough`.

@@ -56,7 +56,8 @@ fn along(tree: &Tree, around: [(Handle, u8); 3], axis: usize, level: u8) -> u64 
         return 0;
     }
     let half = |which: u8| {
-        let child = |(at, digit): (Handle, u8)| (tree.child(at, digit | which << axis, level), digit);
+        let child =
+            |(at, digit): (Handle, u8)| (tree.child(at, digit | which << axis, level), digit);
         along(tree, around.map(child), axis, level + 1)
     };
     // Between the halves is a node if a leaf has a corner there; where all that touches it was
@@ -86,7 +87,8 @@ mod tests {
 
     #[test]
     fn a_refined_corner_hangs_one_node_on_each_edge_it_halves() {
-        let tree = Tree::of_words(&words_of(|o| o.level == 0 || (o.level == 1 && o.corner == [0; 3])));
+        let tree =
+            Tree::of_words(&words_of(|o| o.level == 0 || (o.level == 1 && o.corner == [0; 3])));
         let counts = count(&tree);
         // Three faces of the refined octant lie inside the root. Of their nine edges three lie inside the
         // root (three coarse leaves each), six in its faces (one coarse leaf each).

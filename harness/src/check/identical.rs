@@ -65,7 +65,14 @@ mod tests {
 
     #[test]
     fn the_first_difference_is_told_with_both_levels() {
-        let fine: Vec<u64> = (0..8).map(|d| word::encode(&Leaf { octant: crate::octant::Octant::ROOT.child(d), side: word::Side::Outside })).collect();
+        let fine: Vec<u64> = (0..8)
+            .map(|d| {
+                word::encode(&Leaf {
+                    octant: crate::octant::Octant::ROOT.child(d),
+                    side: word::Side::Outside,
+                })
+            })
+            .collect();
         let mut coarse = fine.clone();
         coarse[3] |= 1;
         assert!(compare(&fine, &fine, &ROOT).holds());

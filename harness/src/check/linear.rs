@@ -46,12 +46,21 @@ pub fn unsorted(part: &str, before: u64, word: u64, root: &Root, result: &mut Ch
 }
 
 /// Reports a word that is no leaf or overlaps the last good one before it.
-pub fn refused(whose: &str, why: Refusal, word: u64, last: u64, root: &Root, result: &mut CheckResult) {
+pub fn refused(
+    whose: &str,
+    why: Refusal,
+    word: u64,
+    last: u64,
+    root: &Root,
+    result: &mut CheckResult,
+) {
     result.find_with(|| {
         let told = identical::tell(word, root);
         match why {
             Refusal::Fault(_) => format!("{whose}not a leaf: {told}"),
-            Refusal::Overlap => format!("{whose}two leaves overlap: {told} and {}", identical::tell(last, root)),
+            Refusal::Overlap => {
+                format!("{whose}two leaves overlap: {told} and {}", identical::tell(last, root))
+            }
         }
     });
 }

@@ -71,8 +71,16 @@ fn against_tally(
     }
 }
 
-fn same<T: PartialEq + Debug>(whose: &str, field: &str, claimed: &T, found: &T, result: &mut CheckResult) {
+fn same<T: PartialEq + Debug>(
+    whose: &str,
+    field: &str,
+    claimed: &T,
+    found: &T,
+    result: &mut CheckResult,
+) {
     if claimed != found {
-        result.find_with(|| format!("{whose}{field}: the manifest says {claimed:?}, it is {found:?}"));
+        result.find_with(|| {
+            format!("{whose}{field}: the manifest says {claimed:?}, it is {found:?}")
+        });
     }
 }

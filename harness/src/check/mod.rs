@@ -8,11 +8,11 @@
 use std::cell::OnceCell;
 use std::fmt;
 
+use self::facets::Facets;
 use crate::case::Case;
 use crate::lattice::Root;
 use crate::leafset::{LeafSet, ReadError};
 use crate::manifest::Keep;
-use self::facets::Facets;
 use crate::tree::{Builder, GHOST, Tree};
 use crate::word::{self, Side};
 

@@ -46,7 +46,8 @@ pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     Contacts { tree, sought: inside, matters: &matters }.visit(&mut |outside, _, across| {
         if across & inside != 0 {
             let leaf = outside.describe(&terms.root);
-            result.find_with(|| format!("an inside leaf shares a face with the outside leaf {leaf}"));
+            result
+                .find_with(|| format!("an inside leaf shares a face with the outside leaf {leaf}"));
         }
     });
     result
@@ -78,7 +79,9 @@ fn inherited(subject: &Subject, base: &[u64], result: &mut CheckResult) {
             && w & 3 != from & 3
         {
             let (side, root) = (word::side(from), &subject.terms.root);
-            result.find_with(|| format!("in a T0 leaf that is {side} lies a {}", identical::tell(w, root)));
+            result.find_with(|| {
+                format!("in a T0 leaf that is {side} lies a {}", identical::tell(w, root))
+            });
         }
     }
 }
@@ -99,12 +102,20 @@ fn labelled(components: &[Component], words: &[u64], terms: &Terms, result: &mut
 }
 
 /// The manifest counts ambiguous components as rays do, and places its example in one of them.
-fn ambiguous(whose: &str, set: &LeafSet, components: &[Component], terms: &Terms, result: &mut CheckResult) {
+fn ambiguous(
+    whose: &str,
+    set: &LeafSet,
+    components: &[Component],
+    terms: &Terms,
+    result: &mut CheckResult,
+) {
     let Ambiguous { count, example } = set.manifest.components_ambiguous;
     let found: Vec<_> = components.iter().filter(|c| c.ambiguous).collect();
     if count != found.len() as u64 {
         let total = found.len();
-        result.find(format!("{whose}the manifest has {count} ambiguous components, rays find {total}"));
+        result.find(format!(
+            "{whose}the manifest has {count} ambiguous components, rays find {total}"
+        ));
     }
     let near = |c: &&Component| {
         let at = terms.root.to_user(c.first.centre());
@@ -113,6 +124,7 @@ fn ambiguous(whose: &str, set: &LeafSet, components: &[Component], terms: &Terms
     };
     let placed = if found.is_empty() { example.is_none() } else { found.iter().any(|c| near(c)) };
     if !placed {
-        result.find(format!("{whose}the example of an ambiguous component, {example:?}, is in none"));
+        result
+            .find(format!("{whose}the example of an ambiguous component, {example:?}, is in none"));
     }
 }

@@ -52,7 +52,13 @@ fn boxes_met(tree: &Tree, terms: &Terms, whose: &str, result: &mut CheckResult) 
     }
 }
 
-fn box_met(tree: &Tree, at: Handle, octant: Octant, extent: &ExtentBox, find: &mut dyn FnMut(Octant)) {
+fn box_met(
+    tree: &Tree,
+    at: Handle,
+    octant: Octant,
+    extent: &ExtentBox,
+    find: &mut dyn FnMut(Octant),
+) {
     if tree.coarsest_level(at, octant.level) >= extent.level || !insides_meet(&octant, extent) {
         return;
     }

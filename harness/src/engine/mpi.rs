@@ -16,6 +16,14 @@ impl SharedMemory {
     pub fn new() -> Self {
         Self(tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok())
     }
+
+    /// Has a command use it.
+    pub fn add_to(&self, command: &mut Command) {
+        if let Some(place) = &self.0 {
+            command.env("OMPI_MCA_btl_vader_backing_directory", place.path());
+            command.env("OMPI_MCA_orte_tmpdir_base", place.path());
+        }
+    }
 }
 
 impl Default for SharedMemory {
@@ -29,10 +37,7 @@ pub fn command(mpirun: &Path, ranks: usize, program: &Path, shared: &SharedMemor
     let mut command = Command::new(mpirun);
     command.arg("-n").arg(ranks.to_string()).arg(program);
     set_environment(&mut command);
-    if let Some(place) = &shared.0 {
-        command.env("OMPI_MCA_btl_vader_backing_directory", place.path());
-        command.env("OMPI_MCA_orte_tmpdir_base", place.path());
-    }
+    shared.add_to(&mut command);
     command
 }
 

@@ -17,6 +17,8 @@ pub struct Given {
 pub struct Programs {
     /// The mesher under test.
     pub mesher: PathBuf,
+    /// The program that the command line gave for it, whatever engine that is of.
+    pub mesher_given: Option<PathBuf>,
     /// The reference.
     pub reference: PathBuf,
     /// OpenMPI's or another `mpirun`.
@@ -29,6 +31,10 @@ pub struct Programs {
     pub p4est: PathBuf,
     /// The catalogue of cases.
     pub catalogue: PathBuf,
+    /// The directory of engine descriptions.
+    pub engines: PathBuf,
+    /// The repository.
+    pub root: PathBuf,
     /// The program itself, for the command that repeats a failure.
     pub harness: PathBuf,
 }
@@ -43,6 +49,7 @@ impl Programs {
         let from_env = |name| env::var_os(name).map(PathBuf::from);
         let target = beside.parent().unwrap_or(Path::new("..")).to_owned();
         Self {
+            mesher_given: given.mesher.clone(),
             mesher: given.mesher.unwrap_or_else(|| beside.join("mesher")),
             reference: given.reference.unwrap_or_else(|| beside.join("reference")),
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
@@ -51,6 +58,8 @@ impl Programs {
             p4est: from_env("HARNESS_P4EST")
                 .unwrap_or_else(|| target.join("engines/p4est-balance")),
             catalogue: root.join("geometries/catalogue.toml"),
+            engines: root.join("harness/engines"),
+            root,
             harness,
         }
     }

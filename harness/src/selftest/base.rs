@@ -101,7 +101,8 @@ fn one_level_short(s: &Specimen) -> Option<Mutation> {
     let sideless: Vec<u64> = s.base.words.iter().map(|w| w & !3).collect();
     let of_surface = |&i: &usize| word::level(sideless[i]) == surface;
     let at: Vec<usize> = octets(&sideless).into_iter().filter(of_surface).collect();
-    let merged: Vec<Octant> = at.iter().map(|&i| word::octant(surgery::parent(sideless[i]))).collect();
+    let merged: Vec<Octant> =
+        at.iter().map(|&i| word::octant(surgery::parent(sideless[i]))).collect();
     let mut words = merge(&s.base.words, &at);
     for w in &mut words {
         if merged.binary_search_by_key(&word::key(*w), |o| word::key_of(o.corner)).is_ok() {

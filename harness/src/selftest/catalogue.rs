@@ -49,8 +49,15 @@ impl Mutation {
 
 /// All corruptions there are.
 pub fn catalogue() -> Vec<Mutant> {
-    [leaves::MUTANTS, sides::MUTANTS, base::MUTANTS, grading::MUTANTS, claims::MUTANTS, files::MUTANTS]
-        .concat()
+    [
+        leaves::MUTANTS,
+        sides::MUTANTS,
+        base::MUTANTS,
+        grading::MUTANTS,
+        claims::MUTANTS,
+        files::MUTANTS,
+    ]
+    .concat()
 }
 
 /// Seen by the leaves alone: the audit must report it too.

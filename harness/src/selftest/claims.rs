@@ -9,17 +9,27 @@ pub(super) const MUTANTS: &[Mutant] = &[
     audited("manifest: one leaf too many", "manifest", |s| claim(s, |m| m.leaves += 1)),
     audited("manifest: a leaf counted at another level", "manifest", |s| claim(s, by_level)),
     audited("manifest: a leaf counted on another side", "manifest", |s| claim(s, by_side)),
-    audited("manifest: another digest", "manifest", |s| claim(s, |m| m.digest = Digest(m.digest.0 ^ 1))),
+    audited("manifest: another digest", "manifest", |s| {
+        claim(s, |m| m.digest = Digest(m.digest.0 ^ 1))
+    }),
     audited("manifest: another digest of one octant", "manifest", |s| claim(s, octant_digest)),
     audited("manifest: digests of two octants swapped", "manifest", |s| claim(s, octants_swapped)),
     audited("manifest: another digest of one part", "manifest", |s| claim(s, part_digest)),
-    audited("manifest: one leaf too many in one part", "manifest", |s| claim(s, |m| m.parts[1].leaves += 1)),
-    informed("manifest: another root corner", "manifest", |s| claim(s, |m| m.root.origin[1] += m.root.edge)),
+    audited("manifest: one leaf too many in one part", "manifest", |s| {
+        claim(s, |m| m.parts[1].leaves += 1)
+    }),
+    informed("manifest: another root corner", "manifest", |s| {
+        claim(s, |m| m.root.origin[1] += m.root.edge)
+    }),
     informed("manifest: another root edge", "manifest", |s| claim(s, |m| m.root.edge *= 2.0)),
     informed("manifest: another surface level", "manifest", |s| claim(s, |m| m.level_surface += 1)),
-    informed("manifest: another layer thickness", "manifest", |s| claim(s, |m| m.layer_cells_min += 1)),
+    informed("manifest: another layer thickness", "manifest", |s| {
+        claim(s, |m| m.layer_cells_min += 1)
+    }),
     informed("manifest: another side kept", "manifest", |s| claim(s, keep)),
-    informed("manifest: crossing leaves treated otherwise", "manifest", |s| claim(s, |m| m.keep_crossing ^= true)),
+    informed("manifest: crossing leaves treated otherwise", "manifest", |s| {
+        claim(s, |m| m.keep_crossing ^= true)
+    }),
     informed("manifest: a box too many", "manifest", |s| claim(s, box_added)),
     informed("manifest: boxes forgotten", "manifest", boxes_forgotten),
     informed("manifest: final mesh called T0", "manifest", |s| claim(s, |m| m.tree = Tree::Base)),

@@ -18,17 +18,31 @@ pub(super) const MUTANTS: &[Mutant] = &[
     audited("part that the manifest does not name", "files", |s| tampered(s, extra)),
     audited("part of signed words", "files", |s| tampered(s, |dir| reheaded(dir, "<i8", 8, false))),
     audited("part of halved words", "files", |s| tampered(s, |dir| reheaded(dir, "<u4", 4, false))),
-    audited("part of big-endian words", "files", |s| tampered(s, |dir| reheaded(dir, ">u8", 8, false))),
-    audited("part of two dimensions", "files", |s| tampered(s, |dir| reheaded(dir, "<u8", 8, true))),
+    audited("part of big-endian words", "files", |s| {
+        tampered(s, |dir| reheaded(dir, ">u8", 8, false))
+    }),
+    audited("part of two dimensions", "files", |s| {
+        tampered(s, |dir| reheaded(dir, "<u8", 8, true))
+    }),
     audited("parts swapped", "manifest", |s| tampered(s, swapped)),
     audited("part overwritten with a copy of another", "linear", |s| tampered(s, duplicated)),
-    audited("part emptied of leaves", "manifest", |s| tampered(s, |dir| npy::write(&dir.join(PART), &[]))),
+    audited("part emptied of leaves", "manifest", |s| {
+        tampered(s, |dir| npy::write(&dir.join(PART), &[]))
+    }),
     audited("part named twice", "linear", |s| Some(renamed(s, "leaves-00000.npy"))),
-    audited("part from outside of the directory", "files", |s| Some(renamed(s, "../leaves-00001.npy"))),
-    audited("manifest missing", "files", |s| tampered(s, |dir| fs::remove_file(dir.join(manifest::FILE)))),
+    audited("part from outside of the directory", "files", |s| {
+        Some(renamed(s, "../leaves-00001.npy"))
+    }),
+    audited("manifest missing", "files", |s| {
+        tampered(s, |dir| fs::remove_file(dir.join(manifest::FILE)))
+    }),
     audited("manifest cut short", "files", |s| tampered(s, manifest_cut)),
-    audited("manifest of an unknown schema", "files", |s| tampered(s, |dir| edited(dir, "set/1", "set/9"))),
-    audited("manifest with an unknown key", "files", |s| tampered(s, |dir| edited(dir, "\"program\"", "\"programme\""))),
+    audited("manifest of an unknown schema", "files", |s| {
+        tampered(s, |dir| edited(dir, "set/1", "set/9"))
+    }),
+    audited("manifest with an unknown key", "files", |s| {
+        tampered(s, |dir| edited(dir, "\"program\"", "\"programme\""))
+    }),
     audited("manifest without one octant's digest", "files", octant_missing),
 ];
 

@@ -37,9 +37,8 @@ fn coarser_places(hood: &Hood) -> [usize; 4] {
 /// Splits a leaf whose coarser neighbours are as wanted: each is then two levels coarser.
 fn split_where(s: &Specimen, wanted: impl Fn([usize; 4]) -> bool) -> Option<Mutation> {
     let tree = Tree::of_words(&s.mesh.words);
-    let fit = |&w: &u64| {
-        word::level(w) < LEVEL_MAX && wanted(coarser_places(&surgery::hood(&tree, w)))
-    };
+    let fit =
+        |&w: &u64| word::level(w) < LEVEL_MAX && wanted(coarser_places(&surgery::hood(&tree, w)));
     let i = s.mesh.words.iter().position(fit)?;
     Some(Mutation::with_words(s, split(&s.mesh.words, i)))
 }
@@ -73,7 +72,8 @@ fn corner_left_behind(s: &Specimen) -> Option<Mutation> {
 
 /// Whether two octants that touch do so in a point.
 fn meet_in_corner(a: &Octant, b: &Octant) -> bool {
-    let apart = |i: usize| a.corner[i] + a.edge() == b.corner[i] || b.corner[i] + b.edge() == a.corner[i];
+    let apart =
+        |i: usize| a.corner[i] + a.edge() == b.corner[i] || b.corner[i] + b.edge() == a.corner[i];
     (0..3).all(apart)
 }
 

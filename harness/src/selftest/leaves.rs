@@ -160,7 +160,8 @@ fn put_back(s: &Specimen) -> Option<Mutation> {
 
 fn coarser_than_base(s: &Specimen) -> Option<Mutation> {
     let words = &s.mesh.words;
-    let of_base = |&i: &usize| words[i..i + 8].iter().all(|w| s.base.words.binary_search(w).is_ok());
+    let of_base =
+        |&i: &usize| words[i..i + 8].iter().all(|w| s.base.words.binary_search(w).is_ok());
     let i = octets(words).into_iter().find(of_base)?;
     Some(Mutation::with_words(s, surgery::merge(words, &[i])))
 }

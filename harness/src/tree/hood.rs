@@ -101,5 +101,4 @@ impl Hood {
         let level = self.octant.level;
         self.around.iter().fold(NO_LEAF, |c, &h| c.min(tree.coarsest_level(h, level)))
     }
-
 }

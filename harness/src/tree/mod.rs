@@ -16,8 +16,8 @@ mod walk;
 pub use build::{Builder, Refusal};
 pub use hood::{Hood, OFFSETS};
 pub use region::{Coarsest, Region};
-pub use walk::walk;
 use store::Store;
+pub use walk::walk;
 
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word;

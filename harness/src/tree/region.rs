@@ -71,7 +71,14 @@ impl Hood {
 }
 
 /// Looks for a leaf coarser than the one found so far.
-fn search(tree: &Tree, at: Handle, corner: [i64; 3], level: u8, region: &Region, found: &mut Coarsest) {
+fn search(
+    tree: &Tree,
+    at: Handle,
+    corner: [i64; 3],
+    level: u8,
+    region: &Region,
+    found: &mut Coarsest,
+) {
     let coarsest = tree.coarsest_level(at, level);
     let edge = i64::from(crate::octant::CELLS_PER_EDGE >> level);
     if coarsest >= found.level || !region.meets(corner, edge) {

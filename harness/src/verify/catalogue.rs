@@ -80,6 +80,14 @@ fn of_path(argument: &str) -> Result<Selected, VerifyError> {
     })
 }
 
+/// The catalogue's case of this name.
+///
+/// # Errors
+/// Where there is none, or the catalogue cannot be read.
+pub fn named(name: &str, programs: &Programs) -> Result<Selected, VerifyError> {
+    of_name(name, read(&programs.catalogue)?)
+}
+
 fn of_name(name: &str, all: Vec<Selected>) -> Result<Selected, VerifyError> {
     let names: Vec<String> = all.iter().map(|case| case.name.clone()).collect();
     all.into_iter().find(|case| case.name == name).ok_or_else(|| {

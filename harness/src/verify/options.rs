@@ -82,6 +82,28 @@ pub struct Options {
 }
 
 impl Options {
+    /// A verification of leaves alone: reference and checks, neither MPI nor oracles nor p4est.
+    pub fn of_leaves_alone(cases: Vec<String>) -> Self {
+        Self {
+            cases,
+            sizes: Vec::new(),
+            ranks: Vec::new(),
+            partitioners: Vec::new(),
+            level_bases: Vec::new(),
+            out: None,
+            keep: false,
+            limit: Duration::from_secs(600),
+            mpi: false,
+            oracles: false,
+            p4est: false,
+            require: Vec::new(),
+            oracle_points: 0,
+            seed: 1,
+            cells_max: 100_000_000,
+            reference_cells_max: 3_000_000,
+        }
+    }
+
     /// Every layout of a run on MPI, in the order of rank counts.
     pub fn layouts(&self) -> Vec<Layout> {
         let mut layouts = Vec::new();

@@ -228,33 +228,31 @@ impl Walk<'_> {
         &mut self,
         l: Level,
         c: Component,
-        key: u64,
-        faced: u64,
+        mut key: u64,
+        mut faced: u64,
         side: Option<(usize, usize)>,
     ) {
-        for j in ones(u64::from(brick::parents(faced))) {
-            let mut code = key << 3 | u64::from(j);
-            let mut m = l;
-            while m > 0 {
-                m -= 1;
-                let frame = &self.way[m as usize];
-                let found = match side {
-                    _ if frame.key == code >> 6 => Some((frame.node, frame.exists)),
-                    Some((axis, up)) => match frame.across[axis][up] {
-                        Across::Here(n, exists) => Some((n, exists)),
-                        _ => None,
-                    },
-                    None => None,
-                };
-                if let Some((node, exists)) = found
-                    && exists >> (code & 63) & 1 == 1
-                {
-                    if let Some(d) = self.nodes.component_of(m, node, code & 63) {
+        let mut m = l;
+        while faced != 0 && m > 0 {
+            faced = u64::from(brick::parents(faced)) << (8 * (key & 7));
+            key >>= 3;
+            m -= 1;
+            let frame = &self.way[m as usize];
+            let (node, exists) = match side {
+                _ if frame.key == key => (frame.node, frame.exists),
+                Some((axis, up)) => match frame.across[axis][up] {
+                    Across::Here(n, exists) => (n, exists),
+                    _ => continue,
+                },
+                None => continue,
+            };
+            if faced & exists != 0 {
+                for (d, bits) in self.nodes.components(m, node) {
+                    if bits & faced != 0 {
                         self.local.join(c, d);
                     }
-                    break;
                 }
-                code >>= 3;
+                faced &= !exists;
             }
         }
     }

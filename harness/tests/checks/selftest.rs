@@ -1,14 +1,13 @@
 //! The self test on meshes of the reference: every corruption is caught by the check meant for it.
 
-mod support;
-
+use crate::support;
 use harness::selftest;
 
 const SPECIMENS: [(&str, &str); 4] = [
-    ("outside", include_str!("../specimens/outside.toml")),
-    ("inside", include_str!("../specimens/inside.toml")),
-    ("all", include_str!("../specimens/all.toml")),
-    ("boxes", include_str!("../specimens/boxes.toml")),
+    ("outside", include_str!("../../specimens/outside.toml")),
+    ("inside", include_str!("../../specimens/inside.toml")),
+    ("all", include_str!("../../specimens/all.toml")),
+    ("boxes", include_str!("../../specimens/boxes.toml")),
 ];
 
 #[test]

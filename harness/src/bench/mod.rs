@@ -1,0 +1,363 @@
+//! Measurements: how long, why, and how it scales.
+//!
+//! [`bench`] runs the studies of a [`plan`] and appends every result to a [`record`] at once. What is said
+//! of them is computed from the record alone, by [`group`], [`pop`], [`cause`] and [`table`] here and by
+//! [`report`](crate::report), so that it can be said again at any time, on any machine.
+//!
+//! Repetitions are the outer loop: what drifts on a machine drifts through all setups alike.
+
+pub mod cause;
+pub mod entry;
+pub mod execute;
+pub mod group;
+pub mod launcher;
+pub mod machine;
+pub mod network;
+pub mod plan;
+pub mod pop;
+pub mod record;
+pub mod sizing;
+pub mod stats;
+pub mod table;
+pub mod variant;
+
+use crate::engine::programs::Programs;
+use entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
+use execute::{Failed, Runner};
+use launcher::Launcher;
+use plan::{Experiment, Layout, Study};
+use record::Record;
+use sizing::Sizes;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use variant::Base;
+
+/// What is asked for.
+#[derive(Debug)]
+pub struct Options {
+    /// The studies, in order.
+    pub studies: Vec<Study>,
+    /// `mesher` or `reference`.
+    pub engine: String,
+    /// How ranks are started.
+    pub launcher: Launcher,
+    /// Latency and bandwidth; measured if not given and the launcher is there.
+    pub network: Option<Network>,
+    /// The record.
+    pub record: PathBuf,
+    /// Time limit of a run.
+    pub limit: Duration,
+    /// The harness's command line, for the record.
+    pub command: Vec<String>,
+}
+
+/// Why measuring ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The user's input.
+    #[error("{0}")]
+    Input(String),
+    /// Something is missing that was asked for.
+    #[error("{0}")]
+    Missing(String),
+    /// Ctrl-C; what was measured is in the record.
+    #[error("interrupted: what was measured so far is in the record")]
+    Interrupted,
+}
+
+/// What a session gave.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Its lines in the record.
+    pub lines: Vec<Line>,
+    /// Number of failures among them.
+    pub failures: usize,
+}
+
+/// Measures. `say` is told what is being done.
+///
+/// # Errors
+/// Where the input is at fault, something is missing, or the user interrupts.
+pub fn bench(
+    options: &Options,
+    programs: &Programs,
+    say: &mut dyn FnMut(&str),
+) -> Result<Outcome, BenchError> {
+    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
+    let place =
+        place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))?;
+    let record = Record::open(&options.record)
+        .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
+    let (launcher, limit) = (&options.launcher, options.limit);
+    let runner = Runner { programs, launcher, limit, place: place.path() };
+    let mut bench =
+        Bench { options, runner, record, say, lines: Vec::new(), digests: HashMap::new() };
+    bench.begin()?;
+    bench.measure_network()?;
+    for study in &options.studies {
+        bench.study(study)?;
+    }
+    let failures = bench.lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
+    Ok(Outcome { lines: bench.lines, failures })
+}
+
+/// What a mesh depends on, as text; its digest must depend on nothing else.
+type Mesh = (String, String, u32);
+
+/// A session under way.
+struct Bench<'a> {
+    options: &'a Options,
+    runner: Runner<'a>,
+    record: Record,
+    say: &'a mut dyn FnMut(&str),
+    lines: Vec<Line>,
+    digests: HashMap<Mesh, String>,
+}
+
+/// A run to be repeated.
+struct Point {
+    setup: Setup,
+    case: PathBuf,
+    failed: bool,
+}
+
+impl Bench<'_> {
+    fn append(&mut self, what: What) -> Result<(), BenchError> {
+        let line = self.record.append(what).map_err(|error| {
+            BenchError::Input(format!("{}: {error}", self.record.path().display()))
+        })?;
+        self.lines.push(line);
+        Ok(())
+    }
+
+    fn begin(&mut self) -> Result<(), BenchError> {
+        let catalogue = &self.runner.programs.catalogue;
+        let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        let session = Session {
+            command: self.options.command.clone(),
+            machine: machine::describe(&self.options.launcher.program(), repository),
+            load_average: machine::load_average(),
+        };
+        self.append(What::Session(Box::new(session)))
+    }
+
+    fn measure_network(&mut self) -> Result<(), BenchError> {
+        let wants_sim =
+            self.options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim);
+        let network = match self.options.network {
+            Some(given) => given,
+            None if !wants_sim => return Ok(()),
+            None => match self.runner.ping_pong().and_then(|text| network::parse(&text)) {
+                Ok(measured) => measured,
+                Err(why) => {
+                    (self.say)(&format!("messages are assumed to cost 2 us and 10 GB/s: {why}"));
+                    network::ASSUMED
+                }
+            },
+        };
+        self.append(What::Network(network))
+    }
+
+    fn study(&mut self, study: &Study) -> Result<(), BenchError> {
+        let base = self.base(&study.case)?;
+        (self.say)(&format!("{} scaling of {}: choosing spacings", study.experiment, base.name));
+        let mut points = self.points(study, &base)?;
+        self.warm_up(&mut points)?;
+        for repeat in 0..study.repeats {
+            for point in points.iter_mut().filter(|p| !p.failed) {
+                self.run(point, repeat, false)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The case by its name in the catalogue or its path, with its geometry written out.
+    fn base(&self, case: &str) -> Result<Base, BenchError> {
+        let path = match case.ends_with(".toml") {
+            true => PathBuf::from(case),
+            false => {
+                in_catalogue(case, &self.runner.programs.catalogue).map_err(BenchError::Input)?
+            }
+        };
+        Base::read(&path, self.runner.place).map_err(BenchError::Input)
+    }
+
+    /// The first setup of every mesh once, unrecorded in statistics: it brings files into memory.
+    fn warm_up(&mut self, points: &mut [Point]) -> Result<(), BenchError> {
+        let mut warm: Vec<PathBuf> = Vec::new();
+        for point in points {
+            if !warm.contains(&point.case) {
+                warm.push(point.case.clone());
+                self.run(point, 0, true)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn run(&mut self, point: &mut Point, repeat: usize, warm_up: bool) -> Result<(), BenchError> {
+        let s = &point.setup;
+        (self.say)(&format!(
+            "{} {}: {} {} ranks, spacing {:.3e}, n {}{}",
+            s.experiment,
+            s.case,
+            match s.comm {
+                Comm::Sim => "simulated",
+                Comm::Mpi => "MPI",
+                Comm::Solo => "serial",
+            },
+            s.ranks,
+            s.spacing_min,
+            s.layer_cells_min,
+            if warm_up {
+                ", warm-up".to_owned()
+            } else {
+                format!(", {} {}, repeat {}", s.partitioner, s.weights, repeat + 1)
+            }
+        ));
+        let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
+            Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
+            Err(Failed::Because(why)) => why,
+            Ok(run) => match self.same_mesh(&run) {
+                Ok(()) => return self.append(What::Run(Box::new(run))),
+                Err(why) => why,
+            },
+        };
+        (self.say)(&format!("failed: {why}"));
+        point.failed = true;
+        let command = format!("{} on {} ranks", self.options.engine, point.setup.ranks);
+        self.append(What::Failure(Failure { setup: point.setup.clone(), command, why }))
+    }
+
+    /// The time of a wrong mesh is no result: all runs of a mesh have one digest.
+    fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
+        let s = &run.setup;
+        let mesh = (s.case.clone(), format!("{:e}", s.spacing_min), s.layer_cells_min);
+        let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
+        if *first == run.digest {
+            return Ok(());
+        }
+        Err(format!("its mesh has the digest {}, where another run of it had {first}", run.digest))
+    }
+
+    fn points(&mut self, study: &Study, base: &Base) -> Result<Vec<Point>, BenchError> {
+        let mut sizes: BTreeMap<u32, Sizes> = BTreeMap::new();
+        let own = [base.layer_cells_min];
+        let layers = if study.layers.is_empty() { &own[..] } else { &study.layers };
+        let mut points = Vec::new();
+        for &n in layers {
+            for layout in &study.layouts {
+                for spacing in self.spacings(study, base, layout, &mut sizes)? {
+                    let case = base.variant(spacing, n).map_err(BenchError::Input)?;
+                    for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
+                        points.push(Point {
+                            setup: self.setup(
+                                study,
+                                base,
+                                layout,
+                                spacing,
+                                n,
+                                [weights, partitioner],
+                            ),
+                            case: case.clone(),
+                            failed: false,
+                        });
+                    }
+                }
+            }
+        }
+        Ok(points)
+    }
+
+    fn setup(
+        &self,
+        study: &Study,
+        base: &Base,
+        layout: &Layout,
+        spacing_min: f64,
+        layer_cells_min: u32,
+        [weights, partitioner]: [&str; 2],
+    ) -> Setup {
+        Setup {
+            experiment: study.experiment.to_string(),
+            engine: self.options.engine.clone(),
+            case: base.name.clone(),
+            spacing_min,
+            layer_cells_min,
+            ranks: layout.ranks,
+            comm: layout.comm,
+            partitioner: partitioner.to_owned(),
+            weights: weights.to_owned(),
+        }
+    }
+
+    /// The spacings of a study's meshes for a number of ranks.
+    fn spacings(
+        &mut self,
+        study: &Study,
+        base: &Base,
+        layout: &Layout,
+        sizes: &mut BTreeMap<u32, Sizes>,
+    ) -> Result<Vec<f64>, BenchError> {
+        let Some(cells) = study.cells else { return Ok(vec![base.spacing_min]) };
+        let n = base.layer_cells_min;
+        let known = sizes.entry(n).or_default();
+        let wanted = match study.experiment {
+            Experiment::Weak => cells as f64 * layout.ranks as f64,
+            _ => cells as f64,
+        };
+        let coarse = base.coarse();
+        let finest = known.spacing(wanted, coarse, |spacing| self.count(base, spacing, n))?;
+        Ok(match study.experiment {
+            Experiment::Spacing => {
+                // Coarser by factors of two, while there are enough cells to measure.
+                let halvings = (wanted / 1e5).log(4.0).max(0.0) as i32;
+                (0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect()
+            }
+            _ => vec![finest],
+        })
+    }
+
+    /// Cells of a mesh, made on one rank.
+    fn count(&self, base: &Base, spacing: f64, n: u32) -> Result<u64, BenchError> {
+        let case = base.variant(spacing, n).map_err(BenchError::Input)?;
+        let setup = Setup {
+            experiment: String::new(),
+            engine: "mesher".to_owned(),
+            case: base.name.clone(),
+            spacing_min: spacing,
+            layer_cells_min: n,
+            ranks: 1,
+            comm: Comm::Solo,
+            partitioner: String::new(),
+            weights: String::new(),
+        };
+        match self.runner.run(&setup, &case, 0, true) {
+            Ok(run) => Ok(run.cells),
+            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
+            Err(Failed::Because(why)) => Err(BenchError::Input(format!("{}: {why}", base.name))),
+        }
+    }
+}
+
+fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<(&'a str, &'a str)> {
+    weights
+        .iter()
+        .flat_map(|w| partitioners.iter().map(move |p| (w.as_str(), p.as_str())))
+        .collect()
+}
+
+/// The file of a case by its name.
+fn in_catalogue(name: &str, catalogue: &Path) -> Result<PathBuf, String> {
+    let wrong = |why: String| format!("{}: {why}", catalogue.display());
+    let text = std::fs::read_to_string(catalogue).map_err(|error| wrong(error.to_string()))?;
+    let table: toml::Table = text.parse().map_err(|error| wrong(format!("{error}")))?;
+    let entries = table.get("case").and_then(toml::Value::as_array).cloned().unwrap_or_default();
+    let named =
+        entries.iter().find(|entry| entry.get("name").and_then(toml::Value::as_str) == Some(name));
+    let file = named.and_then(|entry| entry.get("file")?.as_str());
+    let file = file.ok_or_else(|| {
+        wrong(format!("no case {name} in it, and no file of a case (.toml) either"))
+    })?;
+    Ok(catalogue.parent().unwrap_or(Path::new(".")).join(file))
+}

@@ -1,0 +1,199 @@
+//! `harness bench`: options in, a record and tables out, exit code.
+
+use crate::cli::ProgramArguments;
+use clap::Args;
+use harness::bench::entry::{Network, What};
+use harness::bench::group::Groups;
+use harness::bench::launcher::Launcher;
+use harness::bench::plan::{self, Experiment, Preset, Wishes, studies};
+use harness::bench::{BenchError, Options, bench, network, record, table};
+use harness::engine::programs::{Given, Programs};
+use harness::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Exit code after Ctrl-C.
+const EXIT_INTERRUPTED: u8 = 130;
+
+/// `harness bench`.
+#[derive(Args, Debug)]
+pub struct BenchArguments {
+    /// Names in geometries/catalogue.toml or paths of case files [default: those of the preset]
+    pub cases: Vec<String>,
+    /// Sizes and ranks to choose from
+    #[arg(long, value_enum, default_value = "small")]
+    pub preset: Preset,
+    /// Which questions to ask [default: all]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub experiment: Vec<Experiment>,
+    /// Ranks of simulated runs, as in 1,2,7 or 1..64 for powers of two [default: those of the preset]
+    #[arg(long, value_parser = rank_list)]
+    pub ranks: Option<RankList>,
+    /// Ranks of runs on MPI
+    #[arg(long, value_parser = rank_list)]
+    pub ranks_mpi: Option<RankList>,
+    /// No runs on MPI
+    #[arg(long, conflicts_with = "ranks_mpi")]
+    pub no_mpi: bool,
+    /// Cells of the mesh (strong, weights), per rank (weak), of the largest mesh (spacing), at the case's n (layers)
+    #[arg(long, value_delimiter = ',', value_parser = cell_count)]
+    pub cells: Vec<u64>,
+    /// Values of n in the experiment `layers`
+    #[arg(long, value_delimiter = ',')]
+    pub layers: Vec<u32>,
+    /// Weights of base leaves: unit, area, rehearsal
+    #[arg(long, value_delimiter = ',')]
+    pub weights: Vec<String>,
+    /// Partitioners: metis, morton
+    #[arg(long, value_delimiter = ',')]
+    pub partitioners: Vec<String>,
+    /// Repetitions of every run; 95 % intervals of a median need six
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    pub repeat: Option<u16>,
+    /// What starts ranks; {ranks} stands for their number
+    #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
+    pub launcher: Launcher,
+    /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
+    #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
+    pub network: Option<Network>,
+    /// The program to measure: mesher or reference
+    #[arg(long, default_value = "mesher", value_parser = ["mesher", "reference"])]
+    pub engine: String,
+    /// File of JSON lines to append to
+    #[arg(long, value_name = "FILE", default_value = "reports/out/bench.jsonl")]
+    pub record: PathBuf,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = clap::value_parser!(u64).range(1..))]
+    pub timeout: u64,
+    /// Print the tables of an existing record and measure nothing
+    #[arg(long)]
+    pub show: bool,
+    /// Where the programs are.
+    #[command(flatten)]
+    pub programs: ProgramArguments,
+}
+
+/// A list of rank counts, as one argument.
+#[derive(Clone, Debug)]
+pub struct RankList(Vec<usize>);
+
+fn rank_list(text: &str) -> Result<RankList, String> {
+    plan::ranks(text).map(RankList)
+}
+
+/// A number of cells, `1e9` allowed.
+fn cell_count(text: &str) -> Result<u64, String> {
+    let cells = text.trim().parse::<f64>().ok().filter(|c| (1e3..=1e12).contains(c));
+    cells.map(|c| c as u64).ok_or_else(|| "give a number of cells from 1e3 to 1e12".to_owned())
+}
+
+/// Measures, prints; the exit code.
+pub fn run(arguments: BenchArguments) -> u8 {
+    if arguments.show {
+        return show(&arguments);
+    }
+    let given = Given {
+        mesher: arguments.programs.mesher.clone(),
+        reference: arguments.programs.reference.clone(),
+    };
+    let programs = Programs::find(given);
+    let program =
+        if arguments.engine == "reference" { &programs.reference } else { &programs.mesher };
+    if !program.is_file() {
+        eprintln!("harness: {} is not there; build it or name it", program.display());
+        return EXIT_MISSING;
+    }
+    let options = options(arguments);
+    let start = Instant::now();
+    let mut say = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
+    match bench(&options, &programs, &mut say) {
+        Ok(outcome) => {
+            print!("{}", table::tables(&Groups::of(&outcome.lines)));
+            for line in &outcome.lines {
+                if let What::Failure(f) = &line.what {
+                    println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);
+                }
+            }
+            println!("record: {}", options.record.display());
+            if outcome.failures == 0 { EXIT_HOLDS } else { EXIT_FAILED }
+        }
+        Err(error) => {
+            eprintln!("harness: {error}");
+            match error {
+                BenchError::Input(_) => EXIT_INPUT,
+                BenchError::Missing(_) => EXIT_MISSING,
+                BenchError::Interrupted => EXIT_INTERRUPTED,
+            }
+        }
+    }
+}
+
+fn show(arguments: &BenchArguments) -> u8 {
+    match record::read(&arguments.record) {
+        Ok(content) => {
+            for (line, why) in &content.broken {
+                eprintln!("harness: line {line} is passed over: {why}");
+            }
+            print!("{}", table::tables(&Groups::of(&content.lines)));
+            EXIT_HOLDS
+        }
+        Err(error) => {
+            eprintln!("harness: {}: {error}", arguments.record.display());
+            EXIT_INPUT
+        }
+    }
+}
+
+fn options(arguments: BenchArguments) -> Options {
+    let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
+    let wishes = Wishes {
+        cases: arguments.cases,
+        experiments: arguments.experiment,
+        ranks: list(&arguments.ranks),
+        ranks_mpi: list(&arguments.ranks_mpi),
+        cells: arguments.cells,
+        layers: arguments.layers,
+        weights: arguments.weights,
+        partitioners: arguments.partitioners,
+        repeats: arguments.repeat.map(usize::from),
+        no_mpi: arguments.no_mpi || !arguments.launcher.is_found(),
+        serial: arguments.engine == "reference",
+    };
+    Options {
+        studies: studies(arguments.preset, &wishes),
+        engine: arguments.engine,
+        launcher: arguments.launcher,
+        network: arguments.network,
+        record: arguments.record,
+        limit: Duration::from_secs(arguments.timeout),
+        command: std::env::args().collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::cli::{Arguments, Command};
+    use clap::Parser;
+
+    #[test]
+    fn ranks_launcher_and_cells_are_read() {
+        let words = [
+            "harness",
+            "bench",
+            "uav-small",
+            "--ranks",
+            "1..8",
+            "--cells",
+            "1e6,2e6",
+            "--launcher",
+            "srun -n {ranks}",
+        ];
+        let Command::Bench(bench) = Arguments::try_parse_from(words).unwrap().command else {
+            panic!()
+        };
+        assert_eq!(bench.ranks.unwrap().0, [1, 2, 4, 8]);
+        assert_eq!(bench.cells, [1_000_000, 2_000_000]);
+        assert!(Arguments::try_parse_from(["harness", "bench", "--launcher", "mpirun"]).is_err());
+        assert!(Arguments::try_parse_from(["harness", "bench", "--cells", "5"]).is_err());
+    }
+}
