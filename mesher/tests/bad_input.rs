@@ -1,0 +1,344 @@
+//! Bad input: one sentence, the documented exit code, nothing left behind; on one rank and on several.
+#![allow(missing_docs)]
+
+#[path = "support/process.rs"]
+mod process;
+
+use process::{MESHER, Place, Told, binary_stl, left_out, run};
+use std::path::Path;
+use std::process::Command;
+
+const INPUT: i32 = 2;
+const OUTPUT: i32 = 4;
+
+/// A body that can be meshed.
+fn tetrahedron() -> Vec<u8> {
+    let v = [[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    binary_stl(&[[v[0], v[2], v[1]], [v[0], v[1], v[3]], [v[0], v[3], v[2]], [v[1], v[2], v[3]]])
+}
+
+const COMMS: [&str; 2] = ["--comm=solo", "--comm=sim:3:7"];
+
+/// Runs the mesher with `args`, asking for output, and asserts that it refuses and leaves nothing.
+#[track_caller]
+fn refused(place: &Place, args: &[&str], code: i32, words: &[&str]) {
+    for comm in COMMS {
+        let before = place.contents();
+        let mut all = args.to_vec();
+        if !args.iter().any(|a| a.starts_with("--out")) {
+            all.extend(["--out", "mesh"]);
+        }
+        if !args.iter().any(|a| a.starts_with("--json")) {
+            all.extend(["--json", "run.json"]);
+        }
+        all.push(comm);
+        run(place.mesher(&all)).refuses(code, words);
+        let (before, after) = (before.keys(), place.contents());
+        assert!(before.eq(after.keys()), "{args:?} {comm} left something behind: {:?}", after.keys());
+    }
+}
+
+#[track_caller]
+fn refused_case(text: &str, words: &[&str]) {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    place.put("case.toml", text);
+    refused(&place, &["case.toml"], INPUT, &[&["case.toml"], words].concat());
+}
+
+/// What the rules, not the case file, are wrong about: the file is not named.
+#[track_caller]
+fn refused_rules(text: &str, words: &[&str]) {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    place.put("case.toml", format!("geometry = \"body.stl\"\n{text}"));
+    refused(&place, &["case.toml"], INPUT, words);
+}
+
+#[test]
+fn good_input_is_meshed_and_tells_so_unless_quiet() {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    for comm in COMMS {
+        let told = run(place.mesher(&["body.stl", "--spacing-min", "0.5", comm]));
+        told.succeeds();
+        assert!(told.stdout.contains("cells"), "{told:?}");
+        let told = run(place.mesher(&["body.stl", "--spacing-min", "0.5", "--quiet", comm]));
+        told.succeeds();
+        assert_eq!(told.stdout, "");
+    }
+}
+
+#[test]
+fn files_that_are_no_stl() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/bad");
+    let place = Place::new();
+    let mut count = 0;
+    for entry in std::fs::read_dir(&folder).expect("the catalogue of bad files") {
+        let path = entry.expect("a readable entry").path();
+        if path.extension().is_some_and(|e| e == "stl") {
+            let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+            std::fs::copy(&path, place.path().join(&name)).expect("a copy");
+            let what: &[&str] = match name.as_str() {
+                "empty.stl" => &["empty"],
+                "nan.stl" | "infinite.stl" | "ascii_nan.stl" | "ascii_overflow.stl" => {
+                    &["facet 6", "not finite"]
+                }
+                "count_too_large.stl" => &["promises 4294967295 facets", "484"],
+                _ => &[&name],
+            };
+            refused(&place, &[&name, "--spacing-min", "0.1"], INPUT, what);
+            count += 1;
+        }
+    }
+    assert!(count >= 20, "only {count} bad files");
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let place = Place::new();
+    let spacing = ["--spacing-min", "0.1"];
+    let with = |name| [&[name][..], &spacing].concat();
+    refused(&place, &with("absent.stl"), INPUT, &["absent.stl", "No such file"]);
+    refused(&place, &["absent.toml"], INPUT, &["absent.toml", "No such file"]);
+    std::fs::create_dir(place.path().join("folder.stl")).expect("a directory");
+    refused(&place, &with("folder.stl"), INPUT, &["folder.stl"]);
+    std::fs::create_dir(place.path().join("folder.toml")).expect("a directory");
+    refused(&place, &["folder.toml"], INPUT, &["folder.toml"]);
+    refused(&place, &with("/dev/null"), INPUT, &["/dev/null"]);
+    // Opening one waits for a writer that never comes.
+    let made = Command::new("mkfifo").arg(place.path().join("pipe.stl")).status();
+    assert!(made.expect("mkfifo is there").success());
+    refused(&place, &with("pipe.stl"), INPUT, &["pipe.stl"]);
+}
+
+#[test]
+fn every_truncation_of_a_body() {
+    let whole = tetrahedron();
+    for length in [1, 40, 83, 84, 85, 133, 134, whole.len() - 50, whole.len() - 1] {
+        let place = Place::new();
+        place.put("cut.stl", &whole[..length]);
+        refused(&place, &["cut.stl", "--spacing-min", "0.1"], INPUT, &["cut.stl"]);
+    }
+}
+
+#[test]
+fn spacings_and_layers_that_cannot_be() {
+    for (value, words) in [
+        ("0", &["spacing_min is 0", "positive"][..]),
+        ("0.0", &["spacing_min is 0", "positive"]),
+        ("-0.5", &["spacing_min is -0.5", "positive"]),
+        ("nan", &["spacing_min is NaN", "positive"]),
+        ("inf", &["spacing_min is inf", "positive"]),
+        ("1e-9", &["spacing_min 0.000000001", "too small", "level 19"]),
+        ("5e-324", &["spacing_min", "too small", "level 19"]),
+    ] {
+        refused_rules(&format!("spacing_min = {value}\n"), words);
+        let place = Place::new();
+        place.put("body.stl", tetrahedron());
+        refused(&place, &["body.stl", "--spacing-min", value], INPUT, words);
+    }
+    refused_rules("spacing_min = 0.5\nlayer_cells_min = 0\n", &["layer_cells_min is 0", "at least 1"]);
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    let layers = |n| ["body.stl", "--spacing-min=0.5", "--layer-cells-min", n];
+    refused(&place, &layers("0"), INPUT, &["layer_cells_min is 0", "at least 1"]);
+    refused(&place, &layers("-1"), INPUT, &["--layer-cells-min"]);
+    refused(&place, &layers("2.5"), INPUT, &["--layer-cells-min"]);
+    refused(&place, &["body.stl"], INPUT, &["--spacing-min"]);
+}
+
+#[test]
+fn roots_and_boxes_that_cannot_be() {
+    let root = |origin: &str, edge: &str| {
+        format!("spacing_min = 0.5\n[root]\norigin = [{origin}]\nedge = {edge}\n")
+    };
+    for edge in ["0.0", "-8.0", "nan", "inf"] {
+        refused_rules(&root("0.0, 0.0, 0.0", edge), &["edge", "positive"]);
+    }
+    refused_rules(&root("0.0, nan, 0.0", "8.0"), &["origin", "not finite"]);
+    // Facet 1 is the first that has the vertex (1, 0, 0); one root edge outside is allowed, no more.
+    refused_rules(&root("-100.0, 0.0, 0.0", "8.0"), &["facet 0", "outside the root"]);
+    refused_rules(&root("-16.5, 0.0, 0.0", "8.0"), &["facet 0", "outside the root"]);
+    refused_rules("spacing_min = 0.5\nroot_scale = 0.0\n", &["root_scale is 0", "positive"]);
+    refused_rules("spacing_min = 0.5\nroot_scale = -1.0\n", &["root_scale is -1", "positive"]);
+    let boxed = |min: &str, max: &str, spacing: &str| {
+        format!(
+            "spacing_min = 0.5\n[[box]]\nmin = [0.0, 0.0, 0.0]\nmax = [1.0, 1.0, 1.0]\nspacing = 1.0\n[[box]]\nmin = [{min}]\nmax = [{max}]\nspacing = {spacing}\n"
+        )
+    };
+    refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 0.0, 1.0", "0.5"), &["box 2", "below max"]);
+    refused_rules(&boxed("0.0, 2.0, 0.0", "1.0, 1.0, 1.0", "0.5"), &["box 2", "below max"]);
+    refused_rules(&boxed("0.0, -inf, 0.0", "1.0, 1.0, 1.0", "0.5"), &["box 2", "finite"]);
+    for spacing in ["0.0", "-1.0", "nan"] {
+        refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", spacing), &["box 2", "positive"]);
+    }
+    refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", "1e-9"), &["box 2", "too small"]);
+    let place = Place::new();
+    place.put("none.stl", binary_stl(&[]));
+    place.put("point.stl", binary_stl(&[[[0.25; 3]; 3]]));
+    for name in ["none.stl", "point.stl"] {
+        refused(&place, &[name, "--spacing-min=0.5"], INPUT, &["no extent", "[root]"]);
+    }
+}
+
+#[test]
+fn case_files_with_mistakes() {
+    const GOOD: &str = "geometry = \"body.stl\"\nspacing_min = 0.5\n";
+    for (text, words) in [
+        ("geometry = \"body.stl\"\nspacing_mim = 0.5\n", &["line 2", "spacing_mim", "\"spacing_min\"?"][..]),
+        (&format!("{GOOD}layers_min = 3\n"), &["line 3", "layers_min", "\"layer_cells_min\"?"]),
+        (&format!("{GOOD}keep_crosing = true\n"), &["\"keep_crossing\"?"]),
+        (&format!("{GOOD}[[boxes]]\nmin = [0,0,0]\n"), &["line 3", "boxes", "\"box\"?"]),
+        (&format!("{GOOD}[root]\norigin = [0.0, 0.0, 0.0]\nedges = 1.0\n"), &["\"edge\"?"]),
+        (
+            &format!("{GOOD}[[box]]\nmin = [0.0,0.0,0.0]\nmax = [1.0,1.0,1.0]\nspacings = 1.0\n"),
+            &["line 6", "\"spacing\"?"],
+        ),
+        ("spacing_min = 0.5\n[generator]\nshape = \"sphere\"\nfacet = 80\n", &["\"facets\"?"]),
+        ("spacing_min = 0.5\n[generator]\nshape = \"spere\"\nfacets = 80\n", &["spere"]),
+        ("spacing_min = 0.5\n[generator]\nshape = \"sphere\"\nfacets = 0\n", &["generator"]),
+        ("spacing_min = 0.5\n", &["no geometry"]),
+        (&format!("{GOOD}[generator]\nshape = \"sphere\"\nfacets = 80\n"), &["not both"]),
+        (&format!("{GOOD}root_scale = 2.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 1.0\n"), &["not both"]),
+        (&format!("{GOOD}layer_cells_min = -4\n"), &["layer_cells_min is -4"]),
+        (&format!("{GOOD}layer_cells_min = 4294967296\n"), &["layer_cells_min is 4294967296"]),
+        (&format!("{GOOD}layer_cells_min = 1.5\n"), &["line 3"]),
+        (&format!("{GOOD}keep = \"neither\"\n"), &["neither", "outside"]),
+        (&format!("{GOOD}spacing_min = 0.25\n"), &["line 3", "duplicate"]),
+        ("geometry = \"body.stl\"\nspacing_min = \"0.5\"\n", &["line 2"]),
+        ("geometry = \"body.stl\"\nspacing_min = \n", &["line 2"]),
+        ("geometry = \"body.stl\n\nspacing_min = 0.5\n", &["line 1"]),
+        ("", &["spacing_min"]),
+        ("\u{0}\u{1}\u{2}", &["line 1"]),
+    ] {
+        if text.contains("facets = 0") {
+            // The generator is asked only when it is its turn.
+            let place = Place::new();
+            place.put("case.toml", text);
+            refused(&place, &["case.toml"], INPUT, words);
+        } else {
+            refused_case(text, words);
+        }
+    }
+    let place = Place::new();
+    place.put("case.toml", b"geometry = \"\xff\xfe.stl\"\n");
+    refused(&place, &["case.toml"], INPUT, &["case.toml", "UTF-8"]);
+    place.put("case.toml", "geometry = \"nowhere/body.stl\"\nspacing_min = 0.5\n");
+    refused(&place, &["case.toml"], INPUT, &["nowhere/body.stl", "No such file"]);
+}
+
+#[test]
+fn options_with_mistakes() {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    place.put("case.toml", "geometry = \"body.stl\"\nspacing_min = 0.5\n");
+    let with = |more: &[&'static str]| [&["body.stl", "--spacing-min=0.5"], more].concat();
+    refused(&place, &with(&["--keep", "some"]), INPUT, &["--keep"]);
+    refused(&place, &with(&["--keap", "all"]), INPUT, &["--keap", "--keep"]);
+    refused(&place, &with(&["--root", "0,0,0"]), INPUT, &["--root", "4 numbers"]);
+    refused(&place, &with(&["--box", "0,0,0,1,1,1,x"]), INPUT, &["--box", "7 numbers"]);
+    refused(&place, &with(&["--box", "0,0,0,1,-1,1,1"]), INPUT, &["box 1", "below max"]);
+    refused(&place, &with(&["--root-scale", "-2"]), INPUT, &["root_scale is -2"]);
+    refused(&place, &with(&["--level-base", "20"]), INPUT, &["--level-base"]);
+    refused(&place, &["case.toml", "--spacing-min", "1"], INPUT, &["case.toml is a case file"]);
+    for comm in ["sim:0", "sim", "sim:x", "sim:2:3:4", "sim:4097", "tcp"] {
+        run(place.mesher(&["body.stl", "--comm", comm])).refuses(INPUT, &["--comm"]);
+    }
+    run(place.mesher(&[])).refuses(INPUT, &["INPUT"]);
+}
+
+#[test]
+fn output_that_cannot_be_written() {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    place.put("file", "kept");
+    std::fs::create_dir(place.path().join("full")).expect("a directory");
+    place.put("full/kept.txt", "kept");
+    std::fs::create_dir(place.path().join("folder")).expect("a directory");
+    let to = |option, path| ["body.stl", "--spacing-min=0.5", option, path];
+    for (path, words) in [
+        ("file/mesh", &["file/mesh"][..]),
+        ("file", &["file"]),
+        ("absent/deep/mesh", &["absent/deep/mesh"]),
+        ("full", &["full", "not empty"]),
+        ("/proc/mesh", &["/proc/mesh"]),
+        ("", &["nothing was written"]),
+    ] {
+        refused(&place, &to("--out", path), OUTPUT, words);
+    }
+    for path in ["file/run.json", "absent/run.json", "/proc/run.json", "folder"] {
+        refused(&place, &to("--json", path), OUTPUT, &[path, "--json"]);
+    }
+    for path in ["file/status", "/proc/status"] {
+        refused(&place, &to("--status", path), OUTPUT, &[path]);
+    }
+    assert_eq!(std::fs::read(place.path().join("file")).expect("the file"), b"kept");
+}
+
+/// Runs the mesher through a shell that first does `before`, and lists `folder` afterwards.
+fn in_shell(place: &Place, wrapper: &[&str], before: &str, args: &str, folder: &str) -> Told {
+    let script = format!(
+        "{before} || exit 99; '{MESHER}' {args} --quiet; code=$?; find {folder} -mindepth 1; exit $code"
+    );
+    let mut command = Command::new(wrapper[0]);
+    command.args(&wrapper[1..]).args(["-c", &script]);
+    run(place.at(command))
+}
+
+/// Files may not grow beyond a limit: as on a full disk, a write fails in the middle.
+#[test]
+fn writes_that_fail_in_the_middle() {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    let body = "body.stl --root-scale 2 --keep all --out mesh";
+    // A shell ignores the signal for its children; the write then fails. Blocks have 512 bytes: only
+    // the manifest is larger than 16 of them in the first run, only the parts are in the second.
+    for (blocks, spacing) in [(16, "0.5"), (100, "0.01")] {
+        for comm in ["solo", "sim:3:5"] {
+            let args = format!("{body} --spacing-min {spacing} --comm {comm}");
+            let told =
+                in_shell(&place, &["sh"], &format!("trap '' XFSZ; ulimit -f {blocks}"), &args, "mesh");
+            assert_eq!(told.code, Some(OUTPUT), "{told:?}");
+            let (ours, rest): (Vec<&str>, _) =
+                told.stderr.lines().partition(|l| l.starts_with("mesher: "));
+            assert!(ours.len() == 1 && ours[0].contains("mesh"), "{told:?}");
+            assert!(rest.iter().all(|l| l.starts_with("find: ")), "{told:?}");
+            assert_eq!(told.stdout, "", "something was left behind");
+            assert!(!place.path().join("mesh").exists());
+        }
+    }
+}
+
+/// A disk that is full, and one that is read-only, where this test may mount them.
+#[test]
+fn disks_that_are_full_or_read_only() {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    std::fs::create_dir(place.path().join("disk")).expect("a directory");
+    // The mounts are in a namespace of the shell's own, and vanish with it.
+    let shell = ["unshare", "--mount", "sh"];
+    let try_it = in_shell(&place, &shell, "mount -t tmpfs -o size=64k none disk", "--version", "disk");
+    if try_it.code != Some(0) {
+        return left_out("a full disk", "this user may not mount a small one");
+    }
+    let body = "body.stl --root-scale 2 --keep all";
+    for (options, spacing, json) in [
+        ("size=16k", "0.5", ""),
+        ("size=64k", "0.01", ""),
+        ("size=48k", "0.5", "--json disk/run.json --out disk/mesh/"),
+        ("ro", "0.5", ""),
+        ("ro", "0.5", "--json disk/run.json"),
+    ] {
+        for comm in ["solo", "sim:3:5"] {
+            let out = if json.contains("--out") { "" } else { "--out disk/mesh" };
+            let args = format!("{body} --spacing-min {spacing} {out} {json} --comm {comm}");
+            let mount = format!("mount -t tmpfs -o {options} none disk");
+            let told = in_shell(&place, &shell, &mount, &args, "disk");
+            if options == "size=48k" && told.code == Some(0) {
+                continue;
+            }
+            told.refuses(OUTPUT, &["disk"]);
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! The mesher as a program: run in a directory of its own, within a time limit, and what it left there.
+#![allow(dead_code, missing_docs)]
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// A run on small input that takes longer hangs.
+const LIMIT: Duration = Duration::from_secs(20);
+
+/// The program under test.
+pub const MESHER: &str = env!("CARGO_BIN_EXE_mesher");
+
+/// What a run said. The code is none if a signal ended it.
+#[derive(Debug)]
+pub struct Told {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+/// A directory to run in.
+pub struct Place(TempDir);
+
+impl Place {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary directory"))
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    /// Puts a file there.
+    pub fn put(&self, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path().join(name);
+        std::fs::write(&path, contents).expect("the place can be written to");
+        path
+    }
+
+    /// A command of the mesher's that runs there.
+    pub fn mesher(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(MESHER);
+        command.args(args);
+        self.at(command)
+    }
+
+    /// A command that runs there, away from any MPI job that runs this test.
+    pub fn at(&self, mut command: Command) -> Command {
+        command.current_dir(self.path());
+        for v in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "PMIX_RANK", "MPI_LOCALNRANKS"] {
+            command.env_remove(v);
+        }
+        command
+    }
+
+    /// All that is there: paths with the contents of files; directories have none.
+    pub fn contents(&self) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
+        let mut found = BTreeMap::new();
+        let mut open = vec![self.path().to_owned()];
+        while let Some(folder) = open.pop() {
+            for entry in std::fs::read_dir(&folder).expect("a readable directory") {
+                let path = entry.expect("a readable entry").path();
+                if path.is_dir() {
+                    open.push(path.clone());
+                    found.insert(path, None);
+                } else {
+                    let bytes = path.is_file().then(|| std::fs::read(&path).expect("a file"));
+                    found.insert(path, bytes);
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Starts a command with its output caught.
+pub fn start(mut command: Command) -> Running {
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the program can be started");
+    let stdout = drain(child.stdout.take().expect("a pipe"));
+    let stderr = drain(child.stderr.take().expect("a pipe"));
+    Running { child, stdout, stderr, since: Instant::now() }
+}
+
+type Drained = std::thread::JoinHandle<Vec<u8>>;
+
+fn drain(mut from: impl Read + Send + 'static) -> Drained {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        let _ = from.read_to_end(&mut bytes);
+        bytes
+    })
+}
+
+/// A command under way.
+pub struct Running {
+    child: Child,
+    stdout: Drained,
+    stderr: Drained,
+    since: Instant,
+}
+
+impl Running {
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    pub fn is_over(&mut self) -> bool {
+        self.child.try_wait().expect("a child can be waited for").is_some()
+    }
+
+    /// Waits for the end; a run that takes too long is killed, and fails the test.
+    pub fn finish(mut self) -> Told {
+        while !self.is_over() {
+            if self.since.elapsed() > LIMIT {
+                let _ = self.child.kill();
+                let _ = self.child.wait();
+                panic!("a run did not end within {LIMIT:?}");
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let text = |d: Drained| {
+            String::from_utf8_lossy(&d.join().expect("a reader of output")).into_owned()
+        };
+        let code = self.child.wait().expect("a child can be waited for").code();
+        Told { code, stdout: text(self.stdout), stderr: text(self.stderr) }
+    }
+}
+
+/// Runs a command to its end.
+pub fn run(command: Command) -> Told {
+    start(command).finish()
+}
+
+impl Told {
+    /// Asserts the exit code, and one sentence that has all of `words` on standard error alone.
+    #[track_caller]
+    pub fn refuses(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert_eq!(self.stdout, "", "{self:?}");
+        let lines: Vec<&str> = self.stderr.lines().collect();
+        assert_eq!(lines.len(), 1, "one sentence must be told, not more: {self:?}");
+        self.explains(lines[0], words);
+    }
+
+    /// The same for a run under a launcher, which may say things of its own: one line is the mesher's.
+    #[track_caller]
+    pub fn refuses_under_launcher(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        let ours: Vec<&str> = self.stderr.lines().filter(|l| l.starts_with("mesher: ")).collect();
+        assert_eq!(ours.len(), 1, "one rank must tell one sentence: {self:?}");
+        self.explains(ours[0], words);
+    }
+
+    #[track_caller]
+    fn explains(&self, line: &str, words: &[&str]) {
+        assert!(line.starts_with("mesher: ") && line.len() > 20, "{self:?}");
+        assert!(!self.stderr.contains("panicked"), "{self:?}");
+        for word in words {
+            assert!(line.contains(word), "{word:?} is not said: {self:?}");
+        }
+    }
+
+    /// Asserts that all went well and nothing was complained about.
+    #[track_caller]
+    pub fn succeeds(&self) {
+        assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{self:?}");
+    }
+}
+
+/// Says, even where the test's output is captured, that something was left out.
+pub fn left_out(what: &str, why: &str) {
+    let _ = writeln!(std::io::stderr(), "left out: {what}, because {why}");
+}
+
+/// A binary STL of these facets.
+pub fn binary_stl(facets: &[geometries::Facet]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    geometries::write_stl_binary(facets, &mut bytes).expect("memory can be written to");
+    bytes
+}
