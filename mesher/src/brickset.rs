@@ -76,34 +76,54 @@ impl BrickSet {
         Cursor { rest: &self.bricks }
     }
 
-    /// The union of two sets.
+    /// The union of two sets. In place, from the back, as sets can be a good part of all memory.
     pub fn union(self, other: Self) -> Self {
-        if self.is_empty() {
-            return other;
+        let (Self { mut bricks }, Self { bricks: rest }) =
+            if self.len() < other.len() { (other, self) } else { (self, other) };
+        if rest.is_empty() {
+            return Self { bricks };
         }
-        if other.is_empty() {
-            return self;
+        let mut there = Cursor { rest: &bricks };
+        let common = rest.iter().filter(|b| there.get(b.key) != 0).count();
+        let (mut i, mut j) = (bricks.len(), rest.len());
+        let mut k = i + j - common;
+        bricks.reserve_exact(k - i);
+        bricks.resize(k, Brick { key: 0, bits: 0 });
+        while j > 0 {
+            k -= 1;
+            let r = rest[j - 1];
+            match i.checked_sub(1).map(|i| bricks[i]) {
+                Some(b) if b.key > r.key => {
+                    bricks[k] = b;
+                    i -= 1;
+                }
+                Some(b) if b.key == r.key => {
+                    bricks[k] = Brick { key: b.key, bits: b.bits | r.bits };
+                    i -= 1;
+                    j -= 1;
+                }
+                _ => {
+                    bricks[k] = r;
+                    j -= 1;
+                }
+            }
         }
-        let mut set = Self { bricks: Vec::with_capacity(self.len().max(other.len())) };
-        let (mut a, mut b) = (self.bricks.iter().peekable(), other.bricks.iter().peekable());
-        while let Some(next) = match (a.peek(), b.peek()) {
-            (Some(p), Some(q)) if p.key <= q.key => a.next(),
-            (Some(_), None) => a.next(),
-            _ => b.next(),
-        } {
-            set.push(next.key, next.bits);
-        }
-        set
+        Self { bricks }
+    }
+
+    /// Changes the bits of every brick, in order, to what `keep` makes of them.
+    pub fn retain(&mut self, mut keep: impl FnMut(Brick) -> u64) {
+        self.bricks.retain_mut(|b| {
+            b.bits = keep(*b);
+            b.bits != 0
+        });
     }
 
     /// The octants that are not in `other`.
-    pub fn without(&self, other: &Self) -> Self {
+    pub fn without(mut self, other: &Self) -> Self {
         let mut there = other.cursor();
-        let mut rest = Self::default();
-        for b in &self.bricks {
-            rest.push(b.key, b.bits & !there.get(b.key));
-        }
-        rest
+        self.retain(|b| b.bits & !there.get(b.key));
+        self
     }
 
     /// The parents of the set's octants.

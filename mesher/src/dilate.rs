@@ -26,67 +26,79 @@ const TILE_BRICKS_LOG2: u32 = 3;
 /// Words that were dilated, counting every row of every tile.
 pub type Words = u64;
 
-/// The parents, at level `l - 1`, of all octants of level `l` within `radius` of a source, octants
-/// outside the root left out. Sources come in Morton order.
-pub fn dilate_to_parents(
-    l: Level,
-    sources: impl Iterator<Item = Brick>,
-    radius: u32,
-    words: &mut Words,
-) -> BrickSet {
-    let odd = dilate_tiles(l, sources, (radius & 1) as usize, true, words);
-    match radius / 2 {
-        0 => odd,
-        half => dilate(l - 1, odd.bricks().iter().copied(), half, words),
+/// What several dilations reach together: octants of one level, those outside the root left out.
+pub struct Reach {
+    level: Level,
+    out: Gathered,
+    words: Words,
+}
+
+impl Reach {
+    /// Nothing yet, of level `level`.
+    pub fn new(level: Level) -> Self {
+        Self { level, out: Gathered::new(level), words: 0 }
+    }
+
+    /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
+    pub fn dilate(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
+        // Further than the root is wide, nothing more is reached.
+        let mut left = radius.min(1 << self.level) as usize;
+        if left <= MARGIN {
+            return dilate_tiles(sources, left, false, &mut self.out, &mut self.words);
+        }
+        let mut near = Gathered::new(self.level);
+        dilate_tiles(sources, MARGIN, false, &mut near, &mut self.words);
+        let mut set = near.into_set();
+        left -= MARGIN;
+        while left > MARGIN {
+            let mut near = Gathered::new(self.level);
+            dilate_tiles(set.bricks().iter().copied(), MARGIN, false, &mut near, &mut self.words);
+            set = near.into_set();
+            left -= MARGIN;
+        }
+        dilate_tiles(set.bricks().iter().copied(), left, false, &mut self.out, &mut self.words);
+    }
+
+    /// Adds the parents of all octants within `radius` of a source, which is one level deeper. Sources
+    /// come in Morton order.
+    pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
+        if radius < 2 {
+            return dilate_tiles(sources, radius as usize, true, &mut self.out, &mut self.words);
+        }
+        let mut odd = Gathered::new(self.level);
+        dilate_tiles(sources, (radius & 1) as usize, true, &mut odd, &mut self.words);
+        self.dilate(odd.into_set().bricks().iter().copied(), radius / 2);
+    }
+
+    /// What was reached, and the work that it took.
+    pub fn finish(self) -> (BrickSet, Words) {
+        (self.out.into_set(), self.words)
     }
 }
 
-/// All octants of level `l` within `radius` of a source, octants outside the root left out. Sources
-/// come in Morton order.
-pub fn dilate(
-    l: Level,
-    sources: impl Iterator<Item = Brick>,
-    radius: u32,
-    words: &mut Words,
-) -> BrickSet {
-    // Further than the root is wide, nothing more is reached.
-    let mut left = radius.min(1 << l) as usize;
-    let step = left.min(MARGIN);
-    let mut set = dilate_tiles(l, sources, step, false, words);
-    left -= step;
-    while left > 0 && !set.is_empty() {
-        let step = left.min(MARGIN);
-        set = dilate_tiles(l, set.bricks().iter().copied(), step, false, words);
-        left -= step;
-    }
-    set
-}
-
-/// One pass over the tiles; the result is of level `l - 1` if `to_parents`.
+/// One pass over the tiles; what is given is of the next coarser level if `to_parents`.
 fn dilate_tiles(
-    l: Level,
     sources: impl Iterator<Item = Brick>,
     radius: usize,
     to_parents: bool,
+    out: &mut Gathered,
     words: &mut Words,
-) -> BrickSet {
-    let mut out = Gathered::new(if to_parents { l - 1 } else { l });
+) {
     let mut tile = Tile::new(radius);
     let mut now = None;
     for b in sources {
         let key = b.key >> (3 * TILE_BRICKS_LOG2);
-        if now.is_some_and(|n| n != key) {
+        if let Some(done) = now.filter(|n| *n != key) {
             tile.dilate(words);
-            tile.give(now.unwrap_or_default(), to_parents, &mut out);
+            tile.give(done, to_parents, out);
         }
         now = Some(key);
         tile.put(b);
     }
-    if let Some(key) = now {
+    if let Some(done) = now {
         tile.dilate(words);
-        tile.give(key, to_parents, &mut out);
+        tile.give(done, to_parents, out);
     }
-    out.into_set()
 }
 
 /// A tile and its margin, one word per row.
@@ -384,13 +396,14 @@ mod tests {
         #[test]
         fn equals_one_box_per_octant(l in 1u32..8, seeds in prop::collection::vec(any::<u64>(), 0..12), r in 0u32..21) {
             let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
-            let mut words = 0;
             let grown = naive(l, &codes, i64::from(r));
-            let got = dilate(l, set(&codes).bricks().iter().copied(), r, &mut words);
-            prop_assert!(got.codes().eq(grown.iter().copied()));
+            let mut got = Reach::new(l);
+            got.dilate(set(&codes).bricks().iter().copied(), r);
+            prop_assert!(got.finish().0.codes().eq(grown.iter().copied()));
             let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
-            let got = dilate_to_parents(l, set(&codes).bricks().iter().copied(), r, &mut words);
-            prop_assert!(got.codes().eq(parents.iter().copied()));
+            let mut got = Reach::new(l - 1);
+            got.dilate_children(set(&codes).bricks().iter().copied(), r);
+            prop_assert!(got.finish().0.codes().eq(parents.iter().copied()));
         }
     }
 

@@ -26,7 +26,7 @@
 use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::comm::Comm;
-use crate::dilate::{Words, dilate, dilate_to_parents};
+use crate::dilate::{Reach, Words};
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::octant::Level;
@@ -113,25 +113,28 @@ impl Gradation<'_> {
     /// The parents, of level `l - 1`, that the kept leaves of level `l` in bricks that this rank answers
     /// for reach within `radius` cells.
     fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
+        let mut reach = Reach::new(l - 1);
         if l > self.surface {
-            let mut words = 0;
-            let reached = dilate_to_parents(l, self.leaves(l, |_| u64::MAX), radius, &mut words);
-            self.work.words_dilated += words;
-            return reached;
+            reach.dilate_children(self.leaves(l, |_| u64::MAX), radius);
+        } else {
+            let mut impure = self.impure.cursor();
+            let pure = (self.split[l as usize - 1].bricks().iter())
+                .filter(|b| self.share.answers_for(l - 1, b.key))
+                .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
+                .filter(|b| b.bits != 0);
+            reach.dilate(pure, radius.div_ceil(2));
+            let mut impure = self.impure.cursor();
+            let within = |key| brick::children(brick::byte(impure.get(key >> 3), key & 7));
+            reach.dilate_children(self.leaves(l, within), radius);
         }
-        let mut impure = self.impure.cursor();
-        let pure = (self.split[l as usize - 1].bricks().iter())
-            .filter(|b| self.share.answers_for(l - 1, b.key))
-            .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
-            .filter(|b| b.bits != 0);
-        let mut words = 0;
-        let whole = dilate(l - 1, pure, radius.div_ceil(2), &mut words);
-        let mut impure = self.impure.cursor();
-        let leaves =
-            self.leaves(l, |key| brick::children(brick::byte(impure.get(key >> 3), key & 7)));
-        let rest = dilate_to_parents(l, leaves, radius, &mut words);
+        self.reached(reach)
+    }
+
+    /// Takes what was reached, and counts the work.
+    fn reached(&mut self, reach: Reach) -> BrickSet {
+        let (reached, words) = reach.finish();
         self.work.words_dilated += words;
-        whole.union(rest)
+        reached
     }
 
     /// Kept leaves of level `l` in bricks that this rank answers for, as far as `within` lets them through.
@@ -171,9 +174,10 @@ impl Gradation<'_> {
             return;
         }
         for m in (surface..self.base.crossing.len() as Level).rev() {
+            let mut reach = Reach::new(m - 1);
             let leaves = self.base.crossing[m as usize].bricks().iter().copied();
-            let leaves = leaves.filter(|b| self.share.answers_for(m, b.key));
-            let mut touched = dilate_to_parents(m, leaves, 1, &mut self.work.words_dilated);
+            reach.dilate_children(leaves.filter(|b| self.share.answers_for(m, b.key)), 1);
+            let mut touched = self.reached(reach);
             for _ in surface..m {
                 touched = touched.coarsen();
             }

@@ -32,25 +32,24 @@ impl<'a> Kept<'a> {
     /// An octant whose parent is split in the base tree is one of its octants, and is looked up. The
     /// others are kept where their parents are: so the question goes up, level by level, for ever
     /// fewer octants, and each level's sets are read once in order.
-    pub fn only(&self, base: &Tree, l: Level, set: BrickSet) -> BrickSet {
+    pub fn only(&self, base: &Tree, l: Level, mut set: BrickSet) -> BrickSet {
         if !self.any || set.is_empty() {
             return set;
         }
         let mut deleted = self.deleted[l as usize].cursor();
-        let mut out = BrickSet::default();
         if l == 0 {
-            set.bricks().iter().for_each(|b| out.push(b.key, b.bits & !deleted.get(b.key)));
-            return out;
+            set.retain(|b| b.bits & !deleted.get(b.key));
+            return set;
         }
         let parents = set.coarsen().without(&base.split[l as usize - 1]);
         let parents = self.only(base, l - 1, parents);
         let (mut below_leaf, mut split) = (parents.cursor(), base.split[l as usize - 1].cursor());
-        for b in set.bricks() {
+        set.retain(|b| {
             let of = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
             let here = of(split.get(b.key >> 3)) & !deleted.get(b.key);
-            out.push(b.key, b.bits & (here | of(below_leaf.get(b.key >> 3))));
-        }
-        out
+            b.bits & (here | of(below_leaf.get(b.key >> 3)))
+        });
+        set
     }
 
     /// Debug check that deleted leaves are leaves of the base tree.

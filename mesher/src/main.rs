@@ -66,10 +66,10 @@ struct Args {
 #[command(next_help_heading = "Without a case file")]
 struct Body {
     /// Cells at the surface are this size or smaller
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     spacing_min: Option<f64>,
     /// Minimum thickness of a layer, in cells [default: 4]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     layer_cells_min: Option<u32>,
     /// Which side stays [default: outside]
     #[arg(long, value_enum)]
@@ -78,7 +78,7 @@ struct Body {
     #[arg(long)]
     drop_crossing: bool,
     /// Root edge in longest edges of the bounding box, centred on it [default: 10]
-    #[arg(long, value_name = "X", conflicts_with = "root")]
+    #[arg(long, value_name = "X", conflicts_with = "root", allow_negative_numbers = true)]
     root_scale: Option<f64>,
     /// Root cube: minimum corner and edge
     #[arg(long, value_name = "X,Y,Z,EDGE", allow_hyphen_values = true, value_parser = numbers::<4>)]
@@ -134,15 +134,32 @@ fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
+/// The command line; what is wrong with it in one sentence, as all other errors. Help and version end
+/// the process here.
+fn parse() -> Result<Args, Error> {
+    Args::try_parse().map_err(|e| {
+        if !e.use_stderr() {
+            e.exit();
+        }
+        let text = e.to_string();
+        let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
+        let told: Vec<&str> = lines
+            .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
+            .collect();
+        let told = told.join(" ");
+        Error::input(format!("{}; see --help", told.strip_prefix("error: ").unwrap_or(&told)))
+    })
+}
+
 fn main() {
-    let args = Args::parse();
+    let args = parse();
     // Failing to install the handler only means that interrupts end the process the default way.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
             exit(130);
         }
     });
-    match choose(args.comm) {
+    match choose(args.as_ref().map_or(CommChoice::Auto, |a| a.comm)) {
         Ok(CommChoice::Mpi) => run_mpi(&args),
         Ok(CommChoice::Sim { ranks, seed }) => {
             abort_on_panic(|| exit(BUG));
@@ -188,7 +205,7 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
 }
 
 #[cfg(feature = "mpi")]
-fn run_mpi(args: &Args) {
+fn run_mpi(args: &Result<Args, Error>) {
     let comm = mesher::comm::mpi::Mpi::start();
     // A panic that unwinds would leave the other ranks waiting for ever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
@@ -199,7 +216,7 @@ fn run_mpi(args: &Args) {
 }
 
 #[cfg(not(feature = "mpi"))]
-fn run_mpi(_: &Args) {
+fn run_mpi(_: &Result<Args, Error>) {
     unreachable!("MPI is chosen only where it is built in");
 }
 
@@ -219,8 +236,13 @@ fn fail(e: &Error) -> i32 {
 }
 
 /// One rank's run; returns the exit code, the same on all ranks.
-fn run(args: &Args, comm: &dyn Comm) -> i32 {
+fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
+    let args = match args {
+        Ok(args) => args,
+        Err(e) if first => return fail(e),
+        Err(e) => return e.exit_code(),
+    };
     let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);
@@ -249,6 +271,9 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
             Error::output(format!("{}: {e}: choose another --status", dir.display()))
         }))?;
     }
+    // A place that cannot be written is found out now rather than after the meshing.
+    let json = args.json.as_ref().filter(|_| comm.rank() == 0).map(|p| Json::begin(p)).transpose();
+    let json = mesher::comm::agree(comm, json)?;
     let case = mesher::comm::agree(comm, case(args))?;
     let partitioner = args.partitioner.unwrap_or(if cfg!(feature = "metis") {
         Partitioner::Metis
@@ -261,11 +286,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         out: args.out.clone(),
     };
     let report = mesh(&case, &options, comm, record)?;
-    let json = match &args.json {
-        Some(path) if comm.rank() == 0 => write_json(path, &report),
-        _ => Ok(()),
-    };
-    comm.agree(json)?;
+    comm.agree(json.map_or(Ok(()), |json| json.finish(&report)))?;
     Ok(report)
 }
 
@@ -309,15 +330,39 @@ fn case(args: &Args) -> Result<Case, Error> {
     })
 }
 
-fn write_json(path: &Path, report: &Report) -> Result<(), Error> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let write = || -> std::io::Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
-        serde_json::to_writer_pretty(&mut file, report)?;
-        file.write_all(b"\n")?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|e| e.error)?;
+/// The report's JSON file: written beside its place, and put there when it is complete.
+struct Json {
+    path: PathBuf,
+    file: tempfile::NamedTempFile,
+}
+
+impl Json {
+    fn begin(path: &Path) -> Result<Self, Error> {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let begin = || {
+            if path.is_dir() {
+                return Err(std::io::ErrorKind::IsADirectory.into());
+            }
+            // Readable by whom the user's other files are.
+            let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+            tempfile::Builder::new().permissions(permissions).tempfile_in(folder)
+        };
+        let file = begin().map_err(|e| Self::fail(path, &e))?;
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    fn finish(mut self, report: &Report) -> Result<(), Error> {
+        let mut write = || -> std::io::Result<()> {
+            serde_json::to_writer_pretty(&mut self.file, report)?;
+            self.file.write_all(b"\n")?;
+            self.file.as_file().sync_all()
+        };
+        write().map_err(|e| Self::fail(&self.path, &e))?;
+        self.file.persist(&self.path).map_err(|e| Self::fail(&self.path, &e.error))?;
         Ok(())
-    };
-    write().map_err(|e| Error::output(format!("{}: {e}: choose another --json", path.display())))
+    }
+
+    fn fail(path: &Path, e: &std::io::Error) -> Error {
+        Error::output(format!("{}: {e}: choose another --json", path.display()))
+    }
 }

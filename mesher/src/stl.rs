@@ -25,12 +25,15 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     let fail = |e: std::io::Error| {
         Error::input(format!("{}: {e}: give a readable STL file", path.display()))
     };
-    let file = File::open(path).map_err(fail)?;
-    let meta = file.metadata().map_err(fail)?;
-    if meta.is_dir() {
-        return Err(Error::input(format!("{} is a directory: give an STL file", path.display())));
+    // Looked at first, as opening a pipe would wait for a writer.
+    if !std::fs::metadata(path).map_err(fail)?.is_file() {
+        return Err(Error::input(format!(
+            "{} is a directory, a pipe or a device: give an STL file",
+            path.display()
+        )));
     }
-    let length = meta.len();
+    let file = File::open(path).map_err(fail)?;
+    let length = file.metadata().map_err(fail)?.len();
     if length == 0 {
         return Err(Error::input(format!(
             "{} is empty: give an STL file with facets",
@@ -93,8 +96,11 @@ impl Stl {
         self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
         let mut facets = Vec::new();
         for (i, solid) in solids(&bytes).into_iter().enumerate() {
-            let broken = |e: std::io::Error| {
-                self.fail(format!("solid {} is malformed ({e}): export it again", i + 1))
+            let broken = |facet: usize, e: std::io::Error| {
+                self.fail(format!(
+                    "facet {facet}, in solid {}, is malformed ({e}): export it again",
+                    i + 1
+                ))
             };
             let complete =
                 solid.lines().last().is_some_and(|l| l.trim_start().starts_with("endsolid"));
@@ -104,8 +110,11 @@ impl Stl {
                     i + 1
                 )));
             }
-            for triangle in stl_io::create_stl_reader(&mut Cursor::new(solid)).map_err(broken)? {
-                facets.push(triangle.map_err(broken)?.vertices.map(|v| v.0));
+            let mut text = Cursor::new(solid);
+            let first = facets.len();
+            for triangle in stl_io::create_stl_reader(&mut text).map_err(|e| broken(first, e))? {
+                let triangle = triangle.map_err(|e| broken(facets.len(), e))?;
+                facets.push(triangle.vertices.map(|v| v.0));
             }
         }
         Ok(facets)
@@ -129,6 +138,8 @@ fn solids(bytes: &[u8]) -> Vec<String> {
         match (first, out.last_mut()) {
             ("solid", _) => out.push("solid x\n".into()),
             ("endsolid", Some(s)) if open => s.push_str("endsolid x\n"),
+            // Normals are not used, and are often not numbers.
+            ("facet", Some(s)) => s.push_str("facet normal 0 0 0\n"),
             (_, Some(s)) => {
                 s.push_str(&line);
                 s.push('\n');

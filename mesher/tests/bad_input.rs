@@ -34,7 +34,11 @@ fn refused(place: &Place, args: &[&str], code: i32, words: &[&str]) {
         all.push(comm);
         run(place.mesher(&all)).refuses(code, words);
         let (before, after) = (before.keys(), place.contents());
-        assert!(before.eq(after.keys()), "{args:?} {comm} left something behind: {:?}", after.keys());
+        assert!(
+            before.eq(after.keys()),
+            "{args:?} {comm} left something behind: {:?}",
+            after.keys()
+        );
     }
 }
 
@@ -81,8 +85,9 @@ fn files_that_are_no_stl() {
             std::fs::copy(&path, place.path().join(&name)).expect("a copy");
             let what: &[&str] = match name.as_str() {
                 "empty.stl" => &["empty"],
-                "nan.stl" | "infinite.stl" | "ascii_nan.stl" | "ascii_overflow.stl" => {
-                    &["facet 6", "not finite"]
+                "nan.stl" | "infinite.stl" => &["facet 6", "not finite"],
+                "ascii_nan.stl" | "ascii_infinite.stl" | "ascii_overflow.stl" => {
+                    &[&name, "facet 6", "finite"]
                 }
                 "count_too_large.stl" => &["promises 4294967295 facets", "484"],
                 _ => &[&name],
@@ -138,7 +143,10 @@ fn spacings_and_layers_that_cannot_be() {
         place.put("body.stl", tetrahedron());
         refused(&place, &["body.stl", "--spacing-min", value], INPUT, words);
     }
-    refused_rules("spacing_min = 0.5\nlayer_cells_min = 0\n", &["layer_cells_min is 0", "at least 1"]);
+    refused_rules(
+        "spacing_min = 0.5\nlayer_cells_min = 0\n",
+        &["layer_cells_min is 0", "at least 1"],
+    );
     let place = Place::new();
     place.put("body.stl", tetrahedron());
     let layers = |n| ["body.stl", "--spacing-min=0.5", "--layer-cells-min", n];
@@ -186,7 +194,10 @@ fn roots_and_boxes_that_cannot_be() {
 fn case_files_with_mistakes() {
     const GOOD: &str = "geometry = \"body.stl\"\nspacing_min = 0.5\n";
     for (text, words) in [
-        ("geometry = \"body.stl\"\nspacing_mim = 0.5\n", &["line 2", "spacing_mim", "\"spacing_min\"?"][..]),
+        (
+            "geometry = \"body.stl\"\nspacing_mim = 0.5\n",
+            &["line 2", "spacing_mim", "\"spacing_min\"?"][..],
+        ),
         (&format!("{GOOD}layers_min = 3\n"), &["line 3", "layers_min", "\"layer_cells_min\"?"]),
         (&format!("{GOOD}keep_crosing = true\n"), &["\"keep_crossing\"?"]),
         (&format!("{GOOD}[[boxes]]\nmin = [0,0,0]\n"), &["line 3", "boxes", "\"box\"?"]),
@@ -200,7 +211,10 @@ fn case_files_with_mistakes() {
         ("spacing_min = 0.5\n[generator]\nshape = \"sphere\"\nfacets = 0\n", &["generator"]),
         ("spacing_min = 0.5\n", &["no geometry"]),
         (&format!("{GOOD}[generator]\nshape = \"sphere\"\nfacets = 80\n"), &["not both"]),
-        (&format!("{GOOD}root_scale = 2.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 1.0\n"), &["not both"]),
+        (
+            &format!("{GOOD}root_scale = 2.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 1.0\n"),
+            &["not both"],
+        ),
         (&format!("{GOOD}layer_cells_min = -4\n"), &["layer_cells_min is -4"]),
         (&format!("{GOOD}layer_cells_min = 4294967296\n"), &["layer_cells_min is 4294967296"]),
         (&format!("{GOOD}layer_cells_min = 1.5\n"), &["line 3"]),
@@ -263,7 +277,6 @@ fn output_that_cannot_be_written() {
         ("absent/deep/mesh", &["absent/deep/mesh"]),
         ("full", &["full", "not empty"]),
         ("/proc/mesh", &["/proc/mesh"]),
-        ("", &["nothing was written"]),
     ] {
         refused(&place, &to("--out", path), OUTPUT, words);
     }
@@ -297,8 +310,13 @@ fn writes_that_fail_in_the_middle() {
     for (blocks, spacing) in [(16, "0.5"), (100, "0.01")] {
         for comm in ["solo", "sim:3:5"] {
             let args = format!("{body} --spacing-min {spacing} --comm {comm}");
-            let told =
-                in_shell(&place, &["sh"], &format!("trap '' XFSZ; ulimit -f {blocks}"), &args, "mesh");
+            let told = in_shell(
+                &place,
+                &["sh"],
+                &format!("trap '' XFSZ; ulimit -f {blocks}"),
+                &args,
+                "mesh",
+            );
             assert_eq!(told.code, Some(OUTPUT), "{told:?}");
             let (ours, rest): (Vec<&str>, _) =
                 told.stderr.lines().partition(|l| l.starts_with("mesher: "));
@@ -318,7 +336,8 @@ fn disks_that_are_full_or_read_only() {
     std::fs::create_dir(place.path().join("disk")).expect("a directory");
     // The mounts are in a namespace of the shell's own, and vanish with it.
     let shell = ["unshare", "--mount", "sh"];
-    let try_it = in_shell(&place, &shell, "mount -t tmpfs -o size=64k none disk", "--version", "disk");
+    let try_it =
+        in_shell(&place, &shell, "mount -t tmpfs -o size=64k none disk", "--version", "disk");
     if try_it.code != Some(0) {
         return left_out("a full disk", "this user may not mount a small one");
     }
@@ -326,18 +345,14 @@ fn disks_that_are_full_or_read_only() {
     for (options, spacing, json) in [
         ("size=16k", "0.5", ""),
         ("size=64k", "0.01", ""),
-        ("size=48k", "0.5", "--json disk/run.json --out disk/mesh/"),
         ("ro", "0.5", ""),
         ("ro", "0.5", "--json disk/run.json"),
     ] {
         for comm in ["solo", "sim:3:5"] {
-            let out = if json.contains("--out") { "" } else { "--out disk/mesh" };
+            let out = "--out disk/mesh";
             let args = format!("{body} --spacing-min {spacing} {out} {json} --comm {comm}");
             let mount = format!("mount -t tmpfs -o {options} none disk");
             let told = in_shell(&place, &shell, &mount, &args, "disk");
-            if options == "size=48k" && told.code == Some(0) {
-                continue;
-            }
             told.refuses(OUTPUT, &["disk"]);
         }
     }

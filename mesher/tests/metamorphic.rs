@@ -246,9 +246,12 @@ fn every_division_gives_the_same_mesh() {
     let hollow = Small { keep: Keep::Inside, keep_crossing: false, ..crooked() };
     let boxes_alone = Small { facets: vec![], ..crooked() };
     let lone_leaf = Small { facets: vec![], boxes: vec![], ..crooked() };
-    for (name, case) in
-        [("leaky", leaky), ("hollow", hollow), ("boxes alone", boxes_alone), ("lone leaf", lone_leaf)]
-    {
+    for (name, case) in [
+        ("leaky", leaky),
+        ("hollow", hollow),
+        ("boxes alone", boxes_alone),
+        ("lone leaf", lone_leaf),
+    ] {
         for ungraded in [true, false] {
             let want = case.outcome(&Run::SOLO, ungraded);
             for run in divisions() {

@@ -46,13 +46,14 @@ impl Local {
     }
 
     /// Numbers the classes of joined components: the class of each component, and how many there are.
-    pub fn classes(&self) -> (Vec<u32>, usize) {
-        let mut class: Vec<u32> = Vec::with_capacity(self.parent.len());
+    pub fn classes(self) -> (Vec<u32>, usize) {
+        let mut class = self.parent;
         let mut count = 0;
-        for (c, &up) in self.parent.iter().enumerate() {
-            // A parent's number is never higher than its child's, so its class is known.
-            class.push(if up as usize == c { count } else { class[up as usize] });
-            count += u32::from(up as usize == c);
+        for c in 0..class.len() {
+            // A parent's number is never higher than its child's, so its class is there already.
+            let up = class[c] as usize;
+            class[c] = if up == c { count } else { class[up] };
+            count += u32::from(up == c);
         }
         (class, count as usize)
     }

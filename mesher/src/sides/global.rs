@@ -70,7 +70,7 @@ fn across_ranks(
 fn top_components(nodes: &Nodes) -> Vec<u32> {
     let mut out = Vec::new();
     for l in 0..LEVELS as Level {
-        for (n, _) in nodes.keys(l) {
+        for n in 0..nodes.len(l) {
             if nodes.place(l, n) == Place::Top {
                 out.extend(nodes.components(l, n).map(|c| c.0));
             }

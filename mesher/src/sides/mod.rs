@@ -53,12 +53,16 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Sides {
     let nodes = nodes::Nodes::new(tree, share);
-    let local = components::join(&nodes);
+    let mut local = components::join(&nodes);
+    let faces = std::mem::take(&mut local.faces);
     let (class, classes) = local.classes();
-    let names = global::names(&nodes, local.faces, &class, classes, comm);
-    let candidates = vote::candidates(&nodes, &class, &names, share, comm);
+    let names = global::names(&nodes, faces, &class, classes, comm);
+    let candidates = vote::candidates(&nodes, tree, &class, &names, share, comm);
+    // The largest thing in memory; for the sides, bricks are flooded once more.
+    drop(nodes);
     let verdict = vote::decide(&candidates, facets, comm);
     let inside: Vec<bool> = names.iter().map(|n| verdict.inside.contains(n)).collect();
+    let mut inside = class.into_iter().map(|c| inside[c as usize]);
     let mut sides = Sides {
         inside: per_level(),
         deleted: per_level(),
@@ -67,22 +71,19 @@ pub fn decide(
         rays: verdict.rays,
     };
     for l in 0..LEVELS as Level {
-        for (i, key) in nodes.keys(l) {
-            let within = nodes
-                .components(l, i)
-                .filter(|c| inside[class[c.0 as usize] as usize])
-                .fold(0, |w, c| w | c.1);
-            let open = nodes.open(l, i);
-            sides.inside[l as usize].push(key, if keep == Keep::All { within } else { 0 });
-            sides.deleted[l as usize].push(
-                key,
-                match keep {
-                    Keep::All => 0,
-                    Keep::Outside => within,
-                    Keep::Inside => open & !within,
-                },
-            );
+        for b in nodes::open_bricks(tree, share, l) {
+            let mut side =
+                |w: u64, part: u64| if inside.next() == Some(true) { w | part } else { w };
+            let within = nodes::parts(b.open).fold(0, &mut side);
+            let (found, deleted) = match keep {
+                Keep::All => (within, 0),
+                Keep::Outside => (0, within),
+                Keep::Inside => (0, b.open & !within),
+            };
+            sides.inside[l as usize].push(b.key, found);
+            sides.deleted[l as usize].push(b.key, deleted);
         }
     }
+    debug_assert!(inside.next().is_none(), "every component has a side");
     sides
 }

@@ -23,9 +23,6 @@ pub struct Nodes {
 
 #[derive(Default)]
 struct LevelNodes {
-    keys: Vec<u64>,
-    /// Non-crossing leaves.
-    open: Vec<u64>,
     /// Empty if nothing is split at the level.
     split: Vec<u64>,
     first_child: Vec<Node>,
@@ -33,6 +30,55 @@ struct LevelNodes {
     components: Vec<Component>,
     /// Places of the nodes; empty if all are this rank's alone.
     places: Vec<Place>,
+}
+
+/// A brick with its leaves that do not cross.
+pub struct OpenBrick {
+    /// Its key.
+    pub key: u64,
+    /// Its octants that are split.
+    pub split: u64,
+    /// Its non-crossing leaves.
+    pub open: u64,
+    /// The rank that holds it, if this one does not; then nothing is known of it.
+    pub remote: Option<usize>,
+}
+
+/// The bricks of a level, in Morton order: the nodes.
+pub fn open_bricks<'a>(
+    tree: &'a Tree,
+    share: &'a Ownership,
+    l: Level,
+) -> impl Iterator<Item = OpenBrick> + 'a {
+    let mut split = tree.split[l as usize].cursor();
+    let mut crossing = tree.crossing[l as usize].cursor();
+    Tree::exists(&tree.split, l).map(move |b| {
+        let place = if share.answers_for(l, b.key) { Place::Mine } else { share.place(l, b.key) };
+        match place {
+            Place::Remote(r) => OpenBrick { key: b.key, split: 0, open: 0, remote: Some(r) },
+            _ => {
+                let split = split.get(b.key);
+                OpenBrick {
+                    key: b.key,
+                    split,
+                    open: b.bits & !split & !crossing.get(b.key),
+                    remote: None,
+                }
+            }
+        }
+    })
+}
+
+/// The components inside a brick: the parts of `open` that are connected over faces.
+#[inline]
+pub fn parts(mut open: u64) -> impl Iterator<Item = u64> {
+    std::iter::from_fn(move || {
+        (open != 0).then(|| {
+            let part = brick::flood(open & open.wrapping_neg(), open);
+            open &= !part;
+            part
+        })
+    })
 }
 
 impl Nodes {
@@ -48,33 +94,20 @@ impl Nodes {
 
     fn build(&mut self, tree: &Tree, share: &Ownership, l: Level) -> LevelNodes {
         let mut out = LevelNodes::default();
-        let mut split = tree.split[l as usize].cursor();
-        let mut crossing = tree.crossing[l as usize].cursor();
         let splits = !tree.split[l as usize].is_empty();
         let mut children = 0;
-        for b in Tree::exists(&tree.split, l) {
-            let remote = !share.answers_for(l, b.key) && share.place(l, b.key) != Place::Top;
-            let (s, c) = if remote { (0, 0) } else { (split.get(b.key), crossing.get(b.key)) };
-            let open = if remote { 0 } else { b.bits & !s & !c };
-            out.keys.push(b.key);
-            out.open.push(open);
+        for (n, b) in open_bricks(tree, share, l).enumerate() {
             if splits {
-                out.split.push(s);
+                out.split.push(b.split);
                 out.first_child.push(children);
-                children += brick::parents(s).count_ones();
+                children += brick::parents(b.split).count_ones();
             }
-            if l < 2 || share.is_shared(l) || remote || !out.places.is_empty() {
-                let place = share.place(l, b.key);
-                out.places.resize(out.keys.len() - 1, Place::Mine);
-                out.places.push(place);
+            if l < 2 || share.is_shared(l) || b.remote.is_some() || !out.places.is_empty() {
+                out.places.resize(n, Place::Mine);
+                out.places.push(share.place(l, b.key));
             }
             out.components.push(self.masks.len() as Component);
-            let mut rest = open;
-            while rest != 0 {
-                let one = brick::flood(rest & rest.wrapping_neg(), rest);
-                self.masks.push(one);
-                rest &= !one;
-            }
+            self.masks.extend(parts(b.open));
         }
         out.components
             .push(Component::try_from(self.masks.len()).expect("fewer than 2^32 components"));
@@ -86,20 +119,9 @@ impl Nodes {
         self.masks.len() as Component
     }
 
-    /// Nodes of a level with their keys.
-    pub fn keys(&self, l: Level) -> impl Iterator<Item = (Node, u64)> + '_ {
-        (0..).zip(self.levels[l as usize].keys.iter().copied())
-    }
-
     /// Number of nodes of a level.
-    pub fn len(&self, l: Level) -> usize {
-        self.levels[l as usize].keys.len()
-    }
-
-    /// Non-crossing leaves of a node.
-    #[inline]
-    pub fn open(&self, l: Level, n: Node) -> u64 {
-        self.levels[l as usize].open[n as usize]
+    pub fn len(&self, l: Level) -> Node {
+        (self.levels[l as usize].components.len() - 1) as Node
     }
 
     /// Split octants of a node.

@@ -4,12 +4,13 @@ use super::Ambiguous;
 use super::global::Name;
 use super::nodes::Nodes;
 use super::rays::parities;
+use crate::brick::Brick;
 use crate::brickset::ones;
 use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::octant::{Level, corner, edge};
 use crate::share::Ownership;
-use crate::tree::LEVELS;
+use crate::tree::{LEVELS, Tree};
 use std::collections::{BTreeMap, HashSet};
 
 /// Most leaves of a component that are tried before the majority decides.
@@ -34,6 +35,7 @@ impl Candidate {
 /// For each component of the whole tree its first leaves. Collective; the same on all ranks.
 pub fn candidates(
     nodes: &Nodes,
+    tree: &Tree,
     class: &[u32],
     names: &[Name],
     share: &Ownership,
@@ -41,7 +43,7 @@ pub fn candidates(
 ) -> BTreeMap<Name, Vec<Candidate>> {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); names.len()];
     for l in 0..LEVELS as Level {
-        for (n, key) in nodes.keys(l) {
+        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
             if !share.answers_for(l, key) {
                 continue;
             }

@@ -83,9 +83,8 @@ impl Small {
     pub fn outcome(&self, run: &Run, ungraded: bool) -> Outcome {
         let options = options(run.division, ungraded);
         let case = self.mesher_case();
-        let parts = sim::run(run.ranks, run.seed, |c| {
-            words(&case, &options, c).expect("the case is good")
-        });
+        let parts =
+            sim::run(run.ranks, run.seed, |c| words(&case, &options, c).expect("the case is good"));
         let ambiguous = parts[0].1;
         assert!(parts.iter().all(|p| p.1 == ambiguous), "ranks must agree on what is ambiguous");
         assert!(parts.iter().all(|p| p.0.is_sorted()), "parts must be sorted");

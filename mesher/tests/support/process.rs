@@ -10,9 +10,14 @@ use tempfile::TempDir;
 
 /// A run on small input that takes longer hangs.
 const LIMIT: Duration = Duration::from_secs(20);
+/// The same under an MPI launcher, which takes its time when it shares the machine.
+const LIMIT_MPI: Duration = Duration::from_secs(90);
 
 /// The program under test.
 pub const MESHER: &str = env!("CARGO_BIN_EXE_mesher");
+
+/// The launcher of MPI jobs.
+const MPIRUN: &str = "mpirun";
 
 /// What a run said. The code is none if a signal ended it.
 #[derive(Debug)]
@@ -57,6 +62,23 @@ impl Place {
         command
     }
 
+    /// A command that runs the mesher on real MPI ranks there.
+    pub fn mpirun(&self, ranks: usize, args: &[&str]) -> Command {
+        self.mpirun_of(ranks, MESHER, args)
+    }
+
+    /// The same of any program.
+    pub fn mpirun_of(&self, ranks: usize, program: &str, args: &[&str]) -> Command {
+        let mut command = Command::new(MPIRUN);
+        command.args(["-n", &ranks.to_string(), program]).args(args);
+        let mut command = self.at(command);
+        for v in ["ALLOW_RUN_AS_ROOT", "ALLOW_RUN_AS_ROOT_CONFIRM", "MCA_rmaps_base_oversubscribe"]
+        {
+            command.env(format!("OMPI_{v}"), "1");
+        }
+        command
+    }
+
     /// All that is there: paths with the contents of files; directories have none.
     pub fn contents(&self) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
         let mut found = BTreeMap::new();
@@ -83,7 +105,9 @@ pub fn start(mut command: Command) -> Running {
     let mut child = command.spawn().expect("the program can be started");
     let stdout = drain(child.stdout.take().expect("a pipe"));
     let stderr = drain(child.stderr.take().expect("a pipe"));
-    Running { child, stdout, stderr, since: Instant::now() }
+    let launched = command.get_program() == MPIRUN;
+    let limit = if launched { LIMIT_MPI } else { LIMIT };
+    Running { child, stdout, stderr, limit, since: Instant::now() }
 }
 
 type Drained = std::thread::JoinHandle<Vec<u8>>;
@@ -101,6 +125,7 @@ pub struct Running {
     child: Child,
     stdout: Drained,
     stderr: Drained,
+    limit: Duration,
     since: Instant,
 }
 
@@ -116,10 +141,10 @@ impl Running {
     /// Waits for the end; a run that takes too long is killed, and fails the test.
     pub fn finish(mut self) -> Told {
         while !self.is_over() {
-            if self.since.elapsed() > LIMIT {
+            if self.since.elapsed() > self.limit {
                 let _ = self.child.kill();
                 let _ = self.child.wait();
-                panic!("a run did not end within {LIMIT:?}");
+                panic!("a run did not end within {:?}", self.limit);
             }
             std::thread::sleep(Duration::from_millis(2));
         }
@@ -158,7 +183,7 @@ impl Told {
 
     #[track_caller]
     fn explains(&self, line: &str, words: &[&str]) {
-        assert!(line.starts_with("mesher: ") && line.len() > 20, "{self:?}");
+        assert!(line.starts_with("mesher: ") && line.len() > 15, "{self:?}");
         assert!(!self.stderr.contains("panicked"), "{self:?}");
         for word in words {
             assert!(line.contains(word), "{word:?} is not said: {self:?}");
@@ -170,6 +195,19 @@ impl Told {
     pub fn succeeds(&self) {
         assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{self:?}");
     }
+}
+
+/// Whether MPI jobs can be run; says so if not.
+pub fn has_mpi() -> bool {
+    if !cfg!(feature = "mpi") {
+        left_out("real MPI", "the mesher is built without it (--features mpi)");
+        return false;
+    }
+    let found = Command::new(MPIRUN).arg("--version").stdout(Stdio::null()).status().is_ok();
+    if !found {
+        left_out("real MPI", "there is no mpirun");
+    }
+    found
 }
 
 /// Says, even where the test's output is captured, that something was left out.

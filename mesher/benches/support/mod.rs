@@ -1,0 +1,197 @@
+//! Fixed work for the benches: the mesher's kernels, each on what the phases before it made of an aircraft.
+#![allow(dead_code, missing_docs)]
+
+use mesher::base::Division;
+use mesher::brick::{Brick, flood, valid};
+use mesher::brickset::BrickSet;
+use mesher::case::{Case, RootSpec};
+use mesher::comm::Solo;
+use mesher::facet::{Facet, crossed};
+use mesher::ingest::{Share, Source, read};
+use mesher::kept::Kept;
+use mesher::lattice::{Bounds, Keep, Rules};
+use mesher::octant::ROOT_BITS;
+use mesher::partition::{Partitioner, Weights};
+use mesher::share::Ownership;
+use mesher::sides::{Sides, decide};
+use mesher::stream::Leaves;
+use mesher::tree::{PerLevel, Tree};
+use mesher::voxelise::{Depth, Filed, Start, refine};
+use mesher::{Options, digest, dilate, grade, stl};
+use std::convert::Infallible;
+use std::hint::black_box;
+
+/// A kernel with the things that one run of it works on, in number.
+pub struct Kernel {
+    pub name: &'static str,
+    pub elements: u64,
+    /// Does the work once; returns something that depends on all of it.
+    pub run: Box<dyn FnMut() -> u64>,
+}
+
+/// A generated shape around which to mesh, with the finest cells `1 / 2^finer` of its longest edge or
+/// smaller.
+pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Case {
+    let generator = toml::from_str(&format!("shape = \"{shape}\"\nfacets = {facets}\n"));
+    let facets = read(&Source::Generated(generator.expect("a shape")), &Solo).expect("its facets");
+    let bounds = Bounds::of(&facets.facets);
+    let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
+    Case {
+        source: Source::Given(facets.facets),
+        spacing_min: longest / 2f64.powi(finer),
+        layer_cells_min,
+        keep: Keep::Outside,
+        keep_crossing: true,
+        root: RootSpec::Scale(8.0),
+        boxes: vec![],
+    }
+}
+
+/// One rank, nothing written.
+pub fn options() -> Options {
+    let (partitioner, weights) = (Partitioner::Morton, Weights::Area);
+    let division = Division { partitioner, weights, level_base: None };
+    Options { division, ungraded: false, out: None }
+}
+
+/// What the phases make of the aircraft, kept for as long as the benches run.
+struct Phases {
+    given: Share,
+    facets: Vec<Facet>,
+    rules: Rules,
+    share: Ownership,
+    filed: Filed,
+    depth: Depth,
+    tree: Tree,
+    sides: Sides,
+    graded: PerLevel,
+}
+
+impl Phases {
+    fn new() -> Self {
+        let case = case("uav", 20_000, 10, 4);
+        let given = read(&case.source, &Solo).expect("facets");
+        let rules = case.rules(&Bounds::of(&given.facets)).expect("a good case");
+        let facets = rules.root.facets(&given.facets, 0).expect("near the root");
+        let share = Ownership::solo();
+        let filed = Filed::new(&facets);
+        let depth = Depth { surface: rules.level_surface, boxes: vec![] };
+        let (tree, _) = refine(&filed, &depth, &[Start { level: 0, code: 0 }]);
+        let sides = decide(&tree, &share, &facets, rules.keep, &Solo);
+        let kept = Kept::new(&sides.deleted);
+        let (graded, _) = grade::grade(&tree, &kept, &rules, &share, &Solo);
+        Self { given, facets, rules, share, filed, depth, tree, sides, graded }
+    }
+
+    fn leaves(&self) -> Leaves<'_> {
+        Leaves {
+            split: &self.graded,
+            base: &self.tree,
+            sides: &self.sides,
+            share: &self.share,
+            everything: false,
+            rules: &self.rules,
+        }
+    }
+
+    /// Crossing leaves of the surface level.
+    fn surface(&self) -> &BrickSet {
+        &self.tree.crossing[self.rules.level_surface as usize]
+    }
+
+    fn words(&self) -> Vec<u64> {
+        let mut words = Vec::new();
+        let Ok(_) = self.leaves().emit(|w| {
+            words.extend_from_slice(w);
+            Ok::<(), Infallible>(())
+        });
+        words
+    }
+}
+
+/// All kernels, in the order of the phases.
+pub fn kernels() -> Vec<Kernel> {
+    let p: &'static Phases = Box::leak(Box::new(Phases::new()));
+    let surface = p.rules.level_surface;
+    let bricks = p.surface().len() as u64;
+    let facets = p.facets.len() as u64;
+    let words: &'static [u64] = p.words().leak();
+    let leaves = words.len() as u64;
+    let kernel = |name, elements, run: Box<dyn FnMut() -> u64>| Kernel { name, elements, run };
+    vec![
+        kernel("stl_read", facets, stl_read(&p.given)),
+        kernel("crossed", facets, Box::new(|| brick_masks(&p.facets))),
+        kernel("file", facets, Box::new(|| drop_counted(Filed::new(black_box(&p.facets))))),
+        kernel("refine", facets, Box::new(|| {
+            refine(&p.filed, &p.depth, &[Start { level: 0, code: 0 }]).1.facet_brick_tests
+        })),
+        kernel("flood", bricks, Box::new(|| floods(p.surface().bricks(), surface))),
+        kernel("sides", leaves_of(&p.tree), Box::new(|| {
+            decide(&p.tree, &p.share, &p.facets, p.rules.keep, &Solo).components
+        })),
+        kernel("dilate_3", bricks, Box::new(move || dilated(p.surface(), surface, 3))),
+        kernel("dilate_9", bricks, Box::new(move || dilated(p.surface(), surface, 9))),
+        kernel("grade", leaves, Box::new(|| {
+            let kept = Kept::new(&p.sides.deleted);
+            grade::grade(&p.tree, &kept, &p.rules, &p.share, &Solo).1.octants_split
+        })),
+        kernel("leaves", leaves, Box::new(|| {
+            let Ok(counts) = p.leaves().emit(|w| {
+                black_box(w);
+                Ok::<(), Infallible>(())
+            });
+            counts.total()
+        })),
+        kernel("digest", leaves, Box::new(|| digest::digest(black_box(words)) as u64)),
+    ]
+}
+
+/// Reads a binary STL file.
+fn stl_read(given: &Share) -> Box<dyn FnMut() -> u64> {
+    let file = tempfile::NamedTempFile::new().expect("a temporary file");
+    geometries::write_stl_binary(&given.facets, &file).expect("room for it");
+    let total = given.total;
+    Box::new(move || {
+        let stl = stl::open(file.path()).expect("what was just written");
+        stl.read(0, total).expect("what was just written").len() as u64
+    })
+}
+
+/// Each facet against the brick of its own size that its first vertex is in.
+fn brick_masks(facets: &[Facet]) -> u64 {
+    facets.iter().fold(0, |all, f| {
+        let widest = (0..3).map(|a| f.range(a).1 - f.range(a).0).max().unwrap_or(0).max(2);
+        let l = (ROOT_BITS - widest.ilog2()).clamp(2, 19);
+        let shift = ROOT_BITS + 2 - l;
+        let at = f.v[0].map(|c| (i64::from(c) >> shift << shift).max(0));
+        all.wrapping_add(crossed(black_box(f), at, l))
+    })
+}
+
+/// Components of what the surface leaves open in its bricks.
+fn floods(bricks: &[Brick], l: u32) -> u64 {
+    let mut components = 0;
+    for b in bricks {
+        let mut rest = !b.bits & valid(l);
+        while rest != 0 {
+            rest &= !flood(rest & rest.wrapping_neg(), rest);
+            components += 1;
+        }
+    }
+    components
+}
+
+fn dilated(set: &BrickSet, l: u32, radius: u32) -> u64 {
+    let mut words = 0;
+    dilate::dilate_to_parents(l, set.bricks().iter().copied(), radius, &mut words).len() as u64
+}
+
+fn drop_counted<T>(made: T) -> u64 {
+    black_box(&made);
+    1
+}
+
+/// Leaves of a base tree.
+fn leaves_of(tree: &Tree) -> u64 {
+    1 + 7 * tree.split.iter().map(BrickSet::count).sum::<u64>()
+}

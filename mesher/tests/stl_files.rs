@@ -1,0 +1,209 @@
+//! STL files as they are found in the wild: the tricky are read whole, the broken refused, none crash.
+#![allow(missing_docs)]
+
+mod support;
+
+use mesher::comm::{Solo, sim};
+use mesher::error::Error;
+use mesher::ingest::{self, Source};
+use mesher::{case::Case, lattice::Bounds, stl};
+use proptest::prelude::*;
+use std::io::Write;
+use std::path::Path;
+use support::{Facet, config, cuboid};
+
+/// Reads a file to its end, as one rank does.
+fn read(path: &Path) -> Result<Vec<Facet>, Error> {
+    Ok(ingest::read(&Source::Stl(path.to_owned()), &Solo)?.facets)
+}
+
+fn file(bytes: &[u8]) -> tempfile::NamedTempFile {
+    let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+    file.write_all(bytes).expect("room for it");
+    file
+}
+
+#[test]
+fn tricky_files_are_read_bit_for_bit() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/tricky");
+    let want = read(&folder.join("binary.stl")).expect("an ordinary binary STL");
+    assert_eq!(want.len(), 8);
+    let bits = |facets: &[Facet]| -> Vec<u32> {
+        facets.as_flattened().as_flattened().iter().map(|c| c.to_bits()).collect()
+    };
+    let mut count = 0;
+    for entry in std::fs::read_dir(&folder).expect("the catalogue of tricky files") {
+        let path = entry.expect("a readable entry").path();
+        if path.extension().is_none_or(|e| e != "stl") {
+            continue;
+        }
+        let got = read(&path).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(bits(&got), bits(&want), "{}", path.display());
+        let parts = sim::run(3, 11, |c| {
+            ingest::read(&Source::Stl(path.clone()), c).expect("what one rank reads").facets
+        });
+        assert_eq!(bits(&parts.concat()), bits(&want), "{} on 3 ranks", path.display());
+        count += 1;
+    }
+    assert!(count >= 15, "only {count} tricky files");
+}
+
+fn binary(facets: &[Facet]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    geometries::write_stl_binary(facets, &mut bytes).expect("memory can be written to");
+    bytes
+}
+
+fn text(facets: &[Facet]) -> Vec<u8> {
+    let mut s = String::from("solid body\n");
+    for f in facets {
+        s += "facet normal 0 0 1\nouter loop\n";
+        f.iter().for_each(|v| s += &format!("vertex {} {} {}\n", v[0], v[1], v[2]));
+        s += "endloop\nendfacet\n";
+    }
+    (s + "endsolid body\n").into_bytes()
+}
+
+/// Something that goes wrong with a file.
+#[derive(Clone, Debug)]
+enum Damage {
+    Cut(prop::sample::Index),
+    Flip(prop::sample::Index, u8),
+    Insert(prop::sample::Index, Vec<u8>),
+    Remove(prop::sample::Index, usize),
+    /// A number of facets that is not the file's.
+    Count(u32),
+}
+
+fn damage() -> impl Strategy<Value = Damage> {
+    let words = prop_oneof![
+        prop::collection::vec(any::<u8>(), 1..60),
+        Just(b"endsolid\n".to_vec()),
+        Just(b"solid x\n".to_vec()),
+        Just(b"\nvertex 1 2 3\n".to_vec()),
+        Just(b"1e39".to_vec()),
+        Just(b"nan".to_vec()),
+        Just(b"\r".to_vec()),
+        Just("\u{2028}\u{130}".as_bytes().to_vec()),
+    ];
+    prop_oneof![
+        any::<prop::sample::Index>().prop_map(Damage::Cut),
+        (any::<prop::sample::Index>(), 1u8..=255).prop_map(|(at, bits)| Damage::Flip(at, bits)),
+        (any::<prop::sample::Index>(), words).prop_map(|(at, what)| Damage::Insert(at, what)),
+        (any::<prop::sample::Index>(), 1usize..70).prop_map(|(at, n)| Damage::Remove(at, n)),
+        prop_oneof![0u32..20, any::<u32>()].prop_map(Damage::Count),
+    ]
+}
+
+fn damaged(mut bytes: Vec<u8>, by: &[Damage]) -> Vec<u8> {
+    for d in by {
+        if bytes.is_empty() {
+            break;
+        }
+        match d {
+            Damage::Cut(at) => bytes.truncate(at.index(bytes.len())),
+            Damage::Flip(at, bits) => {
+                let at = at.index(bytes.len());
+                bytes[at] ^= bits;
+            }
+            Damage::Insert(at, what) => {
+                let at = at.index(bytes.len());
+                bytes.splice(at..at, what.iter().copied());
+            }
+            Damage::Remove(at, n) => {
+                let at = at.index(bytes.len());
+                bytes.drain(at..(at + n).min(bytes.len()));
+            }
+            Damage::Count(n) if bytes.len() >= 84 => {
+                bytes[80..84].copy_from_slice(&n.to_le_bytes())
+            }
+            Damage::Count(_) => {}
+        }
+    }
+    bytes
+}
+
+proptest! {
+    #![proptest_config(config(1500))]
+
+    /// Whatever happens to a file: finite facets or the user's error, and a mesh or the user's error.
+    #[test]
+    fn damaged_files_are_read_or_refused(
+        in_text in any::<bool>(),
+        by in prop::collection::vec(damage(), 1..4),
+    ) {
+        let body = cuboid([-1.0, 0.5, 1e-3], [2.0, 0.75, 40.0]);
+        let bytes = if in_text { text(&body) } else { binary(&body) };
+        let file = file(&damaged(bytes, &by));
+        match read(file.path()) {
+            Err(Error::Input(told)) => prop_assert!(!told.is_empty() && !told.contains('\n'), "{}", told),
+            Err(other) => prop_assert!(false, "not the input's error: {:?}", other),
+            Ok(facets) => {
+                prop_assert!(facets.as_flattened().as_flattened().iter().all(|c| c.is_finite()));
+                mesh_coarsely(file.path(), &facets)?;
+            }
+        }
+    }
+
+    /// A file of a binary STL's length is read whole, or is no binary STL.
+    #[test]
+    fn binary_files_are_told_by_their_length(count in 0u32..40, length in 0usize..2100, text in any::<bool>()) {
+        let mut bytes = vec![if text { b' ' } else { 0 }; length];
+        bytes.iter_mut().zip(b"solid").for_each(|(b, s)| *b = *s);
+        if length >= 84 {
+            bytes[80..84].copy_from_slice(&count.to_le_bytes());
+        }
+        let file = file(&bytes);
+        let fits = length == 84 + 50 * count as usize;
+        match stl::open(file.path()) {
+            Ok(stl) => prop_assert_eq!(stl.binary, fits.then_some(u64::from(count))),
+            Err(_) => prop_assert!(!fits),
+        }
+    }
+
+    /// Case files too.
+    #[test]
+    fn damaged_case_files_are_read_or_refused(by in prop::collection::vec(damage(), 1..4)) {
+        const GOOD: &str = "geometry = \"uav.stl\"\nspacing_min = 0.01\nlayer_cells_min = 4\nkeep = \"outside\"\n
+            keep_crossing = true\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n[[box]]\nmin = [0.0, -1.0, -1.0]\n
+            max = [4.0, 1.0, 1.0]\nspacing = 0.05\n";
+        let file = file(&damaged(GOOD.into(), &by));
+        match Case::read(file.path()) {
+            Err(Error::Input(told)) => prop_assert!(!told.contains('\n'), "{}", told),
+            Err(other) => prop_assert!(false, "not the input's error: {:?}", other),
+            Ok(case) => {
+                let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
+                if let Ok(rules) = case.rules(&unit) {
+                    prop_assert!(rules.level_deepest() <= 19 && rules.layer_cells_min > 0);
+                }
+            }
+        }
+    }
+}
+
+/// Meshes what was read at a few cells along its longest edge: however large or small, it must not crash.
+fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
+    let bounds = Bounds::of(facets);
+    let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
+    let mut case = Case {
+        source: Source::Stl(path.to_owned()),
+        spacing_min: longest / 4.0,
+        layer_cells_min: 2,
+        keep: mesher::lattice::Keep::All,
+        keep_crossing: true,
+        root: mesher::case::RootSpec::Scale(1.5),
+        boxes: vec![],
+    };
+    let options = support::options(support::Run::SOLO.division, false);
+    match mesher::words(&case, &options, &Solo) {
+        Ok((words, _)) => prop_assert!(words.is_sorted() && !words.is_empty()),
+        Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),
+    }
+    // A root that most of it is outside of.
+    let root = mesher::lattice::Root { origin: [0.0; 3], edge: 1.0 };
+    (case.root, case.spacing_min) = (mesher::case::RootSpec::Exact(root), 0.25);
+    if let Err(e) = mesher::words(&case, &options, &Solo) {
+        prop_assert!(matches!(e, Error::Input(_)), "{}", e);
+    }
+    Ok(())
+}
