@@ -34,7 +34,12 @@ fn main() -> ExitCode {
         }
         match count(k.name) {
             Ok(n) => {
-                println!("{:<12}{n:>16}{:>12}{:>20.2}", k.name, k.elements, n as f64 / k.elements as f64);
+                println!(
+                    "{:<12}{n:>16}{:>12}{:>20.2}",
+                    k.name,
+                    k.elements,
+                    n as f64 / k.elements as f64
+                );
             }
             Err(e) => {
                 eprintln!("{}: {e}", k.name);
@@ -54,7 +59,11 @@ fn counted(run: &mut dyn FnMut() -> u64) -> u64 {
 fn count(name: &str) -> Result<u64, String> {
     let me = std::env::current_exe().map_err(|e| e.to_string())?;
     let ended = Command::new("valgrind")
-        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*::counted*"])
+        .args([
+            "--tool=callgrind",
+            "--callgrind-out-file=/dev/null",
+            "--toggle-collect=*::counted*",
+        ])
         .arg(me)
         .env(ONE, name)
         .output()

@@ -12,12 +12,17 @@ use std::time::Duration;
 fn meshes(c: &mut Criterion) {
     let mut group = c.benchmark_group("mesh");
     group.sample_size(10).warm_up_time(Duration::from_secs(1));
-    for (shape, facets, finer, layer_cells_min) in
-        [("sphere", 5_000, 9, 4), ("uav", 20_000, 10, 4), ("uav", 20_000, 10, 10), ("fighter", 100_000, 9, 4)]
-    {
+    for (shape, facets, finer, layer_cells_min) in [
+        ("sphere", 5_000, 9, 4),
+        ("uav", 20_000, 10, 4),
+        ("uav", 20_000, 10, 10),
+        ("fighter", 100_000, 9, 4),
+    ] {
         let case = support::case(shape, facets, finer, layer_cells_min);
         let run = || {
-            mesh(&case, &support::options(), &Solo, &mut Recorder::default()).expect("a good case").cells
+            mesh(&case, &support::options(), &Solo, &mut Recorder::default())
+                .expect("a good case")
+                .cells
         };
         group.throughput(Throughput::Elements(run()));
         let name = format!("{shape}-{facets}-1/2^{finer}-n{layer_cells_min}").replace('/', "_");

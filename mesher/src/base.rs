@@ -1,26 +1,35 @@
-//! The base tree and its partition (the paper's sections II.A and III): the top of T0, cut at
-//! `level_base`, whose leaves are dealt out to the ranks; and the facets' journey to them.
+//! The base tree and its partition (the paper's sections II.A and III): the top of T0, whose leaves
+//! are dealt out to the ranks; and the facets' journey to them.
 //!
 //! Every rank marks the octants that its share of the facets asks to split; the union of the marks is
-//! the same tree for all.
+//! the same tree for all. Where the cut through it goes is a matter of balance: a base leaf that is
+//! heavier than a small part of one rank's share is split further, as no partition can divide it.
+
+mod rehearse;
+mod route;
+
+pub use route::route;
 
 use crate::brick::Brick;
 use crate::brickset::BrickSet;
 use crate::comm::Comm;
 use crate::error::Error;
 use crate::facet::Facet;
-use crate::lattice::Rules;
-use crate::octant::{LEVEL_MAX, Level, start57};
-use crate::partition::{self, Partitioner, Weights};
+use crate::lattice::{ExtentBox, Rules};
+use crate::octant::{LEVEL_MAX, Level, edge, start57};
+use crate::partition::area::{self, Areas};
+use crate::partition::{self, Partitioner, Weights, boxed};
 use crate::share::{BaseLeaf, Ownership};
 use crate::tree::{PerLevel, Tree, per_level};
-use crate::voxelise::{Depth, Filed, Home, Start, Work, reaches, refine};
+use crate::voxelise::{Depth, Filed, Start, Work, refine};
 
-/// Base leaves with children per rank that an automatic `level_base` aims at: enough for a cut to
-/// find equal shares, few enough that what everyone holds stays small.
+/// Base leaves with children per rank that the paper's way, one level for all, aims at.
 const SPLIT_LEAVES_PER_RANK: u64 = 32;
+/// A base leaf heavier than this part of a rank's share is split where that is automatic: a cut then
+/// misses an equal share by a few percent, and what everyone holds stays small.
+const SHARE_PARTS: u64 = 16;
 /// Deepest automatic `level_base`.
-const LEVEL_BASE_AUTO_MAX: Level = 10;
+const LEVEL_BASE_AUTO_MAX: Level = 12;
 
 /// How to divide the work. Without effect on the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +38,7 @@ pub struct Division {
     pub partitioner: Partitioner,
     /// What a base leaf weighs.
     pub weights: Weights,
-    /// Level at which the tree is cut into base leaves; chosen by the number of ranks if none.
+    /// Level at which the tree is cut into base leaves; chosen by ranks and weights if none.
     pub level_base: Option<Level>,
 }
 
@@ -41,10 +50,24 @@ pub struct Base {
     pub top: Tree,
     /// This rank's base leaves that are split in T0.
     pub starts: Vec<Start>,
-    /// Level at which the tree was cut.
+    /// Level of the deepest base leaves.
     pub level_base: Level,
     /// Work done.
     pub work: Work,
+}
+
+/// A cut through the base tree.
+struct Cut {
+    /// Octants above the base leaves.
+    internal: PerLevel,
+    /// What is known of T0.
+    top: Tree,
+    /// The base leaves in order.
+    leaves: Vec<BaseLeaf>,
+    /// Which of them are split in T0.
+    heavy: Vec<bool>,
+    /// Level of the deepest base leaves, or of those that there might be.
+    level_base: Level,
 }
 
 /// Builds the base tree and deals it out. Collective.
@@ -54,38 +77,70 @@ pub fn build(
     division: &Division,
     comm: &dyn Comm,
 ) -> Result<Base, Error> {
-    let deepest = rules.level_deepest();
-    let mark_level = match division.level_base {
-        Some(l) => (l + 1).min(deepest.max(1)),
-        None => deepest.clamp(1, LEVEL_BASE_AUTO_MAX),
+    let deepest = rules.level_deepest().max(1);
+    let level_wanted = match division.level_base {
+        Some(l) => l,
+        None => level_auto(facets, rules, comm),
     };
+    let mark_level = (level_wanted + 1).min(deepest);
     let (marks, work) = mark(facets, rules, mark_level, comm);
-    let level_base = match division.level_base {
-        Some(_) => mark_level - 1,
-        None => {
+    let areas = match division.weights {
+        Weights::Unit => Areas::default(),
+        _ => Areas::gather(facets, rules, mark_level - 1, comm),
+    };
+    let expected = |b: &BaseLeaf| {
+        // A facet's cells come with the layers on its kept side, a third of them being coarser.
+        let thick = (u64::from(rules.layer_cells_min) + 2) * 4 / 3;
+        1 + areas.cells(b.level, b.code) * thick + boxed(b, rules)
+    };
+    let internal = match (division.level_base, division.weights) {
+        (Some(_), _) => uniform(&marks, mark_level - 1),
+        (None, Weights::Unit) => {
             let enough = SPLIT_LEAVES_PER_RANK * comm.size() as u64;
-            (0..mark_level)
-                .find(|&l| marks.split[l as usize].count() >= enough)
-                .unwrap_or(mark_level - 1)
+            let level = (0..mark_level).find(|&l| marks.split[l as usize].count() >= enough);
+            uniform(&marks, level.unwrap_or(mark_level - 1))
+        }
+        (None, _) => adaptive(&marks, mark_level - 1, &expected, comm.size()),
+    };
+    let mut cut = cut(&marks, internal, rules.level_surface);
+    let weights = match division.weights {
+        Weights::Unit => vec![1; cut.leaves.len()],
+        Weights::Area => cut.leaves.iter().map(expected).collect(),
+        Weights::Rehearsal => {
+            let expected: Vec<u64> = cut.leaves.iter().map(expected).collect();
+            rehearse::weights(facets, rules, &cut, expected, comm)
         }
     };
-    let (internal, top, mut leaves) = cut(&marks, level_base, rules.level_surface);
-    let split = |b: &BaseLeaf| top.split[b.level as usize].contains(b.code);
-    let heavy: Vec<bool> = leaves.iter().map(split).collect();
-    let weights = partition::weigh(&leaves, &heavy, facets, rules, division.weights, comm);
-    let owners = partition::assign(&leaves, &weights, division.partitioner, comm)?;
-    leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
-    let mine = leaves.iter().zip(&heavy).filter(|(b, heavy)| **heavy && b.owner == comm.rank());
-    let starts = mine.map(|(b, _)| Start { level: b.level, code: b.code }).collect();
+    let owners = partition::assign(&cut.leaves, &weights, division.partitioner, comm)?;
+    cut.leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
+    let starts = cut.starts(comm.rank());
+    let Cut { internal, top, leaves, level_base, .. } = cut;
     let share = Ownership::new(comm.rank(), comm.size(), internal, leaves);
     share.check_invariants();
     Ok(Base { share, top, starts, level_base, work })
 }
 
+/// The level of base leaves that are small enough for a fair share even where the facets lie closest, by
+/// the facets' area and the boxes' volume. Collective.
+fn level_auto(facets: &[Facet], rules: &Rules, comm: &dyn Comm) -> Level {
+    // Whole finest faces: a sum of integers is the same on all ranks.
+    let face = (edge(rules.level_surface) as f64).powi(2);
+    let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
+    let side = |b: &ExtentBox, a: usize| (b.max[a] - b.min[a]) as f64;
+    let volumes = rules.boxes.iter().map(|b| (0..3).map(|a| side(b, a)).product::<f64>());
+    let volume = volumes.fold(0.0, f64::max);
+    // Four sheets of facets in one octant are not unusual: wings, fins.
+    let parts = (comm.size() as u64 * SHARE_PARTS * 4) as f64;
+    let small = |l: &Level| {
+        let h = edge(*l) as f64;
+        h * h <= area / parts && (volume == 0.0 || h.powi(3) <= volume / parts)
+    };
+    (0..LEVEL_BASE_AUTO_MAX).find(small).unwrap_or(LEVEL_BASE_AUTO_MAX)
+}
+
 /// What all facets and boxes ask to be split down to `level`: exact above it. Collective.
 fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree, Work) {
-    let boxes =
-        rules.boxes.iter().map(|b| crate::lattice::ExtentBox { level: b.level.min(level), ..*b });
+    let boxes = rules.boxes.iter().map(|b| ExtentBox { level: b.level.min(level), ..*b });
     let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
     let (mine, work) = refine(&Filed::new(facets), &depth, &[Start { level: 0, code: 0 }]);
     let mut words = Vec::new();
@@ -95,88 +150,128 @@ fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree
             words.extend(set.bricks().iter().flat_map(|b| [b.key, b.bits]));
         }
     }
+    let all = comm.all_gather(&words);
+    let mut rest: Vec<&[u64]> = all.iter().map(Vec::as_slice).collect();
     let mut tree = Tree::default();
-    for theirs in comm.all_gather(&words) {
-        let mut at = theirs.as_slice();
-        for sets in [&mut tree.split, &mut tree.crossing] {
-            for set in &mut sets[..=level as usize] {
-                let count = at[0] as usize;
-                let bricks =
-                    at[1..1 + 2 * count].chunks_exact(2).map(|w| Brick { key: w[0], bits: w[1] });
-                *set = std::mem::take(set).union(BrickSet::from_unsorted(bricks.collect()));
-                at = &at[1 + 2 * count..];
+    for sets in [&mut tree.split, &mut tree.crossing] {
+        for set in &mut sets[..=level as usize] {
+            // All ranks' bricks at once: a union per rank would copy the set as often as there are ranks.
+            let mut bricks = Vec::new();
+            for words in &mut rest {
+                let (mine, behind) = words[1..].split_at(2 * words[0] as usize);
+                bricks.extend(mine.chunks_exact(2).map(|w| Brick { key: w[0], bits: w[1] }));
+                *words = behind;
             }
+            *set = BrickSet::from_unsorted(bricks);
         }
     }
     (tree, work)
 }
 
-/// Cuts marks at `level_base`: the octants above, what is known of T0, and the base leaves in order.
-fn cut(marks: &Tree, level_base: Level, surface: Level) -> (PerLevel, Tree, Vec<BaseLeaf>) {
+/// The octants above base leaves of one level.
+fn uniform(marks: &Tree, level_base: Level) -> PerLevel {
     let mut internal = per_level();
+    for l in 0..level_base as usize {
+        internal[l] = marks.split[l].clone();
+    }
+    internal
+}
+
+/// The octants above base leaves, each of which is light enough, or of level `deepest`, or not split in T0.
+fn adaptive(
+    marks: &Tree,
+    deepest: Level,
+    expected: impl Fn(&BaseLeaf) -> u64,
+    ranks: usize,
+) -> PerLevel {
+    let root = expected(&BaseLeaf { level: 0, code: 0, owner: 0 });
+    let limit = root / (ranks as u64 * SHARE_PARTS);
+    let mut internal = per_level();
+    for l in 0..deepest {
+        let mut heavy = BrickSet::default();
+        let mut split = marks.split[l as usize].cursor();
+        for b in Tree::exists(&internal, l) {
+            for bit in crate::brickset::ones(b.bits & split.get(b.key)) {
+                let code = b.key << 6 | u64::from(bit);
+                if expected(&BaseLeaf { level: l, code, owner: 0 }) > limit {
+                    heavy.push(b.key, 1 << bit);
+                }
+            }
+        }
+        internal[l as usize] = heavy;
+    }
+    internal
+}
+
+/// Cuts marks below the octants `internal`. Of what lies deeper only top bricks are known to all.
+fn cut(marks: &Tree, internal: PerLevel, surface: Level) -> Cut {
+    let level_base = internal.iter().rposition(|s| !s.is_empty()).map_or(0, |l| l as Level + 1);
     let mut top = Tree::default();
     let mut leaves = Vec::new();
     for l in 0..=level_base as usize {
-        top.split[l] = marks.split[l].clone();
+        let is_top = |key: u64| l < 2 || internal[l - 2].contains(key);
+        for b in marks.split[l].bricks().iter().filter(|b| is_top(b.key)) {
+            top.split[l].push(b.key, b.bits);
+        }
         if l as Level >= surface {
             // A leaf that one rank's facets cross may be split by another's box or facets.
             let mut split = marks.split[l].cursor();
-            for b in marks.crossing[l].bricks() {
+            for b in marks.crossing[l].bricks().iter().filter(|b| is_top(b.key)) {
                 top.crossing[l].push(b.key, b.bits & !split.get(b.key));
             }
         }
-        let split_below = l < level_base as usize;
-        if split_below {
-            internal[l] = marks.split[l].clone();
-        }
-        for b in Tree::exists(&marks.split, l as Level) {
-            let bits = if split_below { b.bits & !marks.split[l].get(b.key) } else { b.bits };
-            let codes = crate::brickset::ones(bits).map(|bit| b.key << 6 | u64::from(bit));
+        let mut above = internal[l].cursor();
+        for b in Tree::exists(&internal, l as Level) {
+            let codes = crate::brickset::ones(b.bits & !above.get(b.key));
+            let codes = codes.map(|bit| b.key << 6 | u64::from(bit));
             leaves.extend(codes.map(|code| BaseLeaf { level: l as Level, code, owner: 0 }));
         }
     }
     leaves.sort_unstable_by_key(|b| start57(b.level, b.code));
-    (internal, top, leaves)
+    let heavy = leaves.iter().map(|b| top.split[b.level as usize].contains(b.code)).collect();
+    Cut { internal, top, leaves, heavy, level_base }
 }
 
-/// Brings every facet to the owners of the base leaves that its extent reaches. Collective.
-pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet> {
-    let mut packed: Vec<Vec<Facet>> = vec![Vec::new(); comm.size()];
-    let mut last = vec![u64::MAX; comm.size()];
-    for (i, f) in (0u64..).zip(facets) {
-        let Some(home) = Home::of(f) else { continue };
-        let first = share.leaf_at(home.start());
-        let end = home.start() + (1 << (3 * (LEVEL_MAX - home.level())));
-        for b in &share.leaves()[first..] {
-            if start57(b.level, b.code) >= end {
-                break;
+impl Cut {
+    /// A rank's base leaves that are split in T0.
+    fn starts(&self, rank: usize) -> Vec<Start> {
+        let mine =
+            self.leaves.iter().zip(&self.heavy).filter(|(b, heavy)| **heavy && b.owner == rank);
+        mine.map(|(b, _)| Start { level: b.level, code: b.code }).collect()
+    }
+}
+
+/// Leaves of the final mesh in the heaviest of this rank's base leaves; `split` is the graded tree.
+pub fn cells_heaviest(
+    split: &[BrickSet],
+    deleted: &[BrickSet],
+    share: &Ownership,
+    rank: usize,
+) -> u64 {
+    let mut counts = vec![1i64; share.leaves().len()];
+    let mut add = |l: Level, set: &BrickSet, each: i64| {
+        for b in set.bricks() {
+            // A top brick spans several base leaves; those are told octant by octant.
+            let spans = l < 2 || share.internal()[l as usize - 2].contains(b.key);
+            if !spans {
+                let at = share.leaf_at(start57(l - 2, b.key));
+                counts[at] += each * i64::from(b.bits.count_ones());
+                continue;
             }
-            let there =
-                b.level <= home.level() || reaches(f, &Start { level: b.level, code: b.code });
-            if there && std::mem::replace(&mut last[b.owner], i) != i {
-                packed[b.owner].push(*f);
+            for bit in crate::brickset::ones(b.bits) {
+                let code = b.key << 6 | u64::from(bit);
+                if !share.internal()[l as usize].contains(code) {
+                    counts[share.leaf_at(start57(l, code))] += each;
+                }
             }
         }
+    };
+    for l in 0..LEVEL_MAX {
+        add(l, &split[l as usize], 7);
+        add(l, &deleted[l as usize], -1);
     }
-    let mut mine = std::mem::take(&mut packed[comm.rank()]);
-    let out = packed.iter().map(|facets| facets.iter().flat_map(pack).collect());
-    for (_, words) in comm.exchange(out.enumerate().collect()) {
-        mine.extend(words.chunks_exact(5).map(unpack));
-    }
-    mine
-}
-
-/// Nine coordinates in five words.
-fn pack(f: &Facet) -> [u64; 5] {
-    let c = f.v.as_flattened();
-    std::array::from_fn(|i| {
-        u64::from(c[2 * i] as u32) | u64::from(c.get(2 * i + 1).map_or(0, |v| *v as u32)) << 32
-    })
-}
-
-fn unpack(words: &[u64]) -> Facet {
-    let at = |i: usize| (words[i / 2] >> (32 * (i % 2))) as u32 as i32;
-    Facet { v: std::array::from_fn(|v| std::array::from_fn(|a| at(3 * v + a))) }
+    let mine = share.leaves().iter().zip(&counts).filter(|(b, _)| b.owner == rank);
+    mine.map(|(_, n)| *n).max().unwrap_or(0).max(0) as u64
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.
@@ -221,12 +316,6 @@ pub(crate) fn middle(f: &Facet) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::octant::position;
-
-    #[test]
-    fn facets_survive_the_journey() {
-        let f = Facet { v: [[-5, 1 << 28, 0], [7, -(1 << 27), 3], [i32::MAX, i32::MIN, -1]] };
-        assert_eq!(unpack(&pack(&f)), f);
-    }
 
     #[test]
     fn neighbours_of_a_uniform_base_tree() {

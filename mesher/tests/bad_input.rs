@@ -4,43 +4,9 @@
 #[path = "support/process.rs"]
 mod process;
 
-use process::{MESHER, Place, Told, binary_stl, left_out, run};
+use process::{COMMS, INPUT, Place, binary_stl, refused, run, tetrahedron};
 use std::path::Path;
 use std::process::Command;
-
-const INPUT: i32 = 2;
-const OUTPUT: i32 = 4;
-
-/// A body that can be meshed.
-fn tetrahedron() -> Vec<u8> {
-    let v = [[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    binary_stl(&[[v[0], v[2], v[1]], [v[0], v[1], v[3]], [v[0], v[3], v[2]], [v[1], v[2], v[3]]])
-}
-
-const COMMS: [&str; 2] = ["--comm=solo", "--comm=sim:3:7"];
-
-/// Runs the mesher with `args`, asking for output, and asserts that it refuses and leaves nothing.
-#[track_caller]
-fn refused(place: &Place, args: &[&str], code: i32, words: &[&str]) {
-    for comm in COMMS {
-        let before = place.contents();
-        let mut all = args.to_vec();
-        if !args.iter().any(|a| a.starts_with("--out")) {
-            all.extend(["--out", "mesh"]);
-        }
-        if !args.iter().any(|a| a.starts_with("--json")) {
-            all.extend(["--json", "run.json"]);
-        }
-        all.push(comm);
-        run(place.mesher(&all)).refuses(code, words);
-        let (before, after) = (before.keys(), place.contents());
-        assert!(
-            before.eq(after.keys()),
-            "{args:?} {comm} left something behind: {:?}",
-            after.keys()
-        );
-    }
-}
 
 #[track_caller]
 fn refused_case(text: &str, words: &[&str]) {
@@ -260,100 +226,4 @@ fn options_with_mistakes() {
         run(place.mesher(&["body.stl", "--comm", comm])).refuses(INPUT, &["--comm"]);
     }
     run(place.mesher(&[])).refuses(INPUT, &["INPUT"]);
-}
-
-#[test]
-fn output_that_cannot_be_written() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
-    place.put("file", "kept");
-    std::fs::create_dir(place.path().join("full")).expect("a directory");
-    place.put("full/kept.txt", "kept");
-    std::fs::create_dir(place.path().join("folder")).expect("a directory");
-    let to = |option, path| ["body.stl", "--spacing-min=0.5", option, path];
-    for (path, words) in [
-        ("file/mesh", &["file/mesh"][..]),
-        ("file", &["file"]),
-        ("absent/deep/mesh", &["absent/deep/mesh"]),
-        ("full", &["full", "not empty"]),
-        ("/proc/mesh", &["/proc/mesh"]),
-    ] {
-        refused(&place, &to("--out", path), OUTPUT, words);
-    }
-    for path in ["file/run.json", "absent/run.json", "/proc/run.json", "folder"] {
-        refused(&place, &to("--json", path), OUTPUT, &[path, "--json"]);
-    }
-    for path in ["file/status", "/proc/status"] {
-        refused(&place, &to("--status", path), OUTPUT, &[path]);
-    }
-    assert_eq!(std::fs::read(place.path().join("file")).expect("the file"), b"kept");
-}
-
-/// Runs the mesher through a shell that first does `before`, and lists `folder` afterwards.
-fn in_shell(place: &Place, wrapper: &[&str], before: &str, args: &str, folder: &str) -> Told {
-    let script = format!(
-        "{before} || exit 99; '{MESHER}' {args} --quiet; code=$?; find {folder} -mindepth 1; exit $code"
-    );
-    let mut command = Command::new(wrapper[0]);
-    command.args(&wrapper[1..]).args(["-c", &script]);
-    run(place.at(command))
-}
-
-/// Files may not grow beyond a limit: as on a full disk, a write fails in the middle.
-#[test]
-fn writes_that_fail_in_the_middle() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
-    let body = "body.stl --root-scale 2 --keep all --out mesh";
-    // A shell ignores the signal for its children; the write then fails. Blocks have 512 bytes: only
-    // the manifest is larger than 16 of them in the first run, only the parts are in the second.
-    for (blocks, spacing) in [(16, "0.5"), (100, "0.01")] {
-        for comm in ["solo", "sim:3:5"] {
-            let args = format!("{body} --spacing-min {spacing} --comm {comm}");
-            let told = in_shell(
-                &place,
-                &["sh"],
-                &format!("trap '' XFSZ; ulimit -f {blocks}"),
-                &args,
-                "mesh",
-            );
-            assert_eq!(told.code, Some(OUTPUT), "{told:?}");
-            let (ours, rest): (Vec<&str>, _) =
-                told.stderr.lines().partition(|l| l.starts_with("mesher: "));
-            assert!(ours.len() == 1 && ours[0].contains("mesh"), "{told:?}");
-            assert!(rest.iter().all(|l| l.starts_with("find: ")), "{told:?}");
-            assert_eq!(told.stdout, "", "something was left behind");
-            assert!(!place.path().join("mesh").exists());
-        }
-    }
-}
-
-/// A disk that is full, and one that is read-only, where this test may mount them.
-#[test]
-fn disks_that_are_full_or_read_only() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
-    std::fs::create_dir(place.path().join("disk")).expect("a directory");
-    // The mounts are in a namespace of the shell's own, and vanish with it.
-    let shell = ["unshare", "--mount", "sh"];
-    let try_it =
-        in_shell(&place, &shell, "mount -t tmpfs -o size=64k none disk", "--version", "disk");
-    if try_it.code != Some(0) {
-        return left_out("a full disk", "this user may not mount a small one");
-    }
-    let body = "body.stl --root-scale 2 --keep all";
-    for (options, spacing, json) in [
-        ("size=16k", "0.5", ""),
-        ("size=64k", "0.01", ""),
-        ("ro", "0.5", ""),
-        ("ro", "0.5", "--json disk/run.json"),
-    ] {
-        for comm in ["solo", "sim:3:5"] {
-            let out = "--out disk/mesh";
-            let args = format!("{body} --spacing-min {spacing} {out} {json} --comm {comm}");
-            let mount = format!("mount -t tmpfs -o {options} none disk");
-            let told = in_shell(&place, &shell, &mount, &args, "disk");
-            told.refuses(OUTPUT, &["disk"]);
-        }
-    }
 }

@@ -6,6 +6,7 @@ use mesher::brick::{Brick, flood, valid};
 use mesher::brickset::BrickSet;
 use mesher::case::{Case, RootSpec};
 use mesher::comm::Solo;
+use mesher::dilate::Reach;
 use mesher::facet::{Facet, crossed};
 use mesher::ingest::{Share, Source, read};
 use mesher::kept::Kept;
@@ -17,7 +18,7 @@ use mesher::sides::{Sides, decide};
 use mesher::stream::Leaves;
 use mesher::tree::{PerLevel, Tree};
 use mesher::voxelise::{Depth, Filed, Start, refine};
-use mesher::{Options, digest, dilate, grade, stl};
+use mesher::{Options, digest, grade, stl};
 use std::convert::Infallible;
 use std::hint::black_box;
 
@@ -122,26 +123,40 @@ pub fn kernels() -> Vec<Kernel> {
         kernel("stl_read", facets, stl_read(&p.given)),
         kernel("crossed", facets, Box::new(|| brick_masks(&p.facets))),
         kernel("file", facets, Box::new(|| drop_counted(Filed::new(black_box(&p.facets))))),
-        kernel("refine", facets, Box::new(|| {
-            refine(&p.filed, &p.depth, &[Start { level: 0, code: 0 }]).1.facet_brick_tests
-        })),
-        kernel("flood", bricks, Box::new(|| floods(p.surface().bricks(), surface))),
-        kernel("sides", leaves_of(&p.tree), Box::new(|| {
-            decide(&p.tree, &p.share, &p.facets, p.rules.keep, &Solo).components
-        })),
+        kernel(
+            "refine",
+            facets,
+            Box::new(|| {
+                refine(&p.filed, &p.depth, &[Start { level: 0, code: 0 }]).1.facet_brick_tests
+            }),
+        ),
+        kernel("flood", bricks, Box::new(move || floods(p.surface().bricks(), surface))),
+        kernel(
+            "sides",
+            leaves_of(&p.tree),
+            Box::new(|| decide(&p.tree, &p.share, &p.facets, p.rules.keep, &Solo).components),
+        ),
         kernel("dilate_3", bricks, Box::new(move || dilated(p.surface(), surface, 3))),
         kernel("dilate_9", bricks, Box::new(move || dilated(p.surface(), surface, 9))),
-        kernel("grade", leaves, Box::new(|| {
-            let kept = Kept::new(&p.sides.deleted);
-            grade::grade(&p.tree, &kept, &p.rules, &p.share, &Solo).1.octants_split
-        })),
-        kernel("leaves", leaves, Box::new(|| {
-            let Ok(counts) = p.leaves().emit(|w| {
-                black_box(w);
-                Ok::<(), Infallible>(())
-            });
-            counts.total()
-        })),
+        kernel(
+            "grade",
+            leaves,
+            Box::new(|| {
+                let kept = Kept::new(&p.sides.deleted);
+                grade::grade(&p.tree, &kept, &p.rules, &p.share, &Solo).1.octants_split
+            }),
+        ),
+        kernel(
+            "leaves",
+            leaves,
+            Box::new(|| {
+                let Ok(counts) = p.leaves().emit(|w| {
+                    black_box(w);
+                    Ok::<(), Infallible>(())
+                });
+                counts.total()
+            }),
+        ),
         kernel("digest", leaves, Box::new(|| digest::digest(black_box(words)) as u64)),
     ]
 }
@@ -182,8 +197,9 @@ fn floods(bricks: &[Brick], l: u32) -> u64 {
 }
 
 fn dilated(set: &BrickSet, l: u32, radius: u32) -> u64 {
-    let mut words = 0;
-    dilate::dilate_to_parents(l, set.bricks().iter().copied(), radius, &mut words).len() as u64
+    let mut reach = Reach::new(l - 1);
+    reach.dilate_children(set.bricks().iter().copied(), radius);
+    reach.finish().0.len() as u64
 }
 
 fn drop_counted<T>(made: T) -> u64 {

@@ -1,4 +1,4 @@
-//! Test support: cases that small cubes of numbers can be drawn from, and both programs run on them.
+//! Test support: small cases, and both programs run on them.
 #![allow(dead_code, missing_docs)]
 
 use mesher::base::Division;
@@ -9,9 +9,11 @@ use mesher::lattice::{Keep, Root};
 use mesher::partition::{Partitioner, Weights};
 use mesher::sides::Ambiguous;
 use mesher::{Options, words};
-use proptest::prelude::*;
 
+pub mod draw;
 pub mod symmetry;
+
+pub use draw::{closed, config, cuboid, run, small, soup};
 
 pub type Facet = [[f32; 3]; 3];
 
@@ -141,31 +143,6 @@ pub struct Outcome {
     pub ambiguous: Option<Ambiguous>,
 }
 
-/// Runs of all kinds, on few ranks mostly.
-pub fn run() -> impl Strategy<Value = Run> {
-    let ranks = prop_oneof![2 => Just(1usize), 4 => 2usize..9, 1 => 9usize..65];
-    let partitioner = prop_oneof![Just(Partitioner::Metis), Just(Partitioner::Morton)];
-    let weights = prop_oneof![Just(Weights::Area), Just(Weights::Unit)];
-    let level_base = prop_oneof![1 => Just(None), 2 => (0u32..6).prop_map(Some)];
-    (ranks, any::<u64>(), partitioner, weights, level_base).prop_map(
-        |(ranks, seed, partitioner, weights, level_base)| Run {
-            ranks,
-            seed,
-            division: Division { partitioner, weights, level_base },
-        },
-    )
-}
-
-/// As many cases as asked for by `PROPTEST_CASES`, else `cases`.
-pub fn config(cases: u32) -> ProptestConfig {
-    let asked = std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok());
-    ProptestConfig {
-        cases: asked.unwrap_or(cases),
-        max_shrink_iters: 300,
-        ..ProptestConfig::default()
-    }
-}
-
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
     Division { partitioner, weights: Weights::Area, level_base }
 }
@@ -202,121 +179,4 @@ macro_rules! assert_same {
         let (a, b) = (&$a, &$b);
         prop_assert!(a == b, "{}: {}", format!($($what)+), support::first_difference(a, b));
     };
-}
-
-/// An axis-parallel box as twelve facets.
-pub fn cuboid(lo: [f32; 3], hi: [f32; 3]) -> Vec<Facet> {
-    let mut out = Vec::new();
-    for a in 0..3 {
-        let (u, w) = ((a + 1) % 3, (a + 2) % 3);
-        for at in [lo[a], hi[a]] {
-            let p = |x: f32, y: f32| {
-                let mut v = [at; 3];
-                v[u] = x;
-                v[w] = y;
-                v
-            };
-            out.push([p(lo[u], lo[w]), p(hi[u], lo[w]), p(hi[u], hi[w])]);
-            out.push([p(lo[u], lo[w]), p(hi[u], hi[w]), p(lo[u], hi[w])]);
-        }
-    }
-    out
-}
-
-fn tetrahedron(v: [[f32; 3]; 4]) -> Vec<Facet> {
-    vec![[v[0], v[1], v[2]], [v[0], v[3], v[1]], [v[0], v[2], v[3]], [v[1], v[3], v[2]]]
-}
-
-/// A coordinate: anywhere in and around the root, or on the lattice of level 6, or of level 3.
-fn coordinate() -> impl Strategy<Value = f32> {
-    prop_oneof![
-        4 => -3.0f32..67.0,
-        3 => (0i32..=64).prop_map(|v| v as f32),
-        1 => (0i32..=8).prop_map(|v| 8.0 * v as f32),
-        1 => -30.0f32..94.0,
-    ]
-}
-
-fn point() -> impl Strategy<Value = [f32; 3]> {
-    [coordinate(), coordinate(), coordinate()]
-}
-
-/// Closed bodies, of whole-number corners or any.
-pub fn closed() -> impl Strategy<Value = Vec<Facet>> {
-    let corner = || [2i32..62, 2i32..62, 2i32..62];
-    let boxed = (corner(), [1i32..40, 1i32..40, 1i32..40]).prop_map(|(lo, d)| {
-        let hi: [i32; 3] = std::array::from_fn(|a| (lo[a] + d[a]).min(63));
-        cuboid(lo.map(|c| c as f32), hi.map(|c| c as f32))
-    });
-    let sphere = (20usize..400, 4.0f32..28.0, [20.0f32..44.0, 20.0f32..44.0, 20.0f32..44.0])
-        .prop_map(|(facets, r, c)| {
-            let text = format!("shape = \"sphere\"\nfacets = {facets}\n");
-            let g: geometries::Generator = toml::from_str(&text).expect("a sphere");
-            let unit = g.facets().expect("a sphere's facets");
-            unit.into_iter()
-                .map(|f| f.map(|v| std::array::from_fn(|a| v[a] * r * 2.0 + c[a])))
-                .collect()
-        });
-    let tetra = [point(), point(), point(), point()].prop_map(tetrahedron);
-    prop_oneof![2 => boxed, 2 => sphere, 1 => tetra]
-}
-
-/// Facet soups of all kinds.
-pub fn soup() -> impl Strategy<Value = Vec<Facet>> {
-    let facet = prop_oneof![
-        6 => [point(), point(), point()],
-        1 => point().prop_map(|p| [p; 3]),
-        1 => (point(), point()).prop_map(|(p, q)| [p, q, p]),
-    ];
-    let leaky = (closed(), any::<prop::sample::Index>()).prop_map(|(mut f, i)| {
-        f.remove(i.index(f.len()));
-        f
-    });
-    prop_oneof![
-        1 => Just(Vec::new()),
-        2 => prop::collection::vec(facet, 1..12),
-        3 => closed(),
-        2 => leaky,
-        2 => (closed(), closed()).prop_map(|(mut a, b)| { a.extend(b); a }),
-    ]
-}
-
-fn extent_box() -> impl Strategy<Value = (BoxSpec, u32)> {
-    (point(), [0.5f64..20.0, 0.5f64..20.0, 0.5f64..20.0], 1u32..8).prop_map(|(p, d, level)| {
-        let min = p.map(f64::from);
-        // Small boxes may be finer than the surface.
-        let level = if d.iter().product::<f64>() > 1000.0 { level.min(6) } else { level };
-        (
-            BoxSpec {
-                min,
-                max: std::array::from_fn(|a| min[a] + d[a]),
-                spacing: 64.0 / f64::from(1 << level),
-            },
-            level,
-        )
-    })
-}
-
-/// A case with these facets.
-pub fn small(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value = Small> {
-    let keep = prop_oneof![2 => Just(Keep::Outside), 2 => Just(Keep::Inside), 1 => Just(Keep::All)];
-    let boxes = prop_oneof![3 => Just(vec![]), 2 => prop::collection::vec(extent_box(), 1..3)];
-    let odd_root = prop_oneof![3 => Just(None), 1 => ([-9.0f64..3.0, -9.0f64..3.0, -9.0f64..3.0], 65.0f64..90.0).prop_map(Some)];
-    (facets, 0u32..=6, 1.0f64..1.99, 1u32..=10, keep, any::<bool>(), boxes, odd_root).prop_map(
-        |(facets, level, slack, layer_cells_min, keep, keep_crossing, boxes, odd_root)| {
-            let root = odd_root.map_or(Root { origin: [0.0; 3], edge: 64.0 }, |(origin, edge)| {
-                Root { origin, edge }
-            });
-            let spacing_min = root.edge / f64::from(1 << level) * slack;
-            Small {
-                facets,
-                root,
-                spacing_min,
-                layer_cells_min,
-                keep,
-                keep_crossing,
-                boxes: boxes.into_iter().map(|b| b.0).collect(),
-            }
-        },
-    )
 }

@@ -221,3 +221,40 @@ pub fn binary_stl(facets: &[geometries::Facet]) -> Vec<u8> {
     geometries::write_stl_binary(facets, &mut bytes).expect("memory can be written to");
     bytes
 }
+
+/// Exit code of unusable input.
+pub const INPUT: i32 = 2;
+/// Exit code of output that could not be written.
+pub const OUTPUT: i32 = 4;
+
+/// A body that can be meshed.
+pub fn tetrahedron() -> Vec<u8> {
+    let v = [[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    binary_stl(&[[v[0], v[2], v[1]], [v[0], v[1], v[3]], [v[0], v[3], v[2]], [v[1], v[2], v[3]]])
+}
+
+/// One rank, and several.
+pub const COMMS: [&str; 2] = ["--comm=solo", "--comm=sim:3:7"];
+
+/// Runs the mesher with `args`, asking for output, and asserts that it refuses and leaves nothing.
+#[track_caller]
+pub fn refused(place: &Place, args: &[&str], code: i32, words: &[&str]) {
+    for comm in COMMS {
+        let before = place.contents();
+        let mut all = args.to_vec();
+        if !args.iter().any(|a| a.starts_with("--out")) {
+            all.extend(["--out", "mesh"]);
+        }
+        if !args.iter().any(|a| a.starts_with("--json")) {
+            all.extend(["--json", "run.json"]);
+        }
+        all.push(comm);
+        run(place.mesher(&all)).refuses(code, words);
+        let (before, after) = (before.keys(), place.contents());
+        assert!(
+            before.eq(after.keys()),
+            "{args:?} {comm} left something behind: {:?}",
+            after.keys()
+        );
+    }
+}

@@ -1,0 +1,140 @@
+//! Where the facets' area lies: what leaves are to be expected where.
+//!
+//! A plane crosses cells, and a layer of cells along it holds cells, in proportion to its area times the
+//! sum of its normal's components, as cells and layers are cubes. So area is measured by that norm, in
+//! units of a finest cell's face; a facet larger than the octants asked for is split in four until it is
+//! not.
+
+use crate::base::middle;
+use crate::comm::Comm;
+use crate::facet::Facet;
+use crate::lattice::Rules;
+use crate::octant::{Level, edge, start57};
+
+/// Parts of a finest cell's face: sums of integers do not depend on their order.
+const PARTS: f64 = 1024.0;
+
+/// Area by place.
+#[derive(Debug, Default)]
+pub struct Areas {
+    /// Level-19 codes of octants with area, ascending.
+    starts: Vec<u64>,
+    /// Area in all octants before each of them, and in all at the end.
+    before: Vec<u64>,
+}
+
+/// The area of some facets, by the norm above, in lattice units squared.
+pub fn total(facets: &[Facet]) -> f64 {
+    facets.iter().map(norm).sum()
+}
+
+fn norm(f: &Facet) -> f64 {
+    f.normal().iter().map(|c| (*c as f64).abs()).sum::<f64>() * 0.5
+}
+
+impl Areas {
+    /// Gathers the area of all ranks' facets by octants of a level. Collective.
+    pub fn gather(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> Self {
+        let cell = edge(rules.level_surface) as f64;
+        let mut mine: Vec<(u64, u64)> = Vec::new();
+        let mut add = |at: u64, area: f64| {
+            let shift = 3 * (crate::octant::LEVEL_MAX - level);
+            mine.push((at >> shift << shift, (area * PARTS / (cell * cell)) as u64));
+        };
+        facets.iter().for_each(|f| spread(f, edge(level), &mut add));
+        sum(&mut mine);
+        let words: Vec<u64> = mine.iter().flat_map(|m| [m.0, m.1]).collect();
+        let all = comm.all_gather(&words);
+        let mut pairs: Vec<(u64, u64)> =
+            all.iter().flat_map(|w| w.chunks_exact(2).map(|p| (p[0], p[1]))).collect();
+        sum(&mut pairs);
+        let starts = pairs.iter().map(|p| p.0).collect();
+        let mut before = vec![0];
+        for p in &pairs {
+            before.push(before[before.len() - 1] + p.1);
+        }
+        Self { starts, before }
+    }
+
+    /// Finest cells' faces in an octant that is no finer than the level of gathering.
+    pub fn cells(&self, level: Level, code: u64) -> u64 {
+        let at = |start| self.before[self.starts.partition_point(|s| *s < start)];
+        (at(start57(level, code + 1)) - at(start57(level, code))) / PARTS as u64
+    }
+}
+
+/// Sorts by place and adds up what lies in the same.
+fn sum(pairs: &mut Vec<(u64, u64)>) {
+    pairs.sort_unstable();
+    let mut kept: usize = 0;
+    for i in 0..pairs.len() {
+        if kept > 0 && pairs[kept - 1].0 == pairs[i].0 {
+            pairs[kept - 1].1 += pairs[i].1;
+        } else {
+            pairs[kept] = pairs[i];
+            kept += 1;
+        }
+    }
+    pairs.truncate(kept);
+}
+
+/// Tells the facet's area to `add`, in pieces whose extent is at most `extent`.
+fn spread(f: &Facet, extent: i64, add: &mut impl FnMut(u64, f64)) {
+    let wide = (0..3).any(|a| f.range(a).1 - f.range(a).0 > extent);
+    if !wide {
+        if let Some(at) = middle(f) {
+            add(at, norm(f));
+        }
+        return;
+    }
+    let half = |i: usize, j: usize| -> [i32; 3] {
+        std::array::from_fn(|a| ((i64::from(f.v[i][a]) + i64::from(f.v[j][a])) / 2) as i32)
+    };
+    let (ab, bc, ca) = (half(0, 1), half(1, 2), half(2, 0));
+    for v in [[f.v[0], ab, ca], [ab, f.v[1], bc], [ca, bc, f.v[2]], [ab, bc, ca]] {
+        spread(&Facet { v }, extent, add);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::Solo;
+    use crate::lattice::{Keep, Root};
+    use crate::octant::ROOT_EDGE;
+
+    fn rules(level_surface: Level) -> Rules {
+        Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface,
+            layer_cells_min: 4,
+            keep: Keep::Outside,
+            keep_crossing: true,
+            boxes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_large_facet_is_spread_over_the_octants_that_it_crosses() {
+        // Half of the face of an octant of level 1, in the plane z = 1.
+        let h = (ROOT_EDGE / 2) as i32;
+        let f = Facet { v: [[0, 0, 1], [h, 0, 1], [0, h, 1]] };
+        let areas = Areas::gather(&[f], &rules(6), 4, &Solo);
+        // 32 x 32 finest cells, half of them covered.
+        assert_eq!(areas.cells(0, 0), 512);
+        assert_eq!(areas.cells(1, 0), 512);
+        let parts: Vec<u64> = (0..8).map(|child| areas.cells(2, child)).collect();
+        let total: u64 = parts.iter().sum();
+        assert!(total.abs_diff(512) <= 4, "{parts:?}");
+        // The octant at the right angle is covered whole, its neighbours half.
+        assert!(parts[0].abs_diff(256) <= 32 && parts[1].abs_diff(128) <= 32, "{parts:?}");
+    }
+
+    #[test]
+    fn an_oblique_facet_counts_by_the_cells_that_it_crosses() {
+        let h = (ROOT_EDGE / 2) as i32;
+        let oblique = Facet { v: [[h, 0, 0], [0, h, 0], [0, 0, h]] };
+        // Its shadows on the three coordinate planes together.
+        assert_eq!(total(&[oblique]), 1.5 * f64::from(h) * f64::from(h));
+    }
+}
