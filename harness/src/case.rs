@@ -1,4 +1,5 @@
-//! Case files: what a mesh is made from, as the harness reads them (reference/DEFINITION.md, section 10).
+//! Case files: what a mesh is made from, as the harness reads them (reference/DEFINITION.md,
+//! section 10).
 
 use std::path::{Path, PathBuf};
 

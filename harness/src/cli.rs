@@ -1,6 +1,7 @@
 //! What may be said on the command line.
 
 use crate::cli_bench::BenchArguments;
+use crate::cli_report::ReportArguments;
 use clap::{Args, Parser, Subcommand};
 use harness::verify::options::{Need, Size};
 use std::path::PathBuf;
@@ -28,6 +29,12 @@ pub enum Command {
     Gate(Box<crate::cli_gate::GateArguments>),
     /// Measures: strong and weak scaling, spacing, layers, weights; every result is appended to a record
     Bench(Box<BenchArguments>),
+    /// Makes figures, a page, a LaTeX fragment and an artifact description from records of bench
+    Report(ReportArguments),
+    /// Keeps a history of numbers by commit and finds where they changed
+    Track(Box<crate::cli_track::TrackArguments>),
+    /// Reduces a case that fails to the smallest that still does
+    Shrink(Box<crate::cli_shrink::ShrinkArguments>),
     /// Checks a leaf-set directory of any size by itself
     Audit {
         /// The leaf-set directory
@@ -36,12 +43,15 @@ pub enum Command {
         #[arg(long)]
         nodes_max: Option<usize>,
     },
-    /// Tells where two leaf-set directories differ
+    /// Tells where two leaf-set directories differ, and which rule of the definition decides
     Diff {
         /// A leaf-set directory
         a: PathBuf,
         /// Another
         b: PathBuf,
+        /// The case that both are meshes of: its facets help to decide
+        #[arg(long)]
+        case: Option<PathBuf>,
     },
 }
 
@@ -97,6 +107,9 @@ pub struct VerifyArguments {
     /// Leave out the comparison with p4est
     #[arg(long)]
     pub no_p4est: bool,
+    /// Verify another mesher: name in harness/engines or path of a description [default: the mesher itself]
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Option<String>,
     /// What must not be missing: exit code 3 if it is
     #[arg(long, value_delimiter = ',')]
     pub require: Vec<Need>,

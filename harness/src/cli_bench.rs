@@ -59,12 +59,15 @@ pub struct BenchArguments {
     /// The program to measure: mesher or reference
     #[arg(long, default_value = "mesher", value_parser = ["mesher", "reference"])]
     pub engine: String,
-    /// File of JSON lines to append to
-    #[arg(long, value_name = "FILE", default_value = "reports/out/bench.jsonl")]
-    pub record: PathBuf,
+    /// File of JSON lines to append to [default: reports/out/bench.jsonl]
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = clap::value_parser!(u64).range(1..))]
     pub timeout: u64,
+    /// Make a report, too: DIR/record.jsonl is the record then, unless --record names one
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
     /// Print the tables of an existing record and measure nothing
     #[arg(long)]
     pub show: bool,
@@ -89,6 +92,19 @@ fn cell_count(text: &str) -> Result<u64, String> {
 
 /// Measures, prints; the exit code.
 pub fn run(arguments: BenchArguments) -> u8 {
+    let report = arguments.report.clone();
+    let code = measure(arguments);
+    match report.map(|directory| crate::cli_report::write(&directory, &[])) {
+        // A failed run stays the graver of the two.
+        Some(Err(why)) => {
+            eprintln!("harness: {why}");
+            code.max(EXIT_INPUT)
+        }
+        _ => code,
+    }
+}
+
+fn measure(arguments: BenchArguments) -> u8 {
     if arguments.show {
         return show(&arguments);
     }
@@ -129,7 +145,8 @@ pub fn run(arguments: BenchArguments) -> u8 {
 }
 
 fn show(arguments: &BenchArguments) -> u8 {
-    match record::read(&arguments.record) {
+    let path = record_path(arguments);
+    match record::read(&path) {
         Ok(content) => {
             for (line, why) in &content.broken {
                 eprintln!("harness: line {line} is passed over: {why}");
@@ -138,13 +155,21 @@ fn show(arguments: &BenchArguments) -> u8 {
             EXIT_HOLDS
         }
         Err(error) => {
-            eprintln!("harness: {}: {error}", arguments.record.display());
+            eprintln!("harness: {}: {error}", path.display());
             EXIT_INPUT
         }
     }
 }
 
+/// Where results go.
+fn record_path(arguments: &BenchArguments) -> PathBuf {
+    let in_report = arguments.report.as_ref().map(|directory| directory.join("record.jsonl"));
+    let given = arguments.record.clone().or(in_report);
+    given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
+}
+
 fn options(arguments: BenchArguments) -> Options {
+    let record = record_path(&arguments);
     let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
     let wishes = Wishes {
         cases: arguments.cases,
@@ -164,7 +189,7 @@ fn options(arguments: BenchArguments) -> Options {
         engine: arguments.engine,
         launcher: arguments.launcher,
         network: arguments.network,
-        record: arguments.record,
+        record,
         limit: Duration::from_secs(arguments.timeout),
         command: std::env::args().collect(),
     }

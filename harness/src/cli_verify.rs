@@ -21,7 +21,16 @@ pub fn run(arguments: VerifyArguments) -> u8 {
         mesher: arguments.programs.mesher.clone(),
         reference: arguments.programs.reference.clone(),
     };
-    let programs = Programs::find(given);
+    let mut programs = Programs::find(given);
+    if let Some(name) = &arguments.engine {
+        programs = match programs.with_engine(name, Duration::from_secs(arguments.timeout)) {
+            Ok(programs) => programs,
+            Err(why) => {
+                eprintln!("harness: {why}");
+                return EXIT_INPUT;
+            }
+        };
+    }
     let (junit, json) = (arguments.junit.clone(), arguments.json.clone());
     let options = options(arguments);
     let report = match verify(&options, &programs) {

@@ -3,11 +3,13 @@
 //!
 //! Trusts the manifests' digests: that they are true to the leaves is for the check `manifest`.
 
+pub mod rule;
+
 use std::fmt::{self, Debug};
 use std::path::Path;
 
-use crate::check::identical;
-use crate::lattice::Root;
+use crate::case::Case;
+use crate::check::Terms;
 use crate::leafset::{self, LeafDir, ReadError};
 use crate::manifest::{Manifest, octant_index};
 use crate::octant::Octant;
@@ -22,7 +24,12 @@ pub struct DiffReport {
     pub octants: Vec<Octant>,
     /// The first leaf that differs, both sides told.
     pub leaf: Option<String>,
+    /// Which rule of the definition decides, and for whom.
+    pub rules: Vec<String>,
 }
+
+/// Rules are looked for in meshes of up to so many leaves: that holds both in memory.
+const LEAVES_RULED: u64 = 200_000_000;
 
 impl DiffReport {
     /// Whether the leaves are the same.
@@ -47,7 +54,10 @@ impl fmt::Display for DiffReport {
         let (count, paths) = (self.octants.len(), paths.join(", "));
         write!(f, "the leaves differ in {count} of 512 level-3 octants: {paths}{more}")?;
         match &self.leaf {
-            Some(leaf) => write!(f, "\n{leaf}"),
+            Some(leaf) => {
+                write!(f, "\n{leaf}")?;
+                self.rules.iter().try_for_each(|rule| write!(f, "\n  rule: {rule}"))
+            }
             None => {
                 write!(f, "\nthe leaves there are the same: a manifest is not true to its files")
             }
@@ -55,8 +65,8 @@ impl fmt::Display for DiffReport {
     }
 }
 
-/// Compares two leaf-set directories.
-pub fn diff(a: &Path, b: &Path) -> Result<DiffReport, ReadError> {
+/// Compares two leaf-set directories. With the case that both are meshes of, facets and rays help to decide.
+pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadError> {
     let (a, b) = (leafset::open(a)?, leafset::open(b)?);
     let mut report =
         DiffReport { fields: fields(&a.manifest, &b.manifest), ..DiffReport::default() };
@@ -64,8 +74,9 @@ pub fn diff(a: &Path, b: &Path) -> Result<DiffReport, ReadError> {
     let differ: Vec<usize> = digests.filter(|(_, (x, y))| x != y).map(|(i, _)| i).collect();
     report.octants = differ.iter().map(|&i| level_3(i)).collect();
     for &i in &differ {
-        report.leaf = first_difference(&a, &b, i)?;
-        if report.leaf.is_some() {
+        if let Some((x, y)) = first_difference(&a, &b, i)? {
+            report.leaf = Some(rule::sides(x, y, &a.manifest.root));
+            report.rules = rules(&a, &b, case, x, y)?;
             break;
         }
     }
@@ -102,15 +113,52 @@ fn fields(a: &Manifest, b: &Manifest) -> Vec<String> {
     fields
 }
 
-/// The first leaf that differs in a level-3 octant, if one does.
-fn first_difference(a: &LeafDir, b: &LeafDir, index: usize) -> Result<Option<String>, ReadError> {
+/// The words that differ first in a level-3 octant, if any do.
+fn first_difference(
+    a: &LeafDir,
+    b: &LeafDir,
+    index: usize,
+) -> Result<Option<(Option<u64>, Option<u64>)>, ReadError> {
     let (words_a, words_b) = (octant_words(a, index)?, octant_words(b, index)?);
     if words_a == words_b {
         return Ok(None);
     }
     let first = words_a.iter().zip(&words_b).take_while(|(x, y)| x == y).count();
-    let root: &Root = &a.manifest.root;
-    Ok(Some(identical::difference(("A", &words_a), ("B", &words_b), first, root)))
+    Ok(Some((words_a.get(first).copied(), words_b.get(first).copied())))
+}
+
+/// The rules that decide, for what was asked of mesh A.
+fn rules(
+    a: &LeafDir,
+    b: &LeafDir,
+    case: Option<&Case>,
+    x: Option<u64>,
+    y: Option<u64>,
+) -> Result<Vec<String>, ReadError> {
+    let wrong = |what: &str| Ok(vec![what.to_owned()]);
+    if a.manifest.tree != b.manifest.tree {
+        return wrong("nothing: one is a base tree, the other a final mesh");
+    }
+    if Terms::of_manifest(&a.manifest) != Terms::of_manifest(&b.manifest) {
+        return wrong("section 1: the inputs were not the same");
+    }
+    if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
+        return wrong("a rule that is not looked for: the meshes are too large to be held in memory");
+    }
+    let (words_a, words_b) = (all_words(a)?, all_words(b)?);
+    let terms = Terms::of_manifest(&a.manifest);
+    Ok(rule::Dispute { a: &words_a, b: &words_b, terms: &terms, case }.rule(x, y))
+}
+
+/// All words of a mesh, sorted.
+fn all_words(set: &LeafDir) -> Result<Vec<u64>, ReadError> {
+    let mut words = Vec::new();
+    for part in &set.parts {
+        let read = part.read_all();
+        words.extend(read.map_err(|e| ReadError::Part { path: part.path().to_owned(), source: e.into() })?);
+    }
+    words.sort_unstable();
+    Ok(words)
 }
 
 /// All words of a level-3 octant, from all parts, sorted.

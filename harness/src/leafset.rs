@@ -1,7 +1,8 @@
 //! Leaf-set directories: `mesh.json` and the part files it names, read and written.
 //!
 //! Reading refuses only what cannot be understood (no manifest, a part missing or not an array of
-//! words, a part file that the manifest does not name). Whether the contents are true is the checks' affair.
+//! words, a part file that the manifest does not name). Whether the contents are true is the
+//! checks' affair.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -3,12 +3,16 @@
 mod cli;
 mod cli_bench;
 mod cli_gate;
+mod cli_report;
 mod cli_selftest;
+mod cli_shrink;
+mod cli_track;
 mod cli_verify;
 
 use clap::Parser;
 use cli::{Arguments, Command};
 use harness::audit::{self, AuditOptions};
+use harness::case::Case;
 use harness::diff;
 use harness::engine::interrupt;
 use harness::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
@@ -22,9 +26,12 @@ fn main() -> ExitCode {
         Command::Verify(arguments) => cli_verify::run(*arguments),
         Command::Gate(arguments) => cli_gate::run(*arguments),
         Command::Bench(arguments) => cli_bench::run(*arguments),
+        Command::Shrink(arguments) => cli_shrink::run(&arguments),
+        Command::Report(arguments) => cli_report::run(&arguments),
+        Command::Track(arguments) => cli_track::run(&arguments),
         Command::Selftest(arguments) => cli_selftest::run(&arguments),
         Command::Audit { mesh, nodes_max } => run_audit(&mesh, nodes_max),
-        Command::Diff { a, b } => run_diff(&a, &b),
+        Command::Diff { a, b, case } => run_diff(&a, &b, case.as_deref()),
     };
     ExitCode::from(code)
 }
@@ -41,8 +48,11 @@ fn run_audit(mesh: &Path, nodes_max: Option<usize>) -> u8 {
     if report.holds() { EXIT_HOLDS } else { EXIT_FAILED }
 }
 
-fn run_diff(a: &Path, b: &Path) -> u8 {
-    match diff::diff(a, b) {
+fn run_diff(a: &Path, b: &Path, case: Option<&Path>) -> u8 {
+    let compared = case.map(Case::read).transpose().map_err(|error| error.to_string());
+    match compared
+        .and_then(|case| diff::diff(a, b, case.as_ref()).map_err(|error| error.to_string()))
+    {
         Ok(report) => {
             println!("{report}");
             if report.same_leaves() { EXIT_HOLDS } else { EXIT_FAILED }

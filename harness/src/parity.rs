@@ -175,3 +175,52 @@ fn bounds(facet: &FacetLattice, axis: usize) -> ([i64; 2], [i64; 2]) {
     };
     (pick(i64::min), pick(i64::max))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A box as twelve facets, each with a winding of its own.
+    fn hull(low: [i64; 3], high: [i64; 3]) -> Vec<FacetLattice> {
+        let corner = |i: usize| -> [i64; 3] { std::array::from_fn(|a| [low, high][i >> a & 1][a]) };
+        let quads =
+            [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+        let halves = |q: [usize; 4]| [[q[0], q[1], q[2]], [q[3], q[0], q[2]]];
+        quads.into_iter().flat_map(halves).map(|t| t.map(corner)).collect()
+    }
+
+    proptest! {
+        /// Rays that run along edges and through corners count each crossing once.
+        #[test]
+        fn a_box_is_inside_where_it_is(
+            low in prop::array::uniform3(-4i64..4),
+            size in prop::array::uniform3(2i64..6),
+            point in prop::array::uniform3(-5i64..10),
+        ) {
+            let high: [i64; 3] = std::array::from_fn(|a| low[a] + size[a]);
+            let on = |a: usize| low[a] <= point[a] && point[a] <= high[a];
+            let inner = |a: usize| low[a] < point[a] && point[a] < high[a];
+            let inside = (0..3).all(inner);
+            prop_assume!(inside || !(0..3).all(on));
+            prop_assert_eq!(Parity::new(&hull(low, high)).inside(point), [inside; 6]);
+        }
+    }
+
+    #[test]
+    fn a_single_facet_is_odd_on_one_side_only() {
+        let facet = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
+        let parity = Parity::new(&[facet]);
+        assert_eq!(parity.inside([2, 2, -3]), [false, false, false, false, true, false]);
+        assert_eq!(parity.inside([2, 2, 3]), [false, false, false, false, false, true]);
+        // Duplicated, it cancels itself.
+        assert_eq!(Parity::new(&[facet, facet]).inside([2, 2, 3]), [false; 6]);
+    }
+
+    #[test]
+    fn degenerate_facets_and_none_count_for_nothing() {
+        let segment = [[0, 0, 0], [8, 8, 8], [4, 4, 4]];
+        assert_eq!(Parity::new(&[segment]).inside([4, 4, 3]), [false; 6]);
+        assert_eq!(Parity::new(&[]).inside([1, 2, 3]), [false; 6]);
+    }
+}

@@ -43,50 +43,57 @@ fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     Some(bytes[84..].chunks_exact(50).map(facet).collect())
 }
 
-/// Words that stand between vertices and mean nothing to a facet soup.
-const SKIPPED: [&str; 7] = ["facet", "outer", "loop", "endloop", "endfacet", "end", "normal"];
-
-/// ASCII: every vertex of every solid, three to a facet.
+/// ASCII: the facets of every solid. Names may be anything, so lines that carry one are set apart
+/// before words are looked at.
 fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
-    let text = std::str::from_utf8(bytes).map_err(|_| wrong("neither binary nor text"))?;
-    let mut vertices = Vec::new();
-    let mut solids = 0;
-    let mut lines = text.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty());
-    if lines.clone().next().is_none_or(|l| first_word(l) != "solid") {
-        return Err(wrong("it does not begin with `solid`"));
+    let text = String::from_utf8_lossy(bytes);
+    let mut lines = text.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty()).peekable();
+    if lines.peek().is_none_or(|l| first_word(l) != "solid") {
+        return Err(wrong("it is not binary, and does not begin with `solid`"));
     }
-    for line in &mut lines {
+    let (mut words, mut open) = (Vec::new(), false);
+    for line in lines {
         match first_word(line).as_str() {
-            "solid" => solids += 1,
-            "endsolid" => solids -= 1,
-            _ => vertices_of(line, &mut vertices)?,
+            "solid" if open => return Err(wrong("a solid begins before `endsolid`")),
+            "solid" => open = true,
+            "endsolid" => open = false,
+            _ if open => words.extend(line.split_whitespace()),
+            _ => return Err(wrong(&format!("{line:?} stands outside of all solids"))),
         }
     }
-    if solids != 0 {
+    if open {
         return Err(wrong("it ends before `endsolid`"));
     }
-    let (facets, rest) = vertices.as_chunks::<3>();
-    if !rest.is_empty() {
-        return Err(wrong("a facet without three vertices"));
+    let mut facets = Vec::new();
+    let mut words = words.into_iter().peekable();
+    while words.peek().is_some() {
+        facets.push(facet(&mut words)?);
     }
-    Ok(facets.to_vec())
+    Ok(facets)
 }
 
-/// The vertices on one line; most files have one, some put a whole facet there.
-fn vertices_of(line: &str, vertices: &mut Vec<[f32; 3]>) -> Result<(), StlError> {
-    let mut words = line.split_whitespace();
-    while let Some(word) = words.next() {
-        if word.eq_ignore_ascii_case("vertex") {
-            let mut vertex = [0.0; 3];
-            for c in &mut vertex {
-                let text = words.next().unwrap_or_default();
-                *c = text.parse().map_err(|_| wrong(&format!("{text:?} is no coordinate")))?;
-            }
-            vertices.push(vertex);
-        } else if word.parse::<f64>().is_err()
-            && !SKIPPED.iter().any(|s| word.eq_ignore_ascii_case(s))
-        {
-            return Err(wrong(&format!("{word:?} has no place in it")));
+/// One facet; its normal is passed over unread.
+fn facet<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<Facet, StlError> {
+    expect(words, &["facet", "normal"])?;
+    let normal = words.by_ref().take(3).count();
+    expect(words, if normal == 3 { &["outer", "loop"] } else { &["a normal of three numbers"] })?;
+    let mut facet = Facet::default();
+    for vertex in &mut facet {
+        expect(words, &["vertex"])?;
+        for c in vertex {
+            let text = words.next().unwrap_or_default();
+            *c = text.parse().map_err(|_| wrong(&format!("{text:?} is no coordinate")))?;
+        }
+    }
+    expect(words, &["endloop", "endfacet"])?;
+    Ok(facet)
+}
+
+fn expect<'a>(words: &mut impl Iterator<Item = &'a str>, key: &[&str]) -> Result<(), StlError> {
+    for key in key {
+        let word = words.next().unwrap_or_default();
+        if !word.eq_ignore_ascii_case(key) {
+            return Err(wrong(&format!("{word:?} stands where `{key}` belongs")));
         }
     }
     Ok(())

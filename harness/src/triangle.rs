@@ -39,7 +39,8 @@ impl Triangle {
         if self.corners.iter().any(within) {
             return true;
         }
-        // The box's corners nearest to and farthest along the normal: if the plane passes by, so does the triangle.
+        // The box's corners nearest to and farthest along the normal: if the plane passes by, so
+        // does the triangle.
         let (near, far) = self.diagonal(low, high);
         let (below, above) =
             (dot(self.normal, near) - self.height, dot(self.normal, far) - self.height);
@@ -113,4 +114,84 @@ fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
 
 fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
     (0..3).map(|i| i128::from(a[i]) * i128::from(b[i])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const LOW: [i64; 3] = [0; 3];
+    const HIGH: [i64; 3] = [4; 3];
+
+    fn meets(corners: FacetLattice) -> bool {
+        Triangle::new(&corners).meets(LOW, HIGH)
+    }
+
+    #[test]
+    fn each_way_to_meet() {
+        // A corner within, an edge through, the inside pierced.
+        assert!(meets([[1, 1, 1], [90, 90, 91], [90, 80, 70]]));
+        assert!(meets([[-5, 2, 2], [9, 2, 3], [2, 90, 90]]));
+        assert!(meets([[-90, -90, 2], [90, -90, 2], [0, 190, 3]]));
+        // In the plane of a face, at an edge, at a corner: closed sets share their boundary.
+        assert!(meets([[-90, -90, 4], [90, -90, 4], [0, 190, 4]]));
+        assert!(meets([[4, 4, -9], [4, 4, 9], [90, 90, 0]]));
+        assert!(meets([[4, 4, 4], [90, 5, 5], [5, 90, 5]]));
+    }
+
+    #[test]
+    fn each_way_to_miss() {
+        // Beside a face; plane above a corner; plane through the box but the triangle elsewhere.
+        assert!(!meets([[5, -9, -9], [5, 9, -9], [5, 0, 90]]));
+        assert!(!meets([[13, 0, 0], [0, 13, 0], [0, 0, 13]]));
+        assert!(!meets([[6, -9, 2], [90, 0, 2], [6, 9, 2]]));
+        // The bounding box covers the box, an edge passes it diagonally.
+        assert!(!meets([[-1, 6, 2], [6, -1, 2], [9, 9, 2]].map(|v: [i64; 3]| [
+            v[0] + 2,
+            v[1] + 2,
+            v[2]
+        ])));
+    }
+
+    #[test]
+    fn points_and_segments_are_triangles_too() {
+        assert!(meets([[4, 0, 4]; 3]));
+        assert!(!meets([[5, 0, 4]; 3]));
+        assert!(meets([[-2, -2, -2], [9, 9, 9], [-2, -2, -2]]));
+        assert!(!meets([[-2, 7, 0], [7, 12, 0], [-2, 7, 0]]));
+    }
+
+    #[test]
+    fn the_largest_coordinates_do_not_overflow() {
+        let (near, far) = (-(1 << 27), 1 << 28);
+        // Its plane passes through the far corner of the root, and through nothing else of it.
+        let triangle = Triangle::new(&[[near, far, far], [far, near, far], [far, far, near]]);
+        assert!(triangle.meets([0; 3], [1 << 27; 3]));
+        assert!(!triangle.meets([0; 3], [(1 << 27) - 1; 3]));
+    }
+
+    proptest! {
+        /// A point of the triangle that lies in the box proves that they meet.
+        #[test]
+        fn whatever_holds_a_common_point_meets(
+            corners in prop::array::uniform3(prop::array::uniform3(-12i64..=16)),
+            (i, j) in (0i64..=12, 0i64..=12),
+        ) {
+            prop_assume!(i + j <= 12);
+            let twelfths = |a: usize| corners[0][a] * (12 - i - j) + corners[1][a] * i + corners[2][a] * j;
+            let within = (0..3).all(|a| (12 * LOW[a]..=12 * HIGH[a]).contains(&twelfths(a)));
+            prop_assert!(!within || meets(corners));
+        }
+
+        /// Nothing depends on the order of corners or the names of axes.
+        #[test]
+        fn corners_and_axes_may_be_permuted(corners in prop::array::uniform3(prop::array::uniform3(-12i64..=16))) {
+            let [a, b, c] = corners;
+            prop_assert_eq!(meets([b, c, a]), meets(corners));
+            prop_assert_eq!(meets([c, b, a]), meets(corners));
+            prop_assert_eq!(meets(corners.map(|[x, y, z]| [y, z, x])), meets(corners));
+            prop_assert_eq!(meets(corners.map(|[x, y, z]| [4 - x, y, z])), meets(corners));
+        }
+    }
 }

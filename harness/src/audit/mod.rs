@@ -2,8 +2,8 @@
 //!
 //! One pass over the part files, merged as they are read, feeds the tally, the order check and the
 //! tree; leaves are not kept. The tree stores equal subtrees once, so that memory grows with the
-//! variety of a mesh and not with its size; how far it may grow is an option. Against the manifest's own
-//! terms, and without T0, facets or another mesh: what that misses, each check says.
+//! variety of a mesh and not with its size; how far it may grow is an option. Against the
+//! manifest's own terms, and without T0, facets or another mesh: what that misses, each check says.
 
 use std::fmt;
 use std::path::Path;
@@ -120,4 +120,61 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
     of_tree.iter_mut().for_each(|c| c.examined = leaves);
     checks.extend(of_tree);
     checks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::testing::{leaf_set, random_words, words_of};
+    use crate::leafset::LeafSet;
+    use proptest::prelude::*;
+
+    fn audited(set: &LeafSet, options: &AuditOptions) -> AuditReport {
+        let dir = tempfile::tempdir().unwrap();
+        set.write(dir.path()).unwrap();
+        audit(dir.path(), options)
+    }
+
+    fn found(report: &AuditReport) -> Vec<&'static str> {
+        report.checks.iter().filter(|c| !c.holds()).map(|c| c.name).collect()
+    }
+
+    /// A balanced mesh of three levels.
+    fn sound() -> Vec<u64> {
+        words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3])
+    }
+
+    proptest! {
+        /// However leaves are dealt to parts, the audit says the same; and it counts every leaf.
+        #[test]
+        fn parts_do_not_matter(words in random_words(3), deal in prop::collection::vec(0usize..5, 600)) {
+            let mut parts = vec![Vec::new(); 5];
+            words.iter().zip(&deal).for_each(|(&w, &part)| parts[part].push(w));
+            let dealt: Vec<u64> = words.iter().take(deal.len()).copied().collect();
+            let options = AuditOptions::default();
+            let (whole, cut) = (audited(&leaf_set(vec![dealt]), &options), audited(&leaf_set(parts), &options));
+            prop_assert_eq!(found(&whole), found(&cut));
+            prop_assert!(!found(&cut).contains(&"manifest") && !found(&cut).contains(&"linear"));
+            prop_assert_eq!(cut.leaves, words.len().min(deal.len()) as u64);
+        }
+    }
+
+    #[test]
+    fn a_sound_mesh_is_sound_and_a_disordered_part_is_not() {
+        let words = sound();
+        assert!(audited(&leaf_set(vec![words.clone(), vec![]]), &AuditOptions::default()).holds());
+        let mut disordered = words;
+        disordered.swap(3, 4);
+        let report = audited(&leaf_set(vec![disordered]), &AuditOptions::default());
+        assert!(found(&report).contains(&"linear"));
+    }
+
+    /// Where memory does not suffice the audit must not pass, but counts and digests are still checked.
+    #[test]
+    fn too_small_a_capacity_is_a_finding() {
+        let mut set = leaf_set(vec![words_of(|o| o.level < 5 && o.corner[0] < 1 << 18)]);
+        set.manifest.leaves += 1;
+        let report = audited(&set, &AuditOptions { nodes_max: 1 });
+        assert_eq!(found(&report), ["manifest", CAPACITY]);
+    }
 }

@@ -1,10 +1,11 @@
 //! Kept and deleted leaves tile the root.
 //!
-//! Sections 5 and 7 of reference/DEFINITION.md. With T0 the check is exact: where a T0 leaf is kept, leaves
-//! fill it without a gap; where one is deleted, there is nothing; nothing is coarser than T0. Without
-//! T0 every hole must be bounded as deletion leaves it: a leaf's neighbour across a face is missing
-//! only where the definition deletes the neighbours of such a leaf. Without T0 it misses leaves dropped from
-//! among others whose neighbours may be missing, as crossing leaves may be all around another.
+//! Sections 5 and 7 of reference/DEFINITION.md. With T0 the check is exact: where a T0 leaf is
+//! kept, leaves fill it without a gap; where one is deleted, there is nothing; nothing is coarser
+//! than T0. Without T0 every hole must be bounded as deletion leaves it: a leaf's neighbour across
+//! a face is missing only where the definition deletes the neighbours of such a leaf. Without T0 it
+//! misses leaves dropped from among others whose neighbours may be missing, as crossing leaves may
+//! be all around another.
 
 use std::fmt::Write;
 

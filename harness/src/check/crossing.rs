@@ -1,10 +1,10 @@
 //! Crossing leaves are exactly those that facets cross.
 //!
-//! Sections 2 and 7 of reference/DEFINITION.md. With T0: its crossing leaves are exactly the crossed ones, and
-//! each leaf of the mesh is crossing iff the T0 leaf that it lies in is. Without T0: no crossed leaf has
-//! another side, and each crossing leaf is crossed or, if finer than the surface level, lies in an octant
-//! of that level that is. Misses: facets beyond the root, which cross nothing; a crossed leaf missing
-//! altogether, which is for `complete`.
+//! Sections 2 and 7 of reference/DEFINITION.md. With T0: its crossing leaves are exactly the
+//! crossed ones, and each leaf of the mesh is crossing iff the T0 leaf that it lies in is. Without
+//! T0: no crossed leaf has another side, and each crossing leaf is crossed or, if finer than the
+//! surface level, lies in an octant of that level that is. Misses: facets beyond the root, which
+//! cross nothing; a crossed leaf missing altogether, which is for `complete`.
 
 use super::facets::{Facets, Visit};
 use super::{CheckResult, Subject, identical};

@@ -1,10 +1,10 @@
 //! What balance and layers have in common: octants that are split must keep their distance from
 //! leaves coarser than themselves.
 //!
-//! A leaf of level `l + 1` or more lies in an octant of level `l` that is split, so "leaves of level
-//! `l + 1` and `l - 1` are so far apart" is "no leaf of level `l - 1` so near to a split octant of level
-//! `l`". Walks all split octants; a subtree is passed over where even its finest leaf is at most one
-//! level below the coarsest leaf anywhere near.
+//! A leaf of level `l + 1` or more lies in an octant of level `l` that is split, so "leaves of
+//! level `l + 1` and `l - 1` are so far apart" is "no leaf of level `l - 1` so near to a split
+//! octant of level `l`". Walks all split octants; a subtree is passed over where even its finest
+//! leaf is at most one level below the coarsest leaf anywhere near.
 
 use super::CheckResult;
 use crate::lattice::Root;
@@ -45,7 +45,8 @@ impl Gap<'_> {
         let nearby = trail.coarsest_nearby(self.tree, margin, &region, level);
         for digit in (0..8).filter(|d| split >> d & 1 == 1) {
             let child = self.tree.child(at, digit, octant.level);
-            // What is near a child is near all of them, and what is near a grandchild is near the child.
+            // What is near a child is near all of them, and what is near a grandchild is near the
+            // child.
             let deep = self.tree.finest_level(child, level) > nearby.max(level) + 1;
             if nearby < level || deep {
                 trail.descend(self.tree, digit);

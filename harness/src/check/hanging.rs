@@ -90,8 +90,8 @@ mod tests {
         let tree =
             Tree::of_words(&words_of(|o| o.level == 0 || (o.level == 1 && o.corner == [0; 3])));
         let counts = count(&tree);
-        // Three faces of the refined octant lie inside the root. Of their nine edges three lie inside the
-        // root (three coarse leaves each), six in its faces (one coarse leaf each).
+        // Three faces of the refined octant lie inside the root. Of their nine edges three lie
+        // inside the root (three coarse leaves each), six in its faces (one coarse leaf each).
         assert_eq!(counts.edges, [12 * 15 - 15, 15, 0]);
         assert!(counts.worst.is_none());
     }

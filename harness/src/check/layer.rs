@@ -1,11 +1,11 @@
 //! Every layer is at least n cells thick, at every level.
 //!
-//! Section 7 of reference/DEFINITION.md: a leaf of level l + 1 or more and one of level l - 1 or less are at
-//! least n cells of level l apart by Chebyshev distance, for every l below the surface's level and, where
-//! all is kept, for every l; and leaves nearer than n - 1 surface cells to a crossing leaf of
-//! the surface's level have that level at least. Where crossing leaves are deleted, whatever touched one has
-//! the surface's level. Misses: layers thicker than they need be; without T0, what deleted crossing
-//! leaves asked for.
+//! Section 7 of reference/DEFINITION.md: a leaf of level l + 1 or more and one of level l - 1 or
+//! less are at least n cells of level l apart by Chebyshev distance, for every l below the
+//! surface's level and, where all is kept, for every l; and leaves nearer than n - 1 surface cells
+//! to a crossing leaf of the surface's level have that level at least. Where crossing leaves are
+//! deleted, whatever touched one has the surface's level. Misses: layers thicker than they need be;
+//! without T0, what deleted crossing leaves asked for.
 
 use super::gap::{Gap, Trail};
 use super::{CheckResult, Subject, Terms, contact};
@@ -104,6 +104,56 @@ impl Insulation<'_> {
                     (octant.describe(&self.terms.root), coarse.describe(&self.terms.root));
                 format!("within {cells} cells of the {what} leaf {leaf}, coarser than the surface: {coarse}")
             });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::testing::{distance, graded_words};
+    use crate::lattice::Root;
+    use crate::word;
+    use proptest::prelude::*;
+
+    fn terms(n: u32, level_surface: u8, keep: Keep, keep_crossing: bool) -> Terms {
+        let root = Root { origin: [0.0; 3], edge: 1.0 };
+        Terms { root, level_surface, layer_cells_min: n, keep, keep_crossing, boxes: Vec::new() }
+    }
+
+    /// The definition word by word, over all pairs of leaves.
+    fn thin(words: &[u64], terms: &Terms) -> bool {
+        let n = i64::from(terms.layer_cells_min);
+        let leaves: Vec<_> = words.iter().map(|&w| (word::octant(w), word::side(w))).collect();
+        let all = terms.keep == Keep::All;
+        leaves.iter().any(|(fine, side)| {
+            leaves.iter().any(|(coarse, _)| {
+                let apart = distance(fine, coarse);
+                let levels = coarse.level + 1..fine.level;
+                let promised = |l: &u8| all || *l < terms.level_surface;
+                let layer = levels.filter(promised).any(|l| apart < n * cell(l));
+                let surface = terms.level_surface;
+                let surrounded = *side == Side::Crossing && fine.level == surface;
+                let insulation = apart < (n - 1) * cell(surface)
+                    || !terms.keep_crossing && apart < cell(surface);
+                layer || surrounded && coarse.level < surface && insulation
+            })
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+
+        #[test]
+        fn agrees_with_all_pairs(words in graded_words(4), n in 1u32..=6, surface in 0u8..=4,
+                                 all in any::<bool>(), keep_crossing in any::<bool>()) {
+            let keep = if all { Keep::All } else { Keep::Outside };
+            let terms = terms(n, surface, keep, keep_crossing);
+            // Crossing leaves deeper than the surface ask for nothing but the extra layer.
+            let fit = |w: &&u64| word::side(**w) != Side::Crossing || word::level(**w) == surface;
+            let words: Vec<u64> = words.iter().filter(fit).copied().collect();
+            let found = check_tree(&Tree::of_words(&words), &terms);
+            prop_assert_eq!(found.holds(), !thin(&words, &terms), "{}", found);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Every word is a leaf, each part is sorted, and no two leaves overlap.
 //!
-//! Sections 7 and 8 of reference/DEFINITION.md. Misses: gaps, which are for `complete`; a side that is wrong
-//! but exists, which is for `sides` and `crossing`.
+//! Sections 7 and 8 of reference/DEFINITION.md. Misses: gaps, which are for `complete`; a side that
+//! is wrong but exists, which is for `sides` and `crossing`.
 
 use super::{CheckResult, Subject, identical};
 use crate::lattice::Root;

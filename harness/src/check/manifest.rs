@@ -1,7 +1,7 @@
 //! The manifest is true to the files and to the case.
 //!
-//! Section 8 of reference/DEFINITION.md: counts, digests, and what was asked for. Misses: whether the leaves are
-//! right; a digest that collides. The ambiguous components are for `sides`.
+//! Section 8 of reference/DEFINITION.md: counts, digests, and what was asked for. Misses: whether
+//! the leaves are right; a digest that collides. The ambiguous components are for `sides`.
 
 use std::fmt::Debug;
 

@@ -118,7 +118,7 @@ impl fmt::Display for CheckResult {
 pub const FILES: &str = "files";
 
 /// The promises a mesh makes, as numbers: from its case, or in an audit from its manifest.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Terms {
     /// The root cube, for coordinates in findings.
     pub root: Root,
@@ -159,7 +159,8 @@ impl Terms {
         }
     }
 
-    /// Whether a box asks for leaves finer than the surface's. Gradation may then refine crossing leaves.
+    /// Whether a box asks for leaves finer than the surface's. Gradation may then refine crossing
+    /// leaves.
     pub fn boxes_beyond_surface(&self) -> bool {
         self.boxes.iter().any(|b| b.level > self.level_surface)
     }

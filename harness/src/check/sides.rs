@@ -1,11 +1,11 @@
 //! One side per component, and the side that rays find.
 //!
-//! Section 4 of reference/DEFINITION.md. With T0: components of its leaves over faces are found by union-find, each is
-//! decided by the harness's own exact rays, and every leaf must have its component's side; the
-//! ambiguous components must be counted as the manifest counts them; every leaf of the mesh must have the side of the
-//! T0 leaf it lies in. Without T0: no outside leaf shares part of a face with an inside one, and no leaf
-//! has a side that is deleted. Misses: a body whose rays agree on what is wrong, as a leaky one's may; the
-//! oracles are for that.
+//! Section 4 of reference/DEFINITION.md. With T0: components of its leaves over faces are found by
+//! union-find, each is decided by the harness's own exact rays, and every leaf must have its
+//! component's side; the ambiguous components must be counted as the manifest counts them; every
+//! leaf of the mesh must have the side of the T0 leaf it lies in. Without T0: no outside leaf
+//! shares part of a face with an inside one, and no leaf has a side that is deleted. Misses: a body
+//! whose rays agree on what is wrong, as a leaky one's may; the oracles are for that.
 
 use super::components::{self, Component};
 use super::contact::{self, Contacts};
@@ -122,7 +122,7 @@ fn ambiguous(
         // Exact on the lattice; in user units within rounding.
         example.is_some_and(|e| (0..3).all(|a| (e[a] - at[a]).abs() <= 1e-9 * terms.root.edge))
     };
-    let placed = if found.is_empty() { example.is_none() } else { found.iter().any(|c| near(c)) };
+    let placed = if found.is_empty() { example.is_none() } else { found.iter().any(near) };
     if !placed {
         result
             .find(format!("{whose}the example of an ambiguous component, {example:?}, is in none"));

@@ -1,9 +1,10 @@
 //! Leaves are as fine as surface and boxes ask, and T0 no finer.
 //!
-//! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has the surface's level at least, every
-//! leaf whose inside meets a box's inside has the box's; T0 is the least such tree, so each octant that it
-//! splits is crossed and coarser than the surface level, or meets a box of a deeper level. Without T0:
-//! only that leaves are fine enough. Misses: needless refinement by gradation, for which there is `identical`.
+//! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has the surface's level at
+//! least, every leaf whose inside meets a box's inside has the box's; T0 is the least such tree, so
+//! each octant that it splits is crossed and coarser than the surface level, or meets a box of a
+//! deeper level. Without T0: only that leaves are fine enough. Misses: needless refinement by
+//! gradation, for which there is `identical`.
 
 use super::facets::{Facets, Visit};
 use super::{CheckResult, Subject, Terms, identical};

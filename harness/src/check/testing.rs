@@ -2,7 +2,11 @@
 
 use proptest::prelude::*;
 
-use crate::octant::Octant;
+use crate::digest::Digest;
+use crate::lattice::Root;
+use crate::leafset::LeafSet;
+use crate::manifest::{self, Ambiguous, BySide, Keep, Manifest};
+use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word::{self, Leaf, Side};
 
 /// The leaves of the tree in which exactly the octants that `split` picks are split, all outside.
@@ -28,15 +32,74 @@ pub fn sided(split: impl Fn(&Octant) -> bool, side: impl Fn(&Octant) -> Option<S
 /// Any tree to this level, with sides and holes at random.
 pub fn random_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
     any::<u64>().prop_map(move |seed| {
-        let pick = |octant: &Octant, salt: u64| {
-            let word = word::key_of(octant.corner) << 5 | u64::from(octant.level);
-            (crate::digest::mix(word ^ seed.rotate_left(salt as u32 * 8)) >> 100) as u64
-        };
         sided(
-            |o| o.level < level && pick(o, 0) % 5 < 3,
-            |o| Side::ALL.get(pick(o, 1) as usize % 4).copied(),
+            |o| o.level < level && pick(seed, o, 0) % 5 < 3,
+            |o| Side::ALL.get(pick(seed, o, 1) as usize % 4).copied(),
         )
     })
+}
+
+/// Trees that grow finer towards a point, steeply or gently, so that about as many keep their distances
+/// as do not; a few leaves missing, a few crossing.
+pub fn graded_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
+    let point = prop::array::uniform3(0..CELLS_PER_EDGE);
+    (point, 0.1f64..3.5, any::<u64>(), 0u64..40).prop_map(move |(point, reach, seed, odd)| {
+        let near = |o: &Octant| {
+            let away = (0..3).map(|a| {
+                let (low, at) = (i64::from(o.corner[a]), i64::from(point[a]));
+                (low - at).max(at - low - i64::from(o.edge())).max(0)
+            });
+            away.fold(0, i64::max) as f64 <= reach * f64::from(o.edge())
+        };
+        sided(
+            |o| o.level < level && near(o),
+            |o| match pick(seed, o, 2) % 100 {
+                p if p < odd / 2 => None,
+                p if p < odd => Some(Side::Crossing),
+                _ => Some(Side::Outside),
+            },
+        )
+    })
+}
+
+/// A number that depends on nothing but its arguments.
+fn pick(seed: u64, octant: &Octant, salt: u32) -> u64 {
+    let word = word::key_of(octant.corner) << 5 | u64::from(octant.level);
+    (crate::digest::mix(word ^ seed.rotate_left(salt * 8)) >> 100) as u64
+}
+
+/// Chebyshev distance of two octants, in level-19 cells.
+pub fn distance(a: &Octant, b: &Octant) -> i64 {
+    let ends = |o: &Octant, i: usize| (i64::from(o.corner[i]), i64::from(o.corner[i] + o.edge()));
+    let along = |i| {
+        let ((al, ah), (bl, bh)) = (ends(a, i), ends(b, i));
+        (al - bh).max(bl - ah).max(0)
+    };
+    (0..3).map(along).fold(0, i64::max)
+}
+
+/// A mesh of these parts from which nothing was deleted and of which little was asked, with a true
+/// manifest.
+pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
+    let empty = Manifest {
+        schema: manifest::SCHEMA.to_owned(),
+        program: "test".to_owned(),
+        tree: manifest::Tree::Final,
+        root: Root { origin: [0.0; 3], edge: 8.0 },
+        level_surface: 0,
+        layer_cells_min: 1,
+        keep: Keep::All,
+        keep_crossing: true,
+        boxes: Vec::new(),
+        leaves: 0,
+        leaves_by_level: [0; 20],
+        leaves_by_side: BySide::default(),
+        components_ambiguous: Ambiguous::default(),
+        digest: Digest::default(),
+        octant_digests: vec![Digest::default(); manifest::OCTANTS],
+        parts: Vec::new(),
+    };
+    LeafSet::new(empty, Vec::new()).with_parts(parts)
 }
 
 /// The leaves' octants and all their ancestors, each once.

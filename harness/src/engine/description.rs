@@ -30,7 +30,7 @@ pub struct Description {
     pub limits: Limits,
     /// How a revision of it is built, for `harness gate --baseline REVISION`.
     pub build: Option<Build>,
-    /// The file's stem; for messages.
+    /// What selects it: a name in the repository, or a path.
     #[serde(skip)]
     pub name: String,
     /// The file's directory: `{here}`.
@@ -126,7 +126,7 @@ impl Description {
         let wrong = |why: String| format!("{}: {why}", path.display());
         let text = std::fs::read_to_string(&path).map_err(|error| wrong(error.to_string()))?;
         let mut description = Self::parse(&text).map_err(wrong)?;
-        description.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        description.name = name.to_owned();
         let here = path.parent().unwrap_or(Path::new(""));
         description.here = std::fs::canonicalize(here.join(".")).unwrap_or(here.to_owned());
         Ok(description)

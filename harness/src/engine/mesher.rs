@@ -2,6 +2,8 @@
 
 use super::mpi::{self, SharedMemory};
 use super::programs::Programs;
+use super::runner::{Engine, Ranks, Wanted};
+use crate::manifest::Manifest;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;
@@ -63,26 +65,54 @@ pub fn reference(programs: &Programs, files: &Files) -> Command {
     command
 }
 
-/// The mesher's command without MPI.
-pub fn serial(programs: &Programs, files: &Files) -> Command {
+/// The command of the mesher, or of the engine that stands in for it, without MPI.
+///
+/// # Errors
+/// Where the engine's description does not say how this is done.
+pub fn serial(programs: &Programs, files: &Files) -> Result<Command, String> {
+    if let Some(engine) = &programs.engine {
+        return described(engine, Ranks::Serial, files, &Wanted::default());
+    }
     let mut command = Command::new(&programs.mesher);
     files.add_to(&mut command);
     command.args(["--comm", "solo", "--quiet"]);
-    command
+    Ok(command)
 }
 
-/// The mesher's command on MPI.
+fn described(
+    engine: &Engine,
+    ranks: Ranks,
+    files: &Files,
+    chosen: &Wanted,
+) -> Result<Command, String> {
+    let Files { case, out, json, status, ungraded } = *files;
+    let wanted = Wanted { out, json, status, ungraded, ..*chosen };
+    engine.command(case, ranks, &wanted).map_err(|why| why.to_string())
+}
+
+/// The command of the mesher, or of the engine that stands in for it, on MPI.
+///
+/// # Errors
+/// Where the engine's description does not say how this is done.
 pub fn parallel(
     programs: &Programs,
     files: &Files,
     layout: &Layout,
     shared: &SharedMemory,
-) -> Command {
+) -> Result<Command, String> {
+    if let Some(engine) = &programs.engine {
+        let (partitioner, level_base) = (layout.partitioner.as_str(), layout.level_base.as_str());
+        let chosen = Wanted { partitioner, level_base, ..Wanted::default() };
+        let mut command = described(engine, Ranks::Mpi(layout.ranks), files, &chosen)?;
+        mpi::set_environment(&mut command);
+        shared.add_to(&mut command);
+        return Ok(command);
+    }
     let mut command = mpi::command(&programs.mpirun, layout.ranks, &programs.mesher, shared);
     files.add_to(&mut command);
     command.args(["--comm", "mpi", "--quiet", "--partitioner", &layout.partitioner]);
     command.args(["--level-base", &layout.level_base]);
-    command
+    Ok(command)
 }
 
 /// What a run says of itself; both programs write more, which is not looked at here.
@@ -121,6 +151,17 @@ impl Record {
         let text = std::fs::read_to_string(path)
             .map_err(|error| format!("{}: {error}", path.display()))?;
         serde_json::from_str(&text).map_err(|error| format!("{}: {error}", path.display()))
+    }
+
+    /// What is known of a run that wrote no record: what its mesh says, and the process's time.
+    pub fn of_mesh(manifest: &Manifest, time_wall_s: f64) -> Self {
+        Self {
+            cells: manifest.leaves,
+            digest: manifest.digest.to_string(),
+            ranks: 1,
+            time_wall_s,
+            peak_rss_bytes: OneOrMany::One(0),
+        }
     }
 
     /// Peak memory of all ranks together.
@@ -164,7 +205,7 @@ mod tests {
         };
         assert_eq!(words(&reference(&programs, &files)), ["a.toml", "--out", "mesh", "--ungraded"]);
         let layout = Layout { ranks: 3, partitioner: "metis".into(), level_base: "2".into() };
-        let parallel = words(&parallel(&programs, &files, &layout, &SharedMemory::new()));
+        let parallel = words(&parallel(&programs, &files, &layout, &SharedMemory::new()).unwrap());
         assert_eq!(parallel[..2], ["-n", "3"]);
         let expected = "a.toml --out mesh --status status --ungraded --comm mpi --quiet --partitioner metis --level-base 2";
         assert_eq!(parallel[3..].join(" "), expected);

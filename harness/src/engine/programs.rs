@@ -1,7 +1,10 @@
 //! Where the programs are: given on the command line, or next to the harness, or on the machine.
 
+use super::description::Description;
+use super::runner::Engine;
 use std::env;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What the command line may say about where programs are.
 #[derive(Clone, Debug, Default)]
@@ -31,6 +34,8 @@ pub struct Programs {
     pub p4est: PathBuf,
     /// The catalogue of cases.
     pub catalogue: PathBuf,
+    /// The engine that stands in for the mesher, where one was named.
+    pub engine: Option<Engine>,
     /// The directory of engine descriptions.
     pub engines: PathBuf,
     /// The repository.
@@ -50,6 +55,7 @@ impl Programs {
         let target = beside.parent().unwrap_or(Path::new("..")).to_owned();
         Self {
             mesher_given: given.mesher.clone(),
+            engine: None,
             mesher: given.mesher.unwrap_or_else(|| beside.join("mesher")),
             reference: given.reference.unwrap_or_else(|| beside.join("reference")),
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
@@ -62,6 +68,18 @@ impl Programs {
             root,
             harness,
         }
+    }
+}
+
+impl Programs {
+    /// The same with another engine in the mesher's place.
+    ///
+    /// # Errors
+    /// One sentence, where there is no such engine.
+    pub fn with_engine(self, name: &str, limit: Duration) -> Result<Self, String> {
+        let description = Description::find(name, &self)?;
+        let engine = Engine::new(description, &self, limit);
+        Ok(Self { mesher: engine.program().to_owned(), engine: Some(engine), ..self })
     }
 }
 

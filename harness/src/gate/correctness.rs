@@ -25,6 +25,7 @@ pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     }
     let mut programs = bench.programs.clone();
     programs.mesher = bench.candidate.program().to_owned();
+    programs.engine = Some(bench.candidate.clone());
     let options = Options { limit: bench.options.limit, ..Options::of_leaves_alone(cases) };
     let report = verify(&options, &programs).map_err(|error| match error {
         VerifyError::Input(why) => GateError::Input(why),

@@ -108,7 +108,8 @@ impl Finding {
         let verdict = match candidate.cmp(&baseline) {
             std::cmp::Ordering::Equal => Verdict::Unchanged,
             std::cmp::Ordering::Less => Verdict::Improvement,
-            std::cmp::Ordering::Greater if change <= tolerance => Verdict::Changed,
+            // Ten percent more than ten is, in binary, a little more than ten percent.
+            std::cmp::Ordering::Greater if change <= tolerance + 1e-9 => Verdict::Changed,
             std::cmp::Ordering::Greater => Verdict::Regression,
         };
         let note = match verdict {

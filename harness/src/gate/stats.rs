@@ -146,13 +146,13 @@ impl Random {
 mod tests {
     use super::*;
 
-    /// A machine with 2 % noise, a burst that doubles the time of one run in ten, and a drift.
+    /// A machine with 2 % noise, a burst that doubles the time of one run in 25, and a drift.
     fn rounds(count: usize, slower: f64, seed: u64) -> Vec<Round> {
         let mut random = Random(seed);
         let mut time = |round: usize, factor: f64| {
             let uniform = |random: &mut Random| random.below(1 << 20) as f64 / f64::from(1 << 20);
             let noise = (0..4).map(|_| uniform(&mut random)).sum::<f64>() - 2.0;
-            let burst = if random.below(10) == 0 { 2.0 } else { 1.0 };
+            let burst = if random.below(25) == 0 { 2.0 } else { 1.0 };
             (factor * burst * (1.0 + 0.035 * noise + 0.01 * round as f64)).ln()
         };
         (0..count)

@@ -5,7 +5,7 @@ use crate::verify::report::{CaseReport, Report, Run, Tally};
 use std::fmt::Write;
 
 /// Headings of the table's columns.
-pub const COLUMNS: [&str; 11] = [
+pub const COLUMNS: [&str; 12] = [
     "case",
     "facets",
     "base",
@@ -15,6 +15,7 @@ pub const COLUMNS: [&str; 11] = [
     "fail",
     "left out",
     "time s",
+    "process s",
     "M cells/s",
     "B/cell",
 ];
@@ -72,11 +73,12 @@ fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
     match run {
         Some(run) => fields.extend([
             format!("{:.3}", run.time_wall_s),
+            format!("{:.3}", run.time_process_s),
             format!("{:.3}", run.cells_per_s() / 1e6),
             format!("{:.1}", run.bytes_per_cell()),
             format!("{:.1}", run.speedup_over_paper()),
         ]),
-        None => fields.extend(vec!["-".to_owned(); 4]),
+        None => fields.extend(vec!["-".to_owned(); 5]),
     }
     fields
 }
@@ -115,7 +117,7 @@ mod tests {
             lines[1][..9],
             ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100"]
         );
-        assert_eq!(lines[2], ["4", "0", "1", "0", "0.050", "0.152", "10.0", "4.0"]);
+        assert_eq!(lines[2], ["4", "0", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::Specimen;
 use super::catalogue::{Mutant, Mutation, audited, informed};
+use super::surgery::other_side;
 use crate::digest::Digest;
 use crate::manifest::{ExtentBox, Keep, Manifest, Tree};
 
@@ -94,6 +95,6 @@ fn leaf_changed(s: &Specimen) -> Option<Mutation> {
     let mut mutation = Mutation::of(s);
     let part = mutation.mesh.parts.iter_mut().find(|p| !p.is_empty())?;
     let last = part.last_mut()?;
-    *last = *last & !3 | (*last + 1 & 3) % 3;
+    *last = other_side(*last);
     Some(mutation)
 }

@@ -1,7 +1,8 @@
 //! Gradation wrong: for `balance` and `layer`.
 //!
-//! Corruptions of gradation are looked for: among all leaves that could be split, or octets that could be merged
-//! although T0 does not need them, those whose change breaks exactly what the corruption's name says.
+//! Corruptions of gradation are looked for: among all leaves that could be split, or octets that
+//! could be merged although T0 does not need them, those whose change breaks exactly what the
+//! corruption's name says.
 
 use super::Specimen;
 use super::catalogue::{Mutant, Mutation, audited, informed};
@@ -78,8 +79,8 @@ fn meet_in_corner(a: &Octant, b: &Octant) -> bool {
 }
 
 fn split_twice(s: &Specimen) -> Option<Mutation> {
-    // A neighbour of its own level is two levels coarser than its grandchildren. Two of the grandchildren
-    // must touch it, so the neighbour is taken across the first child's low faces.
+    // A neighbour of its own level is two levels coarser than its grandchildren. Two of the
+    // grandchildren must touch it, so the neighbour is taken across the first child's low faces.
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
         let hood = surgery::hood(&tree, w);

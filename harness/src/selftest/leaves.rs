@@ -48,7 +48,7 @@ fn doubled(s: &Specimen) -> Option<Mutation> {
 
 fn doubled_other_side(s: &Specimen) -> Option<Mutation> {
     let i = middle(&s.mesh.words, |_| true)?;
-    changed(s, |words| words.push(words[i] & !3 | (words[i] + 1 & 3) % 3))
+    changed(s, |words| words.push(surgery::other_side(words[i])))
 }
 
 fn kept_beside_children(s: &Specimen) -> Option<Mutation> {

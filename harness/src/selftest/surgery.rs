@@ -29,6 +29,11 @@ pub(super) fn sided(word: u64, side: Side) -> u64 {
     word & !3 | side as u64
 }
 
+/// The same leaf with the side after its own.
+pub(super) fn other_side(word: u64) -> u64 {
+    sided(word, Side::ALL[(word as usize % 4 + 1) % 3])
+}
+
 /// Whether a leaf has this side.
 pub(super) fn is(word: u64, side: Side) -> bool {
     word & 3 == side as u64

@@ -3,7 +3,8 @@
 //! Built in one pass over sorted words. A node is nothing but its eight children; it knows neither
 //! its place nor its level, so that a billion leaves around a smooth surface, most of them in
 //! uniform runs, fit in a small part of the memory that one node per octant would take. Walking it
-//! with a [`Hood`] (an octant and what surrounds it) gives every leaf its neighbours without any search.
+//! with a [`Hood`] (an octant and what surrounds it) gives every leaf its neighbours without any
+//! search.
 //!
 //! Invariants: a node has at least one child that is not a hole; children precede parents.
 
@@ -155,7 +156,8 @@ impl Tree {
         }
     }
 
-    /// The kinds of leaves in `of`, and whether there are holes. Beyond the root there is nothing at all.
+    /// The kinds of leaves in `of`, and whether there are holes. Beyond the root there is nothing
+    /// at all.
     pub fn kinds(&self, of: Handle) -> Kinds {
         if of.is_node() {
             return self.store.summary(of).kinds;
@@ -173,7 +175,7 @@ impl Tree {
         let key = word::key_of(cell);
         let (mut at, mut octant) = (self.root, Octant::ROOT);
         while at.is_node() {
-            let digit = (key / word::span(octant.level + 1) & 7) as u8;
+            let digit = ((key / word::span(octant.level + 1)) & 7) as u8;
             at = self.store.children(at)[usize::from(digit)];
             octant = octant.child(digit);
         }

@@ -56,8 +56,8 @@ impl Coarsest {
 
 impl Hood {
     /// The coarsest leaf, ghosts aside, whose inside meets the region, if it is coarser than level
-    /// `enough`; else a level of `enough` and no leaf. Exact where the region lies within the 27 places,
-    /// or this is the root.
+    /// `enough`; else a level of `enough` and no leaf. Exact where the region lies within the 27
+    /// places, or this is the root.
     pub fn coarsest_within(&self, tree: &Tree, region: &Region, enough: u8) -> Coarsest {
         let mut found = Coarsest { level: enough, cell: None };
         let edge = i64::from(self.octant.edge());

@@ -50,6 +50,10 @@ impl<'a> CaseRun<'a> {
     pub fn verify(&mut self) {
         let Some(case) = self.read() else { return };
         self.report.facets = case.facets.len() as u64;
+        let engine = self.programs.engine.as_ref();
+        if let Some(why) = engine.and_then(|engine| engine.description().declines(&case)) {
+            return self.add(Check::new("case", "engine", Outcome::LeftOut(why)), None);
+        }
         let Some(meshes) = self.verify_serial(&case) else {
             return;
         };
@@ -144,7 +148,10 @@ impl<'a> CaseRun<'a> {
         let programs = elsewhere
             .map(|(name, path)| format!(" --{name} {}", quoted(&path.to_string_lossy())))
             .collect::<String>();
-        format!("{program} verify {case} {only} --keep{programs}")
+        let engine = self.programs.engine.as_ref();
+        let engine = engine
+            .map_or(String::new(), |e| format!(" --engine {}", quoted(&e.description().name)));
+        format!("{program} verify {case}{engine} {only} --keep{programs}")
     }
 }
 

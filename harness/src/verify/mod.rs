@@ -99,6 +99,7 @@ fn verify_case(
         });
     }
     let place = workplace.enter(&selected.name)?;
+    let selected = &plain(selected, programs, &place);
     let mut run = CaseRun::new(selected, options, programs, needs, &place, progress);
     run.verify();
     let mut report = run.into_report();
@@ -109,6 +110,17 @@ fn verify_case(
         report.repeat_with = None;
     }
     Ok(report)
+}
+
+/// The case as the engine that stands in for the mesher can read it. One that cannot be read at all stays as it
+/// is: to refuse it is part of what is verified.
+fn plain(selected: &Selected, programs: &Programs, place: &std::path::Path) -> Selected {
+    let prepared = programs
+        .engine
+        .as_ref()
+        .and_then(|engine| engine.prepare(&selected.path, &place.join("plain")).ok());
+    let path = prepared.unwrap_or_else(|| selected.path.clone());
+    Selected { path, ..selected.clone() }
 }
 
 #[cfg(test)]

@@ -119,11 +119,15 @@ fn probe_mpi(programs: &Programs, place: &Path) -> Result<(), String> {
     let probe = tempfile::tempdir_in(place).map_err(|error| error.to_string())?;
     let (case, json) = (probe.path().join("probe.toml"), probe.path().join("probe.json"));
     fs::write(&case, PROBE).map_err(|error| error.to_string())?;
+    let case = match &programs.engine {
+        Some(engine) => engine.prepare(&case, &probe.path().join("plain"))?,
+        None => case,
+    };
     let files = Files { case: &case, out: None, json: Some(&json), status: None, ungraded: false };
     let layout =
         Layout { ranks: PROBE_RANKS, partitioner: "morton".into(), level_base: "auto".into() };
     let shared = SharedMemory::new();
-    let mut command = mesher::parallel(programs, &files, &layout, &shared);
+    let mut command = mesher::parallel(programs, &files, &layout, &shared)?;
     let watch = Watch { limit: PROBE_LIMIT, logs: probe.path(), name: "mpi", status: None };
     let done = process::run(&mut command, &watch)
         .map_err(|error| format!("mpirun cannot be started: {error}"))?;

@@ -75,22 +75,30 @@ impl CaseRun<'_> {
         fs::create_dir_all(&status)
             .map_err(|error| failed(format!("{}: {error}", place.display())))?;
         let (mesh, json) = (place.join("mesh"), place.join("run.json"));
+        // An engine that writes no record is known by its mesh alone.
+        let silent = !matches!(order.what, What::Reference)
+            && self.programs.engine.as_ref().is_some_and(|e| e.description().run.json.is_none());
         let files = Files {
             case: order.case,
-            out: order.write.then_some(mesh.as_path()),
+            out: (order.write || silent).then_some(mesh.as_path()),
             json: Some(&json),
             status: Some(&status),
             ungraded: order.ungraded,
         };
         let shared = SharedMemory::new();
-        let mut command = self.command(order.what, &files, &shared);
+        let mut command = self.command(order.what, &files, &shared).map_err(failed)?;
         let watch =
             Watch { limit: self.options.limit, logs: &place, name: "run", status: Some(&status) };
         let finished = process::run(&mut command, &watch).map_err(|error| {
             failed(format!("{:?} cannot be started: {error}", command.get_program()))
         })?;
         judge(&finished, self.options.limit.as_secs())?;
-        let record = Record::read(&json).map_err(failed)?;
+        let record = match silent {
+            true => leafset::read_manifest(&mesh)
+                .map(|manifest| Record::of_mesh(&manifest, finished.time_wall_s))
+                .map_err(|error| failed(error.to_string()))?,
+            false => Record::read(&json).map_err(failed)?,
+        };
         let mesh = order
             .write
             .then(|| leafset::read(&mesh))
@@ -102,9 +110,9 @@ impl CaseRun<'_> {
         Ok(Done { run: run_of(order.what, &record, finished.time_wall_s), mesh, place })
     }
 
-    fn command(&self, what: What, files: &Files, shared: &SharedMemory) -> Command {
+    fn command(&self, what: What, files: &Files, shared: &SharedMemory) -> Result<Command, String> {
         match what {
-            What::Reference => mesher::reference(self.programs, files),
+            What::Reference => Ok(mesher::reference(self.programs, files)),
             What::Serial => mesher::serial(self.programs, files),
             What::Ranks(layout) => mesher::parallel(self.programs, files, layout, shared),
         }

@@ -29,7 +29,11 @@ impl CaseRun<'_> {
             return None;
         }
         let final_mesh = self.make("serial", What::Serial, "serial", false)?;
-        let base = self.make("base tree", What::Serial, "base", true)?;
+        // An engine that cannot stop at the base tree is checked against the reference's.
+        let stops =
+            self.programs.engine.as_ref().is_none_or(|e| e.description().run.ungraded.is_some());
+        let base = if stops { What::Serial } else { What::Reference };
+        let base = self.make("base tree", base, "base", true)?;
         let base_place = base.place.join("mesh");
         let meshes = Meshes { mesh: final_mesh.mesh?, base: base.mesh?, base_place };
         self.report().leaves_base = meshes.base.words.len() as u64;

@@ -3,5 +3,6 @@
 mod agreement;
 mod no_false_alarms;
 mod selftest;
+mod stl_files;
 mod support;
 mod vectors;

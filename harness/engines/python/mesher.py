@@ -1,0 +1,229 @@
+"""An oct-tree mesher on a dense grid: every step of reference/DEFINITION.md as whole-array operations, for small
+levels. The worked example of how a program that is not ours is verified by `harness verify --engine python`."""
+
+import argparse
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+UNITS = 1 << 27  # lattice units along an edge of the root
+OUTSIDE, INSIDE, CROSSING = 0, 1, 2
+
+
+def read_stl(path):
+    data = path.read_bytes()
+    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+        return np.frombuffer(data[84:], facet)["corners"].astype(np.float64)
+    corners = [line.split()[1:] for line in data.decode().splitlines() if line.split()[:1] == ["vertex"]]
+    return np.array(corners, "f4").reshape(-1, 3, 3).astype(np.float64)
+
+
+def level_for(edge, spacing):
+    return next(level for level in range(20) if edge / 2**level <= spacing)
+
+
+def pool(grid, level):
+    """Whether anything within each cell of a coarser level is set."""
+    n, f = 1 << level, grid.shape[0] >> level
+    return grid.reshape(n, f, n, f, n, f).any(axis=(1, 3, 5))
+
+
+def spread(grid, size):
+    """Cells of a coarser level on a finer grid."""
+    f = size // grid.shape[0]
+    return grid.repeat(f, 0).repeat(f, 1).repeat(f, 2)
+
+
+def dilate(grid, by):
+    for axis in range(3):
+        old, new = np.moveaxis(grid, axis, 0), np.moveaxis(grid := grid.copy(), axis, 0)
+        for step in range(1, min(by, len(old) - 1) + 1):
+            new[step:] |= old[:-step]
+            new[:-step] |= old[step:]
+    return grid
+
+
+def crossed(facet, edge, size):
+    """Cells that a facet shares a point with, as index arrays: separating axes, in integers (section 2)."""
+    low = np.clip(-(-facet.min(0) // edge) - 1, 0, size)
+    high = np.clip(facet.max(0) // edge, -1, size - 1)
+    cells = np.stack(np.meshgrid(*map(np.arange, low, high + 1), indexing="ij"), -1).reshape(-1, 3)
+    corners = 2 * facet[None] - (2 * cells * edge + edge)[:, None]  # doubled, from the cell's centre
+    edges = facet[[1, 2, 0]] - facet
+    meets = np.ones(len(cells), bool)
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        for e in edges:
+            along = corners[..., v] * e[u] - corners[..., u] * e[v]
+            reach = edge * (abs(e[u]) + abs(e[v]))
+            meets &= (along.min(1) <= reach) & (along.max(1) >= -reach)
+    normal = np.cross(edges[0], edges[1]).astype(object)  # beyond 64 bits from here
+    along = (corners[:, 0].astype(object) * normal).sum(1) if len(cells) else np.zeros(0)
+    return tuple(cells[meets & (abs(along) <= edge * abs(normal).sum()).astype(bool)].T)
+
+
+def rays(point, facets):
+    """Whether each of a point's six rays finds it inside (section 4)."""
+    votes = []
+    normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    for a in range(3):
+        u, v = (a + 1) % 3, (a + 2) % 3
+        d = facets[:, [1, 2, 0]] - facets
+        area = d[..., u] * (point[v] - facets[..., v]) - d[..., v] * (point[u] - facets[..., u])
+        sign = np.sign(np.where(area != 0, area, np.where(d[..., v] != 0, -d[..., v], d[..., u])))
+        met = (normals[:, a] != 0) & (abs(sign.sum(1)) == 3)
+        to = ((facets[met, 0] - point).astype(object) * normals[met].astype(object)).sum(1)
+        above = sum(1 for t, n in zip(to, normals[met, a]) if (t > 0) == (n > 0))
+        votes += [above % 2 == 1, (met.sum() - above) % 2 == 1]
+    return votes
+
+
+def flood(region, free):
+    """Everything that is joined to the region by faces of free cells."""
+    while True:
+        before = region.sum()
+        for axis in range(3):
+            r, f = np.moveaxis(region, axis, 0), np.moveaxis(free, axis, 0)
+            for i in range(1, len(r)):
+                r[i] |= r[i - 1] & f[i]
+            for i in range(len(r) - 2, -1, -1):
+                r[i] |= r[i + 1] & f[i]
+        if region.sum() == before:
+            return region
+
+
+def words_of(level, side, chosen):
+    """Sorted leaf words (section 8) of the leaves in the chosen cells."""
+    size, words = level.shape[0], [np.zeros(0, np.uint64)]
+    for l in range(int(level.max()) + 1):
+        at = np.argwhere(pool((level == l) & chosen, l))
+        corner, key = (at << (19 - l)).astype(np.uint64), np.zeros(len(at), np.uint64)
+        for bit in range(19):
+            for a in range(3):
+                key |= (corner[:, a] >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + a)
+        sides = side[tuple((at * (size >> l)).T)].astype(np.uint64)
+        words.append(key << np.uint64(7) | np.uint64(l << 2) | sides)
+    return np.sort(np.concatenate(words))
+
+
+def sides(level, crossing, facets, root):
+    """The side of every cell, how many components were decided by majority, and where one is."""
+    side = np.where(crossing, CROSSING, OUTSIDE).astype(np.uint8)
+    left, firsts = ~crossing, []
+    while left.any():
+        seed = np.zeros_like(left)
+        seed.flat[left.argmax()] = True
+        component = flood(seed, left)
+        leaves = sorted(map(int, words_of(level, side, component)), key=lambda w: (w >> 2 & 31, w))
+        total = []
+        for word in leaves[:32]:
+            edge = UNITS >> (word >> 2 & 31)
+            key = word >> 7
+            at = [256 * sum((key >> (3 * bit + a) & 1) << bit for bit in range(19)) + edge // 2 for a in range(3)]
+            votes = rays(np.array(at), facets)
+            total += votes
+            if len(set(votes)) == 1:
+                inside = votes[0]
+                break
+        else:
+            inside = 2 * sum(total) > len(total)
+            word, edge = leaves[0], UNITS >> (leaves[0] >> 2 & 31)
+            at = [256 * sum((word >> (7 + 3 * bit + a) & 1) << bit for bit in range(19)) + edge // 2 for a in range(3)]
+            firsts.append(((word >> 2 & 31, word), at))
+        side[component] = INSIDE if inside else OUTSIDE
+        left &= ~component
+    example = [o + c * (root["edge"] / UNITS) for o, c in zip(root["origin"], min(firsts)[1])] if firsts else None
+    return side, {"count": len(firsts), "example": example}
+
+
+def grade(split, kept, level_of, n, deep):
+    """Layers and balance, from fine to coarse (section 6)."""
+    def refine(marks, level):
+        for coarser in range(level):
+            split[coarser] |= pool(marks, coarser)
+
+    for l in range(deep, 0, -1):
+        within = pool(kept, l)
+        refine(dilate(pool((level_of() == l) & kept, l), n - 1) & within, l)
+        refine(pool(dilate(pool((level_of() == l) & kept, l), 1) & within, l - 1), l - 1)
+
+
+def mesh(case, facets, ungraded):
+    root, n = case["root"], case.get("layer_cells_min", 4)
+    scale = UNITS / root["edge"]
+    on_lattice = lambda x: np.rint((np.asarray(x, np.float64) - root["origin"]) * scale)
+    facets = on_lattice(facets).astype(np.int64).reshape(-1, 3, 3)
+    surface = level_for(root["edge"], case["spacing_min"])
+    boxes = [{"min": np.clip(on_lattice(b["min"]), 0, UNITS).astype(int).tolist(),
+              "max": np.clip(on_lattice(b["max"]), 0, UNITS).astype(int).tolist(),
+              "level": level_for(root["edge"], b["spacing"])} for b in case.get("box", [])]
+    deep = max([surface] + [b["level"] for b in boxes])
+    size = 1 << deep
+    touched = np.zeros((size,) * 3, bool)
+    for facet in facets:
+        touched[crossed(facet, UNITS >> deep, size)] = True
+    split = [pool(touched, l) & (l < surface) for l in range(deep)]
+    for b in boxes:
+        for l in range(b["level"]):
+            at, edge = np.arange(1 << l), UNITS >> l
+            x, y, z = (np.maximum(at * edge, low) < np.minimum((at + 1) * edge, high) for low, high in zip(b["min"], b["max"]))
+            split[l] |= x[:, None, None] & y[None, :, None] & z[None, None, :]
+    level_of = lambda: sum((spread(s, size).astype(np.uint8) for s in split), np.zeros((size,) * 3, np.uint8))
+    level, crossing = level_of(), np.zeros((size,) * 3, bool)
+    for l in range(deep + 1):
+        crossing |= (level == l) & spread(pool(touched, l), size)
+    side, ambiguous = sides(level, crossing, facets, root)
+    keep, keep_crossing = case.get("keep", "outside"), case.get("keep_crossing", True)
+    kept = crossing | (keep == "all") | (side == (INSIDE if keep == "inside" else OUTSIDE))
+    if ungraded:
+        kept, keep_crossing = np.ones_like(kept), True
+    else:
+        if not keep_crossing and n < 3:
+            marks = pool(dilate(crossing, 1) & kept, surface)
+            for l in range(surface):
+                split[l] |= pool(marks, l)
+        grade(split, kept, level_of, n, deep)
+    words = words_of(level_of(), side, kept if keep_crossing else kept & ~crossing)
+    terms = {"level_surface": surface, "layer_cells_min": n, "keep": keep, "keep_crossing": case.get("keep_crossing", True)}
+    return words, terms | {"root": root, "boxes": boxes, "components_ambiguous": ambiguous}
+
+
+def digest(words):
+    def f(x):
+        x = (x ^ x >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
+        x = (x ^ x >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
+        return x ^ x >> np.uint64(31)
+
+    total = lambda x: (int((x >> np.uint64(32)).sum()) << 32) + int((x & np.uint64(0xFFFFFFFF)).sum())
+    a = f(words + np.uint64(0x9E3779B97F4A7C15))
+    b = f(a ^ (words << np.uint64(32) | words >> np.uint64(32)))
+    return f"{((total(a) << 64) + total(b)) % (1 << 128):032x}"
+
+
+def write(words, terms, out, ungraded):
+    levels = np.bincount((words >> np.uint64(2) & np.uint64(31)).astype(int), minlength=20).tolist()
+    counts = np.bincount((words & np.uint64(3)).astype(int), minlength=3).tolist()
+    octants = (words >> np.uint64(55)).astype(int)
+    part = {"file": "leaves-00000.npy", "leaves": len(words), "digest": digest(words)}
+    manifest = terms | {
+        "schema": "octree-leaf-set/1", "program": "python example", "tree": "base" if ungraded else "final",
+        "leaves": len(words), "leaves_by_level": levels,
+        "leaves_by_side": dict(zip(["outside", "inside", "crossing"], counts)), "digest": part["digest"],
+        "octant_digests": [digest(words[octants == i]) for i in range(512)], "parts": [part]}
+    out.mkdir(parents=True, exist_ok=True)
+    np.save(out / part["file"], words.astype("<u8"))
+    (out / "mesh.json").write_text(json.dumps(manifest))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("case", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--ungraded", action="store_true")
+    options = parser.parse_args()
+    given = tomllib.loads(options.case.read_text())
+    made = mesh(given, read_stl(options.case.parent / given["geometry"]), options.ungraded)
+    write(*made, options.out, options.ungraded)

@@ -1,0 +1,68 @@
+//! `harness report`: records in, figures and a page out.
+
+use clap::Args;
+use harness::bench::record;
+use harness::report::report;
+use harness::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use std::path::{Path, PathBuf};
+
+/// `harness report`.
+#[derive(Args, Debug)]
+pub struct ReportArguments {
+    /// Directory for the report; its files *.jsonl are the records unless --record names some
+    pub directory: PathBuf,
+    /// A record of `harness bench`; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub record: Vec<PathBuf>,
+}
+
+/// Writes the report; the exit code.
+pub fn run(arguments: &ReportArguments) -> u8 {
+    match write(&arguments.directory, &arguments.record) {
+        Ok(()) => EXIT_HOLDS,
+        Err(why) => {
+            eprintln!("harness: {why}");
+            EXIT_INPUT
+        }
+    }
+}
+
+/// Reads records, writes the report into `directory`, and says what it is.
+///
+/// # Errors
+/// One sentence.
+pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
+    let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
+    let mut lines = Vec::new();
+    for path in &records {
+        let content = record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        for (line, why) in &content.broken {
+            eprintln!("harness: {}, line {line} is passed over: {why}", path.display());
+        }
+        lines.extend(content.lines);
+    }
+    if lines.is_empty() {
+        let shown = directory.display();
+        return Err(format!(
+            "no results to report: {shown} has no record; make one with harness bench"
+        ));
+    }
+    let written = report(directory, &lines).map_err(|error| error.to_string())?;
+    for finding in &written.broken {
+        println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
+    }
+    if !cfg!(feature = "figures") {
+        println!("PNG and PDF are left out: build the harness with --features figures");
+    }
+    println!("{} figures; the page is {}", written.figures, written.page.display());
+    Ok(())
+}
+
+fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = std::fs::read_dir(directory)
+        .map_err(|error| format!("{}: {error}", directory.display()))?;
+    let is_record = |path: &PathBuf| path.extension().is_some_and(|e| e == "jsonl");
+    let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_record).collect();
+    found.sort();
+    Ok(found)
+}

@@ -1,0 +1,176 @@
+//! A figure as PGF/TikZ, so that it takes the paper's fonts. Wants `\usepackage{pgfplots}`, compat 1.16.
+
+use super::figure::{Axis, Bars, Body, Figure, How, Series};
+use std::fmt::Write;
+
+const COLOURS: [&str; 7] =
+    ["0,114,178", "213,94,0", "0,158,115", "204,121,167", "86,180,233", "230,159,0", "90,90,90"];
+const MARKS: [(&str, &str); 6] = [
+    ("*", "o"),
+    ("square*", "square"),
+    ("triangle*", "triangle"),
+    ("diamond*", "diamond"),
+    ("triangle*, mark options={rotate=180}", "triangle, mark options={rotate=180}"),
+    ("pentagon*", "pentagon"),
+];
+
+/// The figure as a `tikzpicture`.
+pub fn tikz(figure: &Figure) -> String {
+    let mut out = String::from(
+        "% Drawn with \\usepackage{pgfplots} \\pgfplotsset{compat=1.16}\n\\begin{tikzpicture}\n",
+    );
+    for (i, rgb) in COLOURS.iter().enumerate() {
+        let _ = writeln!(out, "\\definecolor{{look{i}}}{{RGB}}{{{rgb}}}");
+    }
+    let mut options = vec![
+        "width=\\linewidth".to_owned(),
+        "height=0.65\\linewidth".to_owned(),
+        format!("xlabel={{{}}}", escape(&figure.x.label)),
+        format!("ylabel={{{}}}", escape(&figure.y.label)),
+        "grid=major".to_owned(),
+        "legend style={at={(0.5,1.03)},anchor=south,legend columns=2,draw=none,font=\\footnotesize}".to_owned(),
+        "legend cell align=left".to_owned(),
+    ];
+    match &figure.body {
+        Body::Points(series) => {
+            options.extend(axis_options("x", &figure.x));
+            options.extend(axis_options("y", &figure.y));
+            open(&mut out, &options);
+            series.iter().for_each(|s| plot(&mut out, s));
+        }
+        Body::Bars(b) => bars(&mut out, options, b),
+    }
+    out.push_str("\\end{axis}\n\\end{tikzpicture}\n");
+    out
+}
+
+fn open(out: &mut String, options: &[String]) {
+    let _ = writeln!(out, "\\begin{{axis}}[\n  {}\n]", options.join(",\n  "));
+}
+
+fn axis_options(name: &str, axis: &Axis) -> Vec<String> {
+    let mut options = Vec::new();
+    if axis.log {
+        options.push(format!("{name}mode=log"));
+    } else if axis.range.is_none() {
+        options.push(format!("{name}min=0"));
+    }
+    if let Some((low, high)) = axis.range {
+        options.extend([format!("{name}min={low}"), format!("{name}max={high}")]);
+    }
+    if !axis.ticks.is_empty() {
+        let ticks: Vec<String> = axis.ticks.iter().map(f64::to_string).collect();
+        options.push(format!("{name}tick={{{}}}", ticks.join(",")));
+        options.push(format!("{name}ticklabels={{{}}}", ticks.join(",")));
+    }
+    options
+}
+
+fn plot(out: &mut String, s: &Series) {
+    let (solid, hollow) = MARKS[s.look % MARKS.len()];
+    let colour = s.look % COLOURS.len();
+    let style = match (s.how, s.joined) {
+        (How::Bound, _) => "black, densely dotted, no markers".to_owned(),
+        (how, joined) => format!(
+            "look{colour}, {}, mark={}{}",
+            if joined { if how.is_solid() { "solid" } else { "dashed" } } else { "only marks" },
+            if how.is_solid() { solid } else { hollow },
+            ", error bars/.cd, y dir=both, y explicit"
+        ),
+    };
+    let _ = writeln!(out, "\\addplot+[{style}] coordinates {{");
+    for p in &s.points {
+        let _ = match s.how {
+            How::Bound => writeln!(out, "  ({},{})", p.x, p.y),
+            _ => {
+                writeln!(out, "  ({},{}) += (0,{}) -= (0,{})", p.x, p.y, p.high - p.y, p.y - p.low)
+            }
+        };
+    }
+    let _ = writeln!(out, "}};\n\\addlegendentry{{{}}}", escape(&s.name));
+}
+
+fn bars(out: &mut String, mut options: Vec<String>, b: &Bars) {
+    let places: Vec<String> = (0..b.categories.len()).map(|i| i.to_string()).collect();
+    let names: Vec<String> = b.categories.iter().map(|c| format!("{{{}}}", escape(c))).collect();
+    let wide = if b.categories.len() > 20 { "2pt" } else { "8pt" };
+    options.extend([
+        "ybar stacked".to_owned(),
+        format!("bar width={wide}"),
+        "ymin=0".to_owned(),
+        format!("xtick={{{}}}", places.join(",")),
+        format!("xticklabels={{{}}}", names.join(",")),
+        "x tick label style={rotate=45,anchor=east,font=\\footnotesize}".to_owned(),
+    ]);
+    open(out, &options);
+    for (look, (name, values)) in b.parts.iter().enumerate() {
+        let fill = if look % 2 == 1 {
+            format!("look{}!35", look % COLOURS.len())
+        } else {
+            format!("look{}", look % COLOURS.len())
+        };
+        let points: Vec<String> =
+            values.iter().enumerate().map(|(i, v)| format!("({i},{v})")).collect();
+        let _ = writeln!(
+            out,
+            "\\addplot+[fill={fill}, draw=look{}] coordinates {{{}}};",
+            look % COLOURS.len(),
+            points.join(" ")
+        );
+        let _ = writeln!(out, "\\addlegendentry{{{}}}", escape(name));
+    }
+    for (name, level) in &b.lines {
+        let last = b.categories.len() as f64 - 0.5;
+        let _ = writeln!(
+            out,
+            "\\draw[densely dotted] (axis cs:-0.5,{level}) -- (axis cs:{last},{level}) node[above left, font=\\footnotesize] {{{}}};",
+            escape(name)
+        );
+    }
+}
+
+/// Words as LaTeX wants them.
+pub fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\\' => out.push_str("\\textbackslash{}"),
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => out.extend(['\\', c]),
+            '~' => out.push_str("\\textasciitilde{}"),
+            '^' => out.push_str("\\textasciicircum{}"),
+            '<' => out.push_str("\\textless{}"),
+            '>' => out.push_str("\\textgreater{}"),
+            '`' => out.push('\''),
+            '·' => out.push_str("$\\cdot$"),
+            'λ' => out.push_str("$\\lambda$"),
+            '≤' => out.push_str("$\\leq$"),
+            '–' => out.push_str("--"),
+            'µ' => out.push_str("$\\mu$"),
+            '×' => out.push_str("$\\times$"),
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::paint::tests::{figure, series};
+    use super::*;
+
+    #[test]
+    fn hollow_stays_hollow_and_braces_match() {
+        let text =
+            tikz(&figure(Body::Points(vec![series(How::Measured), series(How::Oversubscribed)])));
+        assert!(text.contains("mark=*") && text.contains("mark=o"));
+        assert!(text.contains("xmode=log") && text.contains("xtick={1,2,4}"));
+        let count = |c| text.chars().filter(|x| *x == c).count();
+        assert_eq!(count('{'), count('}'));
+        assert_eq!(text.matches("\\begin").count(), text.matches("\\end").count());
+    }
+
+    #[test]
+    fn words_are_made_safe() {
+        assert_eq!(escape("50 % of A_1 & {B}"), "50 \\% of A\\_1 \\& \\{B\\}");
+    }
+}
