@@ -266,7 +266,7 @@ pub fn cells_heaviest(
             }
         }
     };
-    for l in 0..LEVEL_MAX {
+    for l in 0..=LEVEL_MAX {
         add(l, &split[l as usize], 7);
         add(l, &deleted[l as usize], -1);
     }

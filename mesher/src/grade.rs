@@ -44,10 +44,12 @@ pub struct Work {
     pub bricks_sent: u64,
 }
 
-/// Refines the kept part of `base` until layers are thick enough and touching leaves differ by at most
-/// one level. Collective. Returns the split sets of the graded tree.
+/// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
+/// at most one level. Makes the base tree's `split` sets the graded tree's; `crossing` are the base tree's.
+/// Collective.
 pub fn grade(
-    base: &Tree,
+    split: PerLevel,
+    crossing: &PerLevel,
     kept: &Kept,
     rules: &Rules,
     share: &Ownership,
@@ -55,9 +57,9 @@ pub fn grade(
 ) -> (PerLevel, Work) {
     let surface = rules.level_surface;
     let mut g = Gradation {
-        split: base.split.clone(),
+        split,
         impure: BrickSet::default(),
-        base,
+        crossing,
         kept,
         surface,
         share,
@@ -85,7 +87,7 @@ struct Gradation<'a> {
     split: PerLevel,
     /// Octants, of the level above the sweep's, below which something was deleted.
     impure: BrickSet,
-    base: &'a Tree,
+    crossing: &'a PerLevel,
     kept: &'a Kept<'a>,
     surface: Level,
     share: &'a Ownership,
@@ -158,7 +160,7 @@ impl Gradation<'_> {
         let (reached, sent) = self.share.scatter(l, reached, self.comm);
         self.work.bricks_sent += sent;
         let before = std::mem::take(&mut self.split[l as usize]);
-        let fresh = self.kept.only(self.base, l, reached.without(&before));
+        let fresh = self.kept.only(&self.split, l, reached.without(&before));
         self.work.octants_split += (fresh.bricks().iter())
             .filter(|b| self.share.answers_for(l, b.key))
             .map(|b| u64::from(b.bits.count_ones()))
@@ -173,9 +175,9 @@ impl Gradation<'_> {
         if surface == 0 {
             return;
         }
-        for m in (surface..self.base.crossing.len() as Level).rev() {
+        for m in (surface..self.crossing.len() as Level).rev() {
             let mut reach = Reach::new(m - 1);
-            let leaves = self.base.crossing[m as usize].bricks().iter().copied();
+            let leaves = self.crossing[m as usize].bricks().iter().copied();
             reach.dilate_children(leaves.filter(|b| self.share.answers_for(m, b.key)), 1);
             let mut touched = self.reached(reach);
             for _ in surface..m {

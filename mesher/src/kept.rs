@@ -31,8 +31,9 @@ impl<'a> Kept<'a> {
     ///
     /// An octant whose parent is split in the base tree is one of its octants, and is looked up. The
     /// others are kept where their parents are: so the question goes up, level by level, for ever
-    /// fewer octants, and each level's sets are read once in order.
-    pub fn only(&self, base: &Tree, l: Level, mut set: BrickSet) -> BrickSet {
+    /// fewer octants, and each level's sets are read once in order. `split` may be the graded tree's as
+    /// well as the base tree's: what gradation has split lies in a kept leaf, so all below it is kept.
+    pub fn only(&self, split: &PerLevel, l: Level, mut set: BrickSet) -> BrickSet {
         if !self.any || set.is_empty() {
             return set;
         }
@@ -41,9 +42,9 @@ impl<'a> Kept<'a> {
             set.retain(|b| b.bits & !deleted.get(b.key));
             return set;
         }
-        let parents = set.coarsen().without(&base.split[l as usize - 1]);
-        let parents = self.only(base, l - 1, parents);
-        let (mut below_leaf, mut split) = (parents.cursor(), base.split[l as usize - 1].cursor());
+        let parents = set.coarsen().without(&split[l as usize - 1]);
+        let parents = self.only(split, l - 1, parents);
+        let (mut below_leaf, mut split) = (parents.cursor(), split[l as usize - 1].cursor());
         set.retain(|b| {
             let of = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
             let here = of(split.get(b.key >> 3)) & !deleted.get(b.key);

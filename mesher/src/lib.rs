@@ -144,7 +144,7 @@ impl Meshed {
     fn leaves(&self) -> Leaves<'_> {
         Leaves {
             split: self.graded.as_ref().unwrap_or(&self.refined.tree.split),
-            base: &self.refined.tree,
+            crossing: &self.refined.tree.crossing,
             sides: &self.sides,
             share: &self.refined.share,
             everything: self.graded.is_none(),
@@ -164,7 +164,7 @@ fn build(
     let geometry = record.phase("read", comm, || ingest::read(&case.source, comm))?;
     let (rules, facets) = record.phase("quantise", comm, || quantise(case, &geometry, comm))?;
     drop(geometry.facets);
-    let refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
+    let mut refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
     comm.agree(check_interrupt())?;
 
     let sides = record.phase("sides", comm, || {
@@ -175,10 +175,18 @@ fn build(
 
     let graded = (!options.ungraded).then(|| {
         let kept = kept::Kept::new(&sides.deleted);
+        // From here on the base tree is known by its crossing and deleted leaves.
+        let split = std::mem::take(&mut refined.tree.split);
         let (split, work) = record.phase("grade", comm, || {
-            grade::grade(&refined.tree, &kept, &rules, &refined.share, comm)
+            grade::grade(split, &refined.tree.crossing, &kept, &rules, &refined.share, comm)
         });
         counters.grade(&work);
+        counters.base_leaf(base::cells_heaviest(
+            &split,
+            &sides.deleted,
+            &refined.share,
+            comm.rank(),
+        ));
         split
     });
     comm.agree(check_interrupt())?;

@@ -19,7 +19,7 @@ pub struct Counters {
 }
 
 /// Names of the counters, in the order of their values.
-const COUNTERS: [&str; 9] = [
+const COUNTERS: [&str; 10] = [
     "facet_brick_tests",
     "bricks_voxelised",
     "rays",
@@ -29,6 +29,7 @@ const COUNTERS: [&str; 9] = [
     "messages",
     "message_bytes",
     "leaves",
+    "base_leaf_cells_max",
 ];
 
 impl Counters {
@@ -57,6 +58,11 @@ impl Counters {
     pub(crate) fn traffic(&mut self, t: Traffic) {
         self.add("messages", t.messages);
         self.add("message_bytes", t.bytes);
+    }
+
+    /// Cells in the heaviest of the rank's base leaves.
+    pub(crate) fn base_leaf(&mut self, cells: u64) {
+        self.add("base_leaf_cells_max", cells);
     }
 
     pub(crate) fn leaves(&mut self, n: u64) {

@@ -9,7 +9,7 @@ use crate::lattice::{Keep, Rules};
 use crate::octant::{Level, Side, start57};
 use crate::share::{Ownership, Place};
 use crate::sides::Sides;
-use crate::tree::{LEVELS, Tree};
+use crate::tree::LEVELS;
 
 /// Words handed over at a time, at most.
 const CHUNK: usize = 4096;
@@ -41,8 +41,8 @@ impl Counts {
 pub struct Leaves<'a> {
     /// Split octants of the tree to emit: the graded one, or the base tree's.
     pub split: &'a [BrickSet],
-    /// The base tree, for its crossing leaves.
-    pub base: &'a Tree,
+    /// Crossing leaves of the base tree.
+    pub crossing: &'a [BrickSet],
     /// Sides of the base tree's leaves.
     pub sides: &'a Sides,
     /// Whose bricks are whose.
@@ -59,7 +59,7 @@ impl Leaves<'_> {
     pub fn emit<E>(&self, sink: impl FnMut(&[u64]) -> Result<(), E>) -> Result<Counts, E> {
         let levels = (0..LEVELS).map(|l| LevelCursors {
             split: self.split[l].cursor(),
-            crossing: self.base.crossing[l].cursor(),
+            crossing: self.crossing[l].cursor(),
             inside: self.sides.inside[l].cursor(),
             deleted: self.sides.deleted[l].cursor(),
         });

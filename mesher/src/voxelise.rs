@@ -21,7 +21,7 @@ use std::ops::Range;
 pub struct Home(u64);
 
 impl Home {
-    /// The facet's home; none if its extent misses the root.
+    /// The facet's home; none if it misses the root.
     pub fn of(f: &Facet) -> Option<Self> {
         const SHIFT: u32 = ROOT_BITS - LEVEL_MAX;
         let mut differ = 0;
@@ -40,7 +40,8 @@ impl Home {
             low[a] = first as u32;
         }
         if sticks_out {
-            return Some(Self(0));
+            // Its extent may meet the root where it does not itself; homes are taken to be crossed.
+            return (crossed(f, [0; 3], 0) & 1 == 1).then_some(Self(0));
         }
         let drop = 64 - differ.leading_zeros();
         Some(Self(morton(low.map(|p| p >> drop << drop)) << 5 | u64::from(LEVEL_MAX - drop)))

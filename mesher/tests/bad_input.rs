@@ -39,6 +39,21 @@ fn good_input_is_meshed_and_tells_so_unless_quiet() {
     }
 }
 
+/// METIS speaks up on standard output when it is asked for parts that cannot be.
+#[test]
+fn nothing_but_the_mesher_is_heard() {
+    let place = Place::new();
+    place.put("body.stl", tetrahedron());
+    for comm in ["--comm=sim:2", "--comm=sim:5", "--comm=sim:16", "--comm=sim:40"] {
+        for level_base in ["auto", "1", "3"] {
+            let args = ["body.stl", "--spacing-min=0.1", "--partitioner=metis", "--quiet", comm];
+            let told = run(place.mesher(&[&args[..], &["--level-base", level_base]].concat()));
+            told.succeeds();
+            assert_eq!(told.stdout, "", "{comm} {level_base}");
+        }
+    }
+}
+
 #[test]
 fn files_that_are_no_stl() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/bad");

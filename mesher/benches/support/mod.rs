@@ -80,14 +80,15 @@ impl Phases {
         let (tree, _) = refine(&filed, &depth, &[Start { level: 0, code: 0 }]);
         let sides = decide(&tree, &share, &facets, rules.keep, &Solo);
         let kept = Kept::new(&sides.deleted);
-        let (graded, _) = grade::grade(&tree, &kept, &rules, &share, &Solo);
+        let (graded, _) =
+            grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &share, &Solo);
         Self { given, facets, rules, share, filed, depth, tree, sides, graded }
     }
 
     fn leaves(&self) -> Leaves<'_> {
         Leaves {
             split: &self.graded,
-            base: &self.tree,
+            crossing: &self.tree.crossing,
             sides: &self.sides,
             share: &self.share,
             everything: false,
@@ -143,7 +144,16 @@ pub fn kernels() -> Vec<Kernel> {
             leaves,
             Box::new(|| {
                 let kept = Kept::new(&p.sides.deleted);
-                grade::grade(&p.tree, &kept, &p.rules, &p.share, &Solo).1.octants_split
+                grade::grade(
+                    p.tree.split.clone(),
+                    &p.tree.crossing,
+                    &kept,
+                    &p.rules,
+                    &p.share,
+                    &Solo,
+                )
+                .1
+                .octants_split
             }),
         ),
         kernel(

@@ -89,12 +89,38 @@ pub fn closed() -> impl Strategy<Value = Vec<Facet>> {
     prop_oneof![2 => boxed, 2 => sphere, 1 => tetra]
 }
 
+/// A facet of a few lattice units around a corner of cells: it comes as near to cells as can be without
+/// touching them.
+fn near_miss() -> impl Strategy<Value = Facet> {
+    let corner = prop::sample::select(vec![0.0f32, 1.0, 2.0]);
+    // On a root of edge 64 a lattice unit is 2^-21; f32 holds four times as fine up to 2, twice beyond.
+    let vertex =
+        || [-4i32..=4, -4i32..=4, -4i32..=4].prop_map(|k| k.map(|k| k as f32 / 2_097_152.0));
+    let vertices = [vertex(), vertex(), vertex()];
+    ([corner.clone(), corner.clone(), corner], vertices)
+        .prop_map(|(c, f)| f.map(|v| std::array::from_fn(|a| c[a] + v[a])))
+}
+
+/// A facet of no area: two points, in any order, and one of them again or one between them.
+fn segment() -> impl Strategy<Value = Facet> {
+    // Multiples of four, so that quarters of the way are exact.
+    let end = || [-1i32..=16, -1i32..=16, -1i32..=16].prop_map(|p| p.map(|c| 4 * c));
+    let between = (end(), end(), 0..=4).prop_map(|(p, q, k)| {
+        let m = std::array::from_fn(|a| p[a] + (q[a] - p[a]) / 4 * k);
+        [p, q, m].map(|v| v.map(|c| c as f32))
+    });
+    prop_oneof![(point(), point()).prop_map(|(p, q)| [p, q, p]), between]
+        .prop_flat_map(|f| Just(f.to_vec()).prop_shuffle())
+        .prop_map(|f| [f[0], f[1], f[2]])
+}
+
 /// Facet soups of all kinds.
 pub fn soup() -> impl Strategy<Value = Vec<Facet>> {
     let facet = prop_oneof![
         6 => [point(), point(), point()],
+        3 => near_miss(),
         1 => point().prop_map(|p| [p; 3]),
-        1 => (point(), point()).prop_map(|(p, q)| [p, q, p]),
+        1 => segment(),
     ];
     let leaky = (closed(), any::<prop::sample::Index>()).prop_map(|(mut f, i)| {
         f.remove(i.index(f.len()));
@@ -109,19 +135,16 @@ pub fn soup() -> impl Strategy<Value = Vec<Facet>> {
     ]
 }
 
-fn extent_box() -> impl Strategy<Value = (BoxSpec, u32)> {
-    (point(), [0.5f64..20.0, 0.5f64..20.0, 0.5f64..20.0], 1u32..8).prop_map(|(p, d, level)| {
-        let min = p.map(f64::from);
+fn extent_box() -> impl Strategy<Value = BoxSpec> {
+    let anywhere = (point(), [0.5f64..20.0, 0.5f64..20.0, 0.5f64..20.0])
+        .prop_map(|(p, d)| (p.map(f64::from), d));
+    let on_cells = ([-2i32..62, -2i32..62, -2i32..62], [1i32..20, 1i32..20, 1i32..20])
+        .prop_map(|(p, d)| (p.map(f64::from), d.map(f64::from)));
+    (prop_oneof![anywhere, on_cells], 1u32..8).prop_map(|((min, d), level)| {
         // Small boxes may be finer than the surface.
         let level = if d.iter().product::<f64>() > 1000.0 { level.min(6) } else { level };
-        (
-            BoxSpec {
-                min,
-                max: std::array::from_fn(|a| min[a] + d[a]),
-                spacing: 64.0 / f64::from(1 << level),
-            },
-            level,
-        )
+        let max = std::array::from_fn(|a| min[a] + d[a]);
+        BoxSpec { min, max, spacing: 64.0 / f64::from(1 << level) }
     })
 }
 
@@ -136,15 +159,7 @@ pub fn small(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value =
                 Root { origin, edge }
             });
             let spacing_min = root.edge / f64::from(1 << level) * slack;
-            Small {
-                facets,
-                root,
-                spacing_min,
-                layer_cells_min,
-                keep,
-                keep_crossing,
-                boxes: boxes.into_iter().map(|b| b.0).collect(),
-            }
+            Small { facets, root, spacing_min, layer_cells_min, keep, keep_crossing, boxes }
         },
     )
 }

@@ -13,6 +13,8 @@ use mesher::{Options, words};
 pub mod draw;
 pub mod symmetry;
 
+// Each test uses some of it.
+#[allow(unused_imports)]
 pub use draw::{closed, config, cuboid, run, small, soup};
 
 pub type Facet = [[f32; 3]; 3];
