@@ -23,6 +23,11 @@ const MARGIN: usize = 16;
 /// Bricks along a tile's edge, as a power of two; three of these per key.
 const TILE_BRICKS_LOG2: u32 = 3;
 
+/// Bricks that results are gathered in together, as a power of two: 2 x 2 x 2, of which a layer fills most.
+const BLOCK_LOG2: u32 = 3;
+/// The same as a number.
+const BLOCK: usize = 1 << BLOCK_LOG2;
+
 /// Words that were dilated, counting every row of every tile.
 pub type Words = u64;
 
@@ -287,14 +292,14 @@ fn pairs(row: u64) -> u64 {
     (v | v >> 16) & 0xffff_ffff
 }
 
-/// Bricks gathered from overlapping tiles, 64 to a block.
+/// Bricks gathered from overlapping tiles, block by block.
 struct Gathered {
     /// Bricks along the root's edge.
     extent: i64,
     /// Bits that exist at this level.
     valid: u64,
     blocks: HashMap<u64, u32, Spread>,
-    words: Vec<[u64; 64]>,
+    words: Vec<[u64; BLOCK]>,
     last: Option<(u64, u32)>,
 }
 
@@ -316,14 +321,14 @@ impl Gathered {
         }
         let key = morton(p.map(|c| c as u32));
         let block = match self.last {
-            Some((k, i)) if k == key >> 6 => i,
-            _ => *self.blocks.entry(key >> 6).or_insert_with(|| {
-                self.words.push([0; 64]);
+            Some((k, i)) if k == key >> BLOCK_LOG2 => i,
+            _ => *self.blocks.entry(key >> BLOCK_LOG2).or_insert_with(|| {
+                self.words.push([0; BLOCK]);
                 (self.words.len() - 1) as u32
             }),
         };
-        self.last = Some((key >> 6, block));
-        self.words[block as usize][(key & 63) as usize] |= bits & self.valid;
+        self.last = Some((key >> BLOCK_LOG2, block));
+        self.words[block as usize][(key & (BLOCK as u64 - 1)) as usize] |= bits & self.valid;
     }
 
     fn into_set(self) -> BrickSet {
@@ -332,7 +337,7 @@ impl Gathered {
         let mut set = BrickSet::default();
         for (block, i) in order {
             for (k, &bits) in (0..).zip(&self.words[i as usize]) {
-                set.push(block << 6 | k, bits);
+                set.push(block << BLOCK_LOG2 | k, bits);
             }
         }
         set
