@@ -38,32 +38,24 @@ const ROOT_SCALE: f64 = 10.0;
 /// # Errors
 /// A file that cannot be read or makes no sense. Sizes are checked when the case is meshed.
 pub fn read(path: &Path) -> Result<Case, Error> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    let wrong = |problem: String| Error::CaseFile {
-        path: path.to_owned(),
-        problem,
-    };
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    let wrong = |problem: String| Error::CaseFile { path: path.to_owned(), problem };
     let file: CaseFile = toml::from_str(&text).map_err(|error| wrong(explain(&error, &text)))?;
     let facets: Vec<stl::Facet> = match (&file.geometry, &file.generator) {
         (Some(geometry), None) => {
             stl::read(&path.parent().unwrap_or(Path::new("")).join(geometry))?
         }
-        (None, Some(generator)) => generator
-            .facets()
-            .map_err(|error| wrong(format!("[generator]: {error}")))?,
+        (None, Some(generator)) => {
+            generator.facets().map_err(|error| wrong(format!("[generator]: {error}")))?
+        }
         _ => {
             let sentence =
                 "give either `geometry` or a [generator] table, one and only one of them";
             return Err(wrong(sentence.to_owned()));
         }
     };
-    let facets: Vec<_> = facets
-        .iter()
-        .map(|facet| facet.map(|v| v.map(f64::from)))
-        .collect();
+    let facets: Vec<_> = facets.iter().map(|facet| facet.map(|v| v.map(f64::from))).collect();
     Ok(Case {
         root: root(&file, &facets).map_err(wrong)?,
         facets,
@@ -95,17 +87,14 @@ fn root(file: &CaseFile, facets: &[[[f64; 3]; 3]]) -> Result<Root, String> {
 /// A sentence with the line, and the known key nearest to an unknown one.
 fn explain(error: &toml::de::Error, text: &str) -> String {
     let before = error.span().and_then(|span| text.get(..span.start));
-    let place = before.map_or(String::new(), |before| {
-        format!("line {}: ", before.matches('\n').count() + 1)
-    });
+    let place = before
+        .map_or(String::new(), |before| format!("line {}: ", before.matches('\n').count() + 1));
     // Serde says: unknown field `got`, expected one of `a`, `b`. So the names are in back quotes.
     let message = error.message();
     let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     match names.split_first() {
         Some((unknown, known)) if message.starts_with("unknown ") => {
-            let nearest = known
-                .iter()
-                .min_by_key(|name| strsim::osa_distance(unknown, name));
+            let nearest = known.iter().min_by_key(|name| strsim::osa_distance(unknown, name));
             let advice = nearest.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
             format!("{place}{message}{advice}")
         }

@@ -26,10 +26,7 @@ struct Point {
 
 impl Point {
     fn of_vertex(vertex: [i64; 3]) -> Self {
-        Self {
-            numerator: vertex.map(i128::from),
-            w: 1,
-        }
+        Self { numerator: vertex.map(i128::from), w: 1 }
     }
 
     /// How far the point is above the plane `x[axis] = plane`, times w.

@@ -9,11 +9,7 @@ pub fn grade(tree: &mut Tree, input: &Input) {
     if !input.keep_crossing && input.layer_cells_min < 3 {
         extra_layer(tree, input.level_surface);
     }
-    let deepest = tree
-        .kept_leaves()
-        .map(|(leaf, _)| leaf.level)
-        .max()
-        .unwrap_or(0);
+    let deepest = tree.kept_leaves().map(|(leaf, _)| leaf.level).max().unwrap_or(0);
     for level in (1..=deepest).rev() {
         layer(tree, level, input.layer_cells_min);
         balance(tree, level);
@@ -23,10 +19,7 @@ pub fn grade(tree: &mut Tree, input: &Input) {
 /// What touches a crossing leaf is refined to the level of the surface: crossing leaves will go, and
 /// with them the thickness that they would have lent to the layer.
 fn extra_layer(tree: &mut Tree, level_surface: u32) {
-    let leaves: Vec<_> = tree
-        .kept_leaves()
-        .filter(|&(_, side)| side == Side::Crossing)
-        .collect();
+    let leaves: Vec<_> = tree.kept_leaves().filter(|&(_, side)| side == Side::Crossing).collect();
     for (leaf, _) in leaves {
         tree.refine(&leaf.extent().enlarged(1), level_surface);
     }
@@ -50,8 +43,5 @@ fn balance(tree: &mut Tree, level: u32) {
 
 /// The kept leaves of a level as they now are: refinement on their behalf makes no new sources.
 fn leaves_of_level(tree: &Tree, level: u32) -> Vec<Octant> {
-    tree.kept_leaves()
-        .map(|(leaf, _)| leaf)
-        .filter(|leaf| leaf.level == level)
-        .collect()
+    tree.kept_leaves().map(|(leaf, _)| leaf).filter(|leaf| leaf.level == level).collect()
 }

@@ -54,18 +54,11 @@ impl Input {
         for (index, spec) in case.boxes.iter().enumerate() {
             let finite = spec.min.iter().chain(&spec.max).all(|x| x.is_finite());
             if !finite || (0..3).any(|a| spec.min[a] >= spec.max[a]) {
-                return Err(Error::BoxCorners {
-                    index,
-                    min: spec.min,
-                    max: spec.max,
-                });
+                return Err(Error::BoxCorners { index, min: spec.min, max: spec.max });
             }
             let level = level(&root, &format!("the spacing of box {index}"), spec.spacing)?;
             let corner = |x| quantised(&root, x).map(|q| q.clamp(0.0, ROOT_EDGE as f64) as i64);
-            let extent = Extent {
-                min: corner(spec.min),
-                max: corner(spec.max),
-            };
+            let extent = Extent { min: corner(spec.min), max: corner(spec.max) };
             boxes.push(LatticeBox { extent, level });
         }
         let facets = case.facets.iter().enumerate();
@@ -96,21 +89,12 @@ fn is_size(x: f64) -> bool {
 /// The least level whose cells are of edge `spacing` or smaller.
 fn level(root: &Root, name: &str, spacing: f64) -> Result<u32, Error> {
     if !is_size(spacing) {
-        return Err(Error::Spacing {
-            name: name.to_owned(),
-            spacing,
-        });
+        return Err(Error::Spacing { name: name.to_owned(), spacing });
     }
-    (0..=LEVEL_MAX)
-        .find(|&d| root.edge / f64::from(1_u32 << d) <= spacing)
-        .ok_or_else(|| {
-            let least = root.edge / f64::from(1_u32 << LEVEL_MAX);
-            Error::SpacingTooFine {
-                name: name.to_owned(),
-                spacing,
-                least,
-            }
-        })
+    (0..=LEVEL_MAX).find(|&d| root.edge / f64::from(1_u32 << d) <= spacing).ok_or_else(|| {
+        let least = root.edge / f64::from(1_u32 << LEVEL_MAX);
+        Error::SpacingTooFine { name: name.to_owned(), spacing, least }
+    })
 }
 
 /// The nearest lattice point, still as floating-point numbers, for it may be anywhere.
@@ -124,18 +108,11 @@ fn on_lattice(root: &Root, index: usize, facet: &[[f64; 3]; 3]) -> Result<Facet,
     for (point, &vertex) in points.iter_mut().zip(facet) {
         let q = quantised(root, vertex);
         if !vertex.iter().chain(&q).all(|x| x.is_finite()) {
-            return Err(Error::VertexNotFinite {
-                facet: index,
-                vertex,
-            });
+            return Err(Error::VertexNotFinite { facet: index, vertex });
         }
         let near = -(ROOT_EDGE as f64)..=2.0 * ROOT_EDGE as f64;
         if !q.iter().all(|x| near.contains(x)) {
-            return Err(Error::VertexOutside {
-                facet: index,
-                vertex,
-                root: *root,
-            });
+            return Err(Error::VertexOutside { facet: index, vertex, root: *root });
         }
         // Exact: the numbers are whole and at most 2^28.
         *point = q.map(|x| x as i64);

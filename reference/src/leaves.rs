@@ -20,9 +20,7 @@ pub fn mix(word: u64) -> u128 {
 /// The digest of a set of leaves: a sum, so that neither order nor partition matters.
 #[must_use]
 pub fn digest(words: &[u64]) -> u128 {
-    words
-        .iter()
-        .fold(0, |sum, &word| sum.wrapping_add(mix(word)))
+    words.iter().fold(0, |sum, &word| sum.wrapping_add(mix(word)))
 }
 
 /// Counts and digests of a set of leaves.

@@ -88,14 +88,6 @@ fn check(tree: &Tree) {
 }
 
 fn finished(words: Vec<u64>, input: Input, ambiguous: Option<Ambiguous>) -> Mesh {
-    assert!(
-        words.is_sorted_by(|a, b| a < b),
-        "a tree is walked in Morton order"
-    );
-    Mesh {
-        words,
-        level_surface: input.level_surface,
-        boxes: input.boxes,
-        ambiguous,
-    }
+    assert!(words.is_sorted_by(|a, b| a < b), "a tree is walked in Morton order");
+    Mesh { words, level_surface: input.level_surface, boxes: input.boxes, ambiguous }
 }

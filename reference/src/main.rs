@@ -103,28 +103,15 @@ fn say(mesh: &Mesh, record: &Run) -> Result<(), Error> {
             ambiguous.components
         );
     }
-    let Run {
-        cells,
-        digest,
-        time_wall_s,
-        ..
-    } = record;
-    writeln!(
-        std::io::stdout(),
-        "{cells} cells, digest {digest}, {time_wall_s:.2} s"
-    )
-    .map_err(|source| Error::Write {
-        path: PathBuf::from("standard output"),
-        source,
-    })
+    let Run { cells, digest, time_wall_s, .. } = record;
+    writeln!(std::io::stdout(), "{cells} cells, digest {digest}, {time_wall_s:.2} s")
+        .map_err(|source| Error::Write { path: PathBuf::from("standard output"), source })
 }
 
 /// The most memory that this process has held, where the system tells.
 fn peak_rss_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
     Some(kibibytes * 1024)
 }

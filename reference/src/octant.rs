@@ -42,10 +42,7 @@ impl Extent {
     /// interior of this one grown by 1.
     #[must_use]
     pub fn enlarged(&self, margin: i64) -> Extent {
-        Extent {
-            min: self.min.map(|x| x - margin),
-            max: self.max.map(|x| x + margin),
-        }
+        Extent { min: self.min.map(|x| x - margin), max: self.max.map(|x| x + margin) }
     }
 }
 
@@ -60,10 +57,7 @@ pub struct Octant {
 
 impl Octant {
     /// The octant of level 0.
-    pub const ROOT: Octant = Octant {
-        min: [0; 3],
-        level: 0,
-    };
+    pub const ROOT: Octant = Octant { min: [0; 3], level: 0 };
 
     /// The edge, in lattice units.
     #[must_use]
@@ -74,10 +68,7 @@ impl Octant {
     /// The octant's closed cube.
     #[must_use]
     pub fn extent(&self) -> Extent {
-        Extent {
-            min: self.min,
-            max: self.min.map(|x| x + self.edge()),
-        }
+        Extent { min: self.min, max: self.min.map(|x| x + self.edge()) }
     }
 
     /// The centre, a lattice point.
@@ -91,10 +82,7 @@ impl Octant {
     pub fn child(&self, index: usize) -> Octant {
         let half = self.edge() / 2;
         let min = std::array::from_fn(|a| self.min[a] + half * (index >> a & 1) as i64);
-        Octant {
-            min,
-            level: self.level + 1,
-        }
+        Octant { min, level: self.level + 1 }
     }
 
     /// The Morton key: the minimum corner's coordinates in level-19 cells, interleaved, x lowest.

@@ -51,11 +51,7 @@ fn turn(p: &[i64; 3], q: &[i64; 3], point: [i64; 3], u: usize, v: usize) -> i64 
     let of_eps = -along_v;
     let of_eps_squared = along_u;
     let terms = [undisplaced, of_eps, of_eps_squared];
-    terms
-        .into_iter()
-        .map(i64::signum)
-        .find(|&sign| sign != 0)
-        .unwrap_or(0)
+    terms.into_iter().map(i64::signum).find(|&sign| sign != 0).unwrap_or(0)
 }
 
 /// Whether the facet's plane is above `point` along `axis`.
@@ -64,9 +60,8 @@ fn turn(p: &[i64; 3], q: &[i64; 3], point: [i64; 3], u: usize, v: usize) -> i64 
 /// the facet, as the facet is closed and its projection contains points as near as one likes.
 fn is_above(facet: &Facet, point: [i64; 3], axis: usize) -> bool {
     let [a, _, _] = facet;
-    let offset = (0..3)
-        .map(|i| i128::from(normal(facet, i)) * i128::from(a[i] - point[i]))
-        .sum::<i128>();
+    let offset =
+        (0..3).map(|i| i128::from(normal(facet, i)) * i128::from(a[i] - point[i])).sum::<i128>();
     assert!(offset != 0, "a ray starts on a facet");
     // The plane is met at point[axis] + offset / normal[axis].
     (offset > 0) == (normal(facet, axis) > 0)

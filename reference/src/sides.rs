@@ -22,10 +22,7 @@ pub fn assign(tree: &mut Tree, input: &Input) -> Option<Ambiguous> {
     let mut undecided: Vec<Octant> = Vec::new();
     for mut component in components(tree) {
         component.sort_by_cached_key(|&leaf| coarsest_first(&tree.octant(leaf)));
-        let candidates = component
-            .iter()
-            .take(CANDIDATES_MAX)
-            .map(|&leaf| tree.octant(leaf));
+        let candidates = component.iter().take(CANDIDATES_MAX).map(|&leaf| tree.octant(leaf));
         let verdict = vote(candidates, &input.facets);
         if !verdict.unanimous {
             undecided.push(tree.octant(component[0]));
@@ -34,14 +31,9 @@ pub fn assign(tree: &mut Tree, input: &Input) -> Option<Ambiguous> {
             tree.set_side(leaf, verdict.side);
         }
     }
-    let example = undecided
-        .iter()
-        .min_by_key(|octant| coarsest_first(octant))?;
+    let example = undecided.iter().min_by_key(|octant| coarsest_first(octant))?;
     let components = undecided.len() as u64;
-    Some(Ambiguous {
-        components,
-        example: location(&input.root, example.centroid()),
-    })
+    Some(Ambiguous { components, example: location(&input.root, example.centroid()) })
 }
 
 fn coarsest_first(octant: &Octant) -> (u32, u64) {
@@ -102,33 +94,18 @@ fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
     let (mut rays, mut rays_odd) = (0, 0);
     for candidate in candidates {
         let point = candidate.centroid();
-        let odd = (0..3)
-            .flat_map(|axis| ray::parities(facets, point, axis))
-            .filter(|&odd| odd);
+        let odd = (0..3).flat_map(|axis| ray::parities(facets, point, axis)).filter(|&odd| odd);
         match odd.count() {
             0 => {
-                return Verdict {
-                    side: Side::Outside,
-                    unanimous: true,
-                };
+                return Verdict { side: Side::Outside, unanimous: true };
             }
             6 => {
-                return Verdict {
-                    side: Side::Inside,
-                    unanimous: true,
-                };
+                return Verdict { side: Side::Inside, unanimous: true };
             }
             some => rays_odd += some,
         }
         rays += 6;
     }
-    let side = if 2 * rays_odd > rays {
-        Side::Inside
-    } else {
-        Side::Outside
-    };
-    Verdict {
-        side,
-        unanimous: false,
-    }
+    let side = if 2 * rays_odd > rays { Side::Inside } else { Side::Outside };
+    Verdict { side, unanimous: false }
 }

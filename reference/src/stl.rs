@@ -18,14 +18,9 @@ const FACET_BYTES: usize = 50;
 /// # Errors
 /// A file that cannot be read, is damaged, or is not STL at all; a vertex that is not finite.
 pub fn read(path: &Path) -> Result<Vec<Facet>, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    parse(&bytes).map_err(|problem| Error::Stl {
-        path: path.to_owned(),
-        problem,
-    })
+    let bytes =
+        std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    parse(&bytes).map_err(|problem| Error::Stl { path: path.to_owned(), problem })
 }
 
 /// The facets in the bytes of an STL file, or a sentence on what is wrong with them.
@@ -87,8 +82,5 @@ fn binary(bytes: &[u8]) -> Vec<Facet> {
             })
         })
     };
-    bytes[HEADER_BYTES..]
-        .chunks_exact(FACET_BYTES)
-        .map(facet)
-        .collect()
+    bytes[HEADER_BYTES..].chunks_exact(FACET_BYTES).map(facet).collect()
 }

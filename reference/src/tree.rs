@@ -32,9 +32,7 @@ impl Tree {
     /// The tree of one leaf.
     #[must_use]
     pub fn root() -> Self {
-        Self {
-            nodes: vec![Node::leaf(Octant::ROOT, Side::Outside)],
-        }
+        Self { nodes: vec![Node::leaf(Octant::ROOT, Side::Outside)] }
     }
 
     /// Splits leaves until every leaf that `facet` crosses has level `level` at least; those are
@@ -84,14 +82,11 @@ impl Tree {
     fn split(&mut self, index: Index) {
         let Node { octant, side, .. } = self.nodes[index];
         self.nodes[index].children = Some(self.nodes.len());
-        self.nodes
-            .extend((0..8).map(|i| Node::leaf(octant.child(i), side)));
+        self.nodes.extend((0..8).map(|i| Node::leaf(octant.child(i), side)));
     }
 
     fn update_level_least(&mut self, index: Index) {
-        let levels = self
-            .children(index)
-            .map(|child| self.nodes[child].level_least);
+        let levels = self.children(index).map(|child| self.nodes[child].level_least);
         self.nodes[index].level_least = levels.min().unwrap_or(NOTHING_KEPT);
     }
 
@@ -109,9 +104,7 @@ impl Tree {
     }
 
     fn children(&self, index: Index) -> std::ops::Range<Index> {
-        self.nodes[index]
-            .children
-            .map_or(0..0, |first| first..first + 8)
+        self.nodes[index].children.map_or(0..0, |first| first..first + 8)
     }
 
     /// Checks the invariants at the head of this file.
@@ -120,11 +113,7 @@ impl Tree {
     /// When one does not hold.
     pub fn check_invariants(&self) {
         assert_eq!(self.nodes[0].octant, Octant::ROOT);
-        let parents = self
-            .nodes
-            .iter()
-            .filter(|node| node.children.is_some())
-            .count();
+        let parents = self.nodes.iter().filter(|node| node.children.is_some()).count();
         assert_eq!(
             self.nodes.len(),
             1 + 8 * parents,
@@ -137,15 +126,8 @@ impl Tree {
                 continue;
             }
             let children = || self.children(index).map(|child| &self.nodes[child]);
-            assert!(
-                children()
-                    .enumerate()
-                    .all(|(i, child)| child.octant == node.octant.child(i))
-            );
-            assert_eq!(
-                Some(node.level_least),
-                children().map(|child| child.level_least).min()
-            );
+            assert!(children().enumerate().all(|(i, child)| child.octant == node.octant.child(i)));
+            assert_eq!(Some(node.level_least), children().map(|child| child.level_least).min());
         }
     }
 
@@ -161,11 +143,7 @@ impl Tree {
     #[must_use]
     pub fn leaves_meeting(&self, extent: &Extent) -> Vec<Index> {
         let mut leaves = Vec::new();
-        self.push_leaves(
-            0,
-            &|octant| octant.extent().interiors_meet(extent),
-            &mut leaves,
-        );
+        self.push_leaves(0, &|octant| octant.extent().interiors_meet(extent), &mut leaves);
         leaves
     }
 
@@ -184,10 +162,7 @@ impl Tree {
     /// The kept leaves, in Morton order, each with its side.
     pub fn kept_leaves(&self) -> impl Iterator<Item = (Octant, Side)> {
         let kept = |&index: &Index| self.nodes[index].level_least != NOTHING_KEPT;
-        self.leaves()
-            .into_iter()
-            .filter(kept)
-            .map(|index| (self.octant(index), self.side(index)))
+        self.leaves().into_iter().filter(kept).map(|index| (self.octant(index), self.side(index)))
     }
 
     /// The words of the kept leaves of the sides that `wanted` names, ascending.
@@ -216,11 +191,6 @@ impl Tree {
 
 impl Node {
     fn leaf(octant: Octant, side: Side) -> Self {
-        Self {
-            octant,
-            children: None,
-            side,
-            level_least: octant.level,
-        }
+        Self { octant, children: None, side, level_least: octant.level }
     }
 }

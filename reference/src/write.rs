@@ -71,10 +71,7 @@ impl AmbiguousCount {
     #[must_use]
     pub fn of(mesh: &Mesh) -> Self {
         let ambiguous = mesh.ambiguous.as_ref();
-        Self {
-            count: ambiguous.map_or(0, |a| a.components),
-            example: ambiguous.map(|a| a.example),
-        }
+        Self { count: ambiguous.map_or(0, |a| a.components), example: ambiguous.map(|a| a.example) }
     }
 }
 
@@ -102,27 +99,15 @@ impl Manifest {
             keep: case.keep,
             keep_crossing: case.keep_crossing,
             boxes: boxes
-                .map(|b| ManifestBox {
-                    min: b.extent.min,
-                    max: b.extent.max,
-                    level: b.level,
-                })
+                .map(|b| ManifestBox { min: b.extent.min, max: b.extent.max, level: b.level })
                 .collect(),
             leaves,
             leaves_by_level: tally.leaves_by_level,
-            leaves_by_side: BySide {
-                outside,
-                inside,
-                crossing,
-            },
+            leaves_by_side: BySide { outside, inside, crossing },
             components_ambiguous: AmbiguousCount::of(mesh),
             digest: digest.clone(),
             octant_digests: tally.octant_digests.into_iter().map(hex).collect(),
-            parts: [Part {
-                file: LEAF_FILE,
-                leaves,
-                digest,
-            }],
+            parts: [Part { file: LEAF_FILE, leaves, digest }],
         }
     }
 }
@@ -134,14 +119,9 @@ impl Manifest {
 pub fn check_vacant(directory: &Path) -> Result<(), Error> {
     match fs::read_dir(directory).map(|mut entries| entries.next().is_none()) {
         Ok(true) => Ok(()),
-        Ok(false) => Err(Error::OutputNotEmpty {
-            path: directory.to_owned(),
-        }),
+        Ok(false) => Err(Error::OutputNotEmpty { path: directory.to_owned() }),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(source) => Err(Error::Write {
-            path: directory.to_owned(),
-            source,
-        }),
+        Err(source) => Err(Error::Write { path: directory.to_owned(), source }),
     }
 }
 
@@ -151,15 +131,10 @@ pub fn check_vacant(directory: &Path) -> Result<(), Error> {
 /// Whatever keeps the files from being written.
 pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Result<(), Error> {
     check_vacant(directory)?;
-    fs::create_dir_all(directory).map_err(|source| Error::Write {
-        path: directory.to_owned(),
-        source,
-    })?;
+    fs::create_dir_all(directory)
+        .map_err(|source| Error::Write { path: directory.to_owned(), source })?;
     file(&directory.join(LEAF_FILE), |to| npy(to, &mesh.words))?;
-    json(
-        &directory.join(MANIFEST_FILE),
-        &Manifest::new(which, case, mesh),
-    )
+    json(&directory.join(MANIFEST_FILE), &Manifest::new(which, case, mesh))
 }
 
 /// Writes a JSON file.
@@ -188,32 +163,21 @@ fn file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Res
         // What could not be finished is of no use to anyone; that it may not be removable either is
         // not news.
         let _ = fs::remove_file(&beside);
-        Error::Write {
-            path: path.to_owned(),
-            source,
-        }
+        Error::Write { path: path.to_owned(), source }
     })
 }
 
 /// NumPy's format, version 1.0: a header of a multiple of 64 bytes, then the words.
 fn npy(to: &mut dyn Write, words: &[u64]) -> io::Result<()> {
     const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
-    let mut header = format!(
-        "{{'descr': '<u8', 'fortran_order': False, 'shape': ({},), }}",
-        words.len()
-    );
+    let mut header =
+        format!("{{'descr': '<u8', 'fortran_order': False, 'shape': ({},), }}", words.len());
     while !(MAGIC.len() + 2 + header.len() + 1).is_multiple_of(64) {
         header.push(' ');
     }
     header.push('\n');
     to.write_all(MAGIC)?;
-    to.write_all(
-        &u16::try_from(header.len())
-            .expect("a short header")
-            .to_le_bytes(),
-    )?;
+    to.write_all(&u16::try_from(header.len()).expect("a short header").to_le_bytes())?;
     to.write_all(header.as_bytes())?;
-    words
-        .iter()
-        .try_for_each(|word| to.write_all(&word.to_le_bytes()))
+    words.iter().try_for_each(|word| to.write_all(&word.to_le_bytes()))
 }

@@ -20,14 +20,8 @@ fn refused(text: &str, part: &str) {
 #[test]
 fn defaults() {
     let case = read(&format!("spacing_min = 0.5\n{GENERATED}")).unwrap();
-    assert_eq!(
-        (case.facets.len(), case.spacing_min, case.layer_cells_min),
-        (12, 0.5, 4)
-    );
-    assert_eq!(
-        (case.keep, case.keep_crossing, case.boxes.len()),
-        (Keep::Outside, true, 0)
-    );
+    assert_eq!((case.facets.len(), case.spacing_min, case.layer_cells_min), (12, 0.5, 4));
+    assert_eq!((case.keep, case.keep_crossing, case.boxes.len()), (Keep::Outside, true, 0));
     assert_eq!(case.root, Root::around(&case.facets, 10.0).unwrap());
 }
 
@@ -39,27 +33,10 @@ fn everything_given() {
          [[box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nspacing = 0.1\n"
     );
     let case = read(&text).unwrap();
-    assert_eq!(
-        case.root,
-        Root {
-            origin: [-4.0; 3],
-            edge: 8.0
-        }
-    );
-    assert_eq!(
-        (case.keep, case.keep_crossing, case.layer_cells_min),
-        (Keep::Inside, false, 2)
-    );
-    let first = BoxSpec {
-        min: [0.0, -1.0, -1.0],
-        max: [4.0, 1.0, 1.0],
-        spacing: 0.05,
-    };
-    let second = BoxSpec {
-        min: [0.0; 3],
-        max: [1.0; 3],
-        spacing: 0.1,
-    };
+    assert_eq!(case.root, Root { origin: [-4.0; 3], edge: 8.0 });
+    assert_eq!((case.keep, case.keep_crossing, case.layer_cells_min), (Keep::Inside, false, 2));
+    let first = BoxSpec { min: [0.0, -1.0, -1.0], max: [4.0, 1.0, 1.0], spacing: 0.05 };
+    let second = BoxSpec { min: [0.0; 3], max: [1.0; 3], spacing: 0.1 };
     assert_eq!(case.boxes, [first, second]);
 }
 
@@ -70,39 +47,16 @@ fn geometry_beside_the_case() {
     let path = directory.path().join("case.toml");
     let facet =
         "facet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 0.1 0 endloop endfacet";
-    fs::write(
-        directory.path().join("body.stl"),
-        format!("solid\n{facet}\nendsolid\n"),
-    )
-    .unwrap();
-    fs::write(
-        &path,
-        "geometry = \"body.stl\"\nspacing_min = 1.0\nroot_scale = 2.0\n",
-    )
-    .unwrap();
+    fs::write(directory.path().join("body.stl"), format!("solid\n{facet}\nendsolid\n")).unwrap();
+    fs::write(&path, "geometry = \"body.stl\"\nspacing_min = 1.0\nroot_scale = 2.0\n").unwrap();
     let case = case_file::read(&path).unwrap();
-    assert_eq!(
-        case.facets,
-        [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.10000000149011612, 0.0]]]
-    );
+    assert_eq!(case.facets, [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.10000000149011612, 0.0]]]);
     assert_eq!(case.root, Root::around(&case.facets, 2.0).unwrap());
 
     fs::write(directory.path().join("body.stl"), "solid\nendsolid\n").unwrap();
-    assert!(
-        case_file::read(&path)
-            .unwrap_err()
-            .to_string()
-            .contains("no facets or no size")
-    );
-    fs::write(
-        &path,
-        format!("geometry = \"body.stl\"\nspacing_min = 1.0\n{ROOT}"),
-    )
-    .unwrap();
-    assert!(
-        case_file::read(&path).unwrap().facets.is_empty(),
-        "a root of its own will do"
-    );
+    assert!(case_file::read(&path).unwrap_err().to_string().contains("no facets or no size"));
+    fs::write(&path, format!("geometry = \"body.stl\"\nspacing_min = 1.0\n{ROOT}")).unwrap();
+    assert!(case_file::read(&path).unwrap().facets.is_empty(), "a root of its own will do");
     fs::write(&path, "geometry = \"boddy.stl\"\nspacing_min = 1.0\n").unwrap();
     assert!(matches!(case_file::read(&path), Err(Error::Read { .. })));
 }
@@ -110,54 +64,27 @@ fn geometry_beside_the_case() {
 #[test]
 fn unknown_keys_name_the_nearest_known_one() {
     let with = |line: &str| format!("spacing_min = 1.0\n{line}\n{GENERATED}");
-    refused(
-        &with("layer_cell_min = 3"),
-        "line 2: unknown field `layer_cell_min`",
-    );
-    refused(
-        &with("layer_cell_min = 3"),
-        "did you mean `layer_cells_min`?",
-    );
+    refused(&with("layer_cell_min = 3"), "line 2: unknown field `layer_cell_min`");
+    refused(&with("layer_cell_min = 3"), "did you mean `layer_cells_min`?");
     refused(&with("rootscale = 3"), "did you mean `root_scale`?");
     refused(&with("keep = \"outsde\""), "did you mean `outside`?");
-    refused(
-        &with("[root]\norigin = [0, 0, 0]\nedges = 1"),
-        "did you mean `edge`?",
-    );
-    refused(
-        &with("[[box]]\nmin = [0, 0, 0]\nmxa = [1, 1, 1]\nspacing = 1"),
-        "did you mean `max`?",
-    );
+    refused(&with("[root]\norigin = [0, 0, 0]\nedges = 1"), "did you mean `edge`?");
+    refused(&with("[[box]]\nmin = [0, 0, 0]\nmxa = [1, 1, 1]\nspacing = 1"), "did you mean `max`?");
     refused(&with("[[boxes]]\nspacing = 1"), "did you mean `box`?");
-    refused(
-        "spacing_min = 1\n[generator]\nshape = \"cube\"\nfacet = 12",
-        "did you mean `facets`?",
-    );
-    refused(
-        "spacing_min = 1\n[generator]\nshape = \"cub\"\nfacets = 12",
-        "did you mean `cube`?",
-    );
+    refused("spacing_min = 1\n[generator]\nshape = \"cube\"\nfacet = 12", "did you mean `facets`?");
+    refused("spacing_min = 1\n[generator]\nshape = \"cub\"\nfacets = 12", "did you mean `cube`?");
 }
 
 #[test]
 fn what_makes_no_sense() {
     refused(GENERATED, "missing field `spacing_min`");
-    refused(
-        "spacing_min = 1",
-        "either `geometry` or a [generator] table",
-    );
+    refused("spacing_min = 1", "either `geometry` or a [generator] table");
     let both = format!("spacing_min = 1\ngeometry = \"body.stl\"\n{GENERATED}");
     refused(&both, "either `geometry` or a [generator] table");
     let with = |line: &str| format!("spacing_min = 1.0\n{line}\n{GENERATED}");
-    refused(
-        &with(&format!("root_scale = 2.0\n{ROOT}")),
-        "either `root_scale` or a [root] table",
-    );
+    refused(&with(&format!("root_scale = 2.0\n{ROOT}")), "either `root_scale` or a [root] table");
     for scale in ["0", "-1.0", "nan", "inf"] {
-        refused(
-            &with(&format!("root_scale = {scale}")),
-            "finite and greater than 0",
-        );
+        refused(&with(&format!("root_scale = {scale}")), "finite and greater than 0");
     }
     refused(&with("layer_cells_min = -1"), "line 2");
     refused(&with("layer_cells_min = 1.5"), "line 2");

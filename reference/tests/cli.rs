@@ -30,11 +30,7 @@ fn directory_with_case(text: &str) -> TempDir {
 
 fn reference(directory: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
-    command
-        .current_dir(directory)
-        .args(arguments)
-        .output()
-        .unwrap()
+    command.current_dir(directory).args(arguments).output().unwrap()
 }
 
 /// Runs and returns what went to standard error, which must be one line.
@@ -43,10 +39,7 @@ fn fails(directory: &Path, arguments: &[&str], code: i32) -> String {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(code), "{said}");
     assert!(output.stdout.is_empty());
-    assert!(
-        said.starts_with("error: ") && said.trim_end().lines().count() == 1,
-        "{said}"
-    );
+    assert!(said.starts_with("error: ") && said.trim_end().lines().count() == 1, "{said}");
     said
 }
 
@@ -60,11 +53,7 @@ fn words(directory: &Path) -> Vec<u64> {
     assert_eq!(file.shape().len(), 1);
     let words: Vec<u64> = file.into_vec().unwrap();
     let header_bytes = fs::metadata(path).unwrap().len() - 8 * words.len() as u64;
-    assert_eq!(
-        header_bytes % 64,
-        0,
-        "words are aligned for whoever maps the file"
-    );
+    assert_eq!(header_bytes % 64, 0, "words are aligned for whoever maps the file");
     words
 }
 
@@ -72,18 +61,12 @@ fn words(directory: &Path) -> Vec<u64> {
 fn leaf_set_and_record() {
     let directory = directory_with_case(CASE);
     let path = directory.path();
-    let output = reference(
-        path,
-        &["case.toml", "--out", "new/mesh", "--json", "run.json"],
-    );
+    let output = reference(path, &["case.toml", "--out", "new/mesh", "--json", "run.json"]);
     assert_eq!(output.status.code(), Some(0));
     let out = path.join("new/mesh");
     let expected = mesh(&case_file::read(&path.join("case.toml")).unwrap()).unwrap();
     assert_eq!(words(&out), expected.words);
-    let mut files: Vec<_> = fs::read_dir(&out)
-        .unwrap()
-        .map(|f| f.unwrap().file_name())
-        .collect();
+    let mut files: Vec<_> = fs::read_dir(&out).unwrap().map(|f| f.unwrap().file_name()).collect();
     files.sort();
     assert_eq!(files, ["leaves-00000.npy", "mesh.json"]);
 
@@ -102,25 +85,15 @@ fn leaf_set_and_record() {
 #[test]
 fn manifest_says_what_the_leaves_say() {
     let directory = directory_with_case(CASE);
-    assert!(
-        reference(directory.path(), &["case.toml", "--out", "mesh"])
-            .status
-            .success()
-    );
+    assert!(reference(directory.path(), &["case.toml", "--out", "mesh"]).status.success());
     let out = directory.path().join("mesh");
     let (manifest, words) = (manifest(&out), words(&out));
     let tally = Tally::of(&words);
     let equal = |key: &str, value: Value| assert_eq!(manifest[key], value, "{key}");
     equal("schema", "octree-leaf-set/1".into());
-    equal(
-        "program",
-        concat!("reference ", env!("CARGO_PKG_VERSION")).into(),
-    );
+    equal("program", concat!("reference ", env!("CARGO_PKG_VERSION")).into());
     equal("tree", "final".into());
-    equal(
-        "root",
-        serde_json::json!({"origin": [-1.0, -1.1, -1.2], "edge": 2.25}),
-    );
+    equal("root", serde_json::json!({"origin": [-1.0, -1.1, -1.2], "edge": 2.25}));
     equal("level_surface", 5.into());
     equal("layer_cells_min", 2.into());
     equal("keep", "all".into());
@@ -136,10 +109,7 @@ fn manifest_says_what_the_leaves_say() {
     assert!(outside > 0 && inside > 0 && crossing > 0);
     let sides = serde_json::json!({"outside": outside, "inside": inside, "crossing": crossing});
     equal("leaves_by_side", sides);
-    equal(
-        "components_ambiguous",
-        serde_json::json!({"count": 0, "example": null}),
-    );
+    equal("components_ambiguous", serde_json::json!({"count": 0, "example": null}));
     equal("digest", hex(tally.digest).into());
     let octants: Vec<String> = tally.octant_digests.iter().map(|&d| hex(d)).collect();
     assert_eq!(octants.len(), 512);
@@ -154,12 +124,7 @@ fn manifest_says_what_the_leaves_say() {
 fn ungraded_is_the_base_tree() {
     let directory = directory_with_case(&CASE.replace("all", "outside"));
     assert!(
-        reference(
-            directory.path(),
-            &["case.toml", "--ungraded", "--out", "base"]
-        )
-        .status
-        .success()
+        reference(directory.path(), &["case.toml", "--ungraded", "--out", "base"]).status.success()
     );
     let out = directory.path().join("base");
     let case = case_file::read(&directory.path().join("case.toml")).unwrap();
@@ -169,18 +134,13 @@ fn ungraded_is_the_base_tree() {
     );
     let manifest = manifest(&out);
     assert_eq!(manifest["tree"], "base");
-    assert!(
-        manifest["leaves_by_side"]["inside"].as_u64().unwrap() > 0,
-        "nothing is deleted yet"
-    );
+    assert!(manifest["leaves_by_side"]["inside"].as_u64().unwrap() > 0, "nothing is deleted yet");
 }
 
 /// An internal mesh of nothing: a leaf set without leaves is a leaf set.
 #[test]
 fn empty_mesh() {
-    let text = CASE
-        .replace("all", "inside")
-        .replace("origin = [-1.0", "origin = [1.0");
+    let text = CASE.replace("all", "inside").replace("origin = [-1.0", "origin = [1.0");
     let directory = directory_with_case(&text);
     let output = reference(directory.path(), &["case.toml", "--out", "mesh"]);
     assert_eq!(output.status.code(), Some(0));
@@ -196,23 +156,12 @@ fn ambiguous_components_are_reported() {
         + &facet("-8 -8 3.5", "16 16 3.5", "-8 16 3.5");
     let text = "geometry = \"sheet.stl\"\nspacing_min = 1\n[root]\norigin = [0, 0, 0]\nedge = 8\n";
     let directory = directory_with_case(text);
-    fs::write(
-        directory.path().join("sheet.stl"),
-        format!("solid\n{sheet}endsolid\n"),
-    )
-    .unwrap();
+    fs::write(directory.path().join("sheet.stl"), format!("solid\n{sheet}endsolid\n")).unwrap();
     let output = reference(directory.path(), &["case.toml", "--out", "mesh"]);
     assert_eq!(output.status.code(), Some(0));
-    assert!(
-        String::from_utf8(output.stderr)
-            .unwrap()
-            .contains("2 components disagree")
-    );
+    assert!(String::from_utf8(output.stderr).unwrap().contains("2 components disagree"));
     let ambiguous = serde_json::json!({"count": 2, "example": [2.0, 2.0, 6.0]});
-    assert_eq!(
-        manifest(&directory.path().join("mesh"))["components_ambiguous"],
-        ambiguous
-    );
+    assert_eq!(manifest(&directory.path().join("mesh"))["components_ambiguous"], ambiguous);
 }
 
 #[test]
@@ -222,26 +171,11 @@ fn the_users_input() {
     assert!(fails(path, &["case.toml"], 2).contains("spacing_min"));
     assert!(fails(path, &["nowhere.toml"], 2).contains("nowhere.toml"));
     fs::write(path.join("damaged.stl"), [0; 100]).unwrap();
-    fs::write(
-        path.join("damaged.toml"),
-        "geometry = \"damaged.stl\"\nspacing_min = 1",
-    )
-    .unwrap();
+    fs::write(path.join("damaged.toml"), "geometry = \"damaged.stl\"\nspacing_min = 1").unwrap();
     assert!(fails(path, &["damaged.toml", "--out", "mesh"], 2).contains("damaged.stl"));
-    assert!(
-        !path.join("mesh").exists(),
-        "nothing is written for a case that fails"
-    );
-    for arguments in [
-        &[][..],
-        &["case.toml", "--unknown"],
-        &["case.toml", "--out"],
-    ] {
-        assert_eq!(
-            reference(path, arguments).status.code(),
-            Some(2),
-            "{arguments:?}"
-        );
+    assert!(!path.join("mesh").exists(), "nothing is written for a case that fails");
+    for arguments in [&[][..], &["case.toml", "--unknown"], &["case.toml", "--out"]] {
+        assert_eq!(reference(path, arguments).status.code(), Some(2), "{arguments:?}");
     }
     assert_eq!(reference(path, &["--help"]).status.code(), Some(0));
 }
@@ -251,12 +185,7 @@ fn output_that_cannot_be_written() {
     let directory = directory_with_case(CASE);
     let path = directory.path();
     fs::create_dir(path.join("empty")).unwrap();
-    assert!(
-        reference(path, &["case.toml", "--out", "empty"])
-            .status
-            .success(),
-        "empty will do"
-    );
+    assert!(reference(path, &["case.toml", "--out", "empty"]).status.success(), "empty will do");
     assert!(fails(path, &["case.toml", "--out", "empty"], 4).contains("not empty"));
     assert!(fails(path, &["case.toml", "--out", "case.toml"], 4).contains("case.toml"));
     assert!(fails(path, &["case.toml", "--out", "case.toml/mesh"], 4).contains("cannot write"));

@@ -23,18 +23,9 @@ fn small_coordinates() {
             std::array::from_fn(|_| std::array::from_fn(|_| seeded.of(0..=reach)));
         let min: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=reach - 1));
         let edge = seeded.of(1..=2);
-        crossing += u32::from(agree(
-            &facet,
-            &Extent {
-                min,
-                max: min.map(|x| x + edge),
-            },
-        ));
+        crossing += u32::from(agree(&facet, &Extent { min, max: min.map(|x| x + edge) }));
     }
-    assert!(
-        (50_000..250_000).contains(&crossing),
-        "both answers occur: {crossing}"
-    );
+    assert!((50_000..250_000).contains(&crossing), "both answers occur: {crossing}");
 }
 
 /// Points and segments: facets that repeat a vertex or have all three in a line.
@@ -47,10 +38,7 @@ fn degenerate_facets() {
         let (second, third) = (seeded.of(0..=2), seeded.of(-1..=2));
         let along = |times: i64| std::array::from_fn(|i| a[i] + times * step[i]);
         let min: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=5));
-        let extent = Extent {
-            min,
-            max: min.map(|x| x + 1),
-        };
+        let extent = Extent { min, max: min.map(|x| x + 1) };
         agree(&[a, along(second), along(third)], &extent);
         agree(&[a, a, a], &extent);
     }
@@ -64,32 +52,19 @@ fn great_coordinates() {
     for _ in 0..100_000 {
         let facet: [[i64; 3]; 3] = std::array::from_fn(|_| {
             std::array::from_fn(|_| {
-                if seeded.chance(1, 3) {
-                    seeded.pick(&[lo, hi])
-                } else {
-                    seeded.of(lo..=hi)
-                }
+                if seeded.chance(1, 3) { seeded.pick(&[lo, hi]) } else { seeded.of(lo..=hi) }
             })
         });
         let level = seeded.of(0..=19);
         let edge = (1 << 27) >> level;
         let min: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=(1 << level) - 1) * edge);
-        agree(
-            &facet,
-            &Extent {
-                min,
-                max: min.map(|x| x + edge),
-            },
-        );
+        agree(&facet, &Extent { min, max: min.map(|x| x + edge) });
     }
 }
 
 #[test]
 fn what_touches_crosses() {
-    let extent = Extent {
-        min: [4; 3],
-        max: [6; 3],
-    };
+    let extent = Extent { min: [4; 3], max: [6; 3] };
     let in_the_face_plane = [[6, 0, 0], [6, 9, 0], [6, 0, 20]];
     let corner_only = [[6, 6, 6], [9, 7, 8], [7, 9, 9]];
     let edge_only = [[6, 6, 0], [6, 6, 9], [9, 9, 4]];

@@ -15,15 +15,8 @@ fn facets(seeded: &mut Seeded) -> Vec<Facet> {
     for _ in 0..seeded.of(0..=2) {
         let min: [i64; 3] = std::array::from_fn(|_| seeded.of(-1..=reach - 2));
         let max = min.map(|x| x + seeded.of(2..=reach));
-        let shift = if seeded.chance(1, 2) {
-            seeded.of(0..=unit)
-        } else {
-            0
-        };
-        facets.extend(block(
-            min.map(|x| x * unit + shift),
-            max.map(|x| x * unit + shift),
-        ));
+        let shift = if seeded.chance(1, 2) { seeded.of(0..=unit) } else { 0 };
+        facets.extend(block(min.map(|x| x * unit + shift), max.map(|x| x * unit + shift)));
     }
     // Now and then a block with a hole.
     if seeded.chance(1, 3) {
@@ -84,32 +77,14 @@ fn compare(seeded: &mut Seeded, finest: u32) -> Compared {
     let ambiguous = assign_sides(&mut dense, &facets);
     let base = base_tree(&case).unwrap();
     assert_eq!(base.words, dense.words(|_| true), "base tree of {case:?}");
-    assert_eq!(
-        base.ambiguous.map_or(0, |a| a.components),
-        ambiguous,
-        "{case:?}"
-    );
+    assert_eq!(base.ambiguous.map_or(0, |a| a.components), ambiguous, "{case:?}");
     for cell in &mut dense.cells {
         cell.kept = kept(case.keep, cell.side);
     }
-    grade(
-        &mut dense,
-        i64::from(case.layer_cells_min),
-        case.keep_crossing,
-        level_surface,
-    );
+    grade(&mut dense, i64::from(case.layer_cells_min), case.keep_crossing, level_surface);
     let wanted = |leaf: Cell| leaf.kept && (case.keep_crossing || leaf.side != CROSSING);
-    assert_eq!(
-        mesh(&case).unwrap().words,
-        dense.words(wanted),
-        "final mesh of {case:?}"
-    );
-    Compared {
-        case,
-        level_surface,
-        ambiguous,
-        graded: dense,
-    }
+    assert_eq!(mesh(&case).unwrap().words, dense.words(wanted), "final mesh of {case:?}");
+    Compared { case, level_surface, ambiguous, graded: dense }
 }
 
 #[test]
@@ -127,10 +102,7 @@ fn two_ways_one_mesh() {
     // What is rare in random cases must not be missing from them.
     assert!(inside > 50, "{inside} cases have an inside");
     assert!(ambiguous > 20, "{ambiguous} cases are ambiguous");
-    assert!(
-        crossing_deep > 50,
-        "{crossing_deep} cases have boxes finer than the surface on it"
-    );
+    assert!(crossing_deep > 50, "{crossing_deep} cases have boxes finer than the surface on it");
     for _ in 0..20 {
         compare(&mut seeded, 5);
     }
@@ -142,12 +114,7 @@ fn two_ways_one_mesh() {
 fn promises() {
     let mut seeded = Seeded::new(6);
     for _ in 0..60 {
-        let Compared {
-            case,
-            level_surface,
-            graded,
-            ..
-        } = compare(&mut seeded, 4);
+        let Compared { case, level_surface, graded, .. } = compare(&mut seeded, 4);
         let mut leaves = graded.leaves();
         leaves.retain(|leaf| leaf.kept);
         for (i, &p) in leaves.iter().enumerate() {
@@ -173,22 +140,12 @@ fn check_apart(dense: &Dense, case: &Case, level_surface: u32, fine: Cell, coars
         let promised = level < level_surface || case.keep == Keep::All;
         if promised && !gone(fine) && !gone(coarse) {
             let cell = 1 << (dense.finest - level);
-            assert!(
-                distance >= n * cell,
-                "{:?} {:?} of {case:?}",
-                fine.at,
-                coarse.at
-            );
+            assert!(distance >= n * cell, "{:?} {:?} of {case:?}", fine.at, coarse.at);
         }
     }
     let near = (n - 1) << (dense.finest - level_surface.min(dense.finest));
     if fine.side == CROSSING && fine.level == level_surface && distance < near {
-        assert!(
-            coarse.level >= level_surface,
-            "{:?} {:?} of {case:?}",
-            fine.at,
-            coarse.at
-        );
+        assert!(coarse.level >= level_surface, "{:?} {:?} of {case:?}", fine.at, coarse.at);
     }
 }
 

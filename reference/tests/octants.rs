@@ -27,10 +27,7 @@ fn children_tile_their_parent_in_morton_order() {
         assert_eq!(children[7].extent().max, extent.max);
         assert!(children.is_sorted_by_key(Octant::key));
         for (i, child) in children.iter().enumerate() {
-            assert_eq!(
-                (child.level, child.edge() * 2),
-                (octant.level + 1, octant.edge())
-            );
+            assert_eq!((child.level, child.edge() * 2), (octant.level + 1, octant.edge()));
             assert!((0..3).all(|a| child.min[a] >= extent.min[a]));
             assert!((0..3).all(|a| child.extent().max[a] <= extent.max[a]));
             for other in &children[..i] {
@@ -53,28 +50,17 @@ fn meeting_and_touching() {
                 o.key() >> (3 * (LEVEL_MAX - p.level.min(q.level)))
             });
             let nested = cells(p) == cells(q);
-            assert_eq!(
-                p.extent().interiors_meet(&q.extent()),
-                nested,
-                "{p:?} {q:?} {level}"
-            );
+            assert_eq!(p.extent().interiors_meet(&q.extent()), nested, "{p:?} {q:?} {level}");
             let touch =
                 (0..3).all(|a| grid(&p.extent(), a).any(|x| grid(&q.extent(), a).contains(&x)));
-            assert_eq!(
-                p.extent().enlarged(1).interiors_meet(&q.extent()),
-                touch,
-                "{p:?} {q:?}"
-            );
+            assert_eq!(p.extent().enlarged(1).interiors_meet(&q.extent()), touch, "{p:?} {q:?}");
         }
     }
 }
 
 #[test]
 fn boxes_without_volume_have_no_interior() {
-    let flat = Extent {
-        min: [0, 0, ROOT_EDGE / 3],
-        max: [ROOT_EDGE, ROOT_EDGE, ROOT_EDGE / 3],
-    };
+    let flat = Extent { min: [0, 0, ROOT_EDGE / 3], max: [ROOT_EDGE, ROOT_EDGE, ROOT_EDGE / 3] };
     assert!(!flat.interiors_meet(&Octant::ROOT.extent()));
     assert!(!Octant::ROOT.extent().interiors_meet(&flat));
 }
@@ -85,10 +71,7 @@ fn words_tell_octants_and_sides_apart() {
     for octant in octants() {
         for side in [Side::Outside, Side::Inside, Side::Crossing] {
             let word = octant.word(side);
-            assert_eq!(
-                (word & 3, word >> 2 & 31),
-                (side as u64, u64::from(octant.level))
-            );
+            assert_eq!((word & 3, word >> 2 & 31), (side as u64, u64::from(octant.level)));
             assert_eq!(word >> 7, octant.key());
             words.push(word);
         }

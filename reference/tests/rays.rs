@@ -16,10 +16,7 @@ fn any_facets() {
             .collect();
         let point: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=reach));
         // Rays start on no facet.
-        if facets
-            .iter()
-            .any(|facet| crosses_by_axes(facet, point, point))
-        {
+        if facets.iter().any(|facet| crosses_by_axes(facet, point, point)) {
             continue;
         }
         for axis in 0..3 {

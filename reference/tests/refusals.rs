@@ -14,11 +14,7 @@ fn what_cannot_be_meshed_is_an_error() {
     };
     let edge = ROOT_EDGE as f64;
     let facets = [2.0 * edge + 1.0, -edge - 1.0].map(|x| error(&move |c| c.facets[1][2][0] = x));
-    assert!(
-        facets
-            .iter()
-            .all(|e| matches!(e, Error::VertexOutside { facet: 1, .. }))
-    );
+    assert!(facets.iter().all(|e| matches!(e, Error::VertexOutside { facet: 1, .. })));
     for x in [f64::NAN, f64::INFINITY] {
         let error = error(&|c| c.facets[1][2][0] = x);
         assert!(matches!(error, Error::VertexNotFinite { facet: 1, .. }));
@@ -28,38 +24,14 @@ fn what_cannot_be_meshed_is_an_error() {
     mesh(&at_the_limit).unwrap();
 
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            error(&|c| c.spacing_min = spacing),
-            Error::Spacing { .. }
-        ));
-        assert!(matches!(
-            error(&|c| c.root.edge = spacing),
-            Error::RootEdge(_)
-        ));
+        assert!(matches!(error(&|c| c.spacing_min = spacing), Error::Spacing { .. }));
+        assert!(matches!(error(&|c| c.root.edge = spacing), Error::RootEdge(_)));
     }
-    assert!(matches!(
-        error(&|c| c.spacing_min = 255.9),
-        Error::SpacingTooFine { .. }
-    ));
-    assert!(matches!(
-        error(&|c| c.root.origin[1] = f64::NAN),
-        Error::RootOrigin(_)
-    ));
-    assert!(matches!(
-        error(&|c| c.layer_cells_min = 0),
-        Error::LayerCells
-    ));
+    assert!(matches!(error(&|c| c.spacing_min = 255.9), Error::SpacingTooFine { .. }));
+    assert!(matches!(error(&|c| c.root.origin[1] = f64::NAN), Error::RootOrigin(_)));
+    assert!(matches!(error(&|c| c.layer_cells_min = 0), Error::LayerCells));
     let boxed = |min, max, spacing| error(&move |c| c.boxes = vec![BoxSpec { min, max, spacing }]);
-    assert!(matches!(
-        boxed([0.0; 3], [1.0, 1.0, 0.0], 1e6),
-        Error::BoxCorners { index: 0, .. }
-    ));
-    assert!(matches!(
-        boxed([0.0; 3], [f64::INFINITY; 3], 1e6),
-        Error::BoxCorners { .. }
-    ));
-    assert!(matches!(
-        boxed([0.0; 3], [1.0; 3], 1.0),
-        Error::SpacingTooFine { .. }
-    ));
+    assert!(matches!(boxed([0.0; 3], [1.0, 1.0, 0.0], 1e6), Error::BoxCorners { index: 0, .. }));
+    assert!(matches!(boxed([0.0; 3], [f64::INFINITY; 3], 1e6), Error::BoxCorners { .. }));
+    assert!(matches!(boxed([0.0; 3], [1.0; 3], 1.0), Error::SpacingTooFine { .. }));
 }

@@ -34,14 +34,8 @@ fn refused(bytes: &[u8], part: &str) {
 
 #[test]
 fn binary_files() {
-    assert_eq!(
-        parse(&binary(b"", 2, &[FACET, FACET])).unwrap(),
-        [FACET, FACET]
-    );
-    assert_eq!(
-        parse(&binary(b"solid but binary", 1, &[FACET])).unwrap(),
-        [FACET]
-    );
+    assert_eq!(parse(&binary(b"", 2, &[FACET, FACET])).unwrap(), [FACET, FACET]);
+    assert_eq!(parse(&binary(b"solid but binary", 1, &[FACET])).unwrap(), [FACET]);
     let no_zero_byte = [b'x'; 80];
     assert_eq!(parse(&binary(&no_zero_byte, 1, &[FACET])).unwrap(), [FACET]);
     assert!(parse(&binary(b"", 0, &[])).unwrap().is_empty());
@@ -66,30 +60,16 @@ fn ascii_files() {
         );
     }
     assert_eq!(parse(TEXT.to_uppercase().as_bytes()).unwrap(), [FACET]);
-    assert_eq!(
-        parse(format!("\n\r\n  {TEXT}\n\n").as_bytes()).unwrap(),
-        [FACET]
-    );
-    assert_eq!(
-        parse(format!("\u{feff}{TEXT}").as_bytes()).unwrap(),
-        [FACET]
-    );
-    assert_eq!(
-        parse(TEXT.trim_end().as_bytes()).unwrap(),
-        [FACET],
-        "no line end at the end"
-    );
+    assert_eq!(parse(format!("\n\r\n  {TEXT}\n\n").as_bytes()).unwrap(), [FACET]);
+    assert_eq!(parse(format!("\u{feff}{TEXT}").as_bytes()).unwrap(), [FACET]);
+    assert_eq!(parse(TEXT.trim_end().as_bytes()).unwrap(), [FACET], "no line end at the end");
 }
 
 #[test]
 fn several_solids() {
     let solids = [TEXT, "solid\nendsolid\n", &TEXT.to_uppercase(), TEXT].concat();
     assert_eq!(parse(solids.as_bytes()).unwrap(), [FACET; 3]);
-    assert!(
-        parse(b"solid nothing\nendsolid nothing\n")
-            .unwrap()
-            .is_empty()
-    );
+    assert!(parse(b"solid nothing\nendsolid nothing\n").unwrap().is_empty());
 }
 
 /// Whatever is cut off at the end, it is missed; only a name may go.
@@ -99,10 +79,7 @@ fn truncated_ascii_files() {
     for length in "solid".len()..whole {
         assert!(parse(&TEXT.as_bytes()[..length]).is_err(), "{length} bytes");
     }
-    refused(
-        &TEXT.as_bytes()[..whole - 8],
-        "line 9 where facet or endsolid should follow",
-    );
+    refused(&TEXT.as_bytes()[..whole - 8], "line 9 where facet or endsolid should follow");
 }
 
 #[test]
@@ -111,17 +88,11 @@ fn truncated_and_overlong_binary_files() {
     for length in 0..whole.len() {
         assert!(parse(&whole[..length]).is_err(), "{length} bytes");
     }
-    refused(
-        &whole[..100],
-        "promises 2 facets, 184 bytes in all, but the file has 100",
-    );
+    refused(&whole[..100], "promises 2 facets, 184 bytes in all, but the file has 100");
     refused(&[&whole[..], b"x"].concat(), "but the file has 185");
     refused(&binary(b"", 1, &[FACET, FACET]), "promises 1 facets");
     // Nothing is allocated for a count that the file cannot hold.
-    refused(
-        &binary(b"", u32::MAX, &[FACET]),
-        "promises 4294967295 facets",
-    );
+    refused(&binary(b"", u32::MAX, &[FACET]), "promises 4294967295 facets");
 }
 
 #[test]
@@ -139,18 +110,9 @@ fn what_is_not_stl() {
         TEXT.replace("2.5", "blah").as_bytes(),
         "line 4 says \"blah\" where a number should be",
     );
-    refused(
-        TEXT.replace("2.5", "").as_bytes(),
-        "line 5 says \"vertex\" where a number should be",
-    );
-    refused(
-        TEXT.replace("2.5", "2.5 1").as_bytes(),
-        "line 4 says \"1\" where vertex should be",
-    );
-    refused(
-        TEXT.replace("outer loop", "outer").as_bytes(),
-        "where loop should be",
-    );
+    refused(TEXT.replace("2.5", "").as_bytes(), "line 5 says \"vertex\" where a number should be");
+    refused(TEXT.replace("2.5", "2.5 1").as_bytes(), "line 4 says \"1\" where vertex should be");
+    refused(TEXT.replace("outer loop", "outer").as_bytes(), "where loop should be");
     let crlf = TEXT.replace('\n', "\r\n").replace("2.5", "2,5");
     refused(crlf.as_bytes(), "line 4 says \"2,5\"");
     let cr = TEXT.replace('\n', "\r").replace("2.5", "2,5");
@@ -163,15 +125,9 @@ fn what_is_not_stl() {
 #[test]
 fn vertices_that_are_not_finite() {
     for word in ["nan", "inf", "-Infinity", "1e999"] {
-        refused(
-            TEXT.replace("2.5", word).as_bytes(),
-            "facet 0 has a vertex that is not finite",
-        );
+        refused(TEXT.replace("2.5", word).as_bytes(), "facet 0 has a vertex that is not finite");
     }
     let mut wrong = FACET;
     wrong[2][1] = f32::NAN;
-    refused(
-        &binary(b"", 2, &[FACET, wrong]),
-        "facet 1 has a vertex that is not finite",
-    );
+    refused(&binary(b"", 2, &[FACET, wrong]), "facet 1 has a vertex that is not finite");
 }

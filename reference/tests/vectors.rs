@@ -57,10 +57,7 @@ fn digests() {
         assert_eq!(hex(digest(&words)), case["digest"], "whatever the order");
         let tally = Tally::of(&words);
         assert_eq!(hex(tally.digest), case["digest"]);
-        let merged = tally
-            .octant_digests
-            .iter()
-            .fold(0_u128, |sum, &d| sum.wrapping_add(d));
+        let merged = tally.octant_digests.iter().fold(0_u128, |sum, &d| sum.wrapping_add(d));
         assert_eq!(hex(merged), case["digest"], "octants merge by addition");
     }
 }
@@ -88,10 +85,7 @@ fn levels() {
     for case in cases("levels") {
         let edge = number(&case["edge"]);
         let spacing_min = number(&case["spacing"]);
-        let found = Input::new(&Case {
-            spacing_min,
-            ..empty([0.0; 3], edge)
-        });
+        let found = Input::new(&Case { spacing_min, ..empty([0.0; 3], edge) });
         match case["level"].as_u64() {
             Some(level) => assert_eq!(u64::from(found.unwrap().level_surface), level),
             None => assert!(matches!(found, Err(Error::SpacingTooFine { .. }))),
@@ -102,21 +96,11 @@ fn levels() {
 #[test]
 fn roots() {
     for case in cases("roots") {
-        let vertices: Vec<[f64; 3]> = case["vertices"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(point)
-            .collect();
+        let vertices: Vec<[f64; 3]> =
+            case["vertices"].as_array().unwrap().iter().map(point).collect();
         let facet = vertices.try_into().unwrap();
         let root = Root::around(&[facet], number(&case["root_scale"])).unwrap();
-        assert_eq!(
-            root,
-            Root {
-                origin: point(&case["origin"]),
-                edge: number(&case["edge"])
-            }
-        );
+        assert_eq!(root, Root { origin: point(&case["origin"]), edge: number(&case["edge"]) });
     }
 }
 
@@ -125,10 +109,8 @@ fn quantised() {
     for case in cases("quantised") {
         let vertex = point(&case["vertex"]);
         let facets = vec![[vertex; 3]];
-        let found = Input::new(&Case {
-            facets,
-            ..empty(point(&case["origin"]), number(&case["edge"]))
-        });
+        let found =
+            Input::new(&Case { facets, ..empty(point(&case["origin"]), number(&case["edge"])) });
         if case["lattice"].is_null() {
             assert!(matches!(found, Err(Error::VertexOutside { facet: 0, .. })));
         } else {
@@ -141,24 +123,10 @@ fn quantised() {
 fn boxes() {
     for case in cases("boxes") {
         let edge = number(&case["edge"]);
-        let spec = BoxSpec {
-            min: point(&case["min"]),
-            max: point(&case["max"]),
-            spacing: edge,
-        };
+        let spec = BoxSpec { min: point(&case["min"]), max: point(&case["max"]), spacing: edge };
         let boxes = vec![spec];
-        let input = Input::new(&Case {
-            boxes,
-            ..empty(point(&case["origin"]), edge)
-        })
-        .unwrap();
-        assert_eq!(
-            input.boxes[0].extent.min,
-            lattice_point(&case["lattice_min"])
-        );
-        assert_eq!(
-            input.boxes[0].extent.max,
-            lattice_point(&case["lattice_max"])
-        );
+        let input = Input::new(&Case { boxes, ..empty(point(&case["origin"]), edge) }).unwrap();
+        assert_eq!(input.boxes[0].extent.min, lattice_point(&case["lattice_min"]));
+        assert_eq!(input.boxes[0].extent.max, lattice_point(&case["lattice_max"]));
     }
 }

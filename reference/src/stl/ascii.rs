@@ -9,10 +9,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Whether the bytes begin like ASCII STL and hold no zero byte, as text never does.
 pub fn is_likely(bytes: &[u8]) -> bool {
     let mut words = Words::new(bytes);
-    words
-        .next()
-        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
-        && !bytes.contains(&0)
+    words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) && !bytes.contains(&0)
 }
 
 /// The facets of all solids, or a sentence on the first thing that is wrong.
@@ -69,22 +66,14 @@ struct Words<'a> {
 impl<'a> Words<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let rest = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-        Self {
-            rest,
-            line: 1,
-            after_return: false,
-        }
+        Self { rest, line: 1, after_return: false }
     }
 
     fn next(&mut self) -> Option<&'a [u8]> {
         while self.rest.first().is_some_and(u8::is_ascii_whitespace) {
             self.step();
         }
-        let length = self
-            .rest
-            .iter()
-            .take_while(|byte| !byte.is_ascii_whitespace())
-            .count();
+        let length = self.rest.iter().take_while(|byte| !byte.is_ascii_whitespace()).count();
         let (word, rest) = self.rest.split_at(length);
         self.rest = rest;
         self.after_return &= word.is_empty();
@@ -93,11 +82,7 @@ impl<'a> Words<'a> {
 
     /// Goes to the end of the line.
     fn skip_line(&mut self) {
-        while self
-            .rest
-            .first()
-            .is_some_and(|&byte| byte != b'\n' && byte != b'\r')
-        {
+        while self.rest.first().is_some_and(|&byte| byte != b'\n' && byte != b'\r') {
             self.step();
         }
     }

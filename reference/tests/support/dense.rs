@@ -32,10 +32,7 @@ impl Dense {
             side: OUTSIDE,
             kept: true,
         };
-        Self {
-            finest,
-            cells: (0..n * n * n).map(cell).collect(),
-        }
+        Self { finest, cells: (0..n * n * n).map(cell).collect() }
     }
 
     fn cell(&mut self, at: [i64; 3]) -> Option<&mut Cell> {
@@ -52,11 +49,7 @@ impl Dense {
 
     /// One cell of every leaf: the one in the minimum corner.
     pub fn leaves(&self) -> Vec<Cell> {
-        self.cells
-            .iter()
-            .copied()
-            .filter(|&cell| self.leaf(cell).1 == cell.at)
-            .collect()
+        self.cells.iter().copied().filter(|&cell| self.leaf(cell).1 == cell.at).collect()
     }
 
     /// Changes all cells of a leaf.
@@ -124,16 +117,9 @@ pub fn base(case: &Case, facets: &[Facet], finest: u32, level_surface: u32) -> D
         (0..3).all(|a| (min[a] as f64) < spec.max[a] && spec.min[a] < max[a] as f64)
     };
     for level in 0..finest {
-        for leaf in dense
-            .leaves()
-            .into_iter()
-            .filter(|leaf| leaf.level == level)
-        {
+        for leaf in dense.leaves().into_iter().filter(|leaf| leaf.level == level) {
             let (min, max) = dense.extent(leaf);
-            let boxed = case
-                .boxes
-                .iter()
-                .any(|b| b.spacing < spacing(level) && meets(b, min, max));
+            let boxed = case.boxes.iter().any(|b| b.spacing < spacing(level) && meets(b, min, max));
             if boxed || (level < level_surface && crossed(min, max)) {
                 dense.change(leaf, |cell| cell.level += 1);
             }
@@ -151,12 +137,8 @@ pub fn base(case: &Case, facets: &[Facet], finest: u32, level_surface: u32) -> D
 /// Spreads from cell to cell; returns the number of ambiguous components.
 pub fn assign_sides(dense: &mut Dense, facets: &[Facet]) -> u64 {
     let mut ambiguous = 0;
-    let mut reached: std::collections::HashSet<[i64; 3]> = dense
-        .cells
-        .iter()
-        .filter(|cell| cell.side == CROSSING)
-        .map(|cell| cell.at)
-        .collect();
+    let mut reached: std::collections::HashSet<[i64; 3]> =
+        dense.cells.iter().filter(|cell| cell.side == CROSSING).map(|cell| cell.at).collect();
     for start in dense.cells.clone() {
         if !reached.insert(start.at) {
             continue;
@@ -203,11 +185,7 @@ pub fn assign_sides(dense: &mut Dense, facets: &[Facet]) -> u64 {
 
 pub fn grade(dense: &mut Dense, n: i64, keep_crossing: bool, level_surface: u32) {
     if !keep_crossing && n < 3 {
-        for leaf in dense
-            .leaves()
-            .into_iter()
-            .filter(|leaf| leaf.side == CROSSING)
-        {
+        for leaf in dense.leaves().into_iter().filter(|leaf| leaf.side == CROSSING) {
             touching(dense, leaf, level_surface);
         }
     }
@@ -215,11 +193,7 @@ pub fn grade(dense: &mut Dense, n: i64, keep_crossing: bool, level_surface: u32)
         for leaf in kept_of_level(dense, level) {
             let (edge, min) = dense.leaf(leaf);
             let margin = (n - 1) * edge;
-            dense.refine(
-                min.map(|x| x - margin),
-                min.map(|x| x + edge + margin),
-                level,
-            );
+            dense.refine(min.map(|x| x - margin), min.map(|x| x + edge + margin), level);
         }
         for leaf in kept_of_level(dense, level) {
             touching(dense, leaf, level - 1);

@@ -20,10 +20,8 @@ impl Seeded {
 
     fn next(&mut self) -> u64 {
         // Knuth's linear congruential generator; its high bits are good enough.
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 >> 33
     }
 
@@ -47,14 +45,8 @@ impl Seeded {
 /// kept and layers are one cell thick.
 pub fn case(facets: &[[[i64; 3]; 3]], level: u32) -> Case {
     Case {
-        facets: facets
-            .iter()
-            .map(|facet| facet.map(|v| v.map(|x| x as f64)))
-            .collect(),
-        root: Root {
-            origin: [0.0; 3],
-            edge: ROOT_EDGE as f64,
-        },
+        facets: facets.iter().map(|facet| facet.map(|v| v.map(|x| x as f64))).collect(),
+        root: Root { origin: [0.0; 3], edge: ROOT_EDGE as f64 },
         spacing_min: spacing(level),
         layer_cells_min: 1,
         keep: Keep::All,
@@ -71,11 +63,7 @@ pub fn spacing(level: u32) -> f64 {
 /// A box with `level` inside.
 pub fn box_of_level(min: [i64; 3], max: [i64; 3], level: u32) -> BoxSpec {
     let corner = |c: [i64; 3]| c.map(|x| x as f64);
-    BoxSpec {
-        min: corner(min),
-        max: corner(max),
-        spacing: spacing(level),
-    }
+    BoxSpec { min: corner(min), max: corner(max), spacing: spacing(level) }
 }
 
 /// The twelve facets of a box.
@@ -108,19 +96,11 @@ pub fn crosses_by_axes(facet: &[[i64; 3]; 3], min: [i64; 3], max: [i64; 3]) -> b
     let corners: [[i64; 3]; 8] = std::array::from_fn(|i| {
         std::array::from_fn(|a| if i >> a & 1 == 0 { min[a] } else { max[a] })
     });
-    let edges = [
-        minus(facet[1], facet[0]),
-        minus(facet[2], facet[1]),
-        minus(facet[0], facet[2]),
-    ];
+    let edges = [minus(facet[1], facet[0]), minus(facet[2], facet[1]), minus(facet[0], facet[2])];
     let units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     let mut axes = vec![cross(edges[0], edges[1])];
     axes.extend(units);
-    axes.extend(
-        edges
-            .iter()
-            .flat_map(|&edge| units.map(|unit| cross(edge, unit))),
-    );
+    axes.extend(edges.iter().flat_map(|&edge| units.map(|unit| cross(edge, unit))));
     axes.into_iter().all(|axis| {
         let (facet_lo, facet_hi) = range(facet, axis);
         let (box_lo, box_hi) = range(&corners, axis);
@@ -129,11 +109,7 @@ pub fn crosses_by_axes(facet: &[[i64; 3]; 3], min: [i64; 3], max: [i64; 3]) -> b
 }
 
 fn range(points: &[[i64; 3]], axis: [i64; 3]) -> (i128, i128) {
-    let at = |p: &[i64; 3]| {
-        (0..3)
-            .map(|a| i128::from(p[a]) * i128::from(axis[a]))
-            .sum::<i128>()
-    };
+    let at = |p: &[i64; 3]| (0..3).map(|a| i128::from(p[a]) * i128::from(axis[a])).sum::<i128>();
     let along = points.iter().map(at);
     (along.clone().min().unwrap(), along.max().unwrap())
 }
@@ -163,18 +139,12 @@ pub fn parities_by_areas(facets: &[[[i64; 3]; 3]], point: [i64; 3], axis: usize)
             let area = du * i128::from(point[v] - p[v]) - dv * i128::from(point[u] - p[u]);
             (area, (area << 64) - (dv << 32) + du)
         });
-        let all = |sign: i128| {
-            areas
-                .iter()
-                .all(|&(_, displaced)| displaced.signum() == sign)
-        };
+        let all = |sign: i128| areas.iter().all(|&(_, displaced)| displaced.signum() == sign);
         let area: i128 = areas.iter().map(|&(area, _)| area).sum();
         if area == 0 || !(all(1) || all(-1)) {
             continue;
         }
-        let weighted: i128 = (0..3)
-            .map(|i| areas[i].0 * i128::from(facet[i][axis]))
-            .sum();
+        let weighted: i128 = (0..3).map(|i| areas[i].0 * i128::from(facet[i][axis])).sum();
         let above = weighted * area.signum() > i128::from(point[axis]) * area.abs();
         odd[usize::from(above)] ^= true;
     }
