@@ -6,7 +6,9 @@ use harness::engine::programs::{Given, Programs};
 use harness::gate::page::{json, junit, markdown, text};
 use harness::gate::report::{LayerName, Report};
 use harness::gate::{GateError, Options, gate};
-use harness::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use harness::verify::report::{
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING,
+};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use std::{env, fs, io};
@@ -104,7 +106,9 @@ fn exit_code(report: &Report, arguments: &GateArguments) -> u8 {
     match (report.interrupted, report.holds()) {
         (true, _) => EXIT_INTERRUPTED,
         (_, false) => EXIT_FAILED,
-        _ if arguments.require_layers && report.layers.iter().any(|l| l.left_out.is_some()) => EXIT_MISSING,
+        _ if arguments.require_layers && report.layers.iter().any(|l| l.left_out.is_some()) => {
+            EXIT_MISSING
+        }
         _ => EXIT_HOLDS,
     }
 }

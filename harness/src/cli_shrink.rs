@@ -3,9 +3,9 @@
 use crate::cli::ProgramArguments;
 use clap::Args;
 use harness::engine::description::Description;
+use harness::engine::plain::PlainCase;
 use harness::engine::programs::{Given, Programs};
 use harness::engine::runner::{Engine, Ranks};
-use harness::engine::plain::PlainCase;
 use harness::shrink::leave::{Repeat, leave};
 use harness::shrink::probe::{Probe, Trial};
 use harness::shrink::{Budget, shrink};
@@ -75,7 +75,9 @@ fn run_or_why(arguments: &ShrinkArguments) -> Result<u8, String> {
     };
     let case = match arguments.case.ends_with(".toml") {
         true => PathBuf::from(&arguments.case),
-        false => catalogue::named(&arguments.case, &programs).map_err(|error| error.to_string())?.path,
+        false => {
+            catalogue::named(&arguments.case, &programs).map_err(|error| error.to_string())?.path
+        }
     };
     let probe = Probe::new(engine, reference, ranks)?;
     if arguments.check {
@@ -92,7 +94,8 @@ fn run_or_why(arguments: &ShrinkArguments) -> Result<u8, String> {
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let program = programs.mesher_given.as_ref().map(|path| path.to_string_lossy().into_owned());
     let repeat = Repeat { engine: arguments.engine.clone(), program };
-    let told = leave(&shrunk, &probe, &repeat, &out).map_err(|error| format!("{}: {error}", out.display()))?;
+    let told = leave(&shrunk, &probe, &repeat, &out)
+        .map_err(|error| format!("{}: {error}", out.display()))?;
     println!("{told}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

@@ -62,7 +62,11 @@ pub struct TrackArguments {
 fn named_number(text: &str) -> Result<(String, f64), String> {
     let (name, number) = text.split_once('=').ok_or("give CASE/METRIC=NUMBER")?;
     let number: f64 = number.parse().map_err(|_| format!("{number:?} is no number"))?;
-    if number.is_finite() { Ok((name.to_owned(), number)) } else { Err(format!("{number} is not finite")) }
+    if number.is_finite() {
+        Ok((name.to_owned(), number))
+    } else {
+        Err(format!("{number} is not finite"))
+    }
 }
 
 /// Appends, analyses, prints, writes; the exit code.
@@ -79,7 +83,8 @@ fn run_or_why(arguments: &TrackArguments) -> Result<u8, String> {
     }
     let records = history::read(&arguments.history)?;
     let effect_min = arguments.effect_min / 100.0;
-    let rules = Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
+    let rules =
+        Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
     print!("{}", told(&all));

@@ -4,6 +4,7 @@
 //! Trusts the manifests' digests: that they are true to the leaves is for the check `manifest`.
 
 pub mod rule;
+mod witness;
 
 use std::fmt::{self, Debug};
 use std::path::Path;
@@ -113,12 +114,15 @@ fn fields(a: &Manifest, b: &Manifest) -> Vec<String> {
     fields
 }
 
+/// What two meshes hold where they differ first; nothing where one has no more leaves.
+type Differing = (Option<u64>, Option<u64>);
+
 /// The words that differ first in a level-3 octant, if any do.
 fn first_difference(
     a: &LeafDir,
     b: &LeafDir,
     index: usize,
-) -> Result<Option<(Option<u64>, Option<u64>)>, ReadError> {
+) -> Result<Option<Differing>, ReadError> {
     let (words_a, words_b) = (octant_words(a, index)?, octant_words(b, index)?);
     if words_a == words_b {
         return Ok(None);
@@ -143,7 +147,9 @@ fn rules(
         return wrong("section 1: the inputs were not the same");
     }
     if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
-        return wrong("a rule that is not looked for: the meshes are too large to be held in memory");
+        return wrong(
+            "a rule that is not looked for: the meshes are too large to be held in memory",
+        );
     }
     let (words_a, words_b) = (all_words(a)?, all_words(b)?);
     let terms = Terms::of_manifest(&a.manifest);
@@ -155,7 +161,9 @@ fn all_words(set: &LeafDir) -> Result<Vec<u64>, ReadError> {
     let mut words = Vec::new();
     for part in &set.parts {
         let read = part.read_all();
-        words.extend(read.map_err(|e| ReadError::Part { path: part.path().to_owned(), source: e.into() })?);
+        words.extend(
+            read.map_err(|e| ReadError::Part { path: part.path().to_owned(), source: e.into() })?,
+        );
     }
     words.sort_unstable();
     Ok(words)

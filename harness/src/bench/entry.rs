@@ -1,8 +1,8 @@
 //! What a line of a benchmark record says: schema `octree-bench/1`, described in reports/README.md.
 //!
 //! Invariants: a line stands by itself but for its session, whose first line describes the machine; seconds,
-//! bytes and counts are plain numbers in the units of their names; what a rank did is told rank by rank
-//! up to [`BY_RANK_MAX`] ranks and by sum and greatest value beyond, so that a record stays small.
+//! bytes and counts are plain numbers in the units of their names; ranks are told by sum and greatest value,
+//! and one by one only in a run's useful time, up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -102,7 +102,7 @@ pub struct Spread {
     pub max: f64,
     /// That rank.
     pub at: usize,
-    /// Rank by rank, up to [`BY_RANK_MAX`] ranks.
+    /// Rank by rank, where that is kept.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub by_rank: Vec<f64>,
 }
@@ -119,6 +119,11 @@ impl Spread {
             at,
             by_rank: keep.iter().map(|v| round(*v)).collect(),
         }
+    }
+
+    /// The same without values rank by rank.
+    pub fn brief(values: &[f64]) -> Self {
+        Self { by_rank: Vec::new(), ..Self::of(values) }
     }
 
     /// Greatest over mean: 1 where all ranks have the same, and where none has anything.

@@ -186,11 +186,11 @@ fn of_told(setup: Setup, told: &Told) -> Run {
     }
     let phase = |p: &PhaseTold| Phase {
         name: p.name.clone(),
-        useful_s: Spread::of(&p.useful_s()),
-        wall_s: Spread::of(&p.time_wall_s),
-        comm_s: Spread::of(&p.time_comm_wall_s),
-        messages: Spread::of(&p.messages),
-        message_bytes: Spread::of(&p.message_bytes),
+        useful_s: Spread::brief(&p.useful_s()),
+        wall_s: Spread::brief(&p.time_wall_s),
+        comm_s: Spread::brief(&p.time_comm_wall_s),
+        messages: Spread::brief(&p.messages),
+        message_bytes: Spread::brief(&p.message_bytes),
     };
     let peak = match &told.peak_rss_bytes {
         OneOrMany::One(bytes) => vec![*bytes],
@@ -210,10 +210,10 @@ fn of_told(setup: Setup, told: &Told) -> Run {
         digest: told.digest.clone(),
         time_wall_s: told.time_wall_s,
         time_launch_s: 0.0,
-        peak_rss_bytes: Spread::of(&peak),
+        peak_rss_bytes: Spread::brief(&peak),
         useful_s: Spread::of(&useful_s),
         phases: told.phases.iter().map(phase).collect(),
-        counters: told.counters.iter().map(|(name, v)| (name.clone(), Spread::of(v))).collect(),
+        counters: told.counters.iter().map(|(name, v)| (name.clone(), Spread::brief(v))).collect(),
         setup,
     }
 }
@@ -253,7 +253,8 @@ mod tests {
     fn useful_time_is_cpu_time_outside_calls() {
         let told: Told = serde_json::from_str(TOLD).unwrap();
         let run = of_told(setup(Comm::Mpi, 2), &told);
-        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
+        assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
         assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
         // All simulated ranks live in one process.

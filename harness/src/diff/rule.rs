@@ -34,7 +34,7 @@ pub struct Dispute<'a> {
 
 /// Whose leaf it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Who {
+pub(super) enum Who {
     A,
     B,
 }
@@ -65,13 +65,17 @@ impl Dispute<'_> {
         let leaf = |word: Option<u64>| word.map(word::decode).transpose();
         let (a, b) = match (leaf(a), leaf(b)) {
             (Ok(a), Ok(b)) => (a, b),
-            _ => return vec!["section 8: a word that is no leaf is wrong whatever the case".into()],
+            _ => {
+                return vec!["section 8: a word that is no leaf is wrong whatever the case".into()];
+            }
         };
         match (a, b) {
             (Some(a), Some(b)) if a.octant == b.octant => vec![self.side(&a, &b)],
             (Some(a), Some(b)) if a.octant.contains(&b.octant) => self.split(Who::A, a),
             (Some(a), Some(b)) if b.octant.contains(&a.octant) => self.split(Who::B, b),
-            (Some(a), Some(b)) if word::encode(&a) > word::encode(&b) => vec![self.absence(Who::B, &b)],
+            (Some(a), Some(b)) if word::encode(&a) > word::encode(&b) => {
+                vec![self.absence(Who::B, &b)]
+            }
             (Some(a), _) => vec![self.absence(Who::A, &a)],
             (None, Some(b)) => vec![self.absence(Who::B, &b)],
             (None, None) => Vec::new(),
@@ -85,7 +89,9 @@ impl Dispute<'_> {
         };
         if let Some(facet) = crossed_by(&a.octant, case) {
             let right = if a.side == Side::Crossing { "A" } else { "B" };
-            return format!("section 4: facet {facet} crosses it, so it is crossing: {right} is right");
+            return format!(
+                "section 4: facet {facet} crosses it, so it is crossing: {right} is right"
+            );
         }
         let votes = Parity::new(&case.facets_lattice).inside(a.octant.centre());
         let inside = votes.iter().filter(|&&vote| vote).count();
@@ -114,8 +120,12 @@ impl Dispute<'_> {
         };
         let keep = format!("{keep:?}").to_lowercase();
         match (side, kept) {
-            (Side::Crossing, false) => format!("section 7: keep_crossing is false, so {has} must not have a crossing leaf"),
-            (_, false) => format!("section 5: keep is {keep}, so {has} must not have a leaf that is {side}"),
+            (Side::Crossing, false) => {
+                format!("section 7: keep_crossing is false, so {has} must not have a crossing leaf")
+            }
+            (_, false) => {
+                format!("section 5: keep is {keep}, so {has} must not have a leaf that is {side}")
+            }
             _ => format!(
                 "section 5: keep is {keep}, so a leaf that is {side} stays; {lacks} has nothing there: it lost \
                  the leaf, or section 4 gave its component another side"
@@ -164,7 +174,9 @@ impl Dispute<'_> {
     fn caveat(&self) -> &'static str {
         match (self.terms.keep_crossing, self.case) {
             (false, _) => ", unless a crossing leaf that was deleted afterwards does",
-            (_, None) if self.terms.keep != Keep::All => ", unless a facet does (give the case file: --case)",
+            (_, None) if self.terms.keep != Keep::All => {
+                ", unless a facet does (give the case file: --case)"
+            }
             _ => "",
         }
     }
@@ -175,10 +187,14 @@ impl Dispute<'_> {
         if octant.level < self.terms.level_surface {
             let d = self.terms.level_surface;
             if let Some(facet) = self.case.and_then(|case| crossed_by(octant, case)) {
-                return Reason::Settled(format!("section 3: facet {facet} crosses it, so it has level >= D = {d}"));
+                return Reason::Settled(format!(
+                    "section 3: facet {facet} crosses it, so it has level >= D = {d}"
+                ));
             }
             if self.case.is_none() && leaf.side == Side::Crossing {
-                return Reason::Settled(format!("section 3: it is crossing, so it has level >= D = {d}"));
+                return Reason::Settled(format!(
+                    "section 3: it is crossing, so it has level >= D = {d}"
+                ));
             }
         }
         let meets = |b: &&crate::manifest::ExtentBox| {
@@ -186,70 +202,20 @@ impl Dispute<'_> {
             b.level > octant.level && (0..3).all(|a| low[a].max(b.min[a]) < high[a].min(b.max[a]))
         };
         if let Some(b) = self.terms.boxes.iter().find(meets) {
-            return Reason::Settled(format!("section 3: it meets the box {:?} to {:?}, so it has level >= {}", b.min, b.max, b.level));
+            return Reason::Settled(format!(
+                "section 3: it meets the box {:?} to {:?}, so it has level >= {}",
+                b.min, b.max, b.level
+            ));
         }
         let Some((word, undisputed)) = self.witness(who, octant) else { return Reason::None };
         let source = word::octant(word);
-        let why = format!("{}, by the leaf {source}", self.asks(&source, octant).unwrap_or_default());
+        let why =
+            format!("{}, by the leaf {source}", self.asks(&source, octant).unwrap_or_default());
         match undisputed {
             true => Reason::Settled(format!("{why}, which both have")),
             false => Reason::Disputed(why, source),
         }
     }
-
-    /// The leaf that asks for the octant's split: one that both meshes have before any other, then the deepest.
-    fn witness(&self, who: Who, octant: &Octant) -> Option<(u64, bool)> {
-        let (own, other) = match who {
-            Who::A => (self.a, self.b),
-            Who::B => (self.b, self.a),
-        };
-        let sources = other.iter().copied().filter(|&w| word::fault(w).is_none());
-        let asking = sources.filter(|&w| self.asks(&word::octant(w), octant).is_some());
-        let ranked = asking.map(|w| (own.binary_search(&w).is_ok(), word::level(w), w));
-        ranked.max_by_key(|&(both, level, w)| (both, level, std::cmp::Reverse(w))).map(|(both, _, w)| (w, both))
-    }
-
-    /// The rule by which a leaf asks for an octant to be split, if it does.
-    fn asks(&self, source: &Octant, octant: &Octant) -> Option<String> {
-        let n = self.terms.layer_cells_min;
-        let (l, apart) = (source.level, gap(source, octant));
-        if octant.contains(source) || l <= octant.level {
-            return None;
-        }
-        if apart < u64::from(n - 1) * u64::from(source.edge()) {
-            return Some(format!("section 6, step 2 (layer): it is nearer than n - 1 = {} cells of level {l}, so it has level >= {l}", n - 1));
-        }
-        if apart == 0 && l >= octant.level + 2 {
-            return Some(format!("section 6, step 3 (balance): it touches a leaf of level {l}, so it has level >= {}", l - 1));
-        }
-        None
-    }
-
-    /// The leaf of a mesh that is this octant's strict ancestor.
-    fn holder(&self, who: Who, octant: &Octant) -> Option<Leaf> {
-        let words = if who == Who::A { self.a } else { self.b };
-        let key = word::key_of(octant.corner);
-        let after = words.partition_point(|&w| word::key(w) <= key);
-        let leaf = word::decode(*words[..after].last()?).ok()?;
-        (leaf.octant != *octant && leaf.octant.contains(octant)).then_some(leaf)
-    }
-
-    /// Whether a mesh has leaves within an octant.
-    fn has_within(&self, who: Who, octant: &Octant) -> bool {
-        let words = if who == Who::A { self.a } else { self.b };
-        let key = word::key_of(octant.corner);
-        let first = words.partition_point(|&w| word::key(w) < key);
-        words.get(first).is_some_and(|&w| word::key(w) < key + word::span(octant.level))
-    }
-}
-
-/// Distance by Chebyshev, in level-19 cells.
-fn gap(a: &Octant, b: &Octant) -> u64 {
-    let along = |axis: usize| {
-        let (low_a, low_b) = (i64::from(a.corner[axis]), i64::from(b.corner[axis]));
-        (low_a - low_b - i64::from(b.edge())).max(low_b - low_a - i64::from(a.edge())).max(0)
-    };
-    (0..3).map(along).max().unwrap_or(0) as u64
 }
 
 /// The first facet that crosses an octant.
@@ -262,7 +228,8 @@ fn crossed_by(octant: &Octant, case: &Case) -> Option<usize> {
 
 /// Both sides of the first difference, for people.
 pub fn sides(a: Option<u64>, b: Option<u64>, root: &crate::lattice::Root) -> String {
-    let told = |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| tell(word, root));
+    let told =
+        |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| tell(word, root));
     format!("first difference:\n  A has {}\n  B has {}", told(a), told(b))
 }
 
@@ -273,12 +240,20 @@ mod tests {
 
     fn terms(n: u32) -> Terms {
         let root = Root { origin: [0.0; 3], edge: 8.0 };
-        Terms { root, level_surface: 3, layer_cells_min: n, keep: Keep::All, keep_crossing: true, boxes: vec![] }
+        Terms {
+            root,
+            level_surface: 3,
+            layer_cells_min: n,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: vec![],
+        }
     }
 
     /// Sorted words of octants given by paths, all outside.
     fn mesh(paths: &[&[u8]]) -> Vec<u64> {
-        let octant = |path: &&[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
+        let octant =
+            |path: &&[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
         let leaf = |path| word::encode(&Leaf { octant: octant(path), side: Side::Outside });
         let mut words: Vec<u64> = paths.iter().map(leaf).collect();
         words.sort_unstable();
@@ -303,9 +278,16 @@ mod tests {
     fn layer_and_balance_are_told_with_their_witness() {
         let (whole, split) = pair(&[0, 1]);
         let told = rule(&whole, &split, 2);
-        assert!(told.contains("step 2 (layer)") && told.ends_with("by the leaf octant 0.1 (level 2), which both have: B is right"), "{told}");
+        assert!(
+            told.contains("step 2 (layer)")
+                && told.ends_with("by the leaf octant 0.1 (level 2), which both have: B is right"),
+            "{told}"
+        );
         let told = rule(&whole, &split, 1);
-        assert!(told.contains("nothing in either mesh asks") && told.contains("A is right"), "{told}");
+        assert!(
+            told.contains("nothing in either mesh asks") && told.contains("A is right"),
+            "{told}"
+        );
         let (whole, split) = pair(&[0, 1, 1]);
         let told = rule(&split, &whole, 1);
         assert!(told.contains("step 3 (balance)") && told.contains("A is right"), "{told}");
@@ -318,10 +300,14 @@ mod tests {
         let b = mesh(&[&[1, 2, 2], &[3, 0], &[3, 1]]);
         let (first_a, first_b) = (mesh(&[&[3]])[0], mesh(&[&[3, 0]])[0]);
         let terms = terms(1);
-        let told = Dispute { a: &a, b: &b, terms: &terms, case: None }.rule(Some(first_a), Some(first_b));
+        let told =
+            Dispute { a: &a, b: &b, terms: &terms, case: None }.rule(Some(first_a), Some(first_b));
         assert_eq!(told.len(), 2, "{told:?}");
         assert!(told[0].contains("octant 1.2.2 (level 3), which A does not have"), "{told:?}");
-        assert!(told[1].contains("leaf octant 1.2 (level 2)") && told[1].contains("A is right"), "{told:?}");
+        assert!(
+            told[1].contains("leaf octant 1.2 (level 2)") && told[1].contains("A is right"),
+            "{told:?}"
+        );
     }
 
     #[test]
@@ -335,12 +321,15 @@ mod tests {
 
     #[test]
     fn a_case_decides_about_facets_and_rays() {
-        let cube = "spacing_min = 1.0\nkeep = 'all'\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
+        let cube =
+            "spacing_min = 1.0\nkeep = 'all'\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
         let facet = [[-1.5, -1.5, -1.5], [-1.2, -1.5, -1.5], [-1.5, -1.2, -1.5]];
         let case = Case::from_parts(cube, vec![facet]).unwrap();
         let terms = Terms::of_case(&case);
         let told = |a: &[u64], b: &[u64]| {
-            Dispute { a, b, terms: &terms, case: Some(&case) }.rule(a.first().copied(), b.first().copied()).join("")
+            Dispute { a, b, terms: &terms, case: Some(&case) }
+                .rule(a.first().copied(), b.first().copied())
+                .join("")
         };
         let (coarse, fine) = (mesh(&[&[0]]), mesh(&[&[0, 0]]));
         assert!(told(&coarse, &fine).contains("section 3: facet 0 crosses it"));

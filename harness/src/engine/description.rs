@@ -90,13 +90,11 @@ pub struct Limits {
     pub level_max: u8,
     /// Most facets.
     pub facets_max: u64,
-    /// Least rank count that it is run on; and the most.
-    pub ranks_max: usize,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { level_max: crate::octant::LEVEL_MAX, facets_max: u64::MAX, ranks_max: usize::MAX }
+        Self { level_max: crate::octant::LEVEL_MAX, facets_max: u64::MAX }
     }
 }
 
@@ -175,7 +173,8 @@ impl Description {
     /// The program: what the command line gave, or what the file says.
     pub fn program(&self, programs: &Programs) -> PathBuf {
         match &programs.mesher_given {
-            Some(given) => given.clone(),
+            // A name without a slash would be looked for on the PATH.
+            Some(given) => std::fs::canonicalize(given).unwrap_or_else(|_| given.clone()),
             None => PathBuf::from(fill(&self.program, &self.places(programs))),
         }
     }

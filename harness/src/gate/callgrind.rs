@@ -43,15 +43,14 @@ impl Profile {
             } else if let Some(rest) = line.strip_prefix("calls=") {
                 let count: u64 = first_number(rest);
                 // Versions of a symbol of the C library are one function.
-                let plain = callee.split('@').next().unwrap_or(callee).split('\'').next().unwrap_or(callee);
+                let plain =
+                    callee.split('@').next().unwrap_or(callee).split('\'').next().unwrap_or(callee);
                 *profile.calls.entry(plain.to_owned()).or_default() += count;
                 after_calls = true;
-            } else if line.starts_with(|c: char| c.is_ascii_digit() || "+-*".contains(c)) {
-                if !std::mem::take(&mut after_calls) {
-                    let cost = line.split_whitespace().nth(1).map_or(0, first_number);
-                    *profile.own.entry(function.to_owned()).or_default() += cost;
-                    profile.instructions += cost;
-                }
+            } else if is_cost(line) && !std::mem::take(&mut after_calls) {
+                let cost = line.split_whitespace().nth(1).map_or(0, first_number);
+                *profile.own.entry(function.to_owned()).or_default() += cost;
+                profile.instructions += cost;
             }
         }
         match profile.instructions {
@@ -72,6 +71,11 @@ impl Profile {
         grown.retain(|(_, by)| *by != 0);
         grown
     }
+}
+
+/// Whether a line begins with a place.
+fn is_cost(line: &str) -> bool {
+    line.starts_with(|c: char| c.is_ascii_digit() || "+-*".contains(c))
 }
 
 /// `(12) name` defines, `(12)` refers.
@@ -110,7 +114,13 @@ mod tests {
     #[test]
     fn what_grew_most_comes_first() {
         let old = Profile::parse(FILE).unwrap();
-        let new = Profile::parse(&FILE.replace("12 3", "12 30").replace("\n0 7\ntotals", "\n0 5\ntotals")).unwrap();
-        assert_eq!(new.grown_since(&old), [("main".to_owned(), 27), ("_int_malloc".to_owned(), -2)]);
+        let new = Profile::parse(
+            &FILE.replace("12 3", "12 30").replace("\n0 7\ntotals", "\n0 5\ntotals"),
+        )
+        .unwrap();
+        assert_eq!(
+            new.grown_since(&old),
+            [("main".to_owned(), 27), ("_int_malloc".to_owned(), -2)]
+        );
     }
 }

@@ -17,7 +17,12 @@ pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     for case in bench.cases_of(LayerName::Correctness) {
         match &case.path {
             Ok(path) => cases.push(path.to_string_lossy().into_owned()),
-            Err(why) => layer.findings.push(Finding::told(&case.rule.name, "checks", Verdict::Inconclusive, why)),
+            Err(why) => layer.findings.push(Finding::told(
+                &case.rule.name,
+                "checks",
+                Verdict::Inconclusive,
+                why,
+            )),
         }
     }
     if cases.is_empty() {
@@ -38,7 +43,10 @@ pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
 fn finding(case: &CaseReport) -> Finding {
     let tally = case.tally();
     let failure = case.checks.iter().find_map(|check| match &check.outcome {
-        Outcome::Fail(why) => Some(format!("{}: {}: {why}", check.subject, check.name)),
+        Outcome::Fail(why) => {
+            let first = why.lines().next().unwrap_or_default();
+            Some(format!("{}: {}: {first}", check.subject, check.name))
+        }
         _ => None,
     });
     let failure = failure.or(case.input_error.clone());

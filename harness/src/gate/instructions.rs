@@ -36,12 +36,16 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
                 match baseline {
                     Baseline::None => Vec::new(),
                     Baseline::Record(_, record) => match record.cases.get(name) {
-                        Some(old) if !old.counted.is_empty() => against_record(bench, case, old, &new),
+                        Some(old) if !old.counted.is_empty() => {
+                            against_record(bench, case, old, &new)
+                        }
                         _ => told(Verdict::Inconclusive, "the record does not have them".into()),
                     },
                     Baseline::Program(subject) => match count(bench, &subject.engine, case) {
                         Ok(old) => against_program(bench, case, &old, &new),
-                        Err(why) => told(Verdict::Inconclusive, format!("the baseline has none: {why}")),
+                        Err(why) => {
+                            told(Verdict::Inconclusive, format!("the baseline has none: {why}"))
+                        }
                     },
                 }
             }
@@ -55,29 +59,39 @@ fn numbers(profile: &Profile) -> [(String, u64); 2] {
     [("instructions".into(), profile.instructions), ("allocations".into(), profile.allocations())]
 }
 
-fn against_record(bench: &Bench, case: &Selected, old: &CaseMeasures, new: &Profile) -> Vec<Finding> {
+fn against_record(
+    bench: &Bench,
+    case: &Selected,
+    old: &CaseMeasures,
+    new: &Profile,
+) -> Vec<Finding> {
     let numbers = numbers(new);
-    let both = numbers.iter().filter_map(|(metric, new)| Some((metric, *old.counted.get(metric)?, *new)));
+    let both =
+        numbers.iter().filter_map(|(metric, new)| Some((metric, *old.counted.get(metric)?, *new)));
     both.map(|(metric, old, new)| held(bench, case, metric, old, new)).collect()
 }
 
 fn against_program(bench: &Bench, case: &Selected, old: &Profile, new: &Profile) -> Vec<Finding> {
     let both = numbers(old).into_iter().zip(numbers(new));
-    let mut findings: Vec<Finding> = both
-        .map(|((metric, old), (_, new))| held(bench, case, &metric, old, new))
-        .collect();
+    let mut findings: Vec<Finding> =
+        both.map(|((metric, old), (_, new))| held(bench, case, &metric, old, new)).collect();
     if matches!(findings[0].verdict, Verdict::Regression | Verdict::Improvement) {
         let grown = new.grown_since(old).into_iter().take(FUNCTIONS_TOLD);
         let told: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
         let note = &mut findings[0].note;
-        note.push_str(&format!("{}most: {}", if note.is_empty() { "" } else { "; " }, told.join(", ")));
+        note.push_str(&format!(
+            "{}most: {}",
+            if note.is_empty() { "" } else { "; " },
+            told.join(", ")
+        ));
     }
     findings
 }
 
 /// Within the tolerance either way is unchanged: hash seeds and addresses make a few instructions of difference.
 fn held(bench: &Bench, case: &Selected, metric: &str, old: u64, new: u64) -> Finding {
-    let tolerance = case.rule.tolerance_of(metric, bench.rules.tolerance.instructions);
+    let rules = &bench.rules.tolerance;
+    let tolerance = rules.of_metric(&case.rule, metric, rules.instructions);
     let found = Finding::exact(&case.rule.name, metric, old, new, tolerance);
     match found.change_percent {
         Some(change) if change.abs() <= tolerance => {
@@ -106,9 +120,12 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Profile, Str
     let done = process::run(&mut command, &watch).map_err(|error| format!("valgrind: {error}"))?;
     match done.end {
         End::Exited(0) => {}
-        End::TimedOut => return Err(format!("valgrind did not end within {} s", watch.limit.as_secs())),
+        End::TimedOut => {
+            return Err(format!("valgrind did not end within {} s", watch.limit.as_secs()));
+        }
         _ => return Err(format!("under valgrind: {}", done.last_error_line())),
     }
-    let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    let text =
+        std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
     Profile::parse(&text)
 }

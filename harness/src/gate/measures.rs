@@ -74,7 +74,8 @@ impl Measures {
     /// As JSON.
     pub fn json(&self) -> String {
         // Strings and whole numbers only.
-        let mut text = serde_json::to_string_pretty(self).expect("measures are representable in JSON");
+        let mut text =
+            serde_json::to_string_pretty(self).expect("measures are representable in JSON");
         text.push('\n');
         text
     }
@@ -90,7 +91,8 @@ mod tests {
         let mut measures = Measures::of_program(Told { named: "m".into(), revision: None });
         measures.case("cube").exact.insert("rays".into(), u64::MAX);
         assert_eq!(Measures::parse(measures.json().as_bytes()).unwrap(), measures);
-        let report = Report { candidate_measures: measures.clone(), ..Report::new(None, Told::default()) };
+        let report =
+            Report { candidate_measures: measures.clone(), ..Report::new(None, Told::default()) };
         let text = serde_json::to_vec(&report).unwrap();
         assert_eq!(Measures::parse(&text).unwrap(), measures);
         assert!(Measures::parse(b"{\"cells\": 1}").is_err());

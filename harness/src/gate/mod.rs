@@ -90,13 +90,15 @@ pub struct Bench<'a> {
 pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError> {
     let start = Instant::now();
     let description = Description::find(&options.engine, programs).map_err(GateError::Input)?;
-    let rules = Rules::read(options.rules.as_deref().unwrap_or(&programs.engines.join("gate.toml")))?;
+    let rules =
+        Rules::read(options.rules.as_deref().unwrap_or(&programs.engines.join("gate.toml")))?;
     let cases = rules.select(&options.cases, programs)?;
     let engine = Engine::new(description, programs, options.limit);
     let baseline = Baseline::find(options, &engine, programs)?;
     let candidate = Subject::candidate(options, &engine, &baseline, programs)?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();
-    let place = place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
+    let place =
+        place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
     let bench = Bench {
         options,
         rules: &rules,

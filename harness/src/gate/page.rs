@@ -31,9 +31,14 @@ pub fn markdown(report: &Report) -> String {
             let number = |value: Option<f64>| value.map(number).unwrap_or_default();
             let change = finding.change_percent.map(|by| format!("{by:+.2} %")).unwrap_or_default();
             let _ = writeln!(
-                text, "| | {} | {} | {} | {} | {} | {change} | {} |",
-                finding.verdict, escaped(&finding.case), escaped(&finding.metric),
-                number(finding.baseline), number(finding.candidate), escaped(&finding.note)
+                text,
+                "| | {} | {} | {} | {} | {} | {change} | {} |",
+                finding.verdict,
+                escaped(&finding.case),
+                escaped(&finding.metric),
+                number(finding.baseline),
+                number(finding.candidate),
+                escaped(&finding.note)
             );
         }
     }
@@ -111,12 +116,23 @@ fn summary(layer: &Layer) -> String {
     if let Some(why) = &layer.left_out {
         return format!("left out: {why}");
     }
-    let count = |verdict| layer.findings.iter().filter(|finding| finding.verdict == verdict).count();
-    let all = [Verdict::Regression, Verdict::Inconclusive, Verdict::Changed, Verdict::Improvement, Verdict::Unchanged];
+    let count =
+        |verdict| layer.findings.iter().filter(|finding| finding.verdict == verdict).count();
+    let all = [
+        Verdict::Regression,
+        Verdict::Inconclusive,
+        Verdict::Changed,
+        Verdict::Improvement,
+        Verdict::Unchanged,
+    ];
     let counts = all.map(|verdict| (count(verdict), verdict));
     let told = counts.iter().filter(|(n, _)| *n > 0).map(|(n, verdict)| format!("{n} {verdict}"));
     let told: Vec<String> = told.collect();
-    format!("{} ({:.1} s)", if told.is_empty() { "nothing compared".into() } else { told.join(", ") }, layer.time_s)
+    format!(
+        "{} ({:.1} s)",
+        if told.is_empty() { "nothing compared".into() } else { told.join(", ") },
+        layer.time_s
+    )
 }
 
 /// What is unchanged is told where it has something to say: how sure a time is.
@@ -164,16 +180,25 @@ mod tests {
             Finding::exact("cube", "messages", 6, 6, 0.0),
             Finding::told("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
         ];
-        report.layers = vec![counters, Layer { left_out: Some("no valgrind".into()), ..Layer::new(LayerName::Instructions) }];
+        report.layers = vec![
+            counters,
+            Layer { left_out: Some("no valgrind".into()), ..Layer::new(LayerName::Instructions) },
+        ];
         report
     }
 
     #[test]
     fn text_tells_changes_and_counts_the_rest() {
         let text = text(&sample());
-        assert!(text.contains("regression   cube: rays 6 -> 7 (+16.67 %); more than the 0 %"), "{text}");
+        assert!(
+            text.contains("regression   cube: rays 6 -> 7 (+16.67 %); more than the 0 %"),
+            "{text}"
+        );
         assert!(text.contains("1 unchanged") && !text.contains("messages"), "{text}");
-        assert!(text.contains("REGRESSION in counters") && text.contains("left out: no valgrind"), "{text}");
+        assert!(
+            text.contains("REGRESSION in counters") && text.contains("left out: no valgrind"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -26,18 +26,20 @@ pub struct Rules {
 }
 
 /// Growth that is let pass, in percent.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tolerance {
     /// Of any counter that has none of its own.
     pub counters: f64,
     /// Of instructions.
     pub instructions: f64,
+    /// Of single metrics; a case's own come before these.
+    pub of: BTreeMap<String, f64>,
 }
 
 impl Default for Tolerance {
     fn default() -> Self {
-        Self { counters: 0.0, instructions: 1.0 }
+        Self { counters: 0.0, instructions: 1.0, of: BTreeMap::new() }
     }
 }
 
@@ -105,8 +107,8 @@ impl Rules {
     pub fn read(path: &Path) -> Result<Self, GateError> {
         let wrong = |why: String| GateError::Input(format!("{}: {why}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
-        let mut rules: Self = toml::from_str(&text)
-            .map_err(|error| wrong(error.message().replace('\n', " ")))?;
+        let mut rules: Self =
+            toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let time = &rules.time;
         if time.rounds_min < super::stats::ROUNDS_LEAST || time.rounds_max < time.rounds_min {
@@ -123,11 +125,17 @@ impl Rules {
     ///
     /// # Errors
     /// Where a name is not among the rules' or the catalogue's.
-    pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<Selected>, GateError> {
+    pub fn select(
+        &self,
+        names: &[String],
+        programs: &Programs,
+    ) -> Result<Vec<Selected>, GateError> {
         let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
             let known = known.join(", ");
-            return Err(GateError::Input(format!("no case {name} in the gate's rules, which have {known}")));
+            return Err(GateError::Input(format!(
+                "no case {name} in the gate's rules, which have {known}"
+            )));
         }
         let asked = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
         self.cases.iter().filter(asked).map(|rule| self.find(rule, programs)).collect()
@@ -149,13 +157,15 @@ impl Rules {
     }
 }
 
-impl CaseRule {
-    /// Growth of a metric that is let pass, in percent.
-    pub fn tolerance_of(&self, metric: &str, default: f64) -> f64 {
+impl Tolerance {
+    /// Growth of a case's metric that is let pass, in percent: the case's own, else that of the metric, else that of its kind.
+    pub fn of_metric(&self, case: &CaseRule, metric: &str, kind: f64) -> f64 {
         // "4 ranks/messages" is also known as "messages".
         let plain = metric.rsplit('/').next().unwrap_or(metric);
-        let own = self.tolerance.get(metric).or_else(|| self.tolerance.get(plain));
-        own.copied().unwrap_or(default)
+        let tables = [&case.tolerance, &self.of];
+        let own =
+            tables.into_iter().find_map(|table| table.get(metric).or_else(|| table.get(plain)));
+        own.copied().unwrap_or(kind)
     }
 }
 
@@ -178,13 +188,13 @@ mod tests {
     }
 
     #[test]
-    fn a_metric_s_own_tolerance_comes_first() {
-        let rules = read(
-            "[[case]]\nname = 'a'\nlayers = ['counters']\ntolerance = { messages = 5.0, '2 ranks/rays' = 1.0 }",
-        );
-        let case = rules.unwrap().cases.remove(0);
-        let of = |metric| case.tolerance_of(metric, 0.5);
+    fn a_case_s_own_tolerance_comes_first_then_the_metric_s() {
+        let text = "[tolerance.of]\nmessages = 9.0\nhalo = 8.0\n[[case]]\nname = 'a'\nlayers = ['counters']\n\
+                    tolerance = { messages = 5.0, '2 ranks/rays' = 1.0 }";
+        let rules = read(text).unwrap();
+        let of = |metric| rules.tolerance.of_metric(&rules.cases[0], metric, 0.5);
         assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 0.5]);
+        assert_eq!(of("3 ranks/halo"), 8.0);
     }
 
     #[test]

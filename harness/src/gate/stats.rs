@@ -162,8 +162,7 @@ mod tests {
 
     #[test]
     fn the_chance_of_a_false_alarm_is_what_it_is_said_to_be() {
-        let found: Vec<f64> =
-            (0..100).map(|s| compare(&rounds(20, 1.0, s), 0.01, s).p).collect();
+        let found: Vec<f64> = (0..100).map(|s| compare(&rounds(20, 1.0, s), 0.01, s).p).collect();
         let below = |p: f64| found.iter().filter(|&&found| found < p).count();
         assert!((1..=14).contains(&below(0.05)), "{}", below(0.05));
         assert!(below(0.001) <= 1);

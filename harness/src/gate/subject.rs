@@ -31,7 +31,7 @@ pub struct Subject {
 #[derive(Clone, Debug)]
 pub enum Baseline {
     /// A program: it can be run, so times can be compared.
-    Program(Subject),
+    Program(Box<Subject>),
     /// What was recorded of one.
     Record(Told, Measures),
     /// Nothing: the candidate is only recorded.
@@ -43,18 +43,24 @@ impl Baseline {
     ///
     /// # Errors
     /// Where it is neither, or does not build.
-    pub fn find(options: &Options, engine: &Engine, programs: &Programs) -> Result<Self, GateError> {
+    pub fn find(
+        options: &Options,
+        engine: &Engine,
+        programs: &Programs,
+    ) -> Result<Self, GateError> {
         let Some(named) = &options.baseline else { return Ok(Self::None) };
         let path = Path::new(named);
         if path.is_file() {
-            let start = fs::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
+            let start =
+                fs::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
             if start.first() == Some(&b'{') {
-                let measures = Measures::parse(&start).map_err(|why| GateError::Input(format!("{named}: {why}")))?;
+                let measures = Measures::parse(&start)
+                    .map_err(|why| GateError::Input(format!("{named}: {why}")))?;
                 let told = Told { named: named.clone(), revision: measures.of.revision.clone() };
                 return Ok(Self::Record(told, measures));
             }
         }
-        Ok(Self::Program(Subject::find(named, options, engine, programs)?))
+        Ok(Self::Program(Box::new(Subject::find(named, options, engine, programs)?)))
     }
 
     /// How it is told of.
@@ -79,7 +85,8 @@ impl Subject {
         baseline: &Baseline,
         programs: &Programs,
     ) -> Result<Self, GateError> {
-        let built = matches!(baseline, Baseline::Program(subject) if subject.told.revision.is_some());
+        let built =
+            matches!(baseline, Baseline::Program(subject) if subject.told.revision.is_some());
         let named = options.candidate.clone();
         match named.or(built.then(|| ".".to_owned())) {
             Some(named) => Self::find(&named, options, engine, programs),
@@ -87,7 +94,9 @@ impl Subject {
                 let program = engine.program().to_owned();
                 if !program.is_file() {
                     let program = program.display();
-                    return Err(GateError::Missing(format!("there is no {program}: build it, or say where it is")));
+                    return Err(GateError::Missing(format!(
+                        "there is no {program}: build it, or say where it is"
+                    )));
                 }
                 let revision = revision_of("HEAD", &programs.root).ok();
                 let told = Told { named: program.to_string_lossy().into_owned(), revision };
@@ -96,19 +105,28 @@ impl Subject {
         }
     }
 
-    fn find(named: &str, options: &Options, engine: &Engine, programs: &Programs) -> Result<Self, GateError> {
+    fn find(
+        named: &str,
+        options: &Options,
+        engine: &Engine,
+        programs: &Programs,
+    ) -> Result<Self, GateError> {
         if Path::new(named).is_file() {
-            let program = fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
+            let program =
+                fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
             let told = Told { named: named.to_owned(), revision: None };
             return Ok(Self { engine: engine.with_program(program), told });
         }
         let name = &engine.description().name;
         let build = engine.description().build.as_ref().ok_or_else(|| {
-            GateError::Input(format!("{named} is no file, and {name} does not say how a revision is built"))
+            GateError::Input(format!(
+                "{named} is no file, and {name} does not say how a revision is built"
+            ))
         })?;
         let head = if named == "." { "HEAD" } else { named };
-        let revision = revision_of(head, &programs.root)
-            .map_err(|why| GateError::Input(format!("{named} is neither a file nor a revision: {why}")))?;
+        let revision = revision_of(head, &programs.root).map_err(|why| {
+            GateError::Input(format!("{named} is neither a file nor a revision: {why}"))
+        })?;
         let program = match named {
             "." => make(build, &programs.root, "working-tree", options, false)?,
             _ => {
@@ -134,7 +152,8 @@ impl Subject {
 fn revision_of(named: &str, repository: &Path) -> Result<String, String> {
     let mut git = Command::new("git");
     git.arg("-C").arg(repository).args(["rev-parse", "--verify", "--quiet", "--end-of-options"]);
-    let output = git.arg(format!("{named}^{{commit}}")).output().map_err(|error| format!("git: {error}"))?;
+    let output =
+        git.arg(format!("{named}^{{commit}}")).output().map_err(|error| format!("git: {error}"))?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned()),
         false => Err(format!("git knows no {named} in {}", repository.display())),
@@ -147,7 +166,11 @@ fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateErro
     fs::create_dir_all(tree).map_err(wrong)?;
     let archive = tree.with_extension("tar");
     let mut git = Command::new("git");
-    git.arg("-C").arg(repository).args(["archive", "--format=tar", "-o"]).arg(&archive).arg(revision);
+    git.arg("-C")
+        .arg(repository)
+        .args(["archive", "--format=tar", "-o"])
+        .arg(&archive)
+        .arg(revision);
     let mut tar = Command::new("tar");
     tar.arg("-xf").arg(&archive).arg("-C").arg(tree);
     for mut command in [git, tar] {
@@ -161,8 +184,15 @@ fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateErro
 }
 
 /// Builds what is in a directory and keeps the program, so that a later build cannot change it.
-fn make(build: &Build, tree: &Path, name: &str, options: &Options, keep: bool) -> Result<PathBuf, GateError> {
-    let wrong = |error: std::io::Error| GateError::Input(format!("{}: {error}", options.cache.display()));
+fn make(
+    build: &Build,
+    tree: &Path,
+    name: &str,
+    options: &Options,
+    keep: bool,
+) -> Result<PathBuf, GateError> {
+    let wrong =
+        |error: std::io::Error| GateError::Input(format!("{}: {error}", options.cache.display()));
     let place = options.cache.join("programs").join(name);
     fs::create_dir_all(&place).map_err(wrong)?;
     let cache = fs::canonicalize(&options.cache).map_err(wrong)?;
@@ -172,7 +202,8 @@ fn make(build: &Build, tree: &Path, name: &str, options: &Options, keep: bool) -
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
     let told = if keep { &name[..12.min(name.len())] } else { name };
     eprintln!("harness gate: building {told}");
-    let (program, arguments) = words.split_first().ok_or_else(|| GateError::Input("an empty build command".into()))?;
+    let (program, arguments) =
+        words.split_first().ok_or_else(|| GateError::Input("an empty build command".into()))?;
     let mut command = Command::new(program);
     command.args(arguments).current_dir(tree);
     let watch = Watch { limit: BUILD_LIMIT, logs: &place, name: "build", status: None };
@@ -181,7 +212,9 @@ fn make(build: &Build, tree: &Path, name: &str, options: &Options, keep: bool) -
     if done.end != End::Exited(0) {
         let said = done.last_error_line();
         let log = done.stderr.display();
-        return Err(GateError::Input(format!("{told} does not build: {said} (all of it in {log})")));
+        return Err(GateError::Input(format!(
+            "{told} does not build: {said} (all of it in {log})"
+        )));
     }
     // Copied under another name first, so that a program that is there is whole.
     let (half, whole) = (place.join("program.new"), place.join("program"));

@@ -13,7 +13,12 @@ use std::path::Path;
 pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
     let subject = match baseline {
         Baseline::Program(subject) => subject,
-        Baseline::Record(..) => return left_out(LayerName::Time, "a record cannot be run: seconds of another run prove nothing"),
+        Baseline::Record(..) => {
+            return left_out(
+                LayerName::Time,
+                "a record cannot be run: seconds of another run prove nothing",
+            );
+        }
         Baseline::None => return left_out(LayerName::Time, "there is no baseline"),
     };
     let mut layer = Layer::new(LayerName::Time);
@@ -24,7 +29,9 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
         let found = match rounds(bench, &subject.engine, case) {
             Ok(timed) => judge(bench, case, &timed),
             Err(NoResult::Interrupted) => break,
-            Err(why) => Finding::told(&case.rule.name, "time", Verdict::Inconclusive, why.to_string()),
+            Err(why) => {
+                Finding::told(&case.rule.name, "time", Verdict::Inconclusive, why.to_string())
+            }
         };
         layer.findings.push(found);
     }
@@ -72,10 +79,14 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, No
             told[who] = Some(run(bench, engines[who], &path)?);
         }
         let [Some(a), Some(a_again), Some(b)] = told else { unreachable!("each was run") };
-        let time = |told: &Told| told.time_cpu_s.filter(|_| cpu).unwrap_or(told.time_process_s).max(1e-9).ln();
+        let time = |told: &Told| {
+            told.time_cpu_s.filter(|_| cpu).unwrap_or(told.time_process_s).max(1e-9).ln()
+        };
         timed.rounds.push(Round { a: time(&a), a_again: time(&a_again), b: time(&b) });
         for (name, ratios) in &mut timed.phases {
-            let of = |told: &Told| told.phases_cpu_s.iter().find(|(other, _)| other == name).map(|(_, t)| *t);
+            let of = |told: &Told| {
+                told.phases_cpu_s.iter().find(|(other, _)| other == name).map(|(_, t)| *t)
+            };
             if let (Some(a), Some(a_again), Some(b)) = (of(&a), of(&a_again), of(&b)) {
                 ratios.push((2.0 * b.max(1e-9) / (a + a_again).max(1e-9)).ln());
             }
@@ -100,8 +111,13 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
     let percent = |ratio: f64| ratio * 100.0;
     let mut note = format!(
         "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; baseline against itself reaches {:.1} %, smallest effect that would be seen {:.1} %",
-        timed.rounds.len(), timed.what, percent(found.low), percent(found.high), found.p,
-        percent(found.floor), percent(found.visible.max(rules.effect_min / 100.0)),
+        timed.rounds.len(),
+        timed.what,
+        percent(found.low),
+        percent(found.high),
+        found.p,
+        percent(found.floor),
+        percent(found.visible.max(rules.effect_min / 100.0)),
     );
     if matches!(verdict, Verdict::Regression | Verdict::Improvement) {
         note.push_str(&format!("; by phase: {}", phases(timed)));
@@ -114,25 +130,32 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
     }
 }
 
-/// A change needs both: chance does not explain it, and it is larger than the baseline against itself and than what
-/// code costs that lies elsewhere in memory.
+/// A change that looks real, but not with the certainty that is asked for, is not called unchanged.
+const SUSPICIOUS: f64 = 0.01;
+
+/// A change needs both: chance does not explain it, and it is larger than the baseline against itself and than
+/// what code costs that lies elsewhere in memory. To be unchanged needs as much: what matters would have
+/// been seen, is not within the interval, and nothing looks like it.
 fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
-    let least = found.floor.max(rules.effect_min / 100.0);
+    let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
     // As ratios, a third less time is as much as half as much again.
-    let size = if found.effect < 0.0 { 1.0 / (1.0 + found.effect) - 1.0 } else { found.effect };
-    if found.p <= rules.alpha && size > least {
+    let size = |effect: f64| if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect };
+    if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
         return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
     }
-    match found.visible <= rules.effect_wanted / 100.0 {
+    let suspicious = found.p <= SUSPICIOUS && size(found.effect) > least;
+    let within = size(found.low) <= wanted && size(found.high) <= wanted;
+    match found.visible <= wanted && within && !suspicious {
         true => Verdict::Unchanged,
         false => Verdict::Inconclusive,
     }
 }
 
 fn phases(timed: &Timed) -> String {
-    let told = timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
-        format!("{name} {:+.0} %", super::stats::middle(ratios).exp_m1() * 100.0)
-    });
+    let told =
+        timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
+            format!("{name} {:+.0} %", super::stats::middle(ratios).exp_m1() * 100.0)
+        });
     told.collect::<Vec<_>>().join(", ")
 }
 
@@ -143,11 +166,20 @@ mod tests {
     #[test]
     fn a_verdict_needs_significance_and_size() {
         let rules = TimeRules::default();
-        let found = Comparison { effect: 0.08, p: 0.0005, floor: 0.02, visible: 0.05, low: 0.06, high: 0.1 };
+        let found = Comparison {
+            effect: 0.08,
+            p: 0.0005,
+            floor: 0.02,
+            visible: 0.05,
+            low: 0.06,
+            high: 0.1,
+        };
         let of = |found: Comparison| verdict(&found, &rules);
         assert_eq!(of(found), Verdict::Regression);
         assert_eq!(of(Comparison { effect: -0.08, ..found }), Verdict::Improvement);
-        assert_eq!(of(Comparison { p: 0.01, ..found }), Verdict::Unchanged);
+        assert_eq!(of(Comparison { p: 0.02, ..found }), Verdict::Unchanged);
+        assert_eq!(of(Comparison { p: 0.005, ..found }), Verdict::Inconclusive);
+        assert_eq!(of(Comparison { p: 0.02, high: 0.11, ..found }), Verdict::Inconclusive);
         assert_eq!(of(Comparison { effect: 0.02, ..found }), Verdict::Unchanged);
         assert_eq!(of(Comparison { floor: 0.09, visible: 0.12, ..found }), Verdict::Inconclusive);
     }

@@ -22,16 +22,24 @@ pub struct Repeat {
 impl Repeat {
     /// One line that a shell takes: whether the failure is still there.
     pub fn line(&self, case: &Path, ranks: Ranks) -> String {
-        let mut words = vec!["harness".into(), "shrink".into(), case.display().to_string(), "--check".into()];
+        let mut words =
+            vec!["harness".into(), "shrink".into(), case.display().to_string(), "--check".into()];
         words.extend(["--engine".into(), self.engine.clone()]);
         if let Some(program) = &self.program {
             words.extend(["--mesher".into(), program.clone()]);
         }
         match ranks {
             Ranks::Serial => {}
-            Ranks::Mpi(ranks) => words.extend(["--ranks".into(), ranks.to_string(), "--mpi".into()]),
+            Ranks::Mpi(ranks) => {
+                words.extend(["--ranks".into(), ranks.to_string(), "--mpi".into()])
+            }
             Ranks::Simulated { ranks, seed } => {
-                words.extend(["--ranks".into(), ranks.to_string(), "--seed".into(), seed.to_string()]);
+                words.extend([
+                    "--ranks".into(),
+                    ranks.to_string(),
+                    "--seed".into(),
+                    seed.to_string(),
+                ]);
             }
         }
         let quoted = words.iter().map(|word: &String| {
@@ -46,14 +54,24 @@ impl Repeat {
 ///
 /// # Errors
 /// Where something cannot be written.
-pub fn leave(shrunk: &Shrunk, probe: &Probe, repeat: &Repeat, directory: &Path) -> io::Result<String> {
+pub fn leave(
+    shrunk: &Shrunk,
+    probe: &Probe,
+    repeat: &Repeat,
+    directory: &Path,
+) -> io::Result<String> {
     fs::create_dir_all(directory)?;
     let case = shrunk.trial.case.write(directory)?;
     let line = repeat.line(&case, shrunk.trial.ranks);
-    let minimal = if shrunk.minimal { "nothing more can be left out" } else { "the budget was spent" };
+    let minimal =
+        if shrunk.minimal { "nothing more can be left out" } else { "the budget was spent" };
     let text = format!(
         "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nWhether it is still there:\n\n    {line}\n{}",
-        shrunk.failure, shrunk.facets_before, shrunk.trials, told(&shrunk.trial), divergence(shrunk, probe, &case)
+        shrunk.failure,
+        shrunk.facets_before,
+        shrunk.trials,
+        told(&shrunk.trial),
+        divergence(shrunk, probe, &case)
     );
     fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
     Ok(text)
@@ -71,7 +89,10 @@ fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
     match compared {
         Ok(report) => {
             let indented = report.to_string().replace('\n', "\n    ");
-            format!("\nWhere the meshes differ, A being the engine's and B that of {}:\n\n    {indented}\n", probe.truth_name())
+            format!(
+                "\nWhere the meshes differ, A being the engine's and B that of {}:\n\n    {indented}\n",
+                probe.truth_name()
+            )
         }
         Err(why) => format!("\nThe meshes could not be compared: {why}\n"),
     }

@@ -51,7 +51,9 @@ pub fn shrink(case: &Path, probe: &Probe, budget: &Budget) -> Result<Option<Shru
     eprintln!("harness shrink: it fails: {failure}");
     let facets_before = given.case.facets.len();
     let mut trials = 1;
-    let spent = |trials| trials >= budget.trials || start.elapsed() >= budget.time || interrupt::requested();
+    let spent = |trials| {
+        trials >= budget.trials || start.elapsed() >= budget.time || interrupt::requested()
+    };
     let mut fails = |trial: &Trial| {
         if spent(trials) {
             return false;
@@ -62,6 +64,8 @@ pub fn shrink(case: &Path, probe: &Probe, budget: &Budget) -> Result<Option<Shru
     };
     let trial = reduce::reduce(given, &mut fails, &mut |told| eprintln!("harness shrink: {told}"));
     let minimal = !spent(trials);
-    let failure = probe.failure(&trial)?.ok_or("the failure does not repeat: it depends on more than the case")?;
+    let failure = probe
+        .failure(&trial)?
+        .ok_or("the failure does not repeat: it depends on more than the case")?;
     Ok(Some(Shrunk { trial, failure, facets_before, trials, minimal }))
 }

@@ -74,18 +74,28 @@ impl Probe {
     pub fn failure(&self, trial: &Trial) -> Result<Option<Failure>, String> {
         let case = self.write(&trial.case)?;
         let truth = self.run(&self.truth, &case, Ranks::Serial, "truth", false);
-        let wanted = truth.map_err(|why| format!("nothing to compare with: {}: {why}", self.truth_name()))?;
+        let wanted = truth
+            .map_err(|why| format!("nothing to compare with: {}: {why}", self.truth_name()))?;
         match self.run(&self.engine, &case, trial.ranks, "engine", false) {
             Ok(told) if told.digest == wanted.digest => Ok(None),
             Ok(told) => Ok(Some(Failure {
                 kind: Kind::Differs,
                 told: format!(
                     "{}: {} cells, digest {}; {}: {} cells, digest {}",
-                    trial.ranks, told.cells, told.digest, self.truth_name(), wanted.cells, wanted.digest
+                    trial.ranks,
+                    told.cells,
+                    told.digest,
+                    self.truth_name(),
+                    wanted.cells,
+                    wanted.digest
                 ),
             })),
-            Err(NoResult::Failed(why)) => Ok(Some(Failure { kind: Kind::Fails, told: format!("{}: {why}", trial.ranks) })),
-            Err(NoResult::Hung(why)) => Ok(Some(Failure { kind: Kind::Hangs, told: format!("{}: {why}", trial.ranks) })),
+            Err(NoResult::Failed(why)) => {
+                Ok(Some(Failure { kind: Kind::Fails, told: format!("{}: {why}", trial.ranks) }))
+            }
+            Err(NoResult::Hung(why)) => {
+                Ok(Some(Failure { kind: Kind::Hangs, told: format!("{}: {why}", trial.ranks) }))
+            }
             Err(why) => Err(why.to_string()),
         }
     }
@@ -111,7 +121,14 @@ impl Probe {
         case.write(self.place.path()).map_err(|error| error.to_string())
     }
 
-    fn run(&self, engine: &Engine, case: &Path, ranks: Ranks, name: &str, write: bool) -> Result<Told, NoResult> {
+    fn run(
+        &self,
+        engine: &Engine,
+        case: &Path,
+        ranks: Ranks,
+        name: &str,
+        write: bool,
+    ) -> Result<Told, NoResult> {
         let place = self.place.path().join(name);
         let _ = std::fs::remove_dir_all(&place);
         std::fs::create_dir_all(&place).map_err(|error| NoResult::Missing(error.to_string()))?;

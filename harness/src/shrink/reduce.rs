@@ -4,8 +4,8 @@
 //! left out as long as the rest still fails.
 
 use super::probe::Trial;
-use crate::engine::runner::Ranks;
 use crate::case::Facet;
+use crate::engine::runner::Ranks;
 use toml::Value;
 
 /// Whether a trial still fails.
@@ -28,11 +28,15 @@ pub fn reduce(trial: Trial, fails: Fails, tell: &mut dyn FnMut(String)) -> Trial
 
 /// How small a trial is, in a sentence.
 pub fn told(trial: &Trial) -> String {
-    let number = |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
+    let number =
+        |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
     let boxes = trial.case.table.get("box").and_then(Value::as_array).map_or(0, Vec::len);
     let facets = trial.case.facets.len();
     let (spacing, n) = (number("spacing_min"), number("layer_cells_min"));
-    format!("{facets} facets, spacing_min {spacing}, layer_cells_min {n}, {boxes} boxes, {}", trial.ranks)
+    format!(
+        "{facets} facets, spacing_min {spacing}, layer_cells_min {n}, {boxes} boxes, {}",
+        trial.ranks
+    )
 }
 
 /// The first of some changes of a trial that still fails, or the trial itself.
@@ -73,7 +77,8 @@ fn coarsened(trial: &Trial, factor: f64) -> Option<Trial> {
         return None;
     }
     coarser.case.table.insert("spacing_min".into(), Value::Float(spacing * factor));
-    for one in coarser.case.table.get_mut("box").and_then(Value::as_array_mut).into_iter().flatten() {
+    for one in coarser.case.table.get_mut("box").and_then(Value::as_array_mut).into_iter().flatten()
+    {
         let spacing = number(one.get("spacing")?)?;
         one.as_table_mut()?.insert("spacing".into(), Value::Float(spacing * factor));
     }
@@ -132,7 +137,9 @@ fn boxes(trial: Trial, fails: Fails) -> Trial {
     let none = with(&trial, "box", None);
     let mut smallest = first(trial, fails, [none]);
     let mut at = 0;
-    while let Some(boxes) = smallest.case.table.get("box").and_then(Value::as_array).filter(|boxes| at < boxes.len()) {
+    while let Some(boxes) =
+        smallest.case.table.get("box").and_then(Value::as_array).filter(|boxes| at < boxes.len())
+    {
         let mut rest = boxes.clone();
         rest.remove(at);
         let fewer = with(&smallest, "box", Some(Value::Array(rest)));
@@ -190,17 +197,28 @@ mod tests {
             trials += 1;
             let ranks = matches!(trial.ranks, Ranks::Simulated { ranks, seed: 7 } if ranks >= 3);
             let deep = number(&trial.case.table["spacing_min"]).unwrap() < 0.5;
-            let boxed = trial.case.table.get("box").and_then(Value::as_array).is_some_and(|boxes| {
-                boxes.iter().any(|b| b["min"][0].as_float() == Some(2.0))
-            });
-            has(trial, 17.0) && has(trial, 80.0) && ranks && deep && boxed && count(trial, "layer_cells_min") >= 2
+            let boxed = trial
+                .case
+                .table
+                .get("box")
+                .and_then(Value::as_array)
+                .is_some_and(|boxes| boxes.iter().any(|b| b["min"][0].as_float() == Some(2.0)));
+            has(trial, 17.0)
+                && has(trial, 80.0)
+                && ranks
+                && deep
+                && boxed
+                && count(trial, "layer_cells_min") >= 2
         };
         let smallest = reduce(given(), &mut fails, &mut |_| ());
         assert_eq!(smallest.case.facets, [facet(17.0), facet(80.0)]);
         assert_eq!(smallest.ranks, Ranks::Simulated { ranks: 3, seed: 7 });
         let table = &smallest.case.table;
         assert_eq!(number(&table["spacing_min"]), Some(0.32));
-        assert_eq!((count(&smallest, "layer_cells_min"), table["box"].as_array().unwrap().len()), (2, 1));
+        assert_eq!(
+            (count(&smallest, "layer_cells_min"), table["box"].as_array().unwrap().len()),
+            (2, 1)
+        );
         assert_eq!((table["keep"].as_str(), table.get("keep_crossing")), (Some("all"), None));
         assert!(trials < 200, "{trials}");
     }

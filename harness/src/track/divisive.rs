@@ -33,19 +33,19 @@ const SEGMENT_LEAST: usize = 2;
 pub fn change_points(values: &[f64], rules: &Rules) -> Vec<(usize, f64)> {
     let mut random = Random(rules.seed);
     let mut found = Vec::new();
-    // Segments still to be looked at. Each is tested on its own, so their order does not matter.
-    let mut segments = vec![0..values.len()];
-    while let Some(segment) = segments.pop() {
-        let part = &values[segment.clone()];
+    // Segments still to be looked at, in an order that depends on the values alone, as the draws do.
+    let mut segments = Vec::from([(0, values.len())]);
+    while let Some((from, until)) = segments.pop() {
+        let part = &values[from..until];
         let Some((at, energy)) = best_split(part) else { continue };
         if !large(&part[..at], &part[at..], rules.effect_min) {
             continue;
         }
         let p = chance(part, energy, rules, &mut random);
         if p <= rules.alpha {
-            let at = segment.start + at;
+            let at = from + at;
             found.push((at, p));
-            segments.extend([segment.start..at, at..segment.end]);
+            segments.extend([(from, at), (at, until)]);
         }
     }
     found.sort_by_key(|(at, _)| *at);
@@ -61,13 +61,15 @@ fn large(before: &[f64], after: &[f64], share: f64) -> bool {
 /// difference between any values.
 fn best_split(values: &[f64]) -> Option<(usize, f64)> {
     let n = values.len();
-    let distances = |from: &[f64], to: f64| from.iter().map(|value| (value - to).abs()).sum::<f64>();
+    let distances =
+        |from: &[f64], to: f64| from.iter().map(|value| (value - to).abs()).sum::<f64>();
     // Moving one value from after to before changes the three sums by its distances alone.
     let (mut within_before, mut between) = (0.0, 0.0);
     let mut within_after: f64 = (0..n).map(|i| distances(&values[i + 1..], values[i])).sum();
     let mut best: Option<(usize, f64)> = None;
     for i in 0..n {
-        let (to_before, to_after) = (distances(&values[..i], values[i]), distances(&values[i + 1..], values[i]));
+        let (to_before, to_after) =
+            (distances(&values[..i], values[i]), distances(&values[i + 1..], values[i]));
         within_before += to_before;
         within_after -= to_after;
         between += to_after - to_before;
@@ -146,12 +148,15 @@ mod tests {
             let energy = |at: usize| {
                 let (x, y) = values.split_at(at);
                 let (m, n) = (x.len() as f64, y.len() as f64);
-                let distance = 2.0 * mean(x, y, m * n) - mean(x, x, m * (m - 1.0)) - mean(y, y, n * (n - 1.0));
+                let distance =
+                    2.0 * mean(x, y, m * n) - mean(x, x, m * (m - 1.0)) - mean(y, y, n * (n - 1.0));
                 m * n / (m + n) * distance
             };
             let greatest = (2..=10).map(energy).fold(0.0, f64::max);
             match best_split(&values) {
-                Some((at, found)) => assert!((found - energy(at)).abs() < 1e-9 && (found - greatest).abs() < 1e-9),
+                Some((at, found)) => {
+                    assert!((found - energy(at)).abs() < 1e-9 && (found - greatest).abs() < 1e-9)
+                }
                 None => assert!(greatest <= 0.0),
             }
         }

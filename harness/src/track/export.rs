@@ -93,7 +93,10 @@ mod tests {
 
     #[test]
     fn forms_are_those_that_the_tools_document() {
-        let record = Record { metrics: [("uav/4 ranks/words".to_owned(), 3.5)].into(), ..Record::new("a".into()) };
+        let record = Record {
+            metrics: [("uav/4 ranks/words".to_owned(), 3.5)].into(),
+            ..Record::new("a".into())
+        };
         let bencher: Value = serde_json::from_str(&bencher(&record)).unwrap();
         assert_eq!(bencher, json!({ "uav": { "4 ranks/words": { "value": 3.5 } } }));
         let github: Value = serde_json::from_str(&github(&record)).unwrap();

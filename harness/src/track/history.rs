@@ -48,7 +48,13 @@ impl Record {
     /// One sentence, where it knows none.
     pub fn of_commit(named: &str, repository: &Path) -> Result<Self, String> {
         let mut git = Command::new("git");
-        git.arg("-C").arg(repository).args(["log", "-1", "--format=%H%n%cI%n%s", "--end-of-options", named]);
+        git.arg("-C").arg(repository).args([
+            "log",
+            "-1",
+            "--format=%H%n%cI%n%s",
+            "--end-of-options",
+            named,
+        ]);
         let output = git.output().map_err(|error| format!("git: {error}"))?;
         if !output.status.success() {
             return Err(format!("git knows no commit {named} in {}", repository.display()));
@@ -100,7 +106,8 @@ fn parse(text: &str) -> Result<Vec<Record>, String> {
     let mut records: Vec<Record> = Vec::new();
     for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let wrong = |why: String| format!("line {}: {why}", i + 1);
-        let record: Record = serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
+        let record: Record =
+            serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
@@ -141,7 +148,11 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("deep/history.jsonl");
         assert_eq!(read(&path).unwrap(), []);
-        for one in [record("a", &[("x", 1.0)]), record("b", &[("x", 2.5)]), record("a", &[("x", 3.0), ("y", 4.0)])] {
+        for one in [
+            record("a", &[("x", 1.0)]),
+            record("b", &[("x", 2.5)]),
+            record("a", &[("x", 3.0), ("y", 4.0)]),
+        ] {
             append(&path, &one).unwrap();
         }
         let expected = [record("a", &[("x", 3.0), ("y", 4.0)]), record("b", &[("x", 2.5)])];

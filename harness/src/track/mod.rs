@@ -101,10 +101,16 @@ pub fn told(all: &[Series]) -> String {
     let mut text = String::new();
     for series in all {
         for change in &series.changes {
-            let percent = change.percent.map_or("from nothing".to_owned(), |by| format!("{by:+.2} %"));
+            let percent =
+                change.percent.map_or("from nothing".to_owned(), |by| format!("{by:+.2} %"));
             text.push_str(&format!(
                 "{}: {} -> {} ({percent}) in {}..{}, p = {:.3}\n",
-                series.name, change.before, change.after, short(&change.last_old), short(&change.first_new), change.p
+                series.name,
+                change.before,
+                change.after,
+                short(&change.last_old),
+                short(&change.first_new),
+                change.p
             ));
         }
     }
@@ -124,9 +130,15 @@ pub(crate) mod tests {
         let record = |i: usize| {
             let noise = (i * 7919 % 13) as f64 / 13.0;
             let words = if i < 20 { 1000.0 } else { 1100.0 } + 8.0 * noise;
-            let metrics = BTreeMap::from([("uav/words".to_owned(), words), ("uav/cells".to_owned(), 8.0)]);
+            let metrics =
+                BTreeMap::from([("uav/words".to_owned(), words), ("uav/cells".to_owned(), 8.0)]);
             let commit = format!("{i:040x}");
-            Record { time: format!("2026-01-{:02}T00:00:00Z", i + 1), subject: "<b>".into(), metrics, ..Record::new(commit) }
+            Record {
+                time: format!("2026-01-{:02}T00:00:00Z", i + 1),
+                subject: "<b>".into(),
+                metrics,
+                ..Record::new(commit)
+            }
         };
         (0..30).map(record).collect()
     }

@@ -29,14 +29,18 @@ line.worse { stroke: var(--worse); } line.better { stroke: var(--better); } line
 
 /// The page. Metrics that changed come first.
 pub fn page(records: &[Record], all: &[Series]) -> String {
-    let mut text = String::from("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n");
+    let mut text =
+        String::from("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n");
     text.push_str("<meta name=\"viewport\" content=\"width=device-width\"><title>Trend</title>\n");
     // Writing into a string cannot fail.
     let _ = writeln!(text, "<style>{STYLE}</style></head><body>\n<h1>Trend</h1>");
     let _ = writeln!(text, "<p>{}</p>", span(records));
     text.push_str(&changes(records, all));
-    let (moved, still): (Vec<&Series>, Vec<&Series>) = all.iter().partition(|series| !series.changes.is_empty());
-    for (title, part) in [("Metrics that changed", moved), ("Metrics without a change point", still)] {
+    let (moved, still): (Vec<&Series>, Vec<&Series>) =
+        all.iter().partition(|series| !series.changes.is_empty());
+    for (title, part) in
+        [("Metrics that changed", moved), ("Metrics without a change point", still)]
+    {
         if part.is_empty() {
             continue;
         }
@@ -51,7 +55,9 @@ pub fn page(records: &[Record], all: &[Series]) -> String {
 fn span(records: &[Record]) -> String {
     match records {
         [] => "No records.".to_owned(),
-        [first, .., last] => format!("{} commits, {} to {}.", records.len(), told(first), told(last)),
+        [first, .., last] => {
+            format!("{} commits, {} to {}.", records.len(), told(first), told(last))
+        }
         [one] => format!("One commit, {}.", told(one)),
     }
 }
@@ -68,8 +74,10 @@ fn short(commit: &str) -> String {
 
 /// All change points, the latest first.
 fn changes(records: &[Record], all: &[Series]) -> String {
-    let mut found: Vec<(&Series, &Change)> =
-        all.iter().flat_map(|series| series.changes.iter().map(move |change| (series, change))).collect();
+    let mut found: Vec<(&Series, &Change)> = all
+        .iter()
+        .flat_map(|series| series.changes.iter().map(move |change| (series, change)))
+        .collect();
     if found.is_empty() {
         return "<p>No change points.</p>\n".to_owned();
     }
@@ -83,8 +91,13 @@ fn changes(records: &[Record], all: &[Series]) -> String {
             text,
             "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number {}\">{percent}</td>\
              <td><code>{}..{}</code></td><td>{}</td></tr>",
-            escaped(&series.name), number(change.before), number(change.after), class(series, change),
-            escaped(&short(&change.last_old)), escaped(&short(&change.first_new)), escaped(&record.subject)
+            escaped(&series.name),
+            number(change.before),
+            number(change.after),
+            class(series, change),
+            escaped(&short(&change.last_old)),
+            escaped(&short(&change.first_new)),
+            escaped(&record.subject)
         );
     }
     text.push_str("</table>\n");
@@ -101,34 +114,67 @@ fn class(series: &Series, change: &Change) -> &'static str {
 
 fn figure(records: &[Record], series: &Series) -> String {
     let mut text = format!("<figure><figcaption>{}</figcaption>\n", escaped(&series.name));
-    let _ = writeln!(text, "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{} by commit\">", escaped(&series.name));
+    let _ = writeln!(
+        text,
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{} by commit\">",
+        escaped(&series.name)
+    );
     let values = series.points.iter().map(|(_, value)| *value);
-    let (low, high) = bounds(values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max));
+    let (low, high) = bounds(
+        values.clone().fold(f64::INFINITY, f64::min),
+        values.fold(f64::NEG_INFINITY, f64::max),
+    );
     let last = records.len().saturating_sub(1).max(1) as f64;
     let x = |record: usize| LEFT + (WIDTH - LEFT - RIGHT) * record as f64 / last;
     let y = |value: f64| TOP + (HEIGHT - TOP - BOTTOM) * (high - value) / (high - low);
     for value in [low, (low + high) / 2.0, high] {
         let at = y(value);
-        let _ = writeln!(text, "<line class=\"axis\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>", WIDTH - RIGHT);
-        let _ = writeln!(text, "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>", LEFT - 6.0, at + 4.0, number(value));
+        let _ = writeln!(
+            text,
+            "<line class=\"axis\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>",
+            WIDTH - RIGHT
+        );
+        let _ = writeln!(
+            text,
+            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            LEFT - 6.0,
+            at + 4.0,
+            number(value)
+        );
     }
     for (record, anchor) in [(0, "start"), (records.len().saturating_sub(1), "end")] {
-        let commit = records.get(record).map_or(String::new(), |record| escaped(&short(&record.commit)));
-        let _ = writeln!(text, "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"{anchor}\">{commit}</text>", x(record), HEIGHT - 8.0);
+        let commit =
+            records.get(record).map_or(String::new(), |record| escaped(&short(&record.commit)));
+        let _ = writeln!(
+            text,
+            "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"{anchor}\">{commit}</text>",
+            x(record),
+            HEIGHT - 8.0
+        );
     }
     for change in &series.changes {
         // Between the last old and the first new commit.
         let at = (x(series.points[change.at].0) + x(series.points[change.at - 1].0)) / 2.0;
         let class = class(series, change);
-        let _ = writeln!(text, "<line class=\"{class}\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{TOP}\" y2=\"{}\"/>", HEIGHT - BOTTOM);
+        let _ = writeln!(
+            text,
+            "<line class=\"{class}\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{TOP}\" y2=\"{}\"/>",
+            HEIGHT - BOTTOM
+        );
     }
-    let path: Vec<String> = series.points.iter().map(|&(i, value)| format!("{:.1},{:.1}", x(i), y(value))).collect();
+    let path: Vec<String> =
+        series.points.iter().map(|&(i, value)| format!("{:.1},{:.1}", x(i), y(value))).collect();
     let _ = writeln!(text, "<polyline class=\"data\" points=\"{}\"/>", path.join(" "));
     for &(i, value) in &series.points {
         let record = &records[i];
         let _ = writeln!(
-            text, "<circle class=\"dot\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.4\"><title>{} {}\n{}</title></circle>",
-            x(i), y(value), escaped(&short(&record.commit)), value, escaped(&record.subject)
+            text,
+            "<circle class=\"dot\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.4\"><title>{} {}\n{}</title></circle>",
+            x(i),
+            y(value),
+            escaped(&short(&record.commit)),
+            value,
+            escaped(&record.subject)
         );
     }
     text.push_str("</svg></figure>\n");

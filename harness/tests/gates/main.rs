@@ -18,9 +18,19 @@ fn a_bug_of_three_ranks_is_shrunk_to_its_two_facets() {
     at.sort_by(f32::total_cmp);
     assert_eq!(at, [0.25, 0.5], "{}", done.told);
     assert!(case.root.level_for(2.0) == Some(case.level_surface), "{}", done.told);
-    assert!(done.told.contains("3 simulated ranks") && done.told.contains("nothing more can be left out"), "{}", done.told);
+    assert!(
+        done.told.contains("3 simulated ranks")
+            && done.told.contains("nothing more can be left out"),
+        "{}",
+        done.told
+    );
     // The mesh that was wanted has one leaf.
-    assert!(done.told.contains("nothing in either mesh asks for that") || done.told.contains("section 3"), "{}", done.told);
+    assert!(
+        done.told.contains("nothing in either mesh asks for that")
+            || done.told.contains("section 3"),
+        "{}",
+        done.told
+    );
     let readme = fs::read_to_string(play.path("tiny/README.md")).unwrap();
     let line = readme.lines().find(|line| line.contains("harness shrink")).unwrap().trim();
     let again = play.harness(line.strip_prefix("harness ").unwrap());
@@ -41,14 +51,24 @@ fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     let play = Play::new();
     play.engine("more", 1);
     let gate = "gate --engine engine.toml --rules gate.toml --layers counters";
-    let done = play.harness(&format!("{gate} --baseline engine --candidate more --junit gate.xml --record more.json"));
+    let done = play.harness(&format!(
+        "{gate} --baseline engine --candidate more --junit gate.xml --record more.json"
+    ));
     assert_eq!(done.code, 1, "{}", done.told);
-    assert!(done.told.contains("regression   case.toml: words 40 -> 41 (+2.50 %)"), "{}", done.told);
+    assert!(
+        done.told.contains("regression   case.toml: words 40 -> 41 (+2.50 %)"),
+        "{}",
+        done.told
+    );
     assert!(fs::read_to_string(play.path("gate.xml")).unwrap().contains("failures=\"2\""));
     for better in ["--baseline more --candidate engine", "--baseline more.json --mesher engine"] {
         let done = play.harness(&format!("{gate} {better}"));
         assert_eq!(done.code, 0, "{}", done.told);
-        assert!(done.told.contains("improvement  case.toml: 2 ranks/words 41 -> 40"), "{}", done.told);
+        assert!(
+            done.told.contains("improvement  case.toml: 2 ranks/words 41 -> 40"),
+            "{}",
+            done.told
+        );
     }
 }
 
@@ -58,7 +78,8 @@ fn a_gate_says_what_it_cannot_do() {
     let done = play.harness("gate --engine engine.toml --rules gate.toml --baseline main");
     assert_eq!(done.code, 2, "{}", done.told);
     assert!(done.told.contains("does not say how a revision is built"), "{}", done.told);
-    let record = play.harness("gate --engine engine.toml --rules gate.toml --record now.json --layers counters");
+    let record = play
+        .harness("gate --engine engine.toml --rules gate.toml --record now.json --layers counters");
     assert_eq!(record.code, 0, "{}", record.told);
     let done = play.harness("gate --engine engine.toml --rules gate.toml --baseline now.json --layers time --require-layers");
     assert_eq!(done.code, 3, "{}", done.told);
@@ -68,8 +89,13 @@ fn a_gate_says_what_it_cannot_do() {
 #[test]
 fn a_run_on_ranks_that_makes_another_mesh_fails_the_gate() {
     let play = Play::new();
-    play.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\"]\nranks = [3]\n");
-    let done = play.harness("gate --engine engine.toml --rules gate.toml --baseline engine --candidate engine");
+    play.write(
+        "gate.toml",
+        "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\"]\nranks = [3]\n",
+    );
+    let done = play.harness(
+        "gate --engine engine.toml --rules gate.toml --baseline engine --candidate engine",
+    );
     assert_eq!(done.code, 1, "{}", done.told);
     assert!(done.told.contains("serially it is another"), "{}", done.told);
 }
@@ -79,8 +105,22 @@ fn numbers_of_commits_become_a_history_with_a_change_in_it() {
     let play = Play::new();
     let git = |arguments: &str| {
         let mut command = Command::new("git");
-        command.args(["-c", "user.name=a", "-c", "user.email=a@b", "-c", "init.defaultBranch=main"]);
-        assert!(command.args(arguments.split(' ')).current_dir(play.path("")).status().unwrap().success());
+        command.args([
+            "-c",
+            "user.name=a",
+            "-c",
+            "user.email=a@b",
+            "-c",
+            "init.defaultBranch=main",
+        ]);
+        assert!(
+            command
+                .args(arguments.split(' '))
+                .current_dir(play.path(""))
+                .status()
+                .unwrap()
+                .success()
+        );
     };
     git("init --quiet");
     for i in 0..16 {

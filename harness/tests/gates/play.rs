@@ -68,11 +68,16 @@ impl Play {
         play.write("case.toml", CASE);
         let facet = |i: u32| {
             let x = f64::from(i) / 16.0;
-            format!("facet normal 0 0 0\nouter loop\nvertex {x} 0 0\nvertex {x} 1 0\nvertex {x} 0 1\nendloop\nendfacet\n")
+            format!(
+                "facet normal 0 0 0\nouter loop\nvertex {x} 0 0\nvertex {x} 1 0\nvertex {x} 0 1\nendloop\nendfacet\n"
+            )
         };
         let facets: String = (0..40).map(facet).collect();
         play.write("body.stl", &format!("solid body\n{facets}endsolid body\n"));
-        play.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\"]\nranks = [2]\n");
+        play.write(
+            "gate.toml",
+            "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\"]\nranks = [2]\n",
+        );
         play
     }
 
@@ -114,10 +119,14 @@ impl Play {
     /// Runs the harness in the directory.
     pub fn harness(&self, arguments: &str) -> Done {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        command.args(arguments.split(' ')).current_dir(self.0.path()).env("HARNESS_ROOT", self.0.path());
+        command
+            .args(arguments.split(' '))
+            .current_dir(self.0.path())
+            .env("HARNESS_ROOT", self.0.path());
         command.env_remove("GITHUB_STEP_SUMMARY");
         let output = command.output().unwrap();
-        let told = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+        let told =
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
         Done { code: output.status.code().unwrap_or(-1), told }
     }
 }
