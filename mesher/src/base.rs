@@ -100,7 +100,7 @@ pub fn build(
             let level = (0..mark_level).find(|&l| marks.split[l as usize].count() >= enough);
             uniform(&marks, level.unwrap_or(mark_level - 1))
         }
-        (None, _) => adaptive(&marks, mark_level - 1, &expected, comm.size()),
+        (None, _) => adaptive(&marks, mark_level - 1, expected, comm.size()),
     };
     let mut cut = cut(&marks, internal, rules.level_surface);
     let weights = match division.weights {
@@ -171,9 +171,8 @@ fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree
 /// The octants above base leaves of one level.
 fn uniform(marks: &Tree, level_base: Level) -> PerLevel {
     let mut internal = per_level();
-    for l in 0..level_base as usize {
-        internal[l] = marks.split[l].clone();
-    }
+    let above = ..level_base as usize;
+    internal[above].clone_from_slice(&marks.split[above]);
     internal
 }
 
