@@ -43,6 +43,14 @@ pub enum Command {
         #[arg(long)]
         nodes_max: Option<usize>,
     },
+    /// Writes a leaf-set directory as a VTK unstructured grid, to look at in ParaView or pyvista
+    Export {
+        /// The leaf-set directory
+        mesh: PathBuf,
+        /// The file to write, .vtu
+        #[arg(value_name = "FILE")]
+        to: PathBuf,
+    },
     /// Tells where two leaf-set directories differ, and which rule of the definition decides
     Diff {
         /// A leaf-set directory

@@ -5,6 +5,7 @@
 //! - what checks stand on: [`tree`] (leaves as a tree whose equal subtrees are stored once), [`parity`]
 //!   (rays), [`triangle`] (exact facet-octant test);
 //! - [`check`]: a file per promise; [`audit`](mod@audit): those that need no more than the leaves, at any size;
+//! - [`export`]: meshes for VTK to show;
 //! - [`diff`](mod@diff): where two meshes differ; [`selftest`]: the checks themselves put to the test.
 
 pub mod audit;
@@ -14,6 +15,7 @@ pub mod check;
 pub mod diff;
 pub mod digest;
 pub mod engine;
+pub mod export;
 pub mod gate;
 pub mod lattice;
 pub mod leafset;
@@ -21,9 +23,9 @@ pub mod manifest;
 pub mod npy;
 pub mod octant;
 pub mod oracle;
-pub mod report;
 pub mod out;
 pub mod parity;
+pub mod report;
 pub mod selftest;
 pub mod shrink;
 pub mod stl;

@@ -15,6 +15,8 @@ use harness::audit::{self, AuditOptions};
 use harness::case::Case;
 use harness::diff;
 use harness::engine::interrupt;
+use harness::export;
+use harness::leafset;
 use harness::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
 use std::path::Path;
 use std::process::ExitCode;
@@ -31,6 +33,7 @@ fn main() -> ExitCode {
         Command::Track(arguments) => cli_track::run(&arguments),
         Command::Selftest(arguments) => cli_selftest::run(&arguments),
         Command::Audit { mesh, nodes_max } => run_audit(&mesh, nodes_max),
+        Command::Export { mesh, to } => run_export(&mesh, &to),
         Command::Diff { a, b, case } => run_diff(&a, &b, case.as_deref()),
     };
     ExitCode::from(code)
@@ -46,6 +49,17 @@ fn run_audit(mesh: &Path, nodes_max: Option<usize>) -> u8 {
     let report = audit::audit(mesh, &options);
     println!("{report}");
     if report.holds() { EXIT_HOLDS } else { EXIT_FAILED }
+}
+
+fn run_export(mesh: &Path, to: &Path) -> u8 {
+    let exported = leafset::read(mesh).map_err(|e| e.to_string());
+    match exported.and_then(|mesh| export::vtu(&mesh, to).map_err(|e| e.to_string())) {
+        Ok(()) => EXIT_HOLDS,
+        Err(error) => {
+            eprintln!("harness: {error}");
+            EXIT_INPUT
+        }
+    }
 }
 
 fn run_diff(a: &Path, b: &Path, case: Option<&Path>) -> u8 {

@@ -69,6 +69,8 @@ impl fmt::Display for WordError {
     }
 }
 
+impl std::error::Error for WordError {}
+
 /// Spreads the low 19 bits of `v` so that two zero bits follow each.
 fn spread(v: u32) -> u64 {
     let mut x = u64::from(v);
