@@ -317,6 +317,44 @@ mod tests {
     use crate::octant::position;
 
     #[test]
+    fn cells_are_counted_by_base_leaf() {
+        let set = |codes: &[u64]| {
+            let bricks = codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) });
+            BrickSet::from_unsorted(bricks.collect())
+        };
+        let (mut internal, mut split, mut deleted) = (per_level(), per_level(), per_level());
+        internal[0] = set(&[0]);
+        // Octant 3 and two of its children are split, octant 5 alone; of the leaves below 3 two are deleted.
+        for (l, codes) in [(0, &[0][..]), (1, &[3, 5]), (2, &[3 << 3, 3 << 3 | 6])] {
+            split[l] = set(codes);
+        }
+        deleted[2] = set(&[3 << 3 | 1]);
+        deleted[3] = set(&[3 << 6 | 7]);
+        let leaves: Vec<BaseLeaf> =
+            (0..8).map(|code| BaseLeaf { level: 1, code, owner: usize::from(code > 3) }).collect();
+        let share = Ownership::new(0, 2, internal, leaves);
+        assert_eq!(cells_heaviest(&split, &deleted, &share, 0), 1 + 7 + 14 - 2);
+        assert_eq!(cells_heaviest(&split, &deleted, &share, 1), 8);
+    }
+
+    #[test]
+    fn heavy_octants_are_split_and_light_ones_are_not() {
+        let mut marks = Tree::default();
+        marks.split[0] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: 1 }]);
+        marks.split[1] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: 0b101 }]);
+        let expected = |b: &BaseLeaf| match (b.level, b.code) {
+            (0, _) => 6400,
+            (1, 0) => 900,
+            _ => 100,
+        };
+        // A share is 3,200 and a 16th of it 200: octant 2 is split in T0, but light.
+        let internal = adaptive(&marks, 2, expected, 2);
+        assert_eq!(internal[0].count(), 1);
+        assert_eq!(internal[1].codes().collect::<Vec<_>>(), [0]);
+        assert_eq!(cut(&marks, internal, 9).leaves.len(), 7 + 8);
+    }
+
+    #[test]
     fn neighbours_of_a_uniform_base_tree() {
         let leaves: Vec<BaseLeaf> =
             (0..64).map(|code| BaseLeaf { level: 2, code, owner: 0 }).collect();

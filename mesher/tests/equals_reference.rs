@@ -6,29 +6,41 @@ mod support;
 use mesher::lattice::{Keep, Root};
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
-use support::{Small, config, division, small, soup};
+use support::{Run, Small, config, division, leaky_on_rays, run, small, soup, thin};
 
 proptest! {
     #![proptest_config(config(300))]
 
     #[test]
     fn on_one_rank(case in small(soup())) {
-        assert_same!(case.solo(true), case.reference(true), "base tree");
-        assert_same!(case.solo(false), case.reference(false), "final mesh");
+        assert_reference(&case, &Run::SOLO)?;
     }
 
     #[test]
-    fn on_many_ranks(
-        case in small(soup()),
-        ranks in prop_oneof![3 => 2usize..9, 1 => 9usize..65],
-        seed in any::<u64>(),
-        metis in any::<bool>(),
-        level_base in prop_oneof![1 => Just(None), 2 => (0u32..6).prop_map(Some)],
-    ) {
-        let division = division(if metis { Partitioner::Metis } else { Partitioner::Morton }, level_base);
-        assert_same!(case.ranks(ranks, seed, division, true), case.reference(true), "base tree");
-        assert_same!(case.ranks(ranks, seed, division, false), case.reference(false), "final mesh");
+    fn on_many_ranks(case in small(soup()), run in run()) {
+        assert_reference(&case, &run)?;
     }
+
+    /// What is kept looks at itself across what is deleted, and must not see it.
+    #[test]
+    fn thin_bodies_in_fine_boxes(case in thin(), run in run()) {
+        assert_reference(&case, &run)?;
+    }
+
+    /// Rays that meet edges and vertices must be moved as the definition says, or leaks are decided otherwise.
+    #[test]
+    fn leaks_on_rays(case in leaky_on_rays(), run in run()) {
+        assert_reference(&case, &run)?;
+    }
+}
+
+fn assert_reference(case: &Small, run: &Run) -> Result<(), TestCaseError> {
+    for (ungraded, what) in [(true, "base tree"), (false, "final mesh")] {
+        let (got, want) = (case.outcome(run, ungraded), case.reference_outcome(ungraded));
+        assert_same!(got.words, want.words, "{what}");
+        prop_assert_eq!(got.ambiguous, want.ambiguous);
+    }
+    Ok(())
 }
 
 /// A facet that passes by an edge of the root at a lattice unit: its extent meets the root, it does not.

@@ -267,7 +267,7 @@ fn divisions() -> impl Iterator<Item = Run> {
     let levels = [None, Some(0), Some(1), Some(2), Some(4), Some(6), Some(19)];
     let ways = [Partitioner::Metis, Partitioner::Morton]
         .into_iter()
-        .flat_map(|p| [Weights::Unit, Weights::Area].map(|w| (p, w)));
+        .flat_map(|p| [Weights::Unit, Weights::Area, Weights::Rehearsal].map(|w| (p, w)));
     ways.flat_map(move |(partitioner, weights)| {
         levels.into_iter().flat_map(move |level_base| {
             [(2, 1), (3, 2), (8, 3), (8, 4), (33, 5)].map(move |(ranks, seed)| Run {

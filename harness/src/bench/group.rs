@@ -161,6 +161,16 @@ impl Projection<'_> {
     pub fn error(&self) -> f64 {
         self.sim.time_s.value / self.measured.time_s.value - 1.0
     }
+
+    /// The same for CPU times alone: how much longer the simulated ranks' critical path is than the one of
+    /// the real ranks' CPU times. Medians of both.
+    pub fn path_error(&self) -> f64 {
+        let path = |g: &Group| {
+            let paths: Vec<f64> = g.runs.iter().map(pop::path_s).collect();
+            median(&paths).map_or(f64::NAN, |m| m.value)
+        };
+        path(self.sim) / path(self.measured) - 1.0
+    }
 }
 
 #[cfg(test)]
@@ -219,5 +229,6 @@ pub(crate) mod tests {
         let pairs = groups.projections();
         assert_eq!(pairs.len(), 1);
         assert!((pairs[0].error() - 0.1).abs() < 1e-9);
+        assert!((pairs[0].path_error() - 0.1).abs() < 1e-9);
     }
 }

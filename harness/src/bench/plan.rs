@@ -188,12 +188,12 @@ fn change(study: &mut Study, wishes: &Wishes) {
 fn small() -> Vec<Study> {
     let scaling = layouts(&[1, 2, 4, 8, 16, 32, 64], &[1, 2, 4]);
     vec![
-        study(Experiment::Strong, "uav-large", 4 * MILLION, &scaling, 6),
-        study(Experiment::Weak, "uav-large", MILLION / 4, &layouts(&[1, 4, 16, 64], &[1, 2]), 3),
-        study(Experiment::Spacing, "uav-large", 8 * MILLION, &layouts(&[], &[1, 2]), 6),
-        study(Experiment::Layers, "uav-large", 2 * MILLION, &layouts(&[], &[1, 2]), 6),
-        study(Experiment::Weights, "uav-large", 4 * MILLION, &layouts(&[64], &[]), 3),
-        study(Experiment::Weights, "fighter-large", 4 * MILLION, &layouts(&[64], &[]), 3),
+        study(Experiment::Strong, "uav-large", 20 * MILLION, &scaling, 6),
+        study(Experiment::Weak, "uav-large", MILLION, &layouts(&[1, 4, 16, 64], &[1, 2]), 3),
+        study(Experiment::Spacing, "uav-large", 32 * MILLION, &layouts(&[], &[1, 2]), 6),
+        study(Experiment::Layers, "uav-large", 4 * MILLION, &layouts(&[], &[1, 2]), 6),
+        study(Experiment::Weights, "uav-large", 20 * MILLION, &layouts(&[64], &[]), 3),
+        study(Experiment::Weights, "fighter-large", 20 * MILLION, &layouts(&[64], &[]), 3),
     ]
 }
 

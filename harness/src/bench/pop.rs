@@ -61,6 +61,12 @@ pub fn projected_s(run: &Run, network: &Network) -> f64 {
     run.phases.iter().map(|p| p.useful_s.max + messages_s(p, network)).sum()
 }
 
+/// The critical path on a network that costs nothing: what simulated and real ranks must have in common,
+/// also on a machine that is busy with other work.
+pub fn path_s(run: &Run) -> f64 {
+    run.phases.iter().map(|p| p.useful_s.max).sum()
+}
+
 /// Time that a run took: measured where that means something, projected where ranks took turns.
 pub fn time_s(run: &Run, network: &Network) -> f64 {
     match run.setup.comm {
@@ -72,7 +78,7 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
 /// The efficiencies of a run against a reference run, usually the one on fewest ranks.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     let time_s = time_s(run, network);
-    let path_s: f64 = run.phases.iter().map(|p| p.useful_s.max).sum();
+    let path_s = path_s(run);
     let per_cell = |r: &Run| r.useful_s.sum / r.cells.max(1) as f64;
     let lambda = run.useful_s.lambda(run.setup.ranks);
     Efficiency {

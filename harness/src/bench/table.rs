@@ -139,13 +139,14 @@ fn projections(out: &mut String, groups: &Groups) {
     for p in pairs {
         let _ = writeln!(
             out,
-            "  {:<14} {:>13} cells, {} ranks: projected {:.3} s, measured {:.3} s, error {:+.1} %",
+            "  {:<14} {:>13} cells, {} ranks: projected {:.3} s, measured {:.3} s, error {:+.1} %; of CPU times alone {:+.1} %",
             p.sim.setup.case,
             grouped(p.sim.cells()),
             p.sim.setup.ranks,
             p.sim.time_s.value,
             p.measured.time_s.value,
-            p.error() * 100.0
+            p.error() * 100.0,
+            p.path_error() * 100.0
         );
     }
     let largest =

@@ -170,18 +170,19 @@ fn projections(out: &mut String, groups: &Groups) {
         return;
     }
     out.push_str("<h3>projection against MPI</h3>\n<div class=\"scroll\"><table><thead><tr><th>case<th>experiment<th>cells<th>ranks<th>projected \
-        / s<th>measured / s<th>error</tr></thead><tbody>\n");
+        / s<th>measured / s<th>error<th>error of CPU times</tr></thead><tbody>\n");
     for p in pairs {
         let _ = writeln!(
             out,
-            "<tr><td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:+.1} %</tr>",
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:+.1} %<td>{:+.1} %</tr>",
             escape(&p.sim.setup.case),
             p.sim.setup.experiment,
             grouped(p.sim.cells()),
             p.sim.setup.ranks,
             p.sim.time_s.value,
             p.measured.time_s.value,
-            p.error() * 100.0
+            p.error() * 100.0,
+            p.path_error() * 100.0
         );
     }
     out.push_str("</tbody></table></div>\n");

@@ -1,17 +1,17 @@
 //! The rehearsal: the same mesh made a few levels coarser tells what a base leaf will hold.
 //!
-//! Leaves near a surface grow by four per level, so counts scale. But a coarser mesh's layers are thicker
-//! and reach into other base leaves: so the rehearsal is believed for regions that are wide against its
-//! layers, and within them leaves are spread by what the facets' area lets expect. Parts of the rehearsal
-//! are Morton cuts of the latter, too, so that it is divided well itself.
+//! Leaves along a surface grow by four per level, those that its curvature, edges and tips add by two, as
+//! layers there are thicker the coarser the mesh. The facets' area tells the former; what the coarse mesh
+//! holds beyond that is the latter. Parts of the rehearsal are Morton cuts by area, so that it is divided
+//! well itself.
 
 use super::{Cut, route};
 use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
 use crate::octant::Level;
-use crate::partition::{boxed, morton_cuts};
-use crate::share::{BaseLeaf, Ownership};
+use crate::partition::morton_cuts;
+use crate::share::Ownership;
 use crate::stream::Leaves;
 use crate::tree::Tree;
 use crate::voxelise::{Depth, Filed, Start, refine};
@@ -46,35 +46,10 @@ pub fn weights(
     for theirs in comm.all_gather(&rehearse(facets, &coarse, cut, &share, comm)) {
         theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
     }
-    let scale = 1 << (2 * coarser);
-    let region = region_level(&coarse);
-    let regions = regions(&cut.leaves, region);
-    let mut weights = Vec::with_capacity(expected.len());
-    for of in regions.chunk_by(|a, b| a == b) {
-        let range = weights.len()..weights.len() + of.len();
-        let told =
-            counts[range.clone()].iter().map(|n| 1 + n.saturating_sub(1) * scale).sum::<u64>();
-        let thought: u64 = expected[range.clone()].iter().sum();
-        let weight = |w: u64| (u128::from(w) * u128::from(told) / u128::from(thought)) as u64;
-        let least = |i: usize| boxed(&cut.leaves[i], rules).max(1);
-        weights.extend(range.map(|i| weight(expected[i]).max(least(i))));
-    }
-    weights
-}
-
-/// Level of regions that are wide against the layers around the coarse mesh's surface.
-fn region_level(coarse: &Rules) -> Level {
-    let wide = 4 * (coarse.layer_cells_min + 2);
-    coarse.level_surface.saturating_sub(wide.next_power_of_two().ilog2())
-}
-
-/// The region of each base leaf: its ancestor of a level, or itself if it is no deeper.
-fn regions(leaves: &[BaseLeaf], level: Level) -> Vec<(Level, u64)> {
-    let of = |b: &BaseLeaf| match b.level.checked_sub(level) {
-        Some(deeper) => (level, b.code >> (3 * deeper)),
-        None => (b.level, b.code),
-    };
-    leaves.iter().map(of).collect()
+    let scale = 1 << coarser;
+    // With a = area's leaves in the coarse mesh: a * scale^2 + (counted - a) * scale.
+    let weight = |(thought, told): (u64, u64)| told * scale + thought - thought / scale;
+    expected.into_iter().zip(counts).map(weight).collect()
 }
 
 /// The same rules for a coarser mesh whose base tree is equal down to the base leaves.
@@ -105,9 +80,16 @@ fn rehearse(
     crate::share_top(&mut tree, cut.top.clone(), share, cut.level_base, comm);
     let sides = sides::decide(&tree, share, facets, rules.keep, comm);
     let Tree { split, crossing } = tree;
-    let (split, _) = grade::grade(split, &crossing, &kept::Kept::new(&sides.deleted), rules, share, comm);
-    let leaves =
-        Leaves { split: &split, crossing: &crossing, sides: &sides, share, everything: false, rules };
+    let (split, _) =
+        grade::grade(split, &crossing, &kept::Kept::new(&sides.deleted), rules, share, comm);
+    let leaves = Leaves {
+        split: &split,
+        crossing: &crossing,
+        sides: &sides,
+        share,
+        everything: false,
+        rules,
+    };
     let mut counts = vec![0; share.leaves().len()];
     let count = |words: &[u64]| {
         words.iter().for_each(|w| counts[share.leaf_at(w >> 7)] += 1);

@@ -19,7 +19,7 @@ use std::time::Instant;
 /// What a rank has sent so far, to others only, and how long it was at it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traffic {
-    /// Messages, one per receiver.
+    /// Messages: one per receiver, and those of a collective call as MPI libraries make it (see `Meter`).
     pub messages: u64,
     /// Payload.
     pub bytes: u64,
@@ -116,6 +116,18 @@ impl Meter {
         self.0.set(Traffic { messages: t.messages + messages, bytes: t.bytes + 8 * words, ..t });
     }
 
+    /// Counts a gathering of a rank's words by all: a message for every doubling of the number of ranks
+    /// that have them (recursive doubling, Bruck), the words going once to everybody.
+    pub(crate) fn gather(&self, ranks: usize, words: u64) {
+        self.count(doublings(ranks), words * (ranks as u64 - 1));
+    }
+
+    /// Counts what ranks tell each other before an exchange, how many words are to come: one word for
+    /// everybody, by Bruck's algorithm half of them in each message.
+    pub(crate) fn announce(&self, ranks: usize) {
+        self.count(doublings(ranks), doublings(ranks) * (ranks as u64 / 2));
+    }
+
     /// Runs and times a call.
     pub(crate) fn call<T>(&self, body: impl FnOnce() -> T) -> T {
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
@@ -132,6 +144,11 @@ impl Meter {
     pub(crate) fn get(&self) -> Traffic {
         self.0.get()
     }
+}
+
+/// Doublings from one rank to all.
+fn doublings(ranks: usize) -> u64 {
+    u64::from(ranks.next_power_of_two().ilog2())
 }
 
 /// A single rank.
@@ -163,6 +180,25 @@ impl Comm for Solo {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn collective_calls_count_as_libraries_make_them() {
+        let told = sim::run(5, 1, |c| {
+            c.all_gather(&[1, 2]);
+            let gathered = c.traffic();
+            let next = (c.rank() + 1) % 5;
+            c.exchange(vec![(next, vec![0; 10]), (c.rank(), vec![0; 99])]);
+            let t = c.traffic();
+            [
+                gathered.messages,
+                gathered.bytes,
+                t.messages - gathered.messages,
+                t.bytes - gathered.bytes,
+            ]
+        });
+        // Three doublings to reach five ranks; an exchange announces two words in each, and sends one message.
+        assert!(told.iter().all(|t| *t == [3, 8 * 2 * 4, 3 + 1, 8 * (3 * 2 + 10)]), "{told:?}");
+    }
 
     #[test]
     fn errors_survive_the_journey() {

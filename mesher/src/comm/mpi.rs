@@ -90,7 +90,7 @@ impl Mpi {
                 words.extend_from_slice(&buffer[start as usize..(start + n) as usize]);
             }
         }
-        self.meter.count(self.size() as u64 - 1, mine.len() as u64 * (self.size() as u64 - 1));
+        self.meter.gather(self.size(), mine.len() as u64);
         all
     }
 
@@ -100,6 +100,7 @@ impl Mpi {
         to.iter().for_each(|m| counts[m.0] = m.1.len() as u64);
         let mut coming = vec![0u64; self.size()];
         self.world.all_to_all_into(&counts[..], &mut coming[..]);
+        self.meter.announce(self.size());
         let mut received: Vec<(usize, Vec<u64>)> = (0..self.size())
             .filter(|&r| r != me && coming[r] > 0)
             .map(|r| (r, vec![0; coming[r] as usize]))

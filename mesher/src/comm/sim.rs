@@ -191,8 +191,13 @@ impl Sim {
 
     fn call_untimed(&self, gather: bool, words: Messages) -> Messages {
         let call = self.calls.replace(self.calls.get() + 1);
-        let sent = words.iter().filter(|m| m.0 != self.rank);
-        sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
+        if gather {
+            self.meter.gather(self.world.size, words[0].1.len() as u64);
+        } else {
+            self.meter.announce(self.world.size);
+            let sent = words.iter().filter(|m| m.0 != self.rank);
+            sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
+        }
         let mut state = self.lock();
         state.posted[self.rank] = Some(Post { call, gather, words });
         state.doing[self.rank] = Doing::Waiting;

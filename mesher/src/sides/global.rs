@@ -27,14 +27,48 @@ pub fn names(
     if comm.size() == 1 {
         return (0..classes as u32).map(own).collect();
     }
-    let mut pairs = across_ranks(nodes, faces, class, &own, comm);
-    pairs.extend((0..).zip(top_components(nodes)).map(|(top, c)| (top, own(class[c as usize]))));
-    let flat: Vec<u64> = pairs.into_iter().flat_map(|(a, b)| [a, b]).collect();
-    let mut joined = Joined::default();
-    for words in comm.all_gather(&flat) {
-        words.chunks_exact(2).for_each(|p| joined.join(p[0], p[1]));
-    }
+    let pairs = across_ranks(nodes, faces, class, &own, comm);
+    let tops: Vec<Name> = top_components(nodes).iter().map(|&c| own(class[c as usize])).collect();
+    let mut words = vec![pairs.len() as u64];
+    words.extend(pairs.into_iter().flat_map(|(a, b)| [a, b]));
+    words.extend(runs(&tops));
+    let joined = join_all(&comm.all_gather(&words), tops.len());
     (0..classes as u32).map(|c| joined.find(own(c))).collect()
+}
+
+/// Where equal names of top components follow each other: first, number and name of each such run. All
+/// ranks have the same top components in the same order, so runs say it shorter than pairs, by far.
+fn runs(tops: &[Name]) -> Vec<u64> {
+    let mut first = 0;
+    let of = |run: &[Name]| {
+        first += run.len() as u64;
+        [first - run.len() as u64, run.len() as u64, run[0]]
+    };
+    tops.chunk_by(|a, b| a == b).flat_map(of).collect()
+}
+
+/// Joins what all ranks tell: a number of pairs, the pairs, and the runs of top components.
+fn join_all(told: &[Vec<u64>], tops: usize) -> Joined {
+    let parts = || told.iter().map(|w| w[1..].split_at(2 * w[0] as usize));
+    // A top component is one with its predecessor if any rank says so; what is one is joined to others once.
+    let mut follows = vec![false; tops];
+    for run in parts().flat_map(|(_, runs)| runs.chunks_exact(3)) {
+        follows[run[0] as usize + 1..(run[0] + run[1]) as usize].fill(true);
+    }
+    let mut first = 0;
+    let firsts: Vec<Name> = (0..)
+        .zip(follows)
+        .map(|(top, follows)| {
+            first = if follows { first } else { top };
+            first
+        })
+        .collect();
+    let mut joined = Joined::default();
+    for (pairs, runs) in parts() {
+        pairs.chunks_exact(2).for_each(|p| joined.join(p[0], p[1]));
+        runs.chunks_exact(3).for_each(|run| joined.join(firsts[run[0] as usize], run[2]));
+    }
+    joined
 }
 
 /// Pairs of names that are joined over a face between this rank's bricks and another's. Collective.
@@ -111,6 +145,24 @@ impl Joined {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn top_components_join_what_any_rank_joins() {
+        // Five top components; one rank has 0 = 1 and 3 = 4, the other 1 = 2 and 0 = 4.
+        let words = |pairs: &[u64], tops: &[Name]| {
+            let mut words = vec![pairs.len() as u64 / 2];
+            words.extend(pairs);
+            words.extend(runs(tops));
+            words
+        };
+        let one = words(&[101, 202], &[100, 100, 103, 104, 104]);
+        let two = words(&[], &[200, 201, 201, 203, 200]);
+        assert_eq!(one.len(), 1 + 2 + 3 * 3);
+        let j = join_all(&[one, two], 5);
+        assert!([100, 104, 200, 201, 203].iter().all(|&n| j.find(n) == j.find(103)));
+        assert_eq!(j.find(101), j.find(202));
+        assert_ne!(j.find(101), j.find(100));
+    }
 
     #[test]
     fn names_join_through_chains() {

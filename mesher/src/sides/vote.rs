@@ -42,13 +42,23 @@ pub fn candidates(
     comm: &dyn Comm,
 ) -> BTreeMap<Name, Vec<Candidate>> {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); names.len()];
+    let mut here: Vec<(u32, u64)> = Vec::new();
     for l in 0..LEVELS as Level {
         for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
             if !share.answers_for(l, key) {
                 continue;
             }
+            // Components that meet elsewhere are one: their leaves come in one order.
+            here.clear();
             for (c, bits) in nodes.components(l, n) {
-                let list = &mut first[class[c as usize] as usize];
+                let class = class[c as usize];
+                match here.iter_mut().find(|(other, _)| *other == class) {
+                    Some((_, all)) => *all |= bits,
+                    None => here.push((class, bits)),
+                }
+            }
+            for &(class, bits) in &here {
+                let list = &mut first[class as usize];
                 let room = CANDIDATES - list.len();
                 list.extend(
                     ones(bits).take(room).map(|bit| Candidate::new(l, key << 6 | u64::from(bit))),

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 pub fn run() -> impl Strategy<Value = Run> {
     let ranks = prop_oneof![2 => Just(1usize), 4 => 2usize..9, 1 => 9usize..65];
     let partitioner = prop_oneof![Just(Partitioner::Metis), Just(Partitioner::Morton)];
-    let weights = prop_oneof![Just(Weights::Area), Just(Weights::Unit)];
+    let weights = prop_oneof![Just(Weights::Area), Just(Weights::Unit), Just(Weights::Rehearsal)];
     let level_base = prop_oneof![1 => Just(None), 2 => (0u32..6).prop_map(Some)];
     (ranks, any::<u64>(), partitioner, weights, level_base).prop_map(
         |(ranks, seed, partitioner, weights, level_base)| Run {
@@ -162,4 +162,59 @@ pub fn small(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value =
             Small { facets, root, spacing_min, layer_cells_min, keep, keep_crossing, boxes }
         },
     )
+}
+
+/// Plates as thin as cells or thinner, with boxes about them that are finer than their surface: what is
+/// deleted lies between what is kept, a cell away or less.
+pub fn thin() -> impl Strategy<Value = Small> {
+    let reach =
+        || prop_oneof![Just((-10i32, 74i32)), (0i32..50, 2i32..30).prop_map(|(a, d)| (a, a + d))];
+    let plate = (0usize..3, 0i32..120, 1i32..24, reach(), reach()).prop_map(
+        |(axis, at, thickness, (u0, u1), (w0, w1))| {
+            let halves = |p: [i32; 3]| p.map(|c| c as f32 / 2.0);
+            let (mut lo, mut hi) = ([0; 3], [0; 3]);
+            (lo[axis], hi[axis]) = (at, at + thickness);
+            (lo[(axis + 1) % 3], hi[(axis + 1) % 3]) = (2 * u0, 2 * u1);
+            (lo[(axis + 2) % 3], hi[(axis + 2) % 3]) = (2 * w0, 2 * w1);
+            cuboid(halves(lo), halves(hi))
+        },
+    );
+    let boxes = prop::collection::vec(
+        ([0i32..62, 0i32..62, 0i32..62], [1i32..24, 1i32..24, 1i32..24], 1u32..4),
+        1..4,
+    );
+    let keep = prop_oneof![Just(Keep::Outside), Just(Keep::Inside)];
+    (plate, 1u32..5, boxes, 1u32..5, keep, any::<bool>()).prop_map(
+        |(facets, level, boxes, layer_cells_min, keep, keep_crossing)| {
+            let extent = |(min, d, finer): ([i32; 3], [i32; 3], u32)| BoxSpec {
+                min: min.map(f64::from),
+                max: std::array::from_fn(|a| f64::from(min[a] + d[a])),
+                spacing: 64.0 / f64::from(1 << (level + finer).min(6)),
+            };
+            Small {
+                facets,
+                root: Root { origin: [0.0; 3], edge: 64.0 },
+                spacing_min: 64.0 / f64::from(1 << level),
+                layer_cells_min,
+                keep,
+                keep_crossing,
+                boxes: boxes.into_iter().map(extent).collect(),
+            }
+        },
+    )
+}
+
+/// Leaky soups whose edges and vertices lie on the rays from the centroids of coarse leaves.
+pub fn leaky_on_rays() -> impl Strategy<Value = Small> {
+    let point = || [-1i32..10, -1i32..10, -1i32..10].prop_map(|p| p.map(|c| 8.0 * c as f32));
+    let facets = prop::collection::vec([point(), point(), point()], 1..10);
+    (facets, 1u32..5, any::<bool>()).prop_map(|(facets, level, all)| Small {
+        facets,
+        root: Root { origin: [0.0; 3], edge: 64.0 },
+        spacing_min: 64.0 / f64::from(1 << level),
+        layer_cells_min: 1,
+        keep: if all { Keep::All } else { Keep::Outside },
+        keep_crossing: true,
+        boxes: vec![],
+    })
 }

@@ -15,7 +15,7 @@ pub mod symmetry;
 
 // Each test uses some of it.
 #[allow(unused_imports)]
-pub use draw::{closed, config, cuboid, run, small, soup};
+pub use draw::{closed, config, cuboid, leaky_on_rays, run, small, soup, thin};
 
 pub type Facet = [[f32; 3]; 3];
 
@@ -66,9 +66,23 @@ impl Small {
 
     /// Leaf words by the reference.
     pub fn reference(&self, ungraded: bool) -> Vec<u64> {
+        self.reference_mesh(ungraded).words
+    }
+
+    fn reference_mesh(&self, ungraded: bool) -> reference::Mesh {
         let case = self.reference_case();
         let mesh = if ungraded { reference::base_tree(&case) } else { reference::mesh(&case) };
-        mesh.expect("the case is good").words
+        mesh.expect("the case is good")
+    }
+
+    /// What the reference makes of the case.
+    pub fn reference_outcome(&self, ungraded: bool) -> Outcome {
+        let mesh = self.reference_mesh(ungraded);
+        let on_lattice = |p: [f64; 3]| std::array::from_fn(|a| self.root.quantise(a, p[a]));
+        let ambiguous = mesh
+            .ambiguous
+            .map(|a| Ambiguous { count: a.components, example: on_lattice(a.example) });
+        Outcome { words: mesh.words, ambiguous }
     }
 
     /// Leaf words by the mesher on one rank.
