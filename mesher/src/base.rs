@@ -91,7 +91,7 @@ pub fn build(
     let expected = |b: &BaseLeaf| {
         // A facet's cells come with the layers on its kept side, a third of them being coarser.
         let thick = (u64::from(rules.layer_cells_min) + 2) * 4 / 3;
-        1 + areas.cells(b.level, b.code) * thick + boxed(b, rules)
+        1 + areas.cells(b.level, b.code).saturating_mul(thick) + boxed(b, rules)
     };
     let internal = match (division.level_base, division.weights) {
         (Some(_), _) => uniform(&marks, mark_level - 1),
