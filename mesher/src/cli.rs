@@ -26,9 +26,9 @@ pub struct Args {
     /// Stop at the base tree T0: all leaves with their sides, nothing deleted or graded
     #[arg(long)]
     pub ungraded: bool,
-    /// Who cuts the base tree into parts [default: metis where built in, else morton]
-    #[arg(long, value_enum)]
-    pub partitioner: Option<Partitioner>,
+    /// Who cuts the base tree into parts
+    #[arg(long, value_enum, default_value = "morton")]
+    pub partitioner: Partitioner,
     /// What a base leaf weighs in the partition
     #[arg(long, value_enum, default_value = "area")]
     pub weights: Weights,

@@ -8,7 +8,6 @@ use cli::{Args, CommChoice, case, parse};
 use mesher::base::Division;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
-use mesher::partition::Partitioner;
 use mesher::record::{INTERRUPTED, Recorder};
 use mesher::report::Report;
 use mesher::{Options, mesh};
@@ -144,10 +143,12 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     let json = args.json.as_ref().filter(|_| comm.rank() == 0).map(|p| Json::begin(p)).transpose();
     let json = mesher::comm::agree(comm, json)?;
     let case = mesher::comm::agree(comm, case(args))?;
-    // METIS cuts on one rank while the others wait: measured, that costs more than its parts gain.
-    let partitioner = args.partitioner.unwrap_or(Partitioner::Morton);
     let options = Options {
-        division: Division { partitioner, weights: args.weights, level_base: args.level_base.0 },
+        division: Division {
+            partitioner: args.partitioner,
+            weights: args.weights,
+            level_base: args.level_base.0,
+        },
         ungraded: args.ungraded,
         out: args.out.clone(),
     };
