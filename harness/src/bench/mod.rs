@@ -1,6 +1,6 @@
 //! Measurements: how long, why, and how it scales.
 //!
-//! [`bench`] runs the studies of a [`plan`] and appends every result to a [`record`] at once. What is said
+//! [`bench()`] runs the studies of a [`plan`] and appends every result to a [`record`] at once. What is said
 //! of them is computed from the record alone, by [`group`], [`pop`], [`cause`] and [`table`] here and by
 //! [`report`](crate::report), so that it can be said again at any time, on any machine.
 //!

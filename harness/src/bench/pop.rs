@@ -1,8 +1,9 @@
 //! Efficiencies as the POP centre of excellence defines them, measured or projected.
 //!
-//! With u[p][r] the useful time (CPU outside calls to other ranks) of rank r in phase p and T the time
+//! With `u[p][r]` the useful time (CPU outside calls to other ranks) of rank r in phase p and T the time
 //! that the run took:
 //!
+//! ```text
 //!   load balance      = mean over r of U[r] / max over r of U[r],  U[r] = sum over p of u[p][r]
 //!   serialisation     = max over r of U[r] / C,                    C = sum over p of max over r of u[p][r]
 //!   transfer          = C / T
@@ -10,6 +11,7 @@
 //!   parallel          = load balance * communication = mean U / T
 //!   computation scaling = useful time of the reference run, per cell / that of this run, per cell
 //!   global            = parallel * computation scaling
+//! ```
 //!
 //! C is what the phases would take on a network that costs nothing, as ranks wait for each other at the
 //! end of a phase. Where ranks are simulated, T is projected: C plus what a latency-bandwidth model says
