@@ -123,7 +123,7 @@ pub struct Report {
     pub ranks: usize,
     /// Wall time of the slowest rank, in seconds, from reading to the last leaf.
     pub time_wall_s: f64,
-    /// Peak resident memory by rank.
+    /// Peak resident memory by rank; simulated ranks have equal parts of their process's.
     pub peak_rss_bytes: Vec<u64>,
     /// Times by phase and rank.
     pub phases: Vec<PhaseEntry>,
@@ -148,7 +148,7 @@ impl Report {
     ) -> Self {
         let mut counters = *counters;
         counters.leaves(parts[comm.rank()][0]);
-        let mut words = vec![peak_rss_bytes()];
+        let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
         words.extend(counters.values);
         words.extend(record.phases().iter().flat_map(|p| {
             let t = p.traffic;

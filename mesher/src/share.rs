@@ -12,7 +12,8 @@ use crate::brick::Brick;
 use crate::brickset::BrickSet;
 use crate::comm::Comm;
 use crate::octant::{LEVEL_MAX, Level};
-use crate::tree::{PerLevel, per_level};
+use crate::tree::{PerLevel, Tree, per_level};
+use std::sync::Arc;
 
 /// A leaf of the base tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,12 +42,21 @@ pub enum Place {
 pub struct Ownership {
     rank: usize,
     ranks: usize,
-    internal: PerLevel,
-    leaves: Vec<BaseLeaf>,
-    starts: Vec<u64>,
+    dealt: Arc<Dealt>,
     /// Deepest level that has a top brick.
     level_top: Level,
 }
+
+/// What is the same for all ranks.
+#[derive(Debug)]
+struct Dealt {
+    internal: PerLevel,
+    leaves: Vec<BaseLeaf>,
+    starts: Vec<u64>,
+}
+
+/// The rank of a bystander, who has nothing: see [`Ownership::bystander`].
+const NOBODY: usize = usize::MAX;
 
 impl Ownership {
     /// The ownership of a single rank, whose base tree is the root.
@@ -59,22 +69,45 @@ impl Ownership {
     pub fn new(rank: usize, ranks: usize, internal: PerLevel, leaves: Vec<BaseLeaf>) -> Self {
         let starts = leaves.iter().map(|b| crate::octant::start57(b.level, b.code)).collect();
         let deepest = internal.iter().rposition(|s| !s.is_empty()).map_or(0, |l| l as Level + 1);
-        Self { rank, ranks, internal, leaves, starts, level_top: deepest + 1 }
+        let dealt = Arc::new(Dealt { internal, leaves, starts });
+        Self { rank, ranks, dealt, level_top: deepest + 1 }
+    }
+
+    /// The same as seen by someone who owns nothing: every brick is a top brick or remote.
+    pub fn bystander(&self) -> Self {
+        Self { rank: NOBODY, ..self.clone() }
+    }
+
+    /// What of a tree lies in top bricks: the same on all ranks.
+    pub fn top_of(&self, tree: &Tree) -> Tree {
+        let mut top = Tree::default();
+        let all = [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)];
+        for (to, from) in all {
+            for l in 0..=self.level_top as usize {
+                let mut internal = (l >= 2).then(|| self.dealt.internal[l - 2].cursor());
+                let mut is_top = |key: u64| {
+                    internal.as_mut().is_none_or(|set| set.get(key >> 6) >> (key & 63) & 1 == 1)
+                };
+                let bricks = from[l].bricks().iter().filter(|b| is_top(b.key));
+                bricks.for_each(|b| to[l].push(b.key, b.bits));
+            }
+        }
+        top
     }
 
     /// The base leaves in Morton order.
     pub fn leaves(&self) -> &[BaseLeaf] {
-        &self.leaves
+        &self.dealt.leaves
     }
 
     /// The octants above the base leaves.
     pub fn internal(&self) -> &PerLevel {
-        &self.internal
+        &self.dealt.internal
     }
 
     /// The number of the base leaf at a level-19 Morton code.
     pub fn leaf_at(&self, start: u64) -> usize {
-        self.starts.partition_point(|&s| s <= start) - 1
+        self.dealt.starts.partition_point(|&s| s <= start) - 1
     }
 
     /// Whose brick `key` of level `l` is.
@@ -86,7 +119,7 @@ impl Ownership {
         if self.ranks == 1 {
             return Place::Mine;
         }
-        if l <= self.level_top && self.internal[l as usize - 2].contains(key) {
+        if l <= self.level_top && self.dealt.internal[l as usize - 2].contains(key) {
             return Place::Top;
         }
         match self.owner(l, key) {
@@ -109,7 +142,7 @@ impl Ownership {
 
     /// Owner of the base leaf at a brick's minimum corner.
     fn owner(&self, l: Level, key: u64) -> usize {
-        self.leaves[self.leaf_at(brick_start(l, key))].owner
+        self.dealt.leaves[self.leaf_at(brick_start(l, key))].owner
     }
 
     /// Brings octants to the ranks that hold their bricks: returns those for this rank, from all
@@ -120,7 +153,7 @@ impl Ownership {
         }
         let mut mine = BrickSet::default();
         let mut out: Vec<Vec<u64>> = vec![Vec::new(); self.ranks];
-        let mut top = Vec::new();
+        let mut top: Vec<u64> = Vec::new();
         for b in set.bricks() {
             match self.place(l, b.key) {
                 Place::Mine => mine.push(b.key, b.bits),
@@ -128,16 +161,16 @@ impl Ownership {
                 Place::Top => top.extend([b.key, b.bits]),
             }
         }
-        if self.is_shared(l) {
-            for (r, words) in out.iter_mut().enumerate() {
-                if r != self.rank {
-                    words.extend(&top);
-                }
-            }
-        }
         let sent = out.iter().map(|w| w.len() as u64 / 2).sum();
-        let heard = comm.exchange(out.into_iter().enumerate().collect());
-        let more = heard.iter().map(|m| &m.1).chain([&top]).flat_map(|words| words.chunks_exact(2));
+        let mut heard: Vec<Vec<u64>> = comm
+            .exchange(out.into_iter().enumerate().collect())
+            .into_iter()
+            .map(|(_, words)| words)
+            .collect();
+        if self.is_shared(l) {
+            heard.extend(comm.all_gather(&top).iter().cloned());
+        }
+        let more = heard.iter().flat_map(|words| words.chunks_exact(2));
         let more = more.map(|w| Brick { key: w[0], bits: w[1] }).collect();
         (mine.union(BrickSet::from_unsorted(more)), sent)
     }
@@ -145,7 +178,7 @@ impl Ownership {
     /// Checks that the base leaves tile the root.
     pub fn check_invariants(&self) {
         let mut at = 0;
-        for (b, &start) in self.leaves.iter().zip(&self.starts) {
+        for (b, &start) in self.dealt.leaves.iter().zip(&self.dealt.starts) {
             assert_eq!(start, at, "base leaves must follow each other");
             assert!(b.owner < self.ranks, "a base leaf's owner is a rank");
             at += 1 << (3 * (LEVEL_MAX - b.level));

@@ -301,7 +301,7 @@ fn run_length(homes: &[Home], end: Home) -> usize {
 }
 
 /// Whether the facet's extent meets the closed octant.
-pub fn reaches(f: &Facet, o: &Start) -> bool {
+fn reaches(f: &Facet, o: &Start) -> bool {
     let (at, h) = (corner(o.level, o.code), edge(o.level));
     (0..3).all(|a| {
         let (lo, hi) = f.range(a);

@@ -232,7 +232,7 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     words.extend(mine.digests.octants.iter().flat_map(|&d| split(d)));
     let mut digests = Digests::default();
     let mut parts = Vec::new();
-    for theirs in comm.all_gather(&words) {
+    for theirs in comm.all_gather(&words).iter() {
         parts.push([theirs[0], theirs[1], theirs[2]]);
         let octants: Vec<u128> = theirs[3..]
             .chunks_exact(2)

@@ -27,9 +27,9 @@ fn by_mesher(case: &Small) -> Firsts {
     let nodes = Nodes::new(&tree, &share);
     let mut local = components::join(&nodes);
     let faces = std::mem::take(&mut local.faces);
-    let (class, classes) = local.classes();
-    let names = global::names(&nodes, faces, &class, classes, &Solo);
-    let found = vote::candidates(&nodes, &tree, &class, &names, &share, &Solo);
+    let classes = local.classes();
+    let names = global::names(&nodes, &tree, &share, faces, &classes, &Solo);
+    let found = vote::candidates(&nodes, &tree, &classes.of, &names, &share, &Solo);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 

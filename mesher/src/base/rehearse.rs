@@ -43,7 +43,7 @@ pub fn weights(
     leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
     let share = Ownership::new(comm.rank(), comm.size(), cut.internal.clone(), leaves);
     let mut counts = vec![0u64; cut.leaves.len()];
-    for theirs in comm.all_gather(&rehearse(facets, &coarse, cut, &share, comm)) {
+    for theirs in comm.all_gather(&rehearse(facets, &coarse, cut, &share, comm)).iter() {
         theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
     }
     let scale = 1 << coarser;

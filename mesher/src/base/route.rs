@@ -2,9 +2,9 @@
 
 use crate::comm::Comm;
 use crate::facet::Facet;
-use crate::octant::{LEVEL_MAX, start57};
-use crate::share::Ownership;
-use crate::voxelise::{Home, Start, reaches};
+use crate::octant::{LEVEL_MAX, Level, corner, edge, start57};
+use crate::share::{BaseLeaf, Ownership};
+use crate::voxelise::Home;
 
 /// Brings every facet to the owners of the base leaves that its extent reaches. Collective.
 pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet> {
@@ -12,18 +12,13 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
     let mut last = vec![u64::MAX; comm.size()];
     for (i, f) in (0u64..).zip(facets) {
         let Some(home) = Home::of(f) else { continue };
-        let first = share.leaf_at(home.start());
-        let end = home.start() + (1 << (3 * (LEVEL_MAX - home.level())));
-        for b in &share.leaves()[first..] {
-            if start57(b.level, b.code) >= end {
-                break;
-            }
-            let there =
-                b.level <= home.level() || reaches(f, &Start { level: b.level, code: b.code });
-            if there && std::mem::replace(&mut last[b.owner], i) != i {
+        let extent = std::array::from_fn(|a| f.range(a));
+        let code = home.start() >> (3 * (LEVEL_MAX - home.level()));
+        visit(share, &extent, home.level(), code, &mut |b| {
+            if std::mem::replace(&mut last[b.owner], i) != i {
                 packed[b.owner].push(*f);
             }
-        }
+        });
     }
     let mut mine = std::mem::take(&mut packed[comm.rank()]);
     let out = packed.iter().map(|facets| facets.iter().flat_map(pack).collect());
@@ -31,6 +26,29 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
         mine.extend(words.chunks_exact(5).map(unpack));
     }
     mine
+}
+
+/// Tells `found` the base leaves that an extent, inside an octant's, reaches.
+fn visit(
+    share: &Ownership,
+    extent: &[(i64, i64); 3],
+    l: Level,
+    code: u64,
+    found: &mut impl FnMut(&BaseLeaf),
+) {
+    let leaf = &share.leaves()[share.leaf_at(start57(l, code))];
+    if leaf.level <= l {
+        return found(leaf);
+    }
+    let (at, half) = (corner(l, code), edge(l + 1));
+    // By axis, whether the lower and the upper half are reached; they are closed.
+    let halves: [[bool; 2]; 3] =
+        std::array::from_fn(|a| [extent[a].0 <= at[a] + half, extent[a].1 >= at[a] + half]);
+    for child in 0..8 {
+        if (0..3).all(|a| halves[a][child >> a & 1]) {
+            visit(share, extent, l + 1, code << 3 | child as u64, found);
+        }
+    }
 }
 
 /// Nine coordinates in five words.
@@ -49,6 +67,45 @@ fn unpack(words: &[u64]) -> Facet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brick::Brick;
+    use crate::brickset::BrickSet;
+    use crate::tree::per_level;
+    use proptest::prelude::*;
+
+    /// The root's children, and the children of some of those.
+    fn two_levels(split: u8) -> Ownership {
+        let mut internal = per_level();
+        internal[0] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: 1 }]);
+        internal[1] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: u64::from(split) }]);
+        let leaf = |level, code| BaseLeaf { level, code, owner: 0 };
+        let leaves = (0..8u64).flat_map(|c| match split >> c & 1 {
+            0 => vec![leaf(1, c)],
+            _ => (0..8).map(|d| leaf(2, c << 3 | d)).collect(),
+        });
+        Ownership::new(0, 1, internal, leaves.collect())
+    }
+
+    proptest! {
+        #[test]
+        fn all_leaves_that_an_extent_reaches_are_found(
+            split in 1u8..,
+            v in prop::array::uniform3(prop::array::uniform3(-2i32..=10)),
+        ) {
+            // Corners on and beside the octants' faces, and beyond the root.
+            let v = v.map(|p| p.map(|c| (c / 2) * (1 << 25) + c % 2));
+            let (f, share) = (Facet { v }, two_levels(split));
+            let reached = |b: &BaseLeaf| (0..3).all(|a| {
+                let at = corner(b.level, b.code)[a];
+                f.range(a).0 <= at + edge(b.level) && f.range(a).1 >= at
+            });
+            let mut found = Vec::new();
+            visit(&share, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| found.push(*b));
+            // The root itself is taken to be reached; what is outside it has no home.
+            prop_assume!(reached(&BaseLeaf { level: 0, code: 0, owner: 0 }));
+            let want: Vec<BaseLeaf> = share.leaves().iter().filter(|b| reached(b)).copied().collect();
+            prop_assert_eq!(found, want);
+        }
+    }
 
     #[test]
     fn facets_survive_the_journey() {

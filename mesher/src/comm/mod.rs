@@ -14,6 +14,7 @@ pub mod sim;
 use crate::error::Error;
 use cpu_time::ThreadTime;
 use std::cell::Cell;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// What a rank has sent so far, to others only, and how long it was at it.
@@ -29,6 +30,10 @@ pub struct Traffic {
     pub time_cpu_s: f64,
 }
 
+/// Words by rank. Ranks of one process share them: a copy for each would take memory, and time, that no
+/// real rank takes.
+pub type ByRank = Arc<[Vec<u64>]>;
+
 /// A group of ranks.
 pub trait Comm {
     /// This rank, from 0.
@@ -38,11 +43,16 @@ pub trait Comm {
     fn size(&self) -> usize;
 
     /// Everyone's words, by rank. Collective.
-    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>>;
+    fn all_gather(&self, mine: &[u64]) -> ByRank;
 
     /// Sends words to some ranks and returns what others sent here, with the sender, in no
     /// particular order. At most one entry per receiver; empty ones are not sent. Collective.
     fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)>;
+
+    /// Ranks that share this rank's process, itself included.
+    fn ranks_in_process(&self) -> usize {
+        1
+    }
 
     /// What this rank has sent.
     fn traffic(&self) -> Traffic;
@@ -164,8 +174,8 @@ impl Comm for Solo {
         1
     }
 
-    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
-        vec![mine.to_vec()]
+    fn all_gather(&self, mine: &[u64]) -> ByRank {
+        Arc::new([mine.to_vec()])
     }
 
     fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {

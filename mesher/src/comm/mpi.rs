@@ -4,7 +4,7 @@
 //! of mostly empty messages costs a hundred times a sparse one when ranks share cores. Messages are cut
 //! into chunks, as MPI counts in i32.
 
-use super::{Comm, Meter, Traffic};
+use super::{ByRank, Comm, Meter, Traffic};
 use mpi::environment::Universe;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
 
@@ -54,8 +54,8 @@ impl Comm for Mpi {
         self.world.size() as usize
     }
 
-    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
-        self.meter.call(|| self.all_gather_untimed(mine))
+    fn all_gather(&self, mine: &[u64]) -> ByRank {
+        self.meter.call(|| self.all_gather_untimed(mine).into())
     }
 
     fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {

@@ -4,7 +4,7 @@
 //! has to wait for others. Who gets it next, and in which order messages arrive, is drawn from a seed: a
 //! failure is replayed by its seed, and a rank's CPU time is not disturbed by the others.
 
-use super::{Comm, Meter, Traffic};
+use super::{ByRank, Comm, Meter, Traffic};
 use std::any::Any;
 use std::cell::Cell;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -38,18 +38,32 @@ enum Doing {
 struct State {
     running: usize,
     doing: Vec<Doing>,
-    /// What each rank has put into the call under way: its number, kind, and words by receiver.
+    /// What each rank has put into the call under way.
     posted: Vec<Option<Post>>,
     /// What each rank takes out of it.
-    inbox: Vec<Option<Messages>>,
+    inbox: Vec<Option<Delivery>>,
     random: u64,
     broken: bool,
 }
 
 struct Post {
+    /// The call's number.
     call: u64,
-    gather: bool,
-    words: Messages,
+    words: Words,
+}
+
+/// What a rank puts into a call.
+enum Words {
+    /// For everybody.
+    Gather(Vec<u64>),
+    /// By receiver.
+    Exchange(Messages),
+}
+
+/// What it takes out.
+enum Delivery {
+    Gathered(ByRank),
+    Exchanged(Messages),
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -102,6 +116,7 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
     results.into_iter().map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
 }
 
+const UNEQUAL: &str = "ranks must make the same collective calls in the same order";
 const ENDED: &str = "ended because another simulated rank panicked";
 
 /// Hands the token on when a rank ends, in good order or by a panic.
@@ -131,13 +146,30 @@ impl State {
             return;
         }
         let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
-        let same = posts.iter().all(|p| p.call == posts[0].call && p.gather == posts[0].gather);
-        assert!(same, "ranks must make the same collective calls in the same order");
-        let mut inbox: Vec<Messages> = vec![Vec::new(); posts.len()];
-        for (from, post) in posts.into_iter().enumerate() {
-            for (to, words) in post.words {
-                inbox[to].push((from, words));
+        let (ranks, call) = (posts.len(), posts[0].call);
+        let (mut gathered, mut exchanged) = (Vec::new(), Vec::new());
+        for post in posts {
+            assert!(post.call == call, "{UNEQUAL}");
+            match post.words {
+                Words::Gather(words) => gathered.push(words),
+                Words::Exchange(messages) => exchanged.push(messages),
             }
+        }
+        assert!(gathered.is_empty() || exchanged.is_empty(), "{UNEQUAL}");
+        self.inbox = if exchanged.is_empty() {
+            let all: ByRank = gathered.into();
+            (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
+        } else {
+            self.sorted(exchanged).into_iter().map(|m| Some(Delivery::Exchanged(m))).collect()
+        };
+        self.doing.iter_mut().for_each(|d| *d = Doing::Ready);
+    }
+
+    /// Messages by receiver, in an order that is drawn, from those by sender.
+    fn sorted(&mut self, sent: Vec<Messages>) -> Vec<Messages> {
+        let mut inbox: Vec<Messages> = vec![Vec::new(); sent.len()];
+        for (from, messages) in sent.into_iter().enumerate() {
+            messages.into_iter().for_each(|(to, words)| inbox[to].push((from, words)));
         }
         for messages in &mut inbox {
             for i in (1..messages.len()).rev() {
@@ -145,8 +177,7 @@ impl State {
                 messages.swap(i, j);
             }
         }
-        self.inbox = inbox.into_iter().map(Some).collect();
-        self.doing.iter_mut().for_each(|d| *d = Doing::Ready);
+        inbox
     }
 }
 
@@ -185,21 +216,10 @@ impl Sim {
         }
     }
 
-    fn call(&self, gather: bool, words: Messages) -> Messages {
-        self.meter.call(|| self.call_untimed(gather, words))
-    }
-
-    fn call_untimed(&self, gather: bool, words: Messages) -> Messages {
+    fn call(&self, words: Words) -> Delivery {
         let call = self.calls.replace(self.calls.get() + 1);
-        if gather {
-            self.meter.gather(self.world.size, words[0].1.len() as u64);
-        } else {
-            self.meter.announce(self.world.size);
-            let sent = words.iter().filter(|m| m.0 != self.rank);
-            sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
-        }
         let mut state = self.lock();
-        state.posted[self.rank] = Some(Post { call, gather, words });
+        state.posted[self.rank] = Some(Post { call, words });
         state.doing[self.rank] = Doing::Waiting;
         state.deliver();
         self.hand_on(&mut state);
@@ -218,14 +238,27 @@ impl Comm for Sim {
         self.world.size
     }
 
-    fn all_gather(&self, mine: &[u64]) -> Vec<Vec<u64>> {
-        let mut all = self.call(true, (0..self.size()).map(|to| (to, mine.to_vec())).collect());
-        all.sort_unstable_by_key(|m| m.0);
-        all.into_iter().map(|m| m.1).collect()
+    fn all_gather(&self, mine: &[u64]) -> ByRank {
+        self.meter.gather(self.size(), mine.len() as u64);
+        match self.meter.call(|| self.call(Words::Gather(mine.to_vec()))) {
+            Delivery::Gathered(all) => all,
+            Delivery::Exchanged(_) => unreachable!("{UNEQUAL}"),
+        }
     }
 
     fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
-        self.call(false, to.into_iter().filter(|m| !m.1.is_empty()).collect())
+        self.meter.announce(self.size());
+        let to: Messages = to.into_iter().filter(|m| !m.1.is_empty()).collect();
+        let sent = to.iter().filter(|m| m.0 != self.rank);
+        sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
+        match self.meter.call(|| self.call(Words::Exchange(to))) {
+            Delivery::Exchanged(messages) => messages,
+            Delivery::Gathered(_) => unreachable!("{UNEQUAL}"),
+        }
+    }
+
+    fn ranks_in_process(&self) -> usize {
+        self.size()
     }
 
     fn traffic(&self) -> Traffic {

@@ -18,8 +18,16 @@ pub struct Local {
     pub faces: Vec<Face>,
 }
 
+/// Joined components, numbered.
+pub struct Classes {
+    /// The class of each component.
+    pub of: Vec<u32>,
+    /// How many there are.
+    pub count: u32,
+}
+
 /// Octants of a brick, of leaf size or finer, that a component faces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
     /// The rank whose brick it is.
     pub rank: usize,
@@ -45,8 +53,8 @@ impl Local {
         c
     }
 
-    /// Numbers the classes of joined components: the class of each component, and how many there are.
-    pub fn classes(self) -> (Vec<u32>, usize) {
+    /// Numbers the classes of joined components.
+    pub fn classes(self) -> Classes {
         let mut class = self.parent;
         let mut count = 0;
         for c in 0..class.len() {
@@ -55,7 +63,7 @@ impl Local {
             class[c] = if up == c { count } else { class[up] };
             count += u32::from(up == c);
         }
-        (class, count as usize)
+        Classes { of: class, count }
     }
 
     /// Joins two components; the lower number stands for both.

@@ -1,16 +1,16 @@
 //! Components across ranks: names that all ranks agree on.
 //!
-//! Each rank tells its neighbours which octants of theirs its components face, so that the same
-//! component gets the same name everywhere; top bricks, of which all hold copies, tie the rest together. Only
-//! pairs of names travel.
+//! What reaches into top bricks, of which all hold copies, is named by them. Each rank tells its
+//! neighbours which octants of theirs its components face, and by what name; where names differ, they
+//! are joined. Only such pairs travel to everybody.
 
-use super::components::Face;
-use super::nodes::Nodes;
+use super::components::{self, Classes, Face};
+use super::nodes::{Component, Nodes};
 use crate::comm::Comm;
 use crate::octant::Level;
-use crate::share::Place;
-use crate::tree::LEVELS;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use crate::share::{Ownership, Place};
+use crate::tree::{LEVELS, Tree};
+use std::collections::HashMap;
 
 /// A component's name, the same on all ranks.
 pub type Name = u64;
@@ -18,96 +18,97 @@ pub type Name = u64;
 /// Names for this rank's classes of joined components. Collective.
 pub fn names(
     nodes: &Nodes,
+    tree: &Tree,
+    share: &Ownership,
     faces: Vec<Face>,
-    class: &[u32],
-    classes: usize,
+    classes: &Classes,
     comm: &dyn Comm,
 ) -> Vec<Name> {
     let own = |class: u32| (comm.rank() as u64 + 1) << 40 | u64::from(class);
+    let mut names: Vec<Name> = (0..classes.count).map(own).collect();
     if comm.size() == 1 {
-        return (0..classes as u32).map(own).collect();
+        return names;
     }
-    let pairs = across_ranks(nodes, faces, class, &own, comm);
-    let tops: Vec<Name> = top_components(nodes).iter().map(|&c| own(class[c as usize])).collect();
-    let mut words = vec![pairs.len() as u64];
-    words.extend(pairs.into_iter().flat_map(|(a, b)| [a, b]));
-    words.extend(runs(&tops));
-    let joined = join_all(&comm.all_gather(&words), tops.len());
-    (0..classes as u32).map(|c| joined.find(own(c))).collect()
-}
-
-/// Where equal names of top components follow each other: first, number and name of each such run. All
-/// ranks have the same top components in the same order, so runs say it shorter than pairs, by far.
-fn runs(tops: &[Name]) -> Vec<u64> {
-    let mut first = 0;
-    let of = |run: &[Name]| {
-        first += run.len() as u64;
-        [first - run.len() as u64, run.len() as u64, run[0]]
-    };
-    tops.chunk_by(|a, b| a == b).flat_map(of).collect()
-}
-
-/// Joins what all ranks tell: a number of pairs, the pairs, and the runs of top components.
-fn join_all(told: &[Vec<u64>], tops: usize) -> Joined {
-    let parts = || told.iter().map(|w| w[1..].split_at(2 * w[0] as usize));
-    // A top component is one with its predecessor if any rank says so; what is one is joined to others once.
-    let mut follows = vec![false; tops];
-    for run in parts().flat_map(|(_, runs)| runs.chunks_exact(3)) {
-        follows[run[0] as usize + 1..(run[0] + run[1]) as usize].fill(true);
-    }
-    let mut first = 0;
-    let firsts: Vec<Name> = (0..)
-        .zip(follows)
-        .map(|(top, follows)| {
-            first = if follows { first } else { top };
-            first
-        })
-        .collect();
+    let mut pairs = name_by_top(&mut names, nodes, tree, share, classes);
+    pairs.extend(across_ranks(nodes, faces, classes, &names, comm));
+    pairs.sort_unstable();
+    pairs.dedup();
     let mut joined = Joined::default();
-    for (pairs, runs) in parts() {
-        pairs.chunks_exact(2).for_each(|p| joined.join(p[0], p[1]));
-        runs.chunks_exact(3).for_each(|run| joined.join(firsts[run[0] as usize], run[2]));
+    for theirs in comm.all_gather(pairs.as_flattened()).iter() {
+        theirs.chunks_exact(2).for_each(|p| joined.join(p[0], p[1]));
     }
-    joined
+    names.iter().map(|&n| joined.find(n)).collect()
+}
+
+/// Gives the classes that a top brick has part of the name that they have for all ranks: the number of
+/// a class of what is joined within the top. Returns the pairs of such names that are one class here.
+///
+/// Everyone holds the top, and joins it in the same way; so no word of it need travel.
+fn name_by_top(
+    names: &mut [Name],
+    nodes: &Nodes,
+    tree: &Tree,
+    share: &Ownership,
+    classes: &Classes,
+) -> Vec<[Name; 2]> {
+    let bystander = share.bystander();
+    let top = Nodes::new(&share.top_of(tree), &bystander);
+    let of_top = components::join(&top).classes().of;
+    let here = top_components(nodes);
+    assert_eq!(here.len(), of_top.len(), "all ranks hold the same top bricks");
+    let mut pairs = Vec::new();
+    let mut named = vec![false; names.len()];
+    for (c, top) in here.into_iter().zip(of_top) {
+        let class = classes.of[c as usize] as usize;
+        let (name, top) = (&mut names[class], Name::from(top));
+        if !std::mem::replace(&mut named[class], true) {
+            *name = top;
+        } else if *name != top {
+            pairs.push([*name, top]);
+        }
+    }
+    pairs
 }
 
 /// Pairs of names that are joined over a face between this rank's bricks and another's. Collective.
 fn across_ranks(
     nodes: &Nodes,
-    faces: Vec<Face>,
-    class: &[u32],
-    own: &impl Fn(u32) -> Name,
+    mut faces: Vec<Face>,
+    classes: &Classes,
+    names: &[Name],
     comm: &dyn Comm,
-) -> BTreeSet<(Name, Name)> {
-    let mut merged: BTreeMap<(usize, Level, u64, Name), u64> = BTreeMap::new();
-    for f in faces {
-        *merged.entry((f.rank, f.level, f.key, own(class[f.component as usize]))).or_default() |=
-            f.bits;
-    }
+) -> Vec<[Name; 2]> {
+    let name = |c: Component| names[classes.of[c as usize] as usize];
+    let place = |f: &Face| (f.rank, f.level, f.key, name(f.component));
+    faces.sort_unstable_by_key(place);
     let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size()];
-    for ((rank, level, key, name), bits) in merged {
+    for run in faces.chunk_by(|a, b| place(a) == place(b)) {
+        let bits = run.iter().fold(0, |all, f| all | f.bits);
+        let (rank, level, key, name) = place(&run[0]);
         out[rank].extend([u64::from(level), key, name, bits]);
     }
-    let mut pairs = BTreeSet::new();
-    let mut found = Vec::new();
+    drop(faces);
+    let mut pairs = Vec::new();
     for (_, words) in comm.exchange(out.into_iter().enumerate().collect()) {
         for w in words.chunks_exact(4) {
-            found.clear();
-            nodes.meet(w[0] as Level, w[1], w[3], &mut found);
-            pairs.extend(found.iter().map(|&c| (w[2], own(class[c as usize]))));
+            nodes.meet(w[0] as Level, w[1], w[3], |c| {
+                let (theirs, mine) = (w[2], name(c));
+                // Most of what faces another rank is named by the top already.
+                if theirs != mine && pairs.last() != Some(&[theirs, mine]) {
+                    pairs.push([theirs, mine]);
+                }
+            });
         }
     }
     pairs
 }
 
 /// The components of top bricks, in an order that is the same on all ranks.
-fn top_components(nodes: &Nodes) -> Vec<u32> {
+fn top_components(nodes: &Nodes) -> Vec<Component> {
     let mut out = Vec::new();
     for l in 0..LEVELS as Level {
-        for n in 0..nodes.len(l) {
-            if nodes.place(l, n) == Place::Top {
-                out.extend(nodes.components(l, n).map(|c| c.0));
-            }
+        for n in nodes.shared(l).filter(|&n| nodes.place(l, n) == Place::Top) {
+            out.extend(nodes.components(l, n).map(|c| c.0));
         }
     }
     out
@@ -145,24 +146,6 @@ impl Joined {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn top_components_join_what_any_rank_joins() {
-        // Five top components; one rank has 0 = 1 and 3 = 4, the other 1 = 2 and 0 = 4.
-        let words = |pairs: &[u64], tops: &[Name]| {
-            let mut words = vec![pairs.len() as u64 / 2];
-            words.extend(pairs);
-            words.extend(runs(tops));
-            words
-        };
-        let one = words(&[101, 202], &[100, 100, 103, 104, 104]);
-        let two = words(&[], &[200, 201, 201, 203, 200]);
-        assert_eq!(one.len(), 1 + 2 + 3 * 3);
-        let j = join_all(&[one, two], 5);
-        assert!([100, 104, 200, 201, 203].iter().all(|&n| j.find(n) == j.find(103)));
-        assert_eq!(j.find(101), j.find(202));
-        assert_ne!(j.find(101), j.find(100));
-    }
 
     #[test]
     fn names_join_through_chains() {

@@ -53,16 +53,21 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Sides {
     let nodes = nodes::Nodes::new(tree, share);
+
     let mut local = components::join(&nodes);
     let faces = std::mem::take(&mut local.faces);
-    let (class, classes) = local.classes();
-    let names = global::names(&nodes, faces, &class, classes, comm);
-    let candidates = vote::candidates(&nodes, tree, &class, &names, share, comm);
+    let classes = local.classes();
+
+    let names = global::names(&nodes, tree, share, faces, &classes, comm);
+
+    let candidates = vote::candidates(&nodes, tree, &classes.of, &names, share, comm);
     // The largest thing in memory; for the sides, bricks are flooded once more.
     drop(nodes);
+
     let verdict = vote::decide(&candidates, facets, comm);
+
     let inside: Vec<bool> = names.iter().map(|n| verdict.inside.contains(n)).collect();
-    let mut inside = class.into_iter().map(|c| inside[c as usize]);
+    let mut inside = classes.of.into_iter().map(|c| inside[c as usize]);
     let mut sides = Sides {
         inside: per_level(),
         deleted: per_level(),
@@ -84,6 +89,7 @@ pub fn decide(
             sides.deleted[l as usize].push(b.key, deleted);
         }
     }
+
     debug_assert!(inside.next().is_none(), "every component has a side");
     sides
 }

@@ -4,10 +4,10 @@
 //! level, one per byte of `split` that is not zero; components are numbered through all levels in order.
 
 use crate::brick;
-use crate::brickset::ones;
 use crate::octant::Level;
 use crate::share::{Ownership, Place};
 use crate::tree::{LEVELS, Tree};
+use std::ops::Range;
 
 /// Number of a component inside a brick.
 pub type Component = u32;
@@ -162,24 +162,34 @@ impl Nodes {
         self.components(l, n).find(|c| c.1 >> bit & 1 == 1).map(|c| c.0)
     }
 
-    /// The components that the octants `bits` of brick `key` of level `l` touch: of leaves of that level,
-    /// or of the coarser leaves that they lie in; octants that are split have none.
-    pub fn meet(&self, l: Level, key: u64, bits: u64, found: &mut Vec<Component>) {
-        for bit in ones(bits) {
-            found.extend(self.leaf_component(l, key << 6 | u64::from(bit)));
-        }
+    /// The nodes of a level that may be another's too.
+    pub fn shared(&self, l: Level) -> Range<Node> {
+        0..self.levels[l as usize].places.len() as Node
     }
 
-    /// The component of the leaf of level `l` or coarser at an octant.
-    fn leaf_component(&self, l: Level, code: u64) -> Option<Component> {
+    /// Tells `found` the components that the octants `bits` of brick `key` of level `l` touch: of leaves of that
+    /// level, or of the coarser leaves that they lie in; octants that are split have none.
+    pub fn meet(&self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
         let mut node = 0;
         for m in 0..=l {
-            let at = code >> (3 * (l - m));
-            if self.split(m, node) >> (at & 63) & 1 == 0 {
-                return self.component_of(m, node, at & 63);
+            // Down to two levels above, the octants lie in one; then in those of one group; then they are told apart.
+            let here = match l - m {
+                0 => bits,
+                1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
+                up => 1 << (key >> (3 * (up - 2)) & 63),
+            };
+            let split = self.split(m, node);
+            let leaves = here & !split;
+            self.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
+            if here & split == 0 || m == l {
+                return;
             }
-            node = self.child(m, node, at >> 3 & 7)?.0;
+            let group = match l - m {
+                1 => key & 7,
+                up => key >> (3 * (up - 2) + 3) & 7,
+            };
+            let Some((below, _)) = self.child(m, node, group) else { return };
+            node = below;
         }
-        None
     }
 }

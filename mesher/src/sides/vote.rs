@@ -73,7 +73,7 @@ pub fn candidates(
         .collect();
     drop(first);
     let mut all: BTreeMap<Name, Vec<Candidate>> = BTreeMap::new();
-    for words in comm.all_gather(&flat) {
+    for words in comm.all_gather(&flat).iter() {
         words.chunks_exact(2).for_each(|w| all.entry(w[0]).or_default().push(Candidate(w[1])));
     }
     for list in all.values_mut() {
@@ -136,7 +136,7 @@ fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     let pack = |bytes: &[u8]| bytes.iter().rev().fold(0u64, |w, &b| w << 8 | u64::from(b));
     let words: Vec<u64> = mine.chunks(8).map(pack).collect();
     let mut total = vec![0u64; words.len()];
-    for theirs in comm.all_gather(&words) {
+    for theirs in comm.all_gather(&words).iter() {
         total.iter_mut().zip(theirs).for_each(|(t, w)| *t ^= w);
     }
     (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()
