@@ -147,7 +147,7 @@ fn mark(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> (Tree
     for sets in [&mine.split, &mine.crossing] {
         for set in &sets[..=level as usize] {
             words.push(set.len() as u64);
-            words.extend(set.bricks().iter().flat_map(|b| [b.key, b.bits]));
+            words.extend(set.bricks().flat_map(|b| [b.key, b.bits]));
         }
     }
     let all = comm.all_gather(&words);
@@ -209,13 +209,13 @@ fn cut(marks: &Tree, internal: PerLevel, surface: Level) -> Cut {
     let mut leaves = Vec::new();
     for l in 0..=level_base as usize {
         let is_top = |key: u64| l < 2 || internal[l - 2].contains(key);
-        for b in marks.split[l].bricks().iter().filter(|b| is_top(b.key)) {
+        for b in marks.split[l].bricks().filter(|b| is_top(b.key)) {
             top.split[l].push(b.key, b.bits);
         }
         if l as Level >= surface {
             // A leaf that one rank's facets cross may be split by another's box or facets.
             let mut split = marks.split[l].cursor();
-            for b in marks.crossing[l].bricks().iter().filter(|b| is_top(b.key)) {
+            for b in marks.crossing[l].bricks().filter(|b| is_top(b.key)) {
                 top.crossing[l].push(b.key, b.bits & !split.get(b.key));
             }
         }

@@ -1,25 +1,58 @@
 //! Sets of octants of one level: sorted sequences of bricks.
 //!
-//! Invariants: keys strictly ascend; no brick is empty.
+//! A mesh is limited by the memory that its sets take. Keys that follow each other agree in their upper
+//! halves but for a few thousand places; so those are kept once per run, and a brick takes 12 bytes.
+//!
+//! Invariants: keys strictly ascend; no brick is empty; runs have ascending upper halves, and at least a
+//! brick each.
 
 use crate::brick::{self, Brick};
+
+/// Bits of a key that are kept per brick.
+const LOW_BITS: u32 = 32;
 
 /// A set of octants of one level.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BrickSet {
-    bricks: Vec<Brick>,
+    /// Lower halves of the keys.
+    low: Vec<u32>,
+    bits: Vec<u64>,
+    runs: Vec<Run>,
+}
+
+/// Bricks whose keys agree in their upper half.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Run {
+    /// The upper half, in its place.
+    high: u64,
+    /// The first brick's position.
+    start: usize,
+}
+
+/// A key's upper half, in its place.
+#[inline]
+const fn high_of(key: u64) -> u64 {
+    key >> LOW_BITS << LOW_BITS
 }
 
 impl BrickSet {
+    /// Nothing.
+    pub const EMPTY: Self = Self { low: Vec::new(), bits: Vec::new(), runs: Vec::new() };
+
     /// The set of the given bricks, which may come in any order and repeat keys.
     pub fn from_unsorted(mut bricks: Vec<Brick>) -> Self {
         bricks.sort_unstable_by_key(|b| b.key);
         let mut set = Self::default();
-        set.bricks.reserve_exact(bricks.len());
+        set.reserve_exact(bricks.len());
         for b in bricks {
             set.push(b.key, b.bits);
         }
         set
+    }
+
+    fn reserve_exact(&mut self, more: usize) {
+        self.low.reserve_exact(more);
+        self.bits.reserve_exact(more);
     }
 
     /// Adds octants at or behind the last brick.
@@ -31,39 +64,53 @@ impl BrickSet {
         if bits == 0 {
             return;
         }
-        match self.bricks.last_mut() {
-            Some(last) if last.key == key => last.bits |= bits,
-            last => {
-                assert!(last.is_none_or(|l| l.key < key), "bricks must be added in Morton order");
-                self.bricks.push(Brick { key, bits });
+        let high = high_of(key);
+        let last = self.runs.last().map_or(0, |run| run.high);
+        if let Some(&low) = self.low.last() {
+            let before = last | u64::from(low);
+            if before == key {
+                let end = self.bits.len() - 1;
+                self.bits[end] |= bits;
+                return;
             }
+            assert!(before < key, "bricks must be added in Morton order");
         }
+        if high != last || self.runs.is_empty() {
+            self.runs.push(Run { high, start: self.low.len() });
+        }
+        self.low.push(key as u32);
+        self.bits.push(bits);
     }
 
     /// The bricks in order.
     #[inline]
-    pub fn bricks(&self) -> &[Brick] {
-        &self.bricks
+    pub fn bricks(&self) -> Bricks<'_> {
+        Bricks { set: self, at: 0, run_end: 0, high: 0, runs: &self.runs }
     }
 
     /// Number of bricks.
     pub fn len(&self) -> usize {
-        self.bricks.len()
+        self.low.len()
     }
 
     /// Whether the set is empty.
     pub fn is_empty(&self) -> bool {
-        self.bricks.is_empty()
+        self.low.is_empty()
     }
 
     /// Number of octants.
     pub fn count(&self) -> u64 {
-        self.bricks.iter().map(|b| u64::from(b.bits.count_ones())).sum()
+        self.bits.iter().map(|b| u64::from(b.count_ones())).sum()
     }
 
     /// The bits of a brick, 0 where the set has none of it.
     pub fn get(&self, key: u64) -> u64 {
-        self.bricks.binary_search_by_key(&key, |b| b.key).map_or(0, |i| self.bricks[i].bits)
+        let Ok(run) = self.runs.binary_search_by_key(&high_of(key), |r| r.high) else {
+            return 0;
+        };
+        let range = self.runs[run].start..self.runs.get(run + 1).map_or(self.len(), |r| r.start);
+        let found = self.low[range.clone()].binary_search(&(key as u32));
+        found.map_or(0, |i| self.bits[range.start + i])
     }
 
     /// Whether the octant with this Morton code is in the set.
@@ -73,50 +120,74 @@ impl BrickSet {
 
     /// A reader that must be asked for keys in ascending order.
     pub fn cursor(&self) -> Cursor<'_> {
-        Cursor { rest: &self.bricks }
+        let mut cursor = Cursor { set: self, low: &[], end: 0, high: u64::MAX, runs: &self.runs };
+        cursor.next_run();
+        cursor
     }
 
     /// The union of two sets. In place, from the back, as sets can be a good part of all memory.
     pub fn union(self, other: Self) -> Self {
-        let (Self { mut bricks }, Self { bricks: rest }) =
-            if self.len() < other.len() { (other, self) } else { (self, other) };
+        let (mut set, rest) = if self.len() < other.len() { (other, self) } else { (self, other) };
         if rest.is_empty() {
-            return Self { bricks };
+            return set;
         }
-        let mut there = Cursor { rest: &bricks };
-        let common = rest.iter().filter(|b| there.get(b.key) != 0).count();
-        let (mut i, mut j) = (bricks.len(), rest.len());
-        let mut k = i + j - common;
-        bricks.reserve_exact(k - i);
-        bricks.resize(k, Brick { key: 0, bits: 0 });
-        while j > 0 {
+        let mut there = set.cursor();
+        let common = rest.bricks().filter(|b| there.get(b.key) != 0).count();
+        let (mut mine, mut theirs) = (Back::new(&set), Back::new(&rest));
+        let mut k = set.len() + rest.len() - common;
+        set.reserve_exact(k - set.len());
+        set.low.resize(k, 0);
+        set.bits.resize(k, 0);
+        // Runs behind those that stay as they are, from the last.
+        let mut runs: Vec<Run> = Vec::new();
+        while let Some(r) = theirs.last(&rest) {
             k -= 1;
-            let r = rest[j - 1];
-            match i.checked_sub(1).map(|i| bricks[i]) {
-                Some(b) if b.key > r.key => {
-                    bricks[k] = b;
-                    i -= 1;
-                }
-                Some(b) if b.key == r.key => {
-                    bricks[k] = Brick { key: b.key, bits: b.bits | r.bits };
-                    i -= 1;
-                    j -= 1;
-                }
-                _ => {
-                    bricks[k] = r;
-                    j -= 1;
-                }
+            let b = mine.last(&set);
+            let (from_mine, from_theirs) =
+                (b.is_some_and(|b| b.key >= r.key), b.is_none_or(|b| b.key <= r.key));
+            let key = if from_theirs { r.key } else { b.map_or(r.key, |b| b.key) };
+            let part = |from: bool, bits: u64| if from { bits } else { 0 };
+            set.low[k] = key as u32;
+            set.bits[k] = part(from_theirs, r.bits) | part(from_mine, b.map_or(0, |b| b.bits));
+            match runs.last_mut() {
+                Some(run) if run.high == high_of(key) => run.start = k,
+                _ => runs.push(Run { high: high_of(key), start: k }),
+            }
+            if from_mine {
+                mine.step(&set);
+            }
+            if from_theirs {
+                theirs.step(&rest);
             }
         }
-        Self { bricks }
+        set.runs.truncate(mine.runs);
+        if set.runs.last().is_some_and(|r| runs.last().is_some_and(|n| n.high == r.high)) {
+            runs.pop();
+        }
+        set.runs.extend(runs.into_iter().rev());
+        set
     }
 
     /// Changes the bits of every brick, in order, to what `keep` makes of them.
     pub fn retain(&mut self, mut keep: impl FnMut(Brick) -> u64) {
-        self.bricks.retain_mut(|b| {
-            b.bits = keep(*b);
-            b.bits != 0
-        });
+        let runs = std::mem::take(&mut self.runs);
+        let mut kept = 0;
+        for (i, run) in runs.iter().enumerate() {
+            let first = kept;
+            for at in run.start..runs.get(i + 1).map_or(self.low.len(), |r| r.start) {
+                let low = self.low[at];
+                let bits = keep(Brick { key: run.high | u64::from(low), bits: self.bits[at] });
+                if bits != 0 {
+                    (self.low[kept], self.bits[kept]) = (low, bits);
+                    kept += 1;
+                }
+            }
+            if kept > first {
+                self.runs.push(Run { high: run.high, start: first });
+            }
+        }
+        self.low.truncate(kept);
+        self.bits.truncate(kept);
     }
 
     /// The octants that are not in `other`.
@@ -129,54 +200,161 @@ impl BrickSet {
     /// The parents of the set's octants.
     pub fn coarsen(&self) -> Self {
         let mut set = Self::default();
-        for b in &self.bricks {
+        for b in self.bricks() {
             set.push(b.key >> 3, u64::from(brick::parents(b.bits)) << (8 * (b.key & 7)));
         }
         set
     }
 
     /// The children of the set's octants, brick by brick in Morton order.
-    pub fn child_bricks(&self) -> impl Iterator<Item = Brick> + '_ {
-        self.bricks.iter().flat_map(|b| {
-            (0..8).filter_map(move |j| {
-                let byte = brick::byte(b.bits, j);
-                (byte != 0).then(|| Brick { key: b.key << 3 | j, bits: brick::children(byte) })
-            })
-        })
+    #[inline]
+    pub fn child_bricks(&self) -> ChildBricks<'_> {
+        ChildBricks { bricks: self.bricks(), now: Brick { key: 0, bits: 0 }, left: 0 }
     }
 
     /// The codes of the set's octants in Morton order.
     pub fn codes(&self) -> impl Iterator<Item = u64> + '_ {
-        self.bricks.iter().flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
+        self.bricks().flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
     }
 
     /// Checks the invariants; called at the end of a phase in debug builds.
     pub fn check_invariants(&self) {
-        assert!(self.bricks.windows(2).all(|w| w[0].key < w[1].key), "keys must ascend");
-        assert!(self.bricks.iter().all(|b| b.bits != 0), "no brick may be empty");
+        assert!(self.bricks().is_sorted_by(|a, b| a.key < b.key), "keys must ascend");
+        assert!(self.bits.iter().all(|b| *b != 0), "no brick may be empty");
+        assert_eq!(self.low.len(), self.bits.len(), "every key has bits");
+        assert!(self.runs.is_sorted_by(|a, b| a.high < b.high && a.start < b.start));
+    }
+}
+
+/// The bricks of a set in order.
+#[derive(Clone)]
+pub struct Bricks<'a> {
+    set: &'a BrickSet,
+    at: usize,
+    /// End of the current run, and its keys' upper half.
+    run_end: usize,
+    high: u64,
+    /// Runs behind.
+    runs: &'a [Run],
+}
+
+impl Iterator for Bricks<'_> {
+    type Item = Brick;
+
+    #[inline]
+    fn next(&mut self) -> Option<Brick> {
+        if self.at == self.run_end {
+            let (run, behind) = self.runs.split_first()?;
+            self.high = run.high;
+            self.run_end = behind.first().map_or(self.set.len(), |r| r.start);
+            self.runs = behind;
+        }
+        let at = self.at;
+        self.at += 1;
+        Some(Brick { key: self.high | u64::from(self.set.low[at]), bits: self.set.bits[at] })
+    }
+}
+
+/// See [`BrickSet::child_bricks`].
+#[derive(Clone)]
+pub struct ChildBricks<'a> {
+    bricks: Bricks<'a>,
+    now: Brick,
+    /// Groups of the brick that are not told yet.
+    left: u8,
+}
+
+impl Iterator for ChildBricks<'_> {
+    type Item = Brick;
+
+    #[inline]
+    fn next(&mut self) -> Option<Brick> {
+        if self.left == 0 {
+            self.now = self.bricks.next()?;
+            self.left = brick::parents(self.now.bits);
+        }
+        let j = u64::from(self.left.trailing_zeros());
+        self.left &= self.left - 1;
+        let bits = brick::children(brick::byte(self.now.bits, j));
+        Some(Brick { key: self.now.key << 3 | j, bits })
+    }
+}
+
+/// Reads a set from the back; the set may change behind the bricks still to be read.
+struct Back {
+    /// Bricks still to be read.
+    left: usize,
+    /// Runs that have some of them.
+    runs: usize,
+}
+
+impl Back {
+    fn new(set: &BrickSet) -> Self {
+        Self { left: set.len(), runs: set.runs.len() }
+    }
+
+    #[inline]
+    fn last(&self, set: &BrickSet) -> Option<Brick> {
+        let at = self.left.checked_sub(1)?;
+        let key = set.runs[self.runs - 1].high | u64::from(set.low[at]);
+        Some(Brick { key, bits: set.bits[at] })
+    }
+
+    #[inline]
+    fn step(&mut self, set: &BrickSet) {
+        self.left -= 1;
+        self.runs -= usize::from(set.runs[self.runs - 1].start == self.left);
     }
 }
 
 /// Reads a set in ascending order of keys; see [`BrickSet::cursor`].
 pub struct Cursor<'a> {
-    rest: &'a [Brick],
+    set: &'a BrickSet,
+    /// What is left of the current run.
+    low: &'a [u32],
+    /// The run's end, and its keys' upper half; behind the last run higher than any.
+    end: usize,
+    high: u64,
+    /// Runs behind.
+    runs: &'a [Run],
 }
 
 impl Cursor<'_> {
     /// The bits of the brick `key`, which is not before any key asked for earlier.
     #[inline]
     pub fn get(&mut self, key: u64) -> u64 {
-        if self.rest.first().is_some_and(|b| b.key < key) {
+        while self.high < high_of(key) {
+            self.next_run();
+        }
+        if self.high != high_of(key) {
+            return 0;
+        }
+        let want = key as u32;
+        if self.low.first().is_some_and(|low| *low < want) {
             // A gallop: what the reader skips (another rank's share, deleted parts) may be long.
             let mut step = 1;
-            while self.rest.get(step).is_some_and(|b| b.key < key) {
+            while self.low.get(step).is_some_and(|low| *low < want) {
                 step *= 2;
             }
-            let near = &self.rest[step / 2..self.rest.len().min(step + 1)];
-            let skip = step / 2 + near.partition_point(|b| b.key < key);
-            self.rest = &self.rest[skip..];
+            let near = &self.low[step / 2..self.low.len().min(step + 1)];
+            let skip = step / 2 + near.partition_point(|low| *low < want);
+            self.low = &self.low[skip..];
         }
-        self.rest.first().filter(|b| b.key == key).map_or(0, |b| b.bits)
+        match self.low.first() {
+            Some(&low) if low == want => self.set.bits[self.end - self.low.len()],
+            _ => 0,
+        }
+    }
+
+    fn next_run(&mut self) {
+        let Some((run, behind)) = self.runs.split_first() else {
+            (self.low, self.high) = (&[], u64::MAX);
+            return;
+        };
+        self.high = run.high;
+        self.end = behind.first().map_or(self.set.len(), |r| r.start);
+        self.low = &self.set.low[run.start..self.end];
+        self.runs = behind;
     }
 }
 
@@ -195,6 +373,8 @@ pub fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
 
     fn set(codes: &[u64]) -> BrickSet {
         BrickSet::from_unsorted(
@@ -232,6 +412,41 @@ mod tests {
             for key in (0..1600).step_by(stride) {
                 assert_eq!(c.get(key), many.get(key), "key {key} stride {stride}");
                 assert_eq!(c.get(key), many.get(key), "asked twice");
+            }
+        }
+    }
+
+    /// Bricks of few runs, close together and far apart.
+    fn scattered() -> impl Strategy<Value = BTreeMap<u64, u64>> {
+        let key = (0u64..4, prop_oneof![0u64..6, (1u64 << LOW_BITS) - 3..1 << LOW_BITS])
+            .prop_map(|(high, low)| high << LOW_BITS | low);
+        prop::collection::btree_map(key, 1u64..8, 0..24)
+    }
+
+    fn of(bricks: &BTreeMap<u64, u64>) -> BrickSet {
+        BrickSet::from_unsorted(bricks.iter().map(|(&key, &bits)| Brick { key, bits }).collect())
+    }
+
+    proptest! {
+        #[test]
+        fn sets_of_several_runs_behave_as_maps(a in scattered(), b in scattered(), mask in 0u64..8) {
+            let (x, y) = (of(&a), of(&b));
+            x.check_invariants();
+            let (mut both, mut without, mut kept) = (a.clone(), a.clone(), a.clone());
+            b.iter().for_each(|(k, v)| *both.entry(*k).or_default() |= v);
+            without.iter_mut().for_each(|(k, v)| *v &= !b.get(k).unwrap_or(&0));
+            without.retain(|_, v| *v != 0);
+            kept.retain(|k, v| (*v & mask != 0) && k % 3 != 0);
+            prop_assert_eq!(x.clone().union(y.clone()), of(&both));
+            prop_assert_eq!(x.clone().without(&y), of(&without));
+            let mut some = x.clone();
+            some.retain(|b| if b.key % 3 != 0 && b.bits & mask != 0 { b.bits } else { 0 });
+            prop_assert_eq!(some, of(&kept));
+            prop_assert!(x.bricks().map(|b| (b.key, b.bits)).eq(a.iter().map(|(k, v)| (*k, *v))));
+            let mut cursor = x.cursor();
+            for key in both.keys() {
+                let want = a.get(key).copied().unwrap_or(0);
+                prop_assert_eq!((cursor.get(*key), x.get(*key)), (want, want));
             }
         }
     }

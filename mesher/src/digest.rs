@@ -4,6 +4,7 @@
 //! modulo 2^128. Sums of parts add up to the sum of the whole.
 
 use crate::octant::Level;
+use crate::wide::widest;
 
 /// Level of the octants that have a digest of their own in the manifest.
 pub const OCTANT_LEVEL: Level = 3;
@@ -30,14 +31,9 @@ const fn halves(w: u64) -> (u64, u64) {
     (a, finalise(a ^ w.rotate_left(32)))
 }
 
-/// The digest of some words.
-pub fn digest(words: &[u64]) -> u128 {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-        // SAFETY: the features that the function is compiled for were just detected.
-        return unsafe { digest_avx512(words) };
-    }
-    digest_lanes(words)
+widest! {
+    /// The digest of some words.
+    pub fn digest(words: &[u64]) -> u128 = digest_lanes;
 }
 
 /// Sums with the low halves' two 32-bit parts apart, so that no carry is needed inside the loop.
@@ -59,12 +55,6 @@ fn digest_lanes(words: &[u64]) -> u128 {
         total = total.wrapping_add(sum);
     }
     total
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn digest_avx512(words: &[u64]) -> u128 {
-    digest_lanes(words)
 }
 
 /// A digest as the manifest has it.
@@ -123,8 +113,9 @@ mod tests {
             (0..5000u64).map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
         words.sort_unstable();
         let naive = words.iter().fold(0u128, |s, &w| s.wrapping_add(mix(w)));
-        assert_eq!(digest(&words), naive);
-        assert_eq!(digest_lanes(&words), naive);
+        for (width, sum) in crate::wide::tests::widths(|| digest(&words)) {
+            assert_eq!(sum, naive, "{width:?}");
+        }
         let mut d = Digests::default();
         words.chunks(77).for_each(|c| d.add(c));
         assert_eq!(d.whole(), naive);

@@ -56,11 +56,11 @@ impl Reach {
         left -= MARGIN;
         while left > MARGIN {
             let mut near = Gathered::new(self.level);
-            dilate_tiles(set.bricks().iter().copied(), MARGIN, false, &mut near, &mut self.words);
+            dilate_tiles(set.bricks(), MARGIN, false, &mut near, &mut self.words);
             set = near.into_set();
             left -= MARGIN;
         }
-        dilate_tiles(set.bricks().iter().copied(), left, false, &mut self.out, &mut self.words);
+        dilate_tiles(set.bricks(), left, false, &mut self.out, &mut self.words);
     }
 
     /// Adds the parents of all octants within `radius` of a source, which is one level deeper. Sources
@@ -71,7 +71,7 @@ impl Reach {
         }
         let mut odd = Gathered::new(self.level);
         dilate_tiles(sources, (radius & 1) as usize, true, &mut odd, &mut self.words);
-        self.dilate(odd.into_set().bricks().iter().copied(), radius / 2);
+        self.dilate(odd.into_set().bricks(), radius / 2);
     }
 
     /// What was reached, and the work that it took.
@@ -109,6 +109,7 @@ fn dilate_tiles(
 mod tests {
     use super::*;
     use crate::octant::{morton, position};
+    use crate::wide::tests::widths;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -139,13 +140,18 @@ mod tests {
         fn equals_one_box_per_octant(l in 1u32..8, seeds in prop::collection::vec(any::<u64>(), 0..12), r in 0u32..21) {
             let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
             let grown = naive(l, &codes, i64::from(r));
-            let mut got = Reach::new(l);
-            got.dilate(set(&codes).bricks().iter().copied(), r);
-            prop_assert!(got.finish().0.codes().eq(grown.iter().copied()));
+            let all = widths(|| {
+                let mut got = Reach::new(l);
+                got.dilate(set(&codes).bricks(), r);
+                let mut parents = Reach::new(l - 1);
+                parents.dilate_children(set(&codes).bricks(), r);
+                [got, parents].map(|reach| reach.finish().0)
+            });
             let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
-            let mut got = Reach::new(l - 1);
-            got.dilate_children(set(&codes).bricks().iter().copied(), r);
-            prop_assert!(got.finish().0.codes().eq(parents.iter().copied()));
+            for (width, [same, above]) in all {
+                prop_assert!(same.codes().eq(grown.iter().copied()), "{:?}", width);
+                prop_assert!(above.codes().eq(parents.iter().copied()), "{:?}", width);
+            }
         }
     }
 }

@@ -120,7 +120,7 @@ impl Gradation<'_> {
             reach.dilate_children(self.leaves(l, |_| u64::MAX), radius);
         } else {
             let mut impure = self.impure.cursor();
-            let pure = (self.split[l as usize - 1].bricks().iter())
+            let pure = (self.split[l as usize - 1].bricks())
                 .filter(|b| self.share.answers_for(l - 1, b.key))
                 .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
                 .filter(|b| b.bits != 0);
@@ -161,7 +161,7 @@ impl Gradation<'_> {
         self.work.bricks_sent += sent;
         let before = std::mem::take(&mut self.split[l as usize]);
         let fresh = self.kept.only(&self.split, l, reached.without(&before));
-        self.work.octants_split += (fresh.bricks().iter())
+        self.work.octants_split += (fresh.bricks())
             .filter(|b| self.share.answers_for(l, b.key))
             .map(|b| u64::from(b.bits.count_ones()))
             .sum::<u64>();
@@ -177,7 +177,7 @@ impl Gradation<'_> {
         }
         for m in (surface..self.crossing.len() as Level).rev() {
             let mut reach = Reach::new(m - 1);
-            let leaves = self.crossing[m as usize].bricks().iter().copied();
+            let leaves = self.crossing[m as usize].bricks();
             reach.dilate_children(leaves.filter(|b| self.share.answers_for(m, b.key)), 1);
             let mut touched = self.reached(reach);
             for _ in surface..m {

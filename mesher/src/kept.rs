@@ -61,7 +61,7 @@ impl<'a> Kept<'a> {
             let mut crossing = base.crossing[l].cursor();
             for Brick { key, bits } in self.deleted[l].bricks() {
                 assert_eq!(
-                    bits & (split.get(*key) | crossing.get(*key)),
+                    bits & (split.get(key) | crossing.get(key)),
                     0,
                     "level {l}: only leaves off the surface are deleted"
                 );

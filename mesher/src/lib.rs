@@ -30,6 +30,7 @@ pub mod stl;
 pub mod stream;
 pub mod tree;
 pub mod voxelise;
+mod wide;
 pub mod write;
 
 use base::Division;

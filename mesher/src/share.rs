@@ -88,7 +88,7 @@ impl Ownership {
                 let mut is_top = |key: u64| {
                     internal.as_mut().is_none_or(|set| set.get(key >> 6) >> (key & 63) & 1 == 1)
                 };
-                let bricks = from[l].bricks().iter().filter(|b| is_top(b.key));
+                let bricks = from[l].bricks().filter(|b| is_top(b.key));
                 bricks.for_each(|b| to[l].push(b.key, b.bits));
             }
         }

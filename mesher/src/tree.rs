@@ -8,6 +8,7 @@
 //! On several ranks each holds its own bricks and a copy of those above the base tree; then the
 //! first two hold for bricks whose parent brick is here.
 
+use crate::brick::Brick;
 use crate::brickset::BrickSet;
 use crate::octant::{LEVEL_MAX, Level};
 
@@ -40,15 +41,11 @@ impl Default for Tree {
 
 impl Tree {
     /// The octants of level `l` that exist, brick by brick in Morton order.
-    pub fn exists(
-        split: &[BrickSet],
-        l: Level,
-    ) -> Box<dyn Iterator<Item = crate::brick::Brick> + '_> {
-        if l == 0 {
-            Box::new(std::iter::once(crate::brick::Brick { key: 0, bits: 1 }))
-        } else {
-            Box::new(split[l as usize - 1].child_bricks())
-        }
+    pub fn exists(split: &[BrickSet], l: Level) -> impl Iterator<Item = Brick> + '_ {
+        static NONE: BrickSet = BrickSet::EMPTY;
+        let root = (l == 0).then_some(Brick { key: 0, bits: 1 });
+        let above = if l == 0 { &NONE } else { &split[l as usize - 1] };
+        root.into_iter().chain(above.child_bricks())
     }
 
     /// The deepest level at which something is split, plus one; 0 for a lone root.

@@ -208,7 +208,7 @@ fn floods(bricks: &[Brick], l: u32) -> u64 {
 
 fn dilated(set: &BrickSet, l: u32, radius: u32) -> u64 {
     let mut reach = Reach::new(l - 1);
-    reach.dilate_children(set.bricks().iter().copied(), radius);
+    reach.dilate_children(set.bricks(), radius);
     reach.finish().0.len() as u64
 }
 

@@ -9,55 +9,87 @@ use std::collections::HashMap;
 const BLOCK_LOG2: u32 = 3;
 /// The same as a number.
 const BLOCK: usize = 1 << BLOCK_LOG2;
+/// Blocks that are found together, as a power of two: 4 x 4 x 4, as many as a tile has.
+const PAGE_LOG2: u32 = 6;
+/// The same as a number.
+const PAGE: usize = 1 << PAGE_LOG2;
+/// A block that is not there.
+const NONE: u32 = u32::MAX;
 
 /// Bricks gathered from overlapping tiles, block by block.
+///
+/// Blocks are found by their *page*. A tile and its margin touch 3 x 3 x 3 pages, over and over; those are
+/// found in a table of the latest page by position modulo 4, in which neighbours do not collide.
 pub struct Gathered {
-    /// Bricks along the root's edge.
+    /// Blocks along the root's edge.
     extent: i64,
-    /// Bits that exist at this level.
-    valid: u64,
-    blocks: HashMap<u64, u32, Spread>,
+    /// Bits that exist at this level, by brick of a block.
+    valid: [u64; BLOCK],
+    numbers: HashMap<u64, u32, Spread>,
+    /// Blocks by page, [`NONE`] where there is none.
+    pages: Vec<[u32; PAGE]>,
     words: Vec<[u64; BLOCK]>,
-    last: Option<(u64, u32)>,
+    /// Keys of the latest pages, and their numbers.
+    latest: [(u64, u32); PAGE],
 }
 
 impl Gathered {
     /// Nothing yet, of level `l`.
     pub fn new(l: Level) -> Self {
+        // Above level 3 the root has a single brick, whose block has no other.
+        let valid = |i: usize| if l < 3 && i > 0 { 0 } else { brick::valid(l) };
         Self {
-            extent: if l < 2 { 1 } else { 1 << (l - 2) },
-            valid: brick::valid(l),
-            blocks: HashMap::default(),
+            extent: if l < 3 { 1 } else { 1 << (l - 3) },
+            valid: std::array::from_fn(valid),
+            numbers: HashMap::default(),
+            pages: Vec::new(),
             words: Vec::new(),
-            last: None,
+            latest: [(u64::MAX, 0); PAGE],
         }
     }
 
-    /// Ors bits into the brick at a position; outside the root they are dropped.
-    pub fn add(&mut self, p: [i64; 3], bits: u64) {
+    /// Ors bits into the bricks of the block at a position; outside the root they are dropped.
+    #[inline]
+    pub fn add(&mut self, p: [i64; 3], bits: &[u64; BLOCK]) {
         if p.iter().any(|c| !(0..self.extent).contains(c)) {
             return;
         }
         let key = morton(p.map(|c| c as u32));
-        let block = match self.last {
-            Some((k, i)) if k == key >> BLOCK_LOG2 => i,
-            _ => *self.blocks.entry(key >> BLOCK_LOG2).or_insert_with(|| {
-                self.words.push([0; BLOCK]);
-                (self.words.len() - 1) as u32
-            }),
-        };
-        self.last = Some((key >> BLOCK_LOG2, block));
-        self.words[block as usize][(key & (BLOCK as u64 - 1)) as usize] |= bits & self.valid;
+        let page = self.page(key >> PAGE_LOG2);
+        let block = &mut self.pages[page as usize][key as usize % PAGE];
+        if *block == NONE {
+            *block = self.words.len() as u32;
+            self.words.push([0; BLOCK]);
+        }
+        let words = self.words[*block as usize].iter_mut();
+        words.zip(bits).zip(&self.valid).for_each(|((w, b), valid)| *w |= b & valid);
+    }
+
+    /// The number of a page, a new one if need be.
+    #[inline]
+    fn page(&mut self, key: u64) -> u32 {
+        let latest = &mut self.latest[key as usize % PAGE];
+        if latest.0 != key {
+            let number = *self.numbers.entry(key).or_insert_with(|| {
+                self.pages.push([NONE; PAGE]);
+                (self.pages.len() - 1) as u32
+            });
+            *latest = (key, number);
+        }
+        latest.1
     }
 
     /// All that was gathered.
     pub fn into_set(self) -> BrickSet {
-        let mut order: Vec<(u64, u32)> = self.blocks.into_iter().collect();
+        let mut order: Vec<(u64, u32)> = self.numbers.into_iter().collect();
         order.sort_unstable();
         let mut set = BrickSet::default();
-        for (block, i) in order {
-            for (k, &bits) in (0..).zip(&self.words[i as usize]) {
-                set.push(block << BLOCK_LOG2 | k, bits);
+        for (page, number) in order {
+            let blocks = (0..).zip(&self.pages[number as usize]).filter(|b| *b.1 != NONE);
+            for (block, &at) in blocks {
+                for (k, &bits) in (0..).zip(&self.words[at as usize]) {
+                    set.push((page << PAGE_LOG2 | block) << BLOCK_LOG2 | k, bits);
+                }
             }
         }
         set

@@ -4,6 +4,7 @@ use super::gathered::Gathered;
 use super::{MARGIN, TILE, TILE_BRICKS_LOG2, Words};
 use crate::brick::{self, Brick};
 use crate::octant::position;
+use crate::wide::widest;
 
 /// A tile and its margin, one word per row.
 pub struct Tile {
@@ -43,35 +44,14 @@ impl Tile {
     /// Dilates what was put in, along x, then y, then z.
     pub fn dilate(&mut self, words: &mut Words) {
         *words += self.rows.len() as u64;
-        if self.radius == 0 {
-            return;
+        if self.radius > 0 {
+            dilate_rows(self);
         }
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the features that the function is compiled for were just detected.
-            return unsafe { self.dilate_avx512() };
-        } else if is_x86_feature_detected!("avx2") {
-            // SAFETY: as above.
-            return unsafe { self.dilate_avx2() };
-        }
-        self.dilate_portable();
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-    fn dilate_avx512(&mut self) {
-        self.dilate_portable();
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn dilate_avx2(&mut self) {
-        self.dilate_portable();
     }
 
     /// Sources are in the middle, so only the rows that results can be in are touched.
     #[inline(always)]
-    fn dilate_portable(&mut self) {
+    fn dilate_lanes(&mut self) {
         let (r, m, side) = (self.radius, self.margin, self.side);
         let spread = &mut self.spread;
         for z in m..m + TILE {
@@ -98,51 +78,83 @@ impl Tile {
     /// Hands over the result and empties the tile.
     pub fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
+        let side = self.side / scale;
         let halved;
         let rows = if to_parents {
-            halved = self.halved();
+            let mut half = vec![0; side * side];
+            halve(&self.rows, &mut half, side);
+            halved = half;
             &halved
         } else {
             &self.rows
         };
-        let side = self.side / scale;
-        // The first brick of the padded tile, in bricks of the result's level.
+        // The first brick of the padded tile, in bricks of the result's level; even along x.
         let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
-        let first = [MARGIN / scale / 4, self.margin / scale / 4, self.margin / scale / 4];
-        for bz in 0..side / 4 {
-            for by in 0..side / 4 {
-                let mut four_by_four: [u64; 16] =
-                    std::array::from_fn(|i| rows[(4 * bz + (i >> 2)) * side + 4 * by + (i & 3)]);
-                if four_by_four.iter().fold(0, |any, row| any | row) == 0 {
-                    continue;
-                }
-                transpose(&mut four_by_four);
-                for (bx, &bits) in four_by_four.iter().enumerate().filter(|b| *b.1 != 0) {
-                    let b = [bx, by, bz];
-                    let p = std::array::from_fn(|a| origin[a] + b[a] as i64 - first[a] as i64);
-                    out.add(p, brick::from_rows(bits));
+        let margins = [MARGIN, self.margin, self.margin].map(|m| (m / scale / 4) as i64);
+        let first: [i64; 3] = std::array::from_fn(|a| origin[a] - margins[a]);
+        // Blocks of 2 x 2 x 2 bricks start at even ones.
+        let end = |a: usize| (first[a] + (side / 4) as i64 + 1).div_euclid(2);
+        for z in first[2].div_euclid(2)..end(2) {
+            for y in first[1].div_euclid(2)..end(1) {
+                let at = |a: usize, block: i64, odd: usize| 2 * block + odd as i64 - first[a];
+                let bricks: [[u64; 16]; 4] = std::array::from_fn(|k| {
+                    bricks_along(rows, side, at(1, y, k & 1), at(2, z, k >> 1))
+                });
+                let x = first[0].div_euclid(2);
+                for (i, x) in (x..x + 8).enumerate() {
+                    let block: [u64; 8] = std::array::from_fn(|o| bricks[o >> 1][2 * i + (o & 1)]);
+                    if any(&block) {
+                        out.add([x, y, z], &block.map(brick::from_rows));
+                    }
                 }
             }
         }
         self.rows.fill(0);
     }
+}
 
-    /// Rows of the parents: pairs along all three axes ored together.
-    fn halved(&self) -> Vec<u64> {
-        let half = self.side / 2;
-        let mut out = vec![0; half * half];
-        for z in 0..half {
-            for y in 0..half {
-                let at = |dy: usize, dz: usize| self.rows[(2 * z + dz) * self.side + 2 * y + dy];
-                out[z * half + y] = pairs(at(0, 0) | at(1, 0) | at(0, 1) | at(1, 1));
-            }
+/// Whether a bit is set; a comparison with zeros would be a call.
+#[inline(always)]
+fn any(words: &[u64]) -> bool {
+    words.iter().fold(0, |all, w| all | w) != 0
+}
+
+/// The 16 bricks along x, with their bits in rows, at a place along y and z, in bricks; none beside the tile.
+#[inline]
+fn bricks_along(rows: &[u64], side: usize, y: i64, z: i64) -> [u64; 16] {
+    let inside = 0..(side / 4) as i64;
+    if !(inside.contains(&y) && inside.contains(&z)) {
+        return [0; 16];
+    }
+    let base = 4 * (z as usize * side + y as usize);
+    let mut bricks = std::array::from_fn(|i| rows[base + (i >> 2) * side + (i & 3)]);
+    if any(&bricks) {
+        transpose(&mut bricks);
+    }
+    bricks
+}
+
+widest! {
+    fn dilate_rows(tile: &mut Tile) = Tile::dilate_lanes;
+}
+
+widest! {
+    fn halve(rows: &[u64], half: &mut [u64], side: usize) = halve_lanes;
+}
+
+/// Rows of the parents, `side` by `side` of them: pairs along all three axes ored together.
+#[inline(always)]
+fn halve_lanes(rows: &[u64], half: &mut [u64], side: usize) {
+    for (z, out) in half.chunks_exact_mut(side).enumerate() {
+        let (low, high) = rows[4 * z * side..][..4 * side].split_at(2 * side);
+        for (y, row) in out.iter_mut().enumerate() {
+            *row = pairs(low[2 * y] | low[2 * y + 1] | high[2 * y] | high[2 * y + 1]);
         }
-        out
     }
 }
 
 /// Makes the four bits `j` of row `i` the four bits `i` of row `j`: from 16 rows of 16 bricks to 16 bricks.
-#[inline]
+#[inline(always)]
 fn transpose(rows: &mut [u64; 16]) {
     for (step, low) in [
         (8, u64::MAX >> 32),
@@ -159,7 +171,7 @@ fn transpose(rows: &mut [u64; 16]) {
 }
 
 /// `to |= from`, word by word.
-#[inline]
+#[inline(always)]
 fn or_into(to: &mut [u64], from: &[u64]) {
     for (t, f) in to.iter_mut().zip(from) {
         *t |= f;
@@ -167,7 +179,7 @@ fn or_into(to: &mut [u64], from: &[u64]) {
 }
 
 /// A row with every bit spread by `r` to both sides, by doubling.
-#[inline]
+#[inline(always)]
 fn dilate_row(row: u64, r: usize) -> u64 {
     // Every bit starts a run that is `run` long; the margin below keeps bits from falling out.
     let mut wide = row >> r;
@@ -181,7 +193,7 @@ fn dilate_row(row: u64, r: usize) -> u64 {
 }
 
 /// Bit `i` of the result is set where bit `2i` or `2i + 1` of `row` is.
-#[inline]
+#[inline(always)]
 fn pairs(row: u64) -> u64 {
     let v = (row | row >> 1) & 0x5555_5555_5555_5555;
     let v = (v | v >> 1) & 0x3333_3333_3333_3333;

@@ -1,0 +1,112 @@
+//! One source, several vector widths: the widest that the processor has is chosen at run time.
+//!
+//! [`widest`] compiles an `#[inline(always)]` function once for each width and calls the right one, so that
+//! all widths do the same by construction; tests run each of them all the same ([`widths`]).
+
+/// What the compiler may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Width {
+    /// What every processor of the architecture has.
+    Portable,
+    /// AVX2 and the bit instructions that come with it.
+    Avx2,
+    /// AVX-512 F, BW, DQ, VL, and all of the above.
+    Avx512,
+}
+
+/// The widest that this processor has.
+#[inline]
+pub fn width() -> Width {
+    #[cfg(test)]
+    if let Some(forced) = tests::FORCED.get() {
+        return forced;
+    }
+    detected()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+fn detected() -> Width {
+    macro_rules! has {
+        ($($feature:tt)*) => { $(is_x86_feature_detected!($feature) &&)* true };
+    }
+    let avx2 = has!("avx2" "bmi1" "bmi2" "lzcnt" "popcnt");
+    match avx2 && has!("avx512f" "avx512bw" "avx512dq" "avx512vl") {
+        true => Width::Avx512,
+        false if avx2 => Width::Avx2,
+        false => Width::Portable,
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+#[inline]
+fn detected() -> Width {
+    Width::Portable
+}
+
+/// Makes a function that calls `lanes`, compiled for the widest vectors that the processor has. `lanes` must
+/// be `#[inline(always)]`.
+macro_rules! widest {
+    (
+        $(#[$doc:meta])*
+        $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $lanes:path;
+    ) => {
+        $(#[$doc])*
+        #[inline]
+        $vis fn $name($($arg: $type),*) $(-> $result)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(
+                    enable = "avx2,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512dq,avx512vl"
+                )]
+                fn avx512($($arg: $type),*) $(-> $result)? {
+                    $lanes($($arg),*)
+                }
+                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+                fn avx2($($arg: $type),*) $(-> $result)? {
+                    $lanes($($arg),*)
+                }
+                // SAFETY: the only demand of both functions is that the processor has the features that
+                // they are compiled for, and `width` names a width after detecting them all.
+                match $crate::wide::width() {
+                    $crate::wide::Width::Avx512 => return unsafe { avx512($($arg),*) },
+                    $crate::wide::Width::Avx2 => return unsafe { avx2($($arg),*) },
+                    $crate::wide::Width::Portable => {}
+                }
+            }
+            $lanes($($arg),*)
+        }
+    };
+}
+
+pub(crate) use widest;
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    thread_local! {
+        pub static FORCED: Cell<Option<Width>> = const { Cell::new(None) };
+    }
+
+    /// What `work` returns at every width that this processor has.
+    pub fn widths<T>(mut work: impl FnMut() -> T) -> Vec<(Width, T)> {
+        let all = [Width::Portable, Width::Avx2, Width::Avx512];
+        let results = all.into_iter().filter(|w| *w <= detected()).map(|w| {
+            FORCED.set(Some(w));
+            let result = work();
+            FORCED.set(None);
+            (w, result)
+        });
+        results.collect()
+    }
+
+    #[test]
+    fn the_width_asked_for_is_used() {
+        for (asked, used) in widths(width) {
+            assert_eq!(asked, used);
+        }
+        assert_eq!(width(), detected());
+    }
+}
