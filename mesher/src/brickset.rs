@@ -321,8 +321,20 @@ pub struct Cursor<'a> {
 
 impl Cursor<'_> {
     /// The bits of the brick `key`, which is not before any key asked for earlier.
-    #[inline]
+    #[inline(always)]
     pub fn get(&mut self, key: u64) -> u64 {
+        if self.high == high_of(key) {
+            match self.low {
+                [low, ..] if *low == key as u32 => return self.set.bits[self.end - self.low.len()],
+                [low, ..] if *low > key as u32 => return 0,
+                _ => {}
+            }
+        }
+        self.seek(key)
+    }
+
+    /// Goes on to a brick behind the one that is next.
+    fn seek(&mut self, key: u64) -> u64 {
         while self.high < high_of(key) {
             self.next_run();
         }
@@ -330,18 +342,16 @@ impl Cursor<'_> {
             return 0;
         }
         let want = key as u32;
-        if self.low.first().is_some_and(|low| *low < want) {
-            // A gallop: what the reader skips (another rank's share, deleted parts) may be long.
-            let mut step = 1;
-            while self.low.get(step).is_some_and(|low| *low < want) {
-                step *= 2;
-            }
-            let near = &self.low[step / 2..self.low.len().min(step + 1)];
-            let skip = step / 2 + near.partition_point(|low| *low < want);
-            self.low = &self.low[skip..];
+        // A gallop: what the reader skips (another rank's share, deleted parts) may be long.
+        let mut step = 1;
+        while self.low.get(step).is_some_and(|low| *low < want) {
+            step *= 2;
         }
-        match self.low.first() {
-            Some(&low) if low == want => self.set.bits[self.end - self.low.len()],
+        let near = &self.low[step / 2..self.low.len().min(step + 1)];
+        let skip = step / 2 + near.partition_point(|low| *low < want);
+        self.low = &self.low[skip..];
+        match self.low {
+            [low, ..] if *low == want => self.set.bits[self.end - self.low.len()],
             _ => 0,
         }
     }

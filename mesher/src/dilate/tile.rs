@@ -3,6 +3,7 @@
 use super::gathered::Gathered;
 use super::{MARGIN, TILE, TILE_BRICKS_LOG2, Words};
 use crate::brick::{self, Brick};
+use crate::brickset::ones;
 use crate::octant::position;
 use crate::wide::widest;
 
@@ -14,6 +15,8 @@ pub struct Tile {
     /// Rows along y and along z.
     side: usize,
     rows: Vec<u64>,
+    /// Which of the tile's own positions along z have a source.
+    layers: u32,
     /// The rows after the passes along x and y; scratch.
     spread: Vec<u64>,
 }
@@ -23,7 +26,14 @@ impl Tile {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         let margin = radius.next_multiple_of(8);
         let side = TILE + 2 * margin;
-        Self { radius, margin, side, rows: vec![0; side * side], spread: vec![0; side * side] }
+        Self {
+            radius,
+            margin,
+            side,
+            layers: 0,
+            rows: vec![0; side * side],
+            spread: vec![0; side * side],
+        }
     }
 
     /// Adds a source brick.
@@ -33,6 +43,10 @@ impl Tile {
         let rows = brick::to_rows(b.bits);
         let shift = MARGIN + x;
         for dz in 0..4 {
+            if rows >> (16 * dz) & 0xffff == 0 {
+                continue;
+            }
+            self.layers |= 1 << (z + dz);
             let base = (self.margin + z + dz) * self.side + self.margin + y;
             let four = rows >> (16 * dz);
             for (dy, row) in self.rows[base..base + 4].iter_mut().enumerate() {
@@ -54,7 +68,7 @@ impl Tile {
     fn dilate_lanes(&mut self) {
         let (r, m, side) = (self.radius, self.margin, self.side);
         let spread = &mut self.spread;
-        for z in m..m + TILE {
+        for z in ones(u64::from(self.layers)).map(|z| z as usize + m) {
             let rows = &mut self.rows[z * side..(z + 1) * side];
             for row in &mut rows[m..m + TILE] {
                 *row = dilate_row(*row, r);
@@ -67,9 +81,10 @@ impl Tile {
             }
         }
         for z in m - r..m + TILE + r {
-            let (first, last) = ((z - r.min(z)).max(m), (z + r).min(m + TILE - 1));
+            let (first, last) = ((z - r.min(z)).max(m) - m, (z + r).min(m + TILE - 1) - m);
+            let near = u64::from(self.layers) & ((2 << last) - (1 << first));
             let rows = &mut self.rows[z * side..(z + 1) * side];
-            for from in first..=last {
+            for from in ones(near).map(|z| z as usize + m) {
                 or_into(rows, &spread[from * side..(from + 1) * side]);
             }
         }
@@ -110,6 +125,7 @@ impl Tile {
             }
         }
         self.rows.fill(0);
+        self.layers = 0;
     }
 }
 
