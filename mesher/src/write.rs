@@ -13,7 +13,7 @@ use crate::stream::Counts;
 use npyz::WriterBuilder;
 use serde::Serialize;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -69,20 +69,11 @@ impl OutDir {
     pub fn part(&self, rank: usize) -> Result<Part, Error> {
         let file = NamedTempFile::new_in(&self.path).map_err(|e| output(&self.path, &e))?;
         let (file, temporary) = file.into_parts();
-        let begin = || -> io::Result<_> {
-            npyz::WriteOptions::new()
-                .default_dtype()
-                .writer(BufWriter::with_capacity(1 << 20, file))
-                .begin_1d()
-        };
-        let writer = begin().map_err(|e| output(&self.path, &e))?;
-        Ok(Part {
-            path: self.path.join(part_name(rank)),
-            writer,
-            temporary,
-            digests: Digests::default(),
-            leaves: 0,
-        })
+        let mut file = BufWriter::with_capacity(1 << 20, file);
+        let begin = header(u64::MAX).and_then(|room| file.write_all(&room));
+        begin.map_err(|e| output(&self.path, &e))?;
+        let path = self.path.join(part_name(rank));
+        Ok(Part { path, file, temporary, digests: Digests::default(), leaves: 0 })
     }
 
     /// Removes what was written, after an error on any rank.
@@ -129,7 +120,7 @@ fn publish(file: &File, temporary: impl Fn() -> PathBuf, to: &Path) -> io::Resul
 /// A rank's part while it is written.
 pub struct Part {
     path: PathBuf,
-    writer: npyz::NpyWriter<u64, BufWriter<File>>,
+    file: BufWriter<File>,
     temporary: tempfile::TempPath,
     digests: Digests,
     leaves: u64,
@@ -149,15 +140,21 @@ impl Part {
     pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
         self.digests.add(words);
         self.leaves += words.len() as u64;
-        self.writer.extend(words.iter().copied()).map_err(|e| output(&self.path, &e))
+        // As they are in memory: word by word, a library's writer takes longer than the mesh.
+        let written = match cfg!(target_endian = "little") {
+            true => self.file.write_all(bytemuck::cast_slice(words)),
+            false => words.iter().try_for_each(|w| self.file.write_all(&w.to_le_bytes())),
+        };
+        written.map_err(|e| output(&self.path, &e))
     }
 
     /// Completes the file and gives it its name.
     pub fn finish(self) -> Result<Written, Error> {
-        let Self { path, writer, temporary, digests, leaves } = self;
+        let Self { path, file, temporary, digests, leaves } = self;
         let close = || -> io::Result<()> {
-            writer.finish()?;
-            let file = File::options().write(true).open(&temporary)?;
+            let mut file = file.into_inner()?;
+            file.seek(SeekFrom::Start(0))?;
+            file.write_all(&header(leaves)?)?;
             publish(&file, || temporary.to_path_buf(), &path)?;
             let _ = temporary.keep();
             Ok(())
@@ -165,6 +162,23 @@ impl Part {
         close().map_err(|e| output(&path, &e))?;
         Ok(Written { leaves, digests })
     }
+}
+
+/// The head of a `.npy` file of `leaves` words, as long for any number of them, so that it can be written
+/// again when the number is known: its text is padded with spaces.
+fn header(leaves: u64) -> io::Result<Vec<u8>> {
+    /// Bytes before the text: magic, version, and the text's length in the last two (format 1.0).
+    const BEFORE: usize = 10;
+    let of = |leaves: u64| {
+        let head = npyz::WriteOptions::<u64>::new().default_dtype().shape(&[leaves]);
+        head.writer(Vec::new()).write_header_only()
+    };
+    let (mut head, length) = (of(leaves)?, of(u64::MAX)?.len());
+    let newline = head.pop();
+    head.resize(length - 1, b' ');
+    head.extend(newline);
+    head[BEFORE - 2..BEFORE].copy_from_slice(&((length - BEFORE) as u16).to_le_bytes());
+    Ok(head)
 }
 
 /// What `mesh.json` says. Lengths of the boxes are in lattice units, of the root in the geometry's.
@@ -287,6 +301,28 @@ impl Manifest {
             digest: hex(digests.whole()),
             octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
             parts: parts.iter().enumerate().map(entry).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_read_back_whatever_their_length() {
+        let root = tempfile::tempdir().unwrap();
+        for n in [0usize, 1, 9, 10, 4097, 1_000_000] {
+            let out = OutDir::make(&root.path().join(n.to_string())).unwrap();
+            let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
+            let mut part = out.part(3).unwrap();
+            words.chunks(1000).for_each(|c| part.add(c).unwrap());
+            assert_eq!(part.finish().unwrap().leaves, n as u64);
+            let bytes = std::fs::read(out.path.join(part_name(3))).unwrap();
+            let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+            assert_eq!(file.shape(), [n as u64]);
+            assert_eq!(file.into_vec::<u64>().unwrap(), words);
+            assert_eq!((bytes.len() - 8 * n) % 16, 0, "words are aligned");
         }
     }
 }
