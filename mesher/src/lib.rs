@@ -182,12 +182,7 @@ fn build(
             grade::grade(split, &refined.tree.crossing, &kept, &rules, &refined.share, comm)
         });
         counters.grade(&work);
-        counters.base_leaf(base::cells_heaviest(
-            &split,
-            &sides.deleted,
-            &refined.share,
-            comm.rank(),
-        ));
+        counters.base_leaf(base::cells_heaviest(&split, &sides.deleted, &refined.dealt));
         split
     });
     comm.agree(check_interrupt())?;
@@ -215,6 +210,8 @@ fn quantise(
 struct Refined {
     tree: Tree,
     share: Ownership,
+    /// This rank's base leaves as they were dealt out.
+    dealt: Vec<share::BaseLeaf>,
     level_base: octant::Level,
 }
 
@@ -234,7 +231,8 @@ fn refine(
             voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
         });
         counters.voxelise(&work);
-        return Ok(Refined { tree, share: Ownership::solo(), level_base: 0 });
+        let share = Ownership::solo();
+        return Ok(Refined { tree, dealt: share.leaves().to_vec(), share, level_base: 0 });
     }
     let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
@@ -244,25 +242,27 @@ fn refine(
         record.phase("refine", comm, || voxelise::refine(&filed, &depth, &base.starts));
     counters.voxelise(&work);
     record.phase("share top", comm, || {
-        share_top(&mut tree, base.top, &base.share, base.level_base, comm)
+        share_top(&mut tree, base.top, &base.share, &base.levels_split, comm)
     });
-    Ok(Refined { tree, share: base.share, level_base: base.level_base })
+    let base::Base { share, dealt, level_base, .. } = base;
+    Ok(Refined { tree, share, dealt, level_base })
 }
 
-/// Makes the top bricks of a rank's tree those of the whole tree. Collective.
+/// Makes the top bricks of a rank's tree those of the whole tree; `levels_split` are those of base leaves
+/// that are split in T0. Collective.
 fn share_top(
     tree: &mut Tree,
     top: Tree,
     share: &Ownership,
-    level_base: octant::Level,
+    levels_split: &[octant::Level],
     comm: &dyn Comm,
 ) {
     for (sets, top) in [(&mut tree.split, top.split), (&mut tree.crossing, top.crossing)] {
-        let pairs: Vec<_> = sets.iter_mut().map(std::mem::take).zip(top).collect();
-        for ((l, set), (mine, top)) in (0..).zip(sets.iter_mut()).zip(pairs) {
-            // Above, all is known from the base tree; below, bricks are one rank's alone.
-            let mine = if l == level_base + 1 { share.scatter(l, mine, comm).0 } else { mine };
-            *set = mine.union(top);
+        for ((l, set), top) in (0..).zip(sets.iter_mut()).zip(top) {
+            let mine = std::mem::take(set);
+            // A top brick may hold children of base leaves; their owners know those.
+            let below = l > 0 && levels_split.contains(&(l - 1));
+            *set = if below { share.scatter(l, mine, comm).0 } else { mine }.union(top);
         }
     }
 }

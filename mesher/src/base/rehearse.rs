@@ -5,16 +5,17 @@
 //! holds beyond that is the latter. Parts of the rehearsal are Morton cuts by area, so that it is divided
 //! well itself.
 
-use super::{Cut, route};
+use super::cut::Cut;
+use super::route;
 use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::Level;
+use crate::octant::{Level, start57};
 use crate::partition::morton_cuts;
 use crate::share::Ownership;
 use crate::stream::Leaves;
 use crate::tree::Tree;
-use crate::voxelise::{Depth, Filed, Start, refine};
+use crate::voxelise::{Depth, Filed, refine};
 use crate::{grade, kept, sides};
 
 /// Levels that a rehearsal is coarser: it takes a 64th of the cells.
@@ -25,31 +26,28 @@ const COARSER: Level = 3;
 pub fn weights(
     facets: &[Facet],
     rules: &Rules,
+    marks: &Tree,
     cut: &Cut,
-    expected: Vec<u64>,
+    expected: &[u64],
     comm: &dyn Comm,
 ) -> Vec<u64> {
     // The base leaves of the coarse tree must be those of the fine one.
     let Some(coarser) = rules.level_surface.checked_sub(cut.level_base + 2) else {
-        return expected;
+        return expected.to_vec();
     };
     let coarser = coarser.min(COARSER);
     if coarser == 0 || comm.size() == 1 {
-        return expected;
+        return expected.to_vec();
     }
     let coarse = coarsen(rules, coarser, cut.level_base);
-    let mut leaves = cut.leaves.clone();
-    let owners = morton_cuts(&expected, comm.size());
-    leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
-    let share = Ownership::new(comm.rank(), comm.size(), cut.internal.clone(), leaves);
     let mut counts = vec![0u64; cut.leaves.len()];
-    for theirs in comm.all_gather(&rehearse(facets, &coarse, cut, &share, comm)).iter() {
+    for theirs in comm.all_gather(&rehearse(facets, &coarse, marks, cut, expected, comm)).iter() {
         theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
     }
     let scale = 1 << coarser;
     // With a = area's leaves in the coarse mesh: a * scale^2 + (counted - a) * scale.
-    let weight = |(thought, told): (u64, u64)| told * scale + thought - thought / scale;
-    expected.into_iter().zip(counts).map(weight).collect()
+    let weight = |(thought, told): (&u64, u64)| told * scale + thought - thought / scale;
+    expected.iter().zip(counts).map(weight).collect()
 }
 
 /// The same rules for a coarser mesh whose base tree is equal down to the base leaves.
@@ -67,32 +65,37 @@ fn coarsen(rules: &Rules, coarser: Level, level_base: Level) -> Rules {
 fn rehearse(
     facets: &[Facet],
     rules: &Rules,
+    marks: &Tree,
     cut: &Cut,
-    share: &Ownership,
+    expected: &[u64],
     comm: &dyn Comm,
 ) -> Vec<u64> {
+    let mut leaves = cut.leaves.clone();
+    let owners = morton_cuts(expected, comm.size());
+    leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
+    let starts: Vec<u64> = leaves.iter().map(|b| start57(b.level, b.code)).collect();
+    let joined = Cut { leaves, ..cut.clone() }.joined(marks, rules.level_surface);
+    let (mine, levels_split) = (joined.starts(comm.rank()), joined.levels_split());
+    let share = Ownership::new(comm.rank(), comm.size(), joined.internal, joined.leaves);
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let filed = Filed::new(&route(facets, share, comm));
-    let starts = share.leaves().iter().zip(&cut.heavy);
-    let mine = starts.filter(|(b, heavy)| **heavy && b.owner == comm.rank());
-    let starts: Vec<Start> = mine.map(|(b, _)| Start { level: b.level, code: b.code }).collect();
-    let (mut tree, _): (Tree, _) = refine(&filed, &depth, &starts);
-    crate::share_top(&mut tree, cut.top.clone(), share, cut.level_base, comm);
-    let sides = sides::decide(&tree, share, facets, rules.keep, comm);
+    let filed = Filed::new(&route(facets, &share, comm));
+    let (mut tree, _): (Tree, _) = refine(&filed, &depth, &mine);
+    crate::share_top(&mut tree, joined.top, &share, &levels_split, comm);
+    let sides = sides::decide(&tree, &share, facets, rules.keep, comm);
     let Tree { split, crossing } = tree;
     let (split, _) =
-        grade::grade(split, &crossing, &kept::Kept::new(&sides.deleted), rules, share, comm);
+        grade::grade(split, &crossing, &kept::Kept::new(&sides.deleted), rules, &share, comm);
     let leaves = Leaves {
         split: &split,
         crossing: &crossing,
         sides: &sides,
-        share,
+        share: &share,
         everything: false,
         rules,
     };
-    let mut counts = vec![0; share.leaves().len()];
+    let mut counts = vec![0; starts.len()];
     let count = |words: &[u64]| {
-        words.iter().for_each(|w| counts[share.leaf_at(w >> 7)] += 1);
+        words.iter().for_each(|w| counts[starts.partition_point(|&s| s <= w >> 7) - 1] += 1);
         Ok::<(), std::convert::Infallible>(())
     };
     let Ok(_) = leaves.emit(count);

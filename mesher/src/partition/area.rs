@@ -6,10 +6,12 @@
 //! not.
 
 use crate::base::middle;
+use crate::brickset::BrickSet;
 use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::lattice::Rules;
-use crate::octant::{Level, edge, start57};
+use crate::octant::{LEVEL_MAX, Level, edge, start57};
+use crate::share::BaseLeaf;
 
 /// Parts of a finest cell's face: sums of integers do not depend on their order.
 const PARTS: f64 = 1024.0;
@@ -21,6 +23,8 @@ pub struct Areas {
     starts: Vec<u64>,
     /// Area in all octants before each of them, and in all at the end.
     before: Vec<u64>,
+    /// Factors for what is found in some octants, in order.
+    factors: Vec<(BaseLeaf, f64)>,
 }
 
 /// The area of some facets, by the norm above, in lattice units squared.
@@ -35,32 +39,92 @@ fn norm(f: &Facet) -> f64 {
 impl Areas {
     /// Gathers the area of all ranks' facets by octants of a level. Collective.
     pub fn gather(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> Self {
-        let cell = edge(rules.level_surface) as f64;
-        let mut mine: Vec<(u64, u64)> = Vec::new();
-        let mut add = |at: u64, area: f64| {
-            let shift = 3 * (crate::octant::LEVEL_MAX - level);
-            mine.push((at >> shift << shift, (area * PARTS / (cell * cell)) as u64));
-        };
-        facets.iter().for_each(|f| spread(f, edge(level), &mut add));
-        sum(&mut mine);
-        let words: Vec<u64> = mine.iter().flat_map(|m| [m.0, m.1]).collect();
-        let all = comm.all_gather(&words);
-        let mut pairs: Vec<(u64, u64)> =
-            all.iter().flat_map(|w| w.chunks_exact(2).map(|p| (p[0], p[1]))).collect();
-        sum(&mut pairs);
-        let starts = pairs.iter().map(|p| p.0).collect();
-        let mut before = vec![0];
-        for p in &pairs {
-            before.push(before[before.len() - 1] + p.1);
-        }
-        Self { starts, before }
+        let mut areas = Self::default();
+        areas.set(&gathered(facets, rules, level, |_| true, comm));
+        areas
+    }
+
+    /// Gathers the area in some octants of level `coarse` anew, by octants of level `fine`. Collective.
+    pub fn refine(
+        &mut self,
+        facets: &[Facet],
+        rules: &Rules,
+        coarse: Level,
+        octants: &BrickSet,
+        fine: Level,
+        comm: &dyn Comm,
+    ) {
+        let wanted = |start: u64| octants.contains(start >> (3 * (LEVEL_MAX - coarse)));
+        let mut all: Vec<(u64, u64)> = self.pairs().filter(|p| !wanted(p.0)).collect();
+        let fresh = gathered(facets, rules, fine, wanted, comm);
+        all.extend(fresh.into_iter().map(|(start, area)| (start, self.scaled(start, area))));
+        all.sort_unstable();
+        self.set(&all);
+    }
+
+    /// Multiplies the area in some octants, in order, by factors; also what is gathered later.
+    pub fn scale(&mut self, factors: &[(BaseLeaf, f64)]) {
+        factors.clone_into(&mut self.factors);
+        let all: Vec<(u64, u64)> =
+            self.pairs().map(|(start, area)| (start, self.scaled(start, area))).collect();
+        self.set(&all);
+    }
+
+    fn scaled(&self, start: u64, area: u64) -> u64 {
+        let behind = self.factors.partition_point(|(b, _)| start57(b.level, b.code) <= start);
+        let factor = behind.checked_sub(1).map_or(1.0, |at| self.factors[at].1);
+        (area as f64 * factor) as u64
+    }
+
+    /// Places with their areas.
+    fn pairs(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+        let areas = self.before.windows(2).map(|w| w[1] - w[0]);
+        self.starts.iter().copied().zip(areas)
+    }
+
+    fn set(&mut self, pairs: &[(u64, u64)]) {
+        self.starts = pairs.iter().map(|p| p.0).collect();
+        self.before = vec![0];
+        let sums = pairs.iter().scan(0, |sum, p| {
+            *sum += p.1;
+            Some(*sum)
+        });
+        self.before.extend(sums);
     }
 
     /// Finest cells' faces in an octant that is no finer than the level of gathering.
     pub fn cells(&self, level: Level, code: u64) -> u64 {
-        let at = |start| self.before[self.starts.partition_point(|s| *s < start)];
+        let at = |start| {
+            self.before.get(self.starts.partition_point(|s| *s < start)).copied().unwrap_or(0)
+        };
         (at(start57(level, code + 1)) - at(start57(level, code))) / PARTS as u64
     }
+}
+
+/// The area of all ranks' facets by octants of a level, as far as `wanted`. Collective.
+fn gathered(
+    facets: &[Facet],
+    rules: &Rules,
+    level: Level,
+    wanted: impl Fn(u64) -> bool,
+    comm: &dyn Comm,
+) -> Vec<(u64, u64)> {
+    let cell = edge(rules.level_surface) as f64;
+    let shift = 3 * (LEVEL_MAX - level);
+    let mut mine: Vec<(u64, u64)> = Vec::new();
+    let mut add = |at: u64, area: f64| {
+        let at = at >> shift << shift;
+        if wanted(at) {
+            mine.push((at, (area * PARTS / (cell * cell)) as u64));
+        }
+    };
+    facets.iter().for_each(|f| spread(f, edge(level), &mut add));
+    sum(&mut mine);
+    let all = comm.all_gather(mine.iter().map(|m| [m.0, m.1]).collect::<Vec<_>>().as_flattened());
+    let mut pairs: Vec<(u64, u64)> =
+        all.iter().flat_map(|w| w.chunks_exact(2).map(|p| (p[0], p[1]))).collect();
+    sum(&mut pairs);
+    pairs
 }
 
 /// Sorts by place and adds up what lies in the same.

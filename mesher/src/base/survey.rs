@@ -1,0 +1,140 @@
+//! What all ranks know of T0's top before it is divided: which octants split, and where the facets' area lies.
+//!
+//! To a moderate level everywhere; deeper only where someone asks, as what everybody is told costs every
+//! rank, and most of it would only separate octants of one rank.
+
+use crate::brick::Brick;
+use crate::brickset::BrickSet;
+use crate::comm::Comm;
+use crate::facet::Facet;
+use crate::lattice::{ExtentBox, Rules};
+use crate::octant::Level;
+use crate::partition::area::Areas;
+use crate::partition::boxed;
+use crate::share::BaseLeaf;
+use crate::tree::Tree;
+use crate::voxelise::{Depth, Filed, Start, Work, refine};
+
+/// See the module.
+pub struct Survey<'a> {
+    facets: &'a [Facet],
+    filed: Filed,
+    rules: &'a Rules,
+    comm: &'a dyn Comm,
+    /// Octants that split in T0, and its crossing leaves: exact as far as `may_divide`.
+    pub marks: Tree,
+    areas: Areas,
+    /// Levels that base leaves may have, ascending: the first everywhere.
+    levels: Vec<Level>,
+    /// For each level but the last, the octants within which base leaves may be of the next.
+    deeper: Vec<BrickSet>,
+    /// Work done.
+    pub work: Work,
+}
+
+impl<'a> Survey<'a> {
+    /// Looks at everything down to the first of `levels`. Areas are known if `with_areas`. Collective.
+    pub fn new(
+        facets: &'a [Facet],
+        rules: &'a Rules,
+        levels: Vec<Level>,
+        with_areas: bool,
+        comm: &'a dyn Comm,
+    ) -> Self {
+        let areas = if with_areas {
+            Areas::gather(facets, rules, levels[0], comm)
+        } else {
+            Areas::default()
+        };
+        let mut survey = Self {
+            facets,
+            filed: Filed::new(facets),
+            rules,
+            comm,
+            marks: Tree::default(),
+            areas,
+            deeper: vec![BrickSet::default(); levels.len() - 1],
+            levels,
+            work: Work::default(),
+        };
+        survey.mark(survey.levels[0], &[Start { level: 0, code: 0 }]);
+        survey
+    }
+
+    /// Levels that base leaves may have.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// Whether an octant may be above base leaves.
+    pub fn may_divide(&self, l: Level, code: u64) -> bool {
+        // The last of the levels that the octant is not above.
+        match self.levels.partition_point(|&at| at <= l) {
+            0 => true,
+            k => self
+                .deeper
+                .get(k - 1)
+                .is_some_and(|octants| octants.contains(code >> (3 * (l - self.levels[k - 1])))),
+        }
+    }
+
+    /// Looks deeper, to the next of the levels, in octants of level number `k`, which must be split in T0.
+    /// Collective; the same on all ranks.
+    pub fn look_deeper(&mut self, k: usize, octants: BrickSet) {
+        let fresh = octants.without(&self.deeper[k]);
+        if fresh.is_empty() {
+            return;
+        }
+        let (level, next) = (self.levels[k], self.levels[k + 1]);
+        self.areas.refine(self.facets, self.rules, level, &fresh, next, self.comm);
+        let starts: Vec<Start> = fresh.codes().map(|code| Start { level, code }).collect();
+        self.mark(next, &starts);
+        self.deeper[k] = std::mem::take(&mut self.deeper[k]).union(fresh);
+    }
+
+    /// Leaves of the mesh to expect in a base leaf.
+    pub fn expected(&self, b: &BaseLeaf) -> u64 {
+        // A facet's cells come with the layers on its kept side, a third of them being coarser.
+        let thick = (u64::from(self.rules.layer_cells_min) + 2) * 4 / 3;
+        1 + self.areas.cells(b.level, b.code).saturating_mul(thick) + boxed(b, self.rules)
+    }
+
+    /// Makes expectations those that were told for some base leaves, in order.
+    pub fn calibrate(&mut self, leaves: &[BaseLeaf], told: &[u64]) {
+        let factor = |(b, told): (&BaseLeaf, &u64)| (*b, *told as f64 / self.expected(b) as f64);
+        let factors: Vec<(BaseLeaf, f64)> = leaves.iter().zip(told).map(factor).collect();
+        self.areas.scale(&factors);
+    }
+
+    /// Marks what all facets and boxes ask to be split below `starts`, so far that base leaves may be of
+    /// level `level`. Collective.
+    fn mark(&mut self, level: Level, starts: &[Start]) {
+        let rules = self.rules;
+        let level = (level + 1).min(rules.level_deepest().max(1));
+        let boxes = rules.boxes.iter().map(|b| ExtentBox { level: b.level.min(level), ..*b });
+        let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
+        let (mine, work) = refine(&self.filed, &depth, starts);
+        self.work.facet_brick_tests += work.facet_brick_tests;
+        self.work.bricks_voxelised += work.bricks_voxelised;
+        let levels = 0..=level as usize;
+        let mut words = Vec::new();
+        for set in [&mine.split, &mine.crossing].into_iter().flat_map(|s| &s[levels.clone()]) {
+            words.push(set.len() as u64);
+            words.extend(set.bricks().flat_map(|b| [b.key, b.bits]));
+        }
+        let all = self.comm.all_gather(&words);
+        let mut rest: Vec<&[u64]> = all.iter().map(Vec::as_slice).collect();
+        for sets in [&mut self.marks.split, &mut self.marks.crossing] {
+            for set in &mut sets[levels.clone()] {
+                // All ranks' bricks at once: a union per rank would copy the set as often as there are ranks.
+                let mut bricks = Vec::new();
+                for words in &mut rest {
+                    let (mine, behind) = words[1..].split_at(2 * words[0] as usize);
+                    bricks.extend(mine.chunks_exact(2).map(|w| Brick { key: w[0], bits: w[1] }));
+                    *words = behind;
+                }
+                *set = std::mem::take(set).union(BrickSet::from_unsorted(bricks));
+            }
+        }
+    }
+}
