@@ -42,6 +42,9 @@ pub enum Command {
         /// Distinct nodes that may be kept in memory
         #[arg(long)]
         nodes_max: Option<usize>,
+        /// Write verdict, times and memory as JSON
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
     },
     /// Writes a leaf-set directory as a VTK unstructured grid, to look at in ParaView or pyvista
     Export {

@@ -15,6 +15,7 @@ use crate::manifest::{Keep, Manifest, Tree as Kind};
 
 mod merge;
 mod pass;
+pub mod record;
 
 use pass::Pass;
 
