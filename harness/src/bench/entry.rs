@@ -156,7 +156,7 @@ pub struct Phase {
 /// What was run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
-    /// Which experiment it belongs to: `strong`, `weak`, `spacing`, `layers`, `weights`.
+    /// Which experiment it belongs to: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
     pub experiment: String,
     /// The program.
     pub engine: String,

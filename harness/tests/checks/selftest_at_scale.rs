@@ -80,9 +80,16 @@ fn the_seed_decides_places_and_the_number_of_jobs_does_not() {
 fn a_mesh_that_is_wrong_before_is_a_false_alarm_and_no_success() {
     let place = tempfile::tempdir().unwrap();
     let (name, text) = CASES[2];
-    let mut specimen = support::specimen(name, text);
-    specimen.mesh.manifest.leaves_by_side.crossing += 1;
-    let report = run(&[written(name, &specimen, place.path())], 1, 1);
-    assert!(!report.holds());
-    assert!(report.alarms.iter().any(|alarm| alarm.contains("manifest")), "{:?}", report.alarms);
+    let sound = support::specimen(name, text);
+    let mut lying = sound.clone();
+    lying.mesh.manifest.leaves_by_side.crossing += 1;
+    let mut disordered = sound;
+    disordered.mesh.parts[0].reverse();
+    for (name, specimen, check) in
+        [("lying", lying, "manifest"), ("disordered", disordered, "linear")]
+    {
+        let report = run(&[written(name, &specimen, place.path())], 1, 1);
+        assert!(!report.holds() && report.kills.is_empty());
+        assert!(report.alarms.iter().any(|alarm| alarm.contains(check)), "{:?}", report.alarms);
+    }
 }

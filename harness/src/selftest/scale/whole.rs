@@ -139,7 +139,7 @@ impl Whole {
     fn suits(&self, part: usize, octant: &Octant) -> io::Result<bool> {
         for (i, file) in self.set.parts.iter().enumerate() {
             let (from, until) = range(file, octant)?;
-            if until - from > if i == part { WINDOW_LEAVES } else { 0 } {
+            if until.saturating_sub(from) > if i == part { WINDOW_LEAVES } else { 0 } {
                 return Ok(false);
             }
         }
@@ -151,7 +151,7 @@ impl Whole {
         let mut words = Vec::new();
         for file in self.base.iter().flat_map(|base| &base.parts) {
             let (from, until) = range(file, octant)?;
-            if until - from <= WINDOW_BASE_LEAVES {
+            if until.saturating_sub(from) <= WINDOW_BASE_LEAVES {
                 words.extend(read_octant(file, octant)?.1);
             }
         }
@@ -197,6 +197,7 @@ fn range(file: &PartFile, octant: &Octant) -> io::Result<(u64, u64)> {
 
 fn read_octant(file: &PartFile, octant: &Octant) -> io::Result<(u64, Vec<u64>)> {
     let (from, until) = range(file, octant)?;
+    debug_assert!(from <= until, "the part is sorted");
     let mut words = vec![0; usize::try_from(until - from).expect("a window fits memory")];
     file.read_at(from, &mut words)?;
     Ok((from, words))
