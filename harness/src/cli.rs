@@ -42,6 +42,9 @@ pub enum Command {
         /// Distinct nodes that may be kept in memory
         #[arg(long)]
         nodes_max: Option<usize>,
+        /// Write verdict, times and memory as JSON
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
     },
     /// Writes a leaf-set directory as a VTK unstructured grid, to look at in ParaView or pyvista
     Export {
@@ -144,7 +147,23 @@ pub struct SelftestArguments {
     /// Corrupt the meshes of this case file instead of the built-in ones; may be repeated
     #[arg(long, value_name = "CASE")]
     pub case: Vec<PathBuf>,
-    /// Time limit of every run of the reference
+    /// Corrupt a mesh of any size instead, for the audit to find: a leaf-set directory, or a case file to be
+    /// meshed; may be repeated
+    #[arg(long, value_name = "DIR|CASE", conflicts_with = "case")]
+    pub at_scale: Vec<PathBuf>,
+    /// Cells of the meshes of case files, about; the spacing is chosen so [default: the case's own]
+    #[arg(long, value_name = "N", requires = "at_scale", value_parser = crate::cli_bench::cell_count)]
+    pub cells: Option<u64>,
+    /// Trials at a time, at scale; each takes the memory of an audit
+    #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: u16,
+    /// Chooses the places of corruptions, at scale
+    #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1)]
+    pub seed: u64,
+    /// Where scratch files go, at scale: two to four times the size of a mesh [default: the temporary directory]
+    #[arg(long, value_name = "DIR", requires = "at_scale")]
+    pub scratch: Option<PathBuf>,
+    /// Time limit of every run of reference or mesher
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     pub timeout: u64,
     /// Where the programs are.

@@ -8,12 +8,11 @@ use harness::bench::launcher::Launcher;
 use harness::bench::plan::{self, Experiment, Preset, Wishes, studies};
 use harness::bench::{BenchError, Options, bench, network, record, table};
 use harness::engine::programs::{Given, Programs};
-use harness::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use harness::verify::report::{
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING,
+};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-
-/// Exit code after Ctrl-C.
-const EXIT_INTERRUPTED: u8 = 130;
 
 /// `harness bench`.
 #[derive(Args, Debug)]
@@ -68,6 +67,13 @@ pub struct BenchArguments {
     /// Make a report, too: DIR/record.jsonl is the record then, unless --record names one
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    /// Instead of experiments: make the runs that a table of targets needs, and say which targets are met
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["cases", "preset", "experiment", "ranks", "ranks_mpi",
+        "cells", "layers", "weights", "partitioners", "engine"])]
+    pub targets: Option<PathBuf>,
+    /// Only these rows of it
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "targets")]
+    pub only: Vec<String>,
     /// Print the tables of an existing record and measure nothing
     #[arg(long)]
     pub show: bool,
@@ -85,7 +91,7 @@ fn rank_list(text: &str) -> Result<RankList, String> {
 }
 
 /// A number of cells, `1e9` allowed.
-fn cell_count(text: &str) -> Result<u64, String> {
+pub fn cell_count(text: &str) -> Result<u64, String> {
     let cells = text.trim().parse::<f64>().ok().filter(|c| (1e3..=1e12).contains(c));
     cells.map(|c| c as u64).ok_or_else(|| "give a number of cells from 1e3 to 1e12".to_owned())
 }
@@ -93,7 +99,10 @@ fn cell_count(text: &str) -> Result<u64, String> {
 /// Measures, prints; the exit code.
 pub fn run(arguments: BenchArguments) -> u8 {
     let report = arguments.report.clone();
-    let code = measure(arguments);
+    let code = match arguments.targets.clone() {
+        Some(file) => crate::cli_targets::run(&file, arguments),
+        None => measure(arguments),
+    };
     match report.map(|directory| crate::cli_report::write(&directory, &[])) {
         // A failed run stays the graver of the two.
         Some(Err(why)) => {
@@ -108,21 +117,12 @@ fn measure(arguments: BenchArguments) -> u8 {
     if arguments.show {
         return show(&arguments);
     }
-    let given = Given {
-        mesher: arguments.programs.mesher.clone(),
-        reference: arguments.programs.reference.clone(),
+    let programs = match programs(&arguments) {
+        Ok(programs) => programs,
+        Err(code) => return code,
     };
-    let programs = Programs::find(given);
-    let program =
-        if arguments.engine == "reference" { &programs.reference } else { &programs.mesher };
-    if !program.is_file() {
-        eprintln!("harness: {} is not there; build it or name it", program.display());
-        return EXIT_MISSING;
-    }
     let options = options(arguments);
-    let start = Instant::now();
-    let mut say = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    match bench(&options, &programs, &mut say) {
+    match bench(&options, &programs, &mut teller()) {
         Ok(outcome) => {
             print!("{}", table::tables(&Groups::of(&outcome.lines)));
             for line in &outcome.lines {
@@ -133,14 +133,39 @@ fn measure(arguments: BenchArguments) -> u8 {
             println!("record: {}", options.record.display());
             if outcome.failures == 0 { EXIT_HOLDS } else { EXIT_FAILED }
         }
-        Err(error) => {
-            eprintln!("harness: {error}");
-            match error {
-                BenchError::Input(_) => EXIT_INPUT,
-                BenchError::Missing(_) => EXIT_MISSING,
-                BenchError::Interrupted => EXIT_INTERRUPTED,
-            }
-        }
+        Err(error) => refuse(&error),
+    }
+}
+
+/// Where the programs are; an exit code where the one to be measured is not.
+pub fn programs(arguments: &BenchArguments) -> Result<Programs, u8> {
+    let given = Given {
+        mesher: arguments.programs.mesher.clone(),
+        reference: arguments.programs.reference.clone(),
+    };
+    let programs = Programs::find(given);
+    let program =
+        if arguments.engine == "reference" { &programs.reference } else { &programs.mesher };
+    if !program.is_file() {
+        eprintln!("harness: {} is not there; build it or name it", program.display());
+        return Err(EXIT_MISSING);
+    }
+    Ok(programs)
+}
+
+/// Tells on standard error what is being done, with the seconds since now.
+pub fn teller() -> impl FnMut(&str) {
+    let start = Instant::now();
+    move |what| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs())
+}
+
+/// Says why nothing more was measured; the exit code.
+pub fn refuse(error: &BenchError) -> u8 {
+    eprintln!("harness: {error}");
+    match error {
+        BenchError::Input(_) => EXIT_INPUT,
+        BenchError::Missing(_) => EXIT_MISSING,
+        BenchError::Interrupted => EXIT_INTERRUPTED,
     }
 }
 
@@ -162,13 +187,14 @@ fn show(arguments: &BenchArguments) -> u8 {
 }
 
 /// Where results go.
-fn record_path(arguments: &BenchArguments) -> PathBuf {
+pub fn record_path(arguments: &BenchArguments) -> PathBuf {
     let in_report = arguments.report.as_ref().map(|directory| directory.join("record.jsonl"));
     let given = arguments.record.clone().or(in_report);
     given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
 }
 
-fn options(arguments: BenchArguments) -> Options {
+/// What is asked for, in the library's words.
+pub fn options(arguments: BenchArguments) -> Options {
     let record = record_path(&arguments);
     let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
     let wishes = Wishes {

@@ -1,16 +1,20 @@
 //! `harness selftest`: correct meshes from the reference, corrupted; the table of kills, exit code.
 
 use crate::cli::SelftestArguments;
+use harness::bench::execute::Failed;
 use harness::case::Case;
 use harness::engine::mesher::{self, Files};
 use harness::engine::process::{self, End, Watch};
 use harness::engine::programs::{Given, Programs};
 use harness::leafset;
+use harness::selftest::scale::{self, Options, Source};
 use harness::selftest::{self, Specimen};
 use harness::verify::report::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING,
 };
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -37,6 +41,9 @@ pub fn run(arguments: &SelftestArguments) -> u8 {
 type Failure = (u8, String);
 
 fn try_run(arguments: &SelftestArguments) -> Result<u8, Failure> {
+    if !arguments.at_scale.is_empty() {
+        return at_scale(arguments);
+    }
     let given = Given { mesher: None, reference: arguments.programs.reference.clone() };
     let programs = Programs::find(given);
     if !programs.reference.is_file() {
@@ -60,6 +67,70 @@ fn try_run(arguments: &SelftestArguments) -> Result<u8, Failure> {
     let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
     println!("{report}");
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
+}
+
+/// The self test on meshes of any size.
+fn at_scale(arguments: &SelftestArguments) -> Result<u8, Failure> {
+    let input = |error: std::io::Error| (EXIT_INPUT, error.to_string());
+    let mut place = tempfile::Builder::new();
+    place.prefix("harness-selftest-");
+    let scratch = match &arguments.scratch {
+        Some(directory) => place.tempdir_in(directory),
+        None => place.tempdir(),
+    };
+    let scratch = scratch.map_err(input)?;
+    let made = scratch.path().join("made");
+    fs::create_dir(&made).map_err(input)?;
+    let sources = arguments.at_scale.iter().map(|path| source(arguments, path, &made));
+    let sources = sources.collect::<Result<Vec<Source>, Failure>>()?;
+    let options = Options { seed: arguments.seed, jobs: usize::from(arguments.jobs) };
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_style(
+        ProgressStyle::with_template("{pos}/{len} trials [{elapsed}]")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let say = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let report = scale::run(&sources, &options, scratch.path(), &say);
+    bar.finish_and_clear();
+    let report = report.map_err(|error| match error.kind() {
+        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+        _ => input(error),
+    })?;
+    println!("{report}");
+    let (trials, found) = (report.kills.len(), report.found_by_audit());
+    let killed = report.kills.iter().filter(|kill| kill.killed()).count();
+    println!(
+        "the audit found {found} of {trials}; {} show only against the untouched mesh",
+        killed.saturating_sub(found)
+    );
+    Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
+}
+
+/// A directory as it is, or what a case file makes.
+fn source(arguments: &SelftestArguments, path: &Path, made: &Path) -> Result<Source, Failure> {
+    if path.is_dir() {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        return Ok(Source { name, mesh: path.to_owned(), base: None });
+    }
+    let given = Given { mesher: arguments.programs.mesher.clone(), reference: None };
+    let programs = Programs::find(given);
+    if !programs.mesher.is_file() {
+        let path = programs.mesher.display();
+        return Err((
+            EXIT_MISSING,
+            format!("there is no mesher at {path}: build it, or say where it is"),
+        ));
+    }
+    let limit = Duration::from_secs(arguments.timeout);
+    let place = made.join(format!("{}", fs::read_dir(made).map_or(0, Iterator::count)));
+    fs::create_dir(&place).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+    scale::make::source(&programs, path, arguments.cells, &place, limit).map_err(|why| match why {
+        Failed::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+        Failed::Because(why) => (EXIT_INPUT, format!("{}: {why}", path.display())),
+    })
 }
 
 fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {

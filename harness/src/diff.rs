@@ -69,12 +69,8 @@ impl fmt::Display for DiffReport {
 /// Compares two leaf-set directories. With the case that both are meshes of, facets and rays help to decide.
 pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadError> {
     let (a, b) = (leafset::open(a)?, leafset::open(b)?);
-    let mut report =
-        DiffReport { fields: fields(&a.manifest, &b.manifest), ..DiffReport::default() };
-    let digests = a.manifest.octant_digests.iter().zip(&b.manifest.octant_digests).enumerate();
-    let differ: Vec<usize> = digests.filter(|(_, (x, y))| x != y).map(|(i, _)| i).collect();
-    report.octants = differ.iter().map(|&i| level_3(i)).collect();
-    for &i in &differ {
+    let mut report = manifests(&a.manifest, &b.manifest);
+    for i in octants_differing(&a.manifest, &b.manifest) {
         if let Some((x, y)) = first_difference(&a, &b, i)? {
             report.leaf = Some(rule::sides(x, y, &a.manifest.root));
             report.rules = rules(&a, &b, case, x, y)?;
@@ -82,6 +78,18 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadE
         }
     }
     Ok(report)
+}
+
+/// Compares what two manifests say, digests included, and reads no leaf.
+pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
+    let octants = octants_differing(a, b).into_iter().map(level_3).collect();
+    DiffReport { fields: fields(a, b), octants, ..DiffReport::default() }
+}
+
+/// Level-3 octants whose digests differ.
+fn octants_differing(a: &Manifest, b: &Manifest) -> Vec<usize> {
+    let digests = a.octant_digests.iter().zip(&b.octant_digests).enumerate();
+    digests.filter(|(_, (x, y))| x != y).map(|(i, _)| i).collect()
 }
 
 /// The level-3 octant with this index.

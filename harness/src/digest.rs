@@ -43,6 +43,11 @@ impl Digest {
     pub fn merge(&mut self, other: Self) {
         self.0 = self.0.wrapping_add(other.0);
     }
+
+    /// Counts a set of words out that was counted in.
+    pub fn remove(&mut self, other: Self) {
+        self.0 = self.0.wrapping_sub(other.0);
+    }
 }
 
 impl fmt::Display for Digest {

@@ -6,11 +6,13 @@ mod cli_gate;
 mod cli_report;
 mod cli_selftest;
 mod cli_shrink;
+mod cli_targets;
 mod cli_track;
 mod cli_verify;
 
 use clap::Parser;
 use cli::{Arguments, Command};
+use harness::audit::record::AuditRecord;
 use harness::audit::{self, AuditOptions};
 use harness::case::Case;
 use harness::diff;
@@ -32,14 +34,14 @@ fn main() -> ExitCode {
         Command::Report(arguments) => cli_report::run(&arguments),
         Command::Track(arguments) => cli_track::run(&arguments),
         Command::Selftest(arguments) => cli_selftest::run(&arguments),
-        Command::Audit { mesh, nodes_max } => run_audit(&mesh, nodes_max),
+        Command::Audit { mesh, nodes_max, json } => run_audit(&mesh, nodes_max, json.as_deref()),
         Command::Export { mesh, to } => run_export(&mesh, &to),
         Command::Diff { a, b, case } => run_diff(&a, &b, case.as_deref()),
     };
     ExitCode::from(code)
 }
 
-fn run_audit(mesh: &Path, nodes_max: Option<usize>) -> u8 {
+fn run_audit(mesh: &Path, nodes_max: Option<usize>, json: Option<&Path>) -> u8 {
     if !mesh.is_dir() {
         eprintln!("harness: {} is no directory", mesh.display());
         return EXIT_INPUT;
@@ -48,6 +50,12 @@ fn run_audit(mesh: &Path, nodes_max: Option<usize>) -> u8 {
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let report = audit::audit(mesh, &options);
     println!("{report}");
+    if let Some(path) = json
+        && let Err(error) = AuditRecord::of(&report).write(path)
+    {
+        eprintln!("harness: {}: {error}", path.display());
+        return EXIT_INPUT;
+    }
     if report.holds() { EXIT_HOLDS } else { EXIT_FAILED }
 }
 

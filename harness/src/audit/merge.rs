@@ -32,7 +32,7 @@ impl Reader<'_> {
 /// Hands out the words of all parts as runs: each run comes from one part (by its index), and no
 /// other part's next word is below the run's words. If each part is sorted, so is the whole.
 /// An error names the part.
-pub(super) fn merge(
+pub(crate) fn merge(
     parts: &[PartFile],
     run: &mut dyn FnMut(usize, &[u64]) -> bool,
 ) -> Result<(), (usize, std::io::Error)> {

@@ -13,8 +13,9 @@ use crate::check::{self, CheckResult, Terms};
 use crate::leafset;
 use crate::manifest::{Keep, Manifest, Tree as Kind};
 
-mod merge;
+pub(crate) mod merge;
 mod pass;
+pub mod record;
 
 use pass::Pass;
 

@@ -38,6 +38,10 @@ pub enum What {
     Run(Box<Run>),
     /// A program ran and did not do what it should.
     Failure(Failure),
+    /// A mesh was written and `harness audit` read it.
+    Audit(Audited),
+    /// A target was held against what was measured.
+    Target(Judged),
 }
 
 /// What stays the same in a session.
@@ -152,7 +156,7 @@ pub struct Phase {
 /// What was run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
-    /// Which experiment it belongs to: `strong`, `weak`, `spacing`, `layers`, `weights`.
+    /// Which experiment it belongs to: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
     pub experiment: String,
     /// The program.
     pub engine: String,
@@ -214,6 +218,73 @@ pub struct Failure {
     pub command: String,
     /// In a sentence.
     pub why: String,
+}
+
+/// A mesh that was written to disk and audited.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Audited {
+    /// What was meshed.
+    pub setup: Setup,
+    /// The audit's command line.
+    pub command: String,
+    /// Leaves of the mesh.
+    pub cells: u64,
+    /// Whether every check of the audit holds.
+    pub holds: bool,
+    /// Checks that found something.
+    pub found: Vec<String>,
+    /// CPU time of the audit's process.
+    pub time_cpu_s: f64,
+    /// Its wall time.
+    pub time_wall_s: f64,
+    /// Its peak resident memory.
+    pub peak_rss_bytes: u64,
+}
+
+/// A row of a table of targets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Judged {
+    /// The row's name.
+    pub name: String,
+    /// The runs that it is about, by their names in the file of targets.
+    pub runs: Vec<String>,
+    /// The run that they are held against, where the measure has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub against: Option<String>,
+    /// What is measured.
+    pub measure: String,
+    /// Least value wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_least: Option<f64>,
+    /// Greatest value wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_most: Option<f64>,
+    /// What was measured; nothing where the row was left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<f64>,
+    /// `measured`, `oversubscribed`, `projected` or `audited`; empty where the row was left out.
+    pub how: String,
+    /// What came of it.
+    pub verdict: Verdict,
+    /// Why it was left out or failed.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub why: String,
+}
+
+/// What came of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Within its bounds.
+    Met,
+    /// Measured and not within them.
+    Missed,
+    /// It has no bounds: it is there for comparison.
+    Told,
+    /// It was to be measured, and a run failed.
+    Failed,
+    /// It was not measured, by the user's wish or for want of something.
+    LeftOut,
 }
 
 #[cfg(test)]

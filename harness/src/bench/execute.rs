@@ -1,9 +1,10 @@
 //! Runs a program once and reads what it says of itself.
 
-use super::entry::{Comm, Phase, Run, Setup, Spread};
+use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::launcher::Launcher;
 use super::machine;
-use crate::engine::process::{self, End, Watch};
+use crate::audit::record::AuditRecord;
+use crate::engine::process::{self, End, Finished, Watch};
 use crate::engine::programs::Programs;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -94,23 +95,7 @@ impl Runner<'_> {
         let mut command = self.command(setup, case);
         command.arg("--json").arg(&json);
         let shown = shown(&command, self.place);
-        let watch = Watch { limit: self.limit, logs: self.place, name: "run", status: None };
-        let finished = process::run(&mut command, &watch)
-            .map_err(|error| Failed::Because(format!("it could not be started: {error}")))?;
-        match finished.end {
-            End::Exited(0) => {}
-            End::Interrupted => return Err(Failed::Interrupted),
-            End::TimedOut => {
-                return Err(Failed::Because(format!("killed after {} s", self.limit.as_secs())));
-            }
-            End::Exited(code) => {
-                let why = format!("it ended with code {code}: {}", finished.first_error_line());
-                return Err(Failed::Because(why));
-            }
-            End::Signalled(signal) => {
-                return Err(Failed::Because(format!("it was ended by signal {signal}")));
-            }
-        }
+        let finished = self.watched(&mut command, &[0])?;
         let told = std::fs::read_to_string(&json).map_err(|error| error.to_string());
         let told =
             told.and_then(|text| serde_json::from_str::<Told>(&text).map_err(|e| e.to_string()));
@@ -121,6 +106,57 @@ impl Runner<'_> {
         run.time_launch_s = finished.time_wall_s;
         run.oversubscribed = setup.comm == Comm::Mpi && setup.ranks > machine::cores();
         Ok(run)
+    }
+
+    /// Has the mesh of `setup` written into a directory of its own in `disk`, and `harness audit` read it; the
+    /// directory is removed.
+    ///
+    /// # Errors
+    /// Where that gives no verdict; a mesh at fault is one.
+    pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, Failed> {
+        let because = |error: std::io::Error| Failed::Because(error.to_string());
+        let place = tempfile::Builder::new().prefix("harness-audit-").tempdir_in(disk);
+        let place = place.map_err(because)?;
+        let mesh = place.path().join("mesh");
+        let mut command = self.command(setup, case);
+        command.arg("--out").arg(&mesh);
+        self.watched(&mut command, &[0])?;
+        let json = self.place.join("audit.json");
+        let _ = std::fs::remove_file(&json);
+        let mut command = Command::new(&self.programs.harness);
+        command.arg("audit").arg(&mesh).arg("--json").arg(&json);
+        let shown = shown(&command, self.place);
+        // 1: a check failed, which the record tells.
+        self.watched(&mut command, &[0, 1])?;
+        let told = AuditRecord::read(&json).map_err(Failed::Because)?;
+        let found = told.checks.iter().filter(|c| c.findings > 0).map(|c| c.name.clone());
+        Ok(Audited {
+            setup: setup.clone(),
+            command: shown,
+            cells: told.leaves,
+            holds: told.holds,
+            found: found.collect(),
+            time_cpu_s: told.time_cpu_s,
+            time_wall_s: told.time_wall_s,
+            peak_rss_bytes: told.peak_rss_bytes,
+        })
+    }
+
+    /// Runs a command to its end, which must be one of these exit codes.
+    fn watched(&self, command: &mut Command, codes: &[i32]) -> Result<Finished, Failed> {
+        let watch = Watch { limit: self.limit, logs: self.place, name: "run", status: None };
+        let finished = process::run(command, &watch)
+            .map_err(|error| Failed::Because(format!("it could not be started: {error}")))?;
+        let why = match finished.end {
+            End::Exited(code) if codes.contains(&code) => return Ok(finished),
+            End::Interrupted => return Err(Failed::Interrupted),
+            End::TimedOut => format!("killed after {} s", self.limit.as_secs()),
+            End::Exited(code) => {
+                format!("it ended with code {code}: {}", finished.first_error_line())
+            }
+            End::Signalled(signal) => format!("it was ended by signal {signal}"),
+        };
+        Err(Failed::Because(why))
     }
 
     fn command(&self, setup: &Setup, case: &Path) -> Command {

@@ -19,6 +19,7 @@ pub mod record;
 pub mod sizing;
 pub mod stats;
 pub mod table;
+pub mod targets;
 pub mod variant;
 
 use crate::engine::programs::Programs;
@@ -84,22 +85,22 @@ pub fn bench(
     programs: &Programs,
     say: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
-    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
-    let place =
-        place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))?;
-    let record = Record::open(&options.record)
-        .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
-    let (launcher, limit) = (&options.launcher, options.limit);
-    let runner = Runner { programs, launcher, limit, place: place.path() };
-    let mut bench =
-        Bench { options, runner, record, say, lines: Vec::new(), digests: HashMap::new() };
+    let place = temporary_directory()?;
+    let mut bench = Bench::open(options, programs, place.path(), say)?;
     bench.begin()?;
-    bench.measure_network()?;
+    if options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim) {
+        bench.measure_network()?;
+    }
     for study in &options.studies {
         bench.study(study)?;
     }
     let failures = bench.lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
     Ok(Outcome { lines: bench.lines, failures })
+}
+
+fn temporary_directory() -> Result<tempfile::TempDir, BenchError> {
+    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
+    place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))
 }
 
 /// What a mesh depends on, as text; its digest must depend on nothing else.
@@ -120,6 +121,22 @@ struct Point {
     setup: Setup,
     case: PathBuf,
     failed: bool,
+}
+
+impl<'a> Bench<'a> {
+    /// Opens the record; runs leave their files in `place`.
+    fn open(
+        options: &'a Options,
+        programs: &'a Programs,
+        place: &'a Path,
+        say: &'a mut dyn FnMut(&str),
+    ) -> Result<Self, BenchError> {
+        let record = Record::open(&options.record)
+            .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
+        let (launcher, limit) = (&options.launcher, options.limit);
+        let runner = Runner { programs, launcher, limit, place };
+        Ok(Self { options, runner, record, say, lines: Vec::new(), digests: HashMap::new() })
+    }
 }
 
 impl Bench<'_> {
@@ -143,11 +160,8 @@ impl Bench<'_> {
     }
 
     fn measure_network(&mut self) -> Result<(), BenchError> {
-        let wants_sim =
-            self.options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim);
         let network = match self.options.network {
             Some(given) => given,
-            None if !wants_sim => return Ok(()),
             None => match self.runner.ping_pong().and_then(|text| network::parse(&text)) {
                 Ok(measured) => measured,
                 Err(why) => {
@@ -159,6 +173,7 @@ impl Bench<'_> {
         self.append(What::Network(network))
     }
 
+    /// Runs an experiment.
     fn study(&mut self, study: &Study) -> Result<(), BenchError> {
         let base = self.base(&study.case)?;
         (self.say)(&format!("{} scaling of {}: choosing spacings", study.experiment, base.name));
@@ -223,10 +238,27 @@ impl Bench<'_> {
                 Err(why) => why,
             },
         };
+        self.failed(point, why)
+    }
+
+    fn failed(&mut self, point: &mut Point, why: String) -> Result<(), BenchError> {
         (self.say)(&format!("failed: {why}"));
         point.failed = true;
         let command = format!("{} on {} ranks", self.options.engine, point.setup.ranks);
         self.append(What::Failure(Failure { setup: point.setup.clone(), command, why }))
+    }
+
+    /// Has a mesh written beside the record and audited.
+    fn audit(&mut self, point: &mut Point) -> Result<(), BenchError> {
+        let s = &point.setup;
+        (self.say)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
+        let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
+        let disk = disk.unwrap_or(Path::new("."));
+        match self.runner.audit(s, &point.case, disk) {
+            Ok(audited) => self.append(What::Audit(audited)),
+            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
+            Err(Failed::Because(why)) => self.failed(point, why),
+        }
     }
 
     /// The time of a wrong mesh is no result: all runs of a mesh have one digest.

@@ -71,7 +71,24 @@ impl Base {
     /// # Errors
     /// Where it cannot be written.
     pub fn variant(&self, spacing_min: f64, layer_cells_min: u32) -> Result<PathBuf, String> {
-        let (origin, edge) = root(self.origin, self.edge, spacing_min);
+        self.write(root(self.origin, self.edge, spacing_min), spacing_min, layer_cells_min)
+    }
+
+    /// The same with the root as it stands: the finest cells are then those of the level that the spacing
+    /// asks for, up to twice finer than it.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn in_own_root(&self, spacing_min: f64, layer_cells_min: u32) -> Result<PathBuf, String> {
+        self.write((self.origin, self.edge), spacing_min, layer_cells_min)
+    }
+
+    fn write(
+        &self,
+        (origin, edge): ([f64; 3], f64),
+        spacing_min: f64,
+        layer_cells_min: u32,
+    ) -> Result<PathBuf, String> {
         let mut table = self.table.clone();
         table.insert("spacing_min".into(), spacing_min.into());
         table.insert("layer_cells_min".into(), i64::from(layer_cells_min).into());
@@ -79,8 +96,8 @@ impl Base {
         of_root.insert("origin".into(), Value::Array(origin.map(Value::from).to_vec()));
         of_root.insert("edge".into(), edge.into());
         table.insert("root".into(), of_root.into());
-        let path =
-            self.directory.join(format!("{}-{spacing_min:e}-{layer_cells_min}.toml", self.name));
+        let name = format!("{}-{spacing_min:e}-{layer_cells_min}-{edge:e}.toml", self.name);
+        let path = self.directory.join(name);
         fs::write(&path, table.to_string())
             .map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(path)
@@ -126,5 +143,7 @@ mod tests {
         // As it stands, the case stays what it is.
         let same = Case::read(&base.variant(base.spacing_min, 4).unwrap()).unwrap();
         assert_eq!((same.root, same.level_surface), (original.root, original.level_surface));
+        let kept = Case::read(&base.in_own_root(0.07, 3).unwrap()).unwrap();
+        assert_eq!((kept.root, kept.layer_cells_min), (original.root, 3));
     }
 }

@@ -26,7 +26,7 @@ pub fn markdown(report: &Report) -> String {
 }
 
 /// Text in which Markdown and HTML see nothing of theirs, on one line.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

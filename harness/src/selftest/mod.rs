@@ -20,6 +20,7 @@ mod claims;
 mod files;
 mod grading;
 mod leaves;
+pub mod scale;
 mod sides;
 mod surgery;
 mod table;
@@ -73,12 +74,19 @@ pub struct SelftestReport {
     pub alarms: Vec<String>,
     /// Corruptions that applied to no specimen.
     pub unused: Vec<&'static str>,
+    /// Corruptions that were not tried, and why.
+    pub left_out: Vec<(&'static str, String)>,
 }
 
 impl SelftestReport {
     /// Whether every corruption applied and was reported, and no correct mesh was.
     pub fn holds(&self) -> bool {
         self.alarms.is_empty() && self.unused.is_empty() && self.kills.iter().all(Kill::killed)
+    }
+
+    /// Trials in which the audit reported something.
+    pub fn found_by_audit(&self) -> usize {
+        self.kills.iter().filter(|kill| !kill.audit_caught_by.is_empty()).count()
     }
 }
 

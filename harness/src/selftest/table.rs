@@ -34,6 +34,8 @@ pub(super) fn write(report: &SelftestReport, f: &mut fmt::Formatter<'_>) -> fmt:
         .iter()
         .try_for_each(|alarm| writeln!(f, "FALSE ALARM on a correct mesh: {alarm}"))?;
     report.unused.iter().try_for_each(|name| writeln!(f, "NO SPECIMEN for: {name}"))?;
+    let left_out = &report.left_out;
+    left_out.iter().try_for_each(|(name, why)| writeln!(f, "left out: {name}: {why}"))?;
     let names: BTreeSet<_> = report.kills.iter().map(|k| k.mutant).collect();
     let survivors = report.kills.iter().filter(|k| !k.killed()).count();
     let (kinds, tried) = (names.len(), report.kills.len());
@@ -41,7 +43,11 @@ pub(super) fn write(report: &SelftestReport, f: &mut fmt::Formatter<'_>) -> fmt:
         f,
         "{kinds} corruptions in {tried} trials: {survivors} survived, {} false alarms",
         report.alarms.len()
-    )
+    )?;
+    match left_out.len() {
+        0 => Ok(()),
+        count => write!(f, ", {count} left out"),
+    }
 }
 
 /// Findings may quote whole manifests: enough to recognise them by.

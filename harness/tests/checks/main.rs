@@ -3,6 +3,7 @@
 mod agreement;
 mod no_false_alarms;
 mod selftest;
+mod selftest_at_scale;
 mod stl_files;
 mod support;
 mod vectors;

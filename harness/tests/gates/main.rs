@@ -1,6 +1,7 @@
 //! `harness gate`, `shrink` and `track` as a user runs them, on an engine that a script plays.
 
 mod play;
+mod targets;
 
 use play::Play;
 use std::fs;
