@@ -10,7 +10,7 @@
 
 use crate::brick::Brick;
 use crate::brickset::BrickSet;
-use crate::comm::Comm;
+use crate::comm::{Comm, Entry, gather_merged};
 use crate::octant::{LEVEL_MAX, Level};
 use crate::tree::{PerLevel, Tree, per_level};
 use std::sync::Arc;
@@ -153,26 +153,26 @@ impl Ownership {
         }
         let mut mine = BrickSet::default();
         let mut out: Vec<Vec<u64>> = vec![Vec::new(); self.ranks];
-        let mut top: Vec<u64> = Vec::new();
+        let mut top: Vec<Entry> = Vec::new();
         for b in set.bricks() {
             match self.place(l, b.key) {
                 Place::Mine => mine.push(b.key, b.bits),
                 Place::Remote(r) => out[r].extend([b.key, b.bits]),
-                Place::Top => top.extend([b.key, b.bits]),
+                Place::Top => top.push([b.key, b.bits]),
             }
         }
         let sent = out.iter().map(|w| w.len() as u64 / 2).sum();
-        let mut heard: Vec<Vec<u64>> = comm
-            .exchange(out.into_iter().enumerate().collect())
-            .into_iter()
-            .map(|(_, words)| words)
-            .collect();
+        let heard = comm.exchange(out.into_iter().enumerate().collect());
+        let heard = heard.iter().flat_map(|(_, words)| words.as_chunks().0);
+        let told = heard.map(|&[key, bits]| Brick { key, bits }).collect();
+        let mut all = mine.union(BrickSet::from_unsorted(told));
         if self.is_shared(l) {
-            heard.extend(comm.all_gather(&top).iter().cloned());
+            let mut known = BrickSet::default();
+            let top = gather_merged(top, |a, b| a | b, comm);
+            top.into_iter().for_each(|[key, bits]| known.push(key, bits));
+            all = all.union(known);
         }
-        let more = heard.iter().flat_map(|words| words.chunks_exact(2));
-        let more = more.map(|w| Brick { key: w[0], bits: w[1] }).collect();
-        (mine.union(BrickSet::from_unsorted(more)), sent)
+        (all, sent)
     }
 
     /// Checks that the base leaves tile the root.

@@ -7,9 +7,12 @@
 //! Every call is collective: all ranks make the same calls in the same order. Payloads are `u64`
 //! words.
 
+mod merged;
 #[cfg(feature = "mpi")]
 pub mod mpi;
 pub mod sim;
+
+pub use merged::{Entry, gather_merged};
 
 use crate::error::Error;
 use cpu_time::ThreadTime;
@@ -126,10 +129,10 @@ impl Meter {
         self.0.set(Traffic { messages: t.messages + messages, bytes: t.bytes + 8 * words, ..t });
     }
 
-    /// Counts a gathering of a rank's words by all: a message for every doubling of the number of ranks
-    /// that have them (recursive doubling, Bruck), the words going once to everybody.
+    /// Counts a gathering of `words` by all, all ranks' together: a message for every doubling of the number
+    /// of ranks that have them (recursive doubling, Bruck), in which all words but a rank's share pass on.
     pub(crate) fn gather(&self, ranks: usize, words: u64) {
-        self.count(doublings(ranks), words * (ranks as u64 - 1));
+        self.count(doublings(ranks), words - words / ranks as u64);
     }
 
     /// Counts what ranks tell each other before an exchange, how many words are to come: one word for

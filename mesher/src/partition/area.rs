@@ -7,7 +7,7 @@
 
 use crate::base::middle;
 use crate::brickset::BrickSet;
-use crate::comm::Comm;
+use crate::comm::{Comm, Entry, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level, edge, start57};
@@ -55,38 +55,37 @@ impl Areas {
         comm: &dyn Comm,
     ) {
         let wanted = |start: u64| octants.contains(start >> (3 * (LEVEL_MAX - coarse)));
-        let mut all: Vec<(u64, u64)> = self.pairs().filter(|p| !wanted(p.0)).collect();
+        let mut all: Vec<Entry> = self.entries().filter(|e| !wanted(e[0])).collect();
         let fresh = gathered(facets, rules, fine, wanted, comm);
-        all.extend(fresh.into_iter().map(|(start, area)| (start, self.scaled(start, area))));
-        all.sort_unstable();
+        all.extend(fresh.into_iter().map(|e| self.scaled(e)));
+        all.sort();
         self.set(&all);
     }
 
     /// Multiplies the area in some octants, in order, by factors; also what is gathered later.
     pub fn scale(&mut self, factors: &[(BaseLeaf, f64)]) {
         factors.clone_into(&mut self.factors);
-        let all: Vec<(u64, u64)> =
-            self.pairs().map(|(start, area)| (start, self.scaled(start, area))).collect();
+        let all: Vec<Entry> = self.entries().map(|e| self.scaled(e)).collect();
         self.set(&all);
     }
 
-    fn scaled(&self, start: u64, area: u64) -> u64 {
+    fn scaled(&self, [start, area]: Entry) -> Entry {
         let behind = self.factors.partition_point(|(b, _)| start57(b.level, b.code) <= start);
         let factor = behind.checked_sub(1).map_or(1.0, |at| self.factors[at].1);
-        (area as f64 * factor) as u64
+        [start, (area as f64 * factor) as u64]
     }
 
     /// Places with their areas.
-    fn pairs(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+    fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
         let areas = self.before.windows(2).map(|w| w[1] - w[0]);
-        self.starts.iter().copied().zip(areas)
+        self.starts.iter().copied().zip(areas).map(Entry::from)
     }
 
-    fn set(&mut self, pairs: &[(u64, u64)]) {
-        self.starts = pairs.iter().map(|p| p.0).collect();
+    fn set(&mut self, entries: &[Entry]) {
+        self.starts = entries.iter().map(|e| e[0]).collect();
         self.before = vec![0];
-        let sums = pairs.iter().scan(0, |sum, p| {
-            *sum += p.1;
+        let sums = entries.iter().scan(0, |sum, e| {
+            *sum += e[1];
             Some(*sum)
         });
         self.before.extend(sums);
@@ -108,38 +107,18 @@ fn gathered(
     level: Level,
     wanted: impl Fn(u64) -> bool,
     comm: &dyn Comm,
-) -> Vec<(u64, u64)> {
+) -> Vec<Entry> {
     let cell = edge(rules.level_surface) as f64;
     let shift = 3 * (LEVEL_MAX - level);
-    let mut mine: Vec<(u64, u64)> = Vec::new();
+    let mut mine: Vec<Entry> = Vec::new();
     let mut add = |at: u64, area: f64| {
         let at = at >> shift << shift;
         if wanted(at) {
-            mine.push((at, (area * PARTS / (cell * cell)) as u64));
+            mine.push([at, (area * PARTS / (cell * cell)) as u64]);
         }
     };
     facets.iter().for_each(|f| spread(f, edge(level), &mut add));
-    sum(&mut mine);
-    let all = comm.all_gather(mine.iter().map(|m| [m.0, m.1]).collect::<Vec<_>>().as_flattened());
-    let mut pairs: Vec<(u64, u64)> =
-        all.iter().flat_map(|w| w.chunks_exact(2).map(|p| (p[0], p[1]))).collect();
-    sum(&mut pairs);
-    pairs
-}
-
-/// Sorts by place and adds up what lies in the same.
-fn sum(pairs: &mut Vec<(u64, u64)>) {
-    pairs.sort_unstable();
-    let mut kept: usize = 0;
-    for i in 0..pairs.len() {
-        if kept > 0 && pairs[kept - 1].0 == pairs[i].0 {
-            pairs[kept - 1].1 += pairs[i].1;
-        } else {
-            pairs[kept] = pairs[i];
-            kept += 1;
-        }
-    }
-    pairs.truncate(kept);
+    gather_merged(mine, |a, b| a + b, comm)
 }
 
 /// Tells the facet's area to `add`, in pieces whose extent is at most `extent`.
