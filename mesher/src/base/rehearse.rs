@@ -1,9 +1,8 @@
 //! The rehearsal: the same mesh made a few levels coarser tells what a base leaf will hold.
 //!
 //! Leaves along a surface grow by four per level, those that its curvature, edges and tips add by two, as
-//! layers there are thicker the coarser the mesh. The facets' area tells the former; what the coarse mesh
-//! holds beyond that is the latter. Parts of the rehearsal are Morton cuts by area, so that it is divided
-//! well itself.
+//! layers there are thicker the coarser the mesh. What is which, the facets' area tells. Parts of the
+//! rehearsal are Morton cuts by area, so that it is divided well itself.
 
 use super::cut::Cut;
 use super::route;
@@ -18,8 +17,8 @@ use crate::tree::Tree;
 use crate::voxelise::{Depth, Filed, refine};
 use crate::{grade, kept, sides};
 
-/// Levels that a rehearsal is coarser: it takes a 64th of the cells.
-const COARSER: Level = 3;
+/// Cells of a rehearsal per rank, at least: it is as many levels coarser as that allows.
+const CELLS_PER_RANK: u64 = 100_000;
 
 /// Leaves to expect in each base leaf, the same on all ranks. `expected` is what area lets expect, and the
 /// answer where the tree is too shallow to rehearse. Collective.
@@ -35,7 +34,8 @@ pub fn weights(
     let Some(coarser) = rules.level_surface.checked_sub(cut.level_base + 2) else {
         return expected.to_vec();
     };
-    let coarser = coarser.min(COARSER);
+    let share = expected.iter().sum::<u64>() / comm.size() as u64;
+    let coarser = coarser.min((share / CELLS_PER_RANK).max(1).ilog2() / 2);
     if coarser == 0 || comm.size() == 1 {
         return expected.to_vec();
     }
@@ -44,9 +44,20 @@ pub fn weights(
     for theirs in comm.all_gather(&rehearse(facets, &coarse, marks, cut, expected, comm)).iter() {
         theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
     }
-    let scale = 1 << coarser;
-    // With a = area's leaves in the coarse mesh: a * scale^2 + (counted - a) * scale.
-    let weight = |(thought, told): (&u64, u64)| told * scale + thought - thought / scale;
+    extrapolate(expected, &counts, 1 << coarser)
+}
+
+/// Leaves to expect where a mesh `scale` times coarser has `counts`, and area lets expect `expected`.
+///
+/// The latter is put right in all; what a leaf has more or less than that says is taken to grow with the
+/// size only, be it by curvature, edges and tips, or as layers reach from one leaf into the next.
+fn extrapolate(expected: &[u64], counts: &[u64], scale: u64) -> Vec<u64> {
+    let sum = |all: &[u64]| all.iter().map(|&n| n as f64).sum::<f64>();
+    let scale = scale as f64;
+    let right = sum(counts) * scale * scale / sum(expected).max(1.0);
+    let weight = |(&thought, &told): (&u64, &u64)| {
+        (told as f64 * scale + thought as f64 * right * (1.0 - 1.0 / scale)) as u64
+    };
     expected.iter().zip(counts).map(weight).collect()
 }
 
