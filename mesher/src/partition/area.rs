@@ -10,8 +10,8 @@ use crate::brickset::BrickSet;
 use crate::comm::{Comm, Entry, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::Rules;
-use crate::octant::{LEVEL_MAX, Level, edge, start57};
-use crate::share::BaseLeaf;
+use crate::octant::{LEVEL_MAX, Level, edge};
+use std::ops::Range;
 
 /// Parts of a finest cell's face: sums of integers do not depend on their order.
 const PARTS: f64 = 1024.0;
@@ -23,8 +23,8 @@ pub struct Areas {
     starts: Vec<u64>,
     /// Area in all octants before each of them, and in all at the end.
     before: Vec<u64>,
-    /// Factors for what is found in some octants, in order.
-    factors: Vec<(BaseLeaf, f64)>,
+    /// Factors for what is found from some level-19 codes on, ascending.
+    factors: Vec<(u64, f64)>,
 }
 
 /// The area of some facets, by the norm above, in lattice units squared.
@@ -62,15 +62,15 @@ impl Areas {
         self.set(&all);
     }
 
-    /// Multiplies the area in some octants, in order, by factors; also what is gathered later.
-    pub fn scale(&mut self, factors: &[(BaseLeaf, f64)]) {
-        factors.clone_into(&mut self.factors);
+    /// Multiplies the area from some level-19 codes on, ascending, by factors; also what is gathered later.
+    pub fn scale(&mut self, factors: Vec<(u64, f64)>) {
+        self.factors = factors;
         let all: Vec<Entry> = self.entries().map(|e| self.scaled(e)).collect();
         self.set(&all);
     }
 
     fn scaled(&self, [start, area]: Entry) -> Entry {
-        let behind = self.factors.partition_point(|(b, _)| start57(b.level, b.code) <= start);
+        let behind = self.factors.partition_point(|f| f.0 <= start);
         let factor = behind.checked_sub(1).map_or(1.0, |at| self.factors[at].1);
         [start, (area as f64 * factor) as u64]
     }
@@ -91,12 +91,32 @@ impl Areas {
         self.before.extend(sums);
     }
 
-    /// Finest cells' faces in an octant that is no finer than the level of gathering.
-    pub fn cells(&self, level: Level, code: u64) -> u64 {
-        let at = |start| {
-            self.before.get(self.starts.partition_point(|s| *s < start)).copied().unwrap_or(0)
-        };
-        (at(start57(level, code + 1)) - at(start57(level, code))) / PARTS as u64
+    /// Number of octants with area.
+    pub fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Those, by number, whose level-19 codes are in `span`, which are among some.
+    pub fn places_within(&self, among: &Range<usize>, span: Range<u64>) -> Range<usize> {
+        let part = &self.starts[among.clone()];
+        let first = part.partition_point(|s| *s < span.start);
+        let count = part[first..].partition_point(|s| *s < span.end);
+        among.start + first..among.start + first + count
+    }
+
+    /// The same if the first is known.
+    pub fn places_from(&self, first: usize, span: Range<u64>) -> Range<usize> {
+        let count = self.starts[first..].iter().take_while(|s| **s < span.end).count();
+        first..first + count
+    }
+
+    /// Finest cells' faces in some of them.
+    pub fn cells(&self, places: &Range<usize>) -> u64 {
+        // Unit weights gather nothing.
+        if places.is_empty() {
+            return 0;
+        }
+        (self.before[places.end] - self.before[places.start]) / PARTS as u64
     }
 }
 
@@ -144,7 +164,7 @@ mod tests {
     use super::*;
     use crate::comm::Solo;
     use crate::lattice::{Keep, Root};
-    use crate::octant::ROOT_EDGE;
+    use crate::octant::{ROOT_EDGE, start57};
 
     fn rules(level_surface: Level) -> Rules {
         Rules {
@@ -163,10 +183,13 @@ mod tests {
         let h = (ROOT_EDGE / 2) as i32;
         let f = Facet { v: [[0, 0, 1], [h, 0, 1], [0, h, 1]] };
         let areas = Areas::gather(&[f], &rules(6), 4, &Solo);
+        let cells = |l: Level, code: u64| {
+            let span = start57(l, code)..start57(l, code + 1);
+            areas.cells(&areas.places_within(&(0..areas.len()), span))
+        };
         // 32 x 32 finest cells, half of them covered.
-        assert_eq!(areas.cells(0, 0), 512);
-        assert_eq!(areas.cells(1, 0), 512);
-        let parts: Vec<u64> = (0..8).map(|child| areas.cells(2, child)).collect();
+        assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
+        let parts: Vec<u64> = (0..8).map(|child| cells(2, child)).collect();
         let total: u64 = parts.iter().sum();
         assert!(total.abs_diff(512) <= 4, "{parts:?}");
         // The octant at the right angle is covered whole, its neighbours half.
