@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::octant::{LEVEL_MAX, Level, ROOT_EDGE};
+use crate::wide::widest;
 
 /// The root cube, in the STL's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,15 +29,13 @@ impl Bounds {
 
     /// Bounds of facets, whose coordinates must be finite.
     pub fn of(facets: &[geometries::Facet]) -> Self {
-        let mut lo = [f32::INFINITY; 3];
-        let mut hi = [f32::NEG_INFINITY; 3];
-        for v in facets.iter().flatten() {
-            for a in 0..3 {
-                lo[a] = lo[a].min(v[a]);
-                hi[a] = hi[a].max(v[a]);
-            }
-        }
-        Self { lo: lo.map(f64::from), hi: hi.map(f64::from) }
+        // All nine coordinates at a time.
+        let (mut lo, mut hi) = ([f32::INFINITY; 9], [f32::NEG_INFINITY; 9]);
+        widen(facets, &mut lo, &mut hi);
+        let of = |all: [f32; 9], pick: fn(f32, f32) -> f32| {
+            [0, 1, 2].map(|a| f64::from(pick(pick(all[a], all[a + 3]), all[a + 6])))
+        };
+        Self { lo: of(lo, f32::min), hi: of(hi, f32::max) }
     }
 
     /// Bounds of the union.
@@ -85,32 +84,19 @@ impl Root {
         })
     }
 
-    /// Facets on the lattice. `first` is the number of the first one in the whole geometry, for errors.
-    pub fn facets(&self, facets: &[geometries::Facet], first: u64) -> Result<Vec<Facet>, Error> {
-        let scale = ROOT_EDGE as f64 / self.edge;
-        let origin = self.origin;
-        let mut worst = 0.0f64;
-        let at = |v: [f32; 3]| {
-            std::array::from_fn(|a| ((f64::from(v[a]) - origin[a]) * scale).round_ties_even())
-        };
-        let out = facets
-            .iter()
-            .map(|f| Facet {
-                v: f.map(|v| {
-                    let q: [f64; 3] = at(v);
-                    // The distance from the root's middle, in which the allowed range is symmetric.
-                    let off = q.map(|c| (c - ROOT_EDGE as f64 * 0.5).abs());
-                    worst = worst.max(off[0]).max(off[1]).max(off[2]);
-                    q.map(|c| c as i32)
-                }),
-            })
-            .collect();
-        if worst > ROOT_EDGE as f64 * 1.5 {
-            let outside = |v: &[f32; 3]| {
-                at(*v)
-                    .iter()
-                    .any(|c: &f64| (c - ROOT_EDGE as f64 * 0.5).abs() > ROOT_EDGE as f64 * 1.5)
-            };
+    /// Facets on the lattice, in the memory that they are in. `bounds` are theirs; `first` is the number of the
+    /// first one in the whole geometry, for errors.
+    pub fn facets(
+        &self,
+        mut facets: Vec<geometries::Facet>,
+        bounds: &Bounds,
+        first: u64,
+    ) -> Result<Vec<Facet>, Error> {
+        let (origin, scale) = (self.origin, ROOT_EDGE as f64 / self.edge);
+        let far = |c: f64, a: usize| off_middle(at(c, origin[a], scale)) > ROOT_EDGE as f64 * 1.5;
+        // What is nearest on the lattice ascends with the coordinate, so the bounds speak for all.
+        if !facets.is_empty() && (0..3).any(|a| far(bounds.lo[a], a) || far(bounds.hi[a], a)) {
+            let outside = |v: &[f32; 3]| (0..3).any(|a| far(f64::from(v[a]), a));
             let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
             let v = facets[bad].iter().find(|v| outside(v)).unwrap_or(&facets[bad][0]);
             return Err(Error::input(format!(
@@ -121,7 +107,50 @@ impl Root {
                 v[2]
             )));
         }
-        Ok(out)
+        quantise(&mut facets, &origin, scale);
+        Ok(bytemuck::allocation::cast_vec(facets))
+    }
+}
+
+/// The lattice coordinate nearest to a coordinate.
+#[inline(always)]
+fn at(c: f64, origin: f64, scale: f64) -> f64 {
+    ((c - origin) * scale).round_ties_even()
+}
+
+/// The distance from the root's middle, in which the allowed range is symmetric.
+fn off_middle(c: f64) -> f64 {
+    (c - ROOT_EDGE as f64 * 0.5).abs()
+}
+
+widest! {
+    fn widen(facets: &[geometries::Facet], lo: &mut [f32; 9], hi: &mut [f32; 9]) = widen_lanes;
+}
+
+#[inline(always)]
+fn widen_lanes(facets: &[geometries::Facet], lo: &mut [f32; 9], hi: &mut [f32; 9]) {
+    let (mut least, mut most) = (*lo, *hi);
+    for f in facets {
+        let c: [f32; 9] = bytemuck::cast(*f);
+        least = std::array::from_fn(|i| if c[i] < least[i] { c[i] } else { least[i] });
+        most = std::array::from_fn(|i| if c[i] > most[i] { c[i] } else { most[i] });
+    }
+    (*lo, *hi) = (least, most);
+}
+
+widest! {
+    /// Replaces coordinates by the bits of those on the lattice, as i32.
+    fn quantise(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f64) = quantise_lanes;
+}
+
+#[inline(always)]
+fn quantise_lanes(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f64) {
+    // All nine coordinates at a time: as many lanes as there are.
+    let origins: [f64; 9] = std::array::from_fn(|i| origin[i % 3]);
+    for f in facets {
+        let c: [f32; 9] = bytemuck::cast(*f);
+        let whole: &mut [i32; 9] = bytemuck::cast_mut(f);
+        *whole = std::array::from_fn(|i| at(f64::from(c[i]), origins[i], scale) as i32);
     }
 }
 
@@ -191,6 +220,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn all_widths_bring_facets_to_the_same_place() {
+        let mut random = 7u32;
+        let mut draw = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) as f32 / 1e6 - 3.0
+        };
+        let facets: Vec<geometries::Facet> =
+            (0..500).map(|_| [0; 3].map(|_| [0; 3].map(|_| draw()))).collect();
+        let root = Root { origin: [-5.0, -4.5, -7.25], edge: 24.0 };
+        let all = crate::wide::tests::widths(|| {
+            let bounds = Bounds::of(&facets);
+            (bounds, root.facets(facets.clone(), &bounds, 0).unwrap())
+        });
+        for (width, (bounds, quantised)) in &all {
+            assert_eq!((bounds, quantised), (&all[0].1.0, &all[0].1.1), "{width:?}");
+            let naive = facets.as_flattened().iter().fold(f32::INFINITY, |m, v| m.min(v[1]));
+            assert_eq!(bounds.lo[1], f64::from(naive));
+            let c = (f64::from(facets[9][2][0]) + 5.0) * (ROOT_EDGE as f64 / 24.0);
+            assert_eq!(quantised[9].v[2][0], c.round_ties_even() as i32);
+        }
+    }
+
+    #[test]
     fn a_spacing_means_that_size_or_smaller() {
         let root = Root { origin: [0.0; 3], edge: 8.0 };
         for (s, l) in [(9.0, 0), (8.0, 0), (7.9, 1), (1.0, 3), (0.99, 4), (8.0 / 524_288.0, 19)] {
@@ -207,8 +259,13 @@ mod tests {
         assert_eq!([1.0, 3.0, 5.0].map(|x| root.quantise(0, x)), [0, 2, 2]);
         let near = [[0.0f32; 3]; 3];
         let far = [[0.0; 3], [0.0; 3], [0.0, 3.1 * ROOT_EDGE as f32 * 2.0, 0.0]];
-        assert_eq!(root.facets(&[near], 0).unwrap().len(), 1);
-        assert!(root.facets(&[near, far], 40).unwrap_err().to_string().contains("facet 41"));
+        assert_eq!(root.facets(vec![near], &Bounds::of(&[near]), 0).unwrap().len(), 1);
+        assert!(
+            root.facets(vec![near, far], &Bounds::of(&[near, far]), 40)
+                .unwrap_err()
+                .to_string()
+                .contains("facet 41")
+        );
     }
 
     #[test]

@@ -163,8 +163,8 @@ fn build(
 ) -> Result<(Meshed, Counters), Error> {
     let mut counters = Counters::default();
     let geometry = record.phase("read", comm, || ingest::read(&case.source, comm))?;
-    let (rules, facets) = record.phase("quantise", comm, || quantise(case, &geometry, comm))?;
-    drop(geometry.facets);
+    let (rules, facets, total) =
+        record.phase("quantise", comm, || quantise(case, geometry, comm))?;
     let mut refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
     comm.agree(check_interrupt())?;
 
@@ -186,24 +186,25 @@ fn build(
         split
     });
     comm.agree(check_interrupt())?;
-    Ok((Meshed { facets: geometry.total, rules, refined, sides, graded }, counters))
+    Ok((Meshed { facets: total, rules, refined, sides, graded }, counters))
 }
 
-/// The rules, and this rank's facets on the lattice. Collective.
+/// The rules, this rank's facets on the lattice, and the number of all. Collective.
 fn quantise(
     case: &Case,
-    geometry: &ingest::Share,
+    geometry: ingest::Share,
     comm: &dyn Comm,
-) -> Result<(Rules, Vec<facet::Facet>), Error> {
-    let mine = Bounds::of(&geometry.facets);
+) -> Result<(Rules, Vec<facet::Facet>, u64), Error> {
+    let ingest::Share { facets, first, total } = geometry;
+    let mine = Bounds::of(&facets);
     let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
     let bounds = comm.all_gather(&words).iter().fold(Bounds::EMPTY, |b, w| {
         let at = |i: usize| f64::from_bits(w[i]);
         b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
     });
     let rules = case.rules(&bounds)?;
-    let facets = agree(comm, rules.root.facets(&geometry.facets, geometry.first))?;
-    Ok((rules, facets))
+    let facets = agree(comm, rules.root.facets(facets, &mine, first))?;
+    Ok((rules, facets, total))
 }
 
 /// The base tree T0 as this rank holds it.

@@ -19,7 +19,10 @@ type Firsts = BTreeSet<Vec<[i64; 3]>>;
 
 fn by_mesher(case: &Small) -> Firsts {
     let rules = case.mesher_case().rules(&Bounds::of(&case.facets)).expect("the case is good");
-    let facets = rules.root.facets(&case.facets, 0).expect("near the root");
+    let facets = rules
+        .root
+        .facets(case.facets.clone(), &Bounds::of(&case.facets), 0)
+        .expect("near the root");
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     let (tree, _) = refine(&Filed::new(&facets), &depth, &[Start { level: 0, code: 0 }]);
     tree.check_invariants();

@@ -113,14 +113,18 @@ fn lattice_points() {
             // The vertex that f32 has nearest, and a root moved by as much.
             let by = |a: usize| f64::from(near[a]) - vertex[a];
             let moved = Root { origin: std::array::from_fn(|a| root.origin[a] + by(a)), ..root };
-            let told = moved.facets(&[[near; 3]], 0).expect_err("too far outside").to_string();
+            let told = moved
+                .facets(vec![[near; 3]], &Bounds::of(&[[near; 3]]), 0)
+                .expect_err("too far outside")
+                .to_string();
             assert!(told.contains("facet 0") && told.contains("outside the root"), "{told}");
             continue;
         }
         assert_eq!(at, integers(&v["lattice"]), "{v}");
         // A vertex that f32 cannot hold is none that an STL can have; boxes may have it.
         if near.map(f64::from) == vertex {
-            let found = root.facets(&[[near; 3]], 0).expect("near the root");
+            let found =
+                root.facets(vec![[near; 3]], &Bounds::of(&[[near; 3]]), 0).expect("near the root");
             assert_eq!(found[0].v.map(|p| p.map(i64::from)), [at; 3], "{v}");
         }
     }

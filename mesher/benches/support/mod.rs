@@ -73,7 +73,10 @@ impl Phases {
         let case = case("uav", 20_000, 10, 4);
         let given = read(&case.source, &Solo).expect("facets");
         let rules = case.rules(&Bounds::of(&given.facets)).expect("a good case");
-        let facets = rules.root.facets(&given.facets, 0).expect("near the root");
+        let facets = rules
+            .root
+            .facets(given.facets.clone(), &Bounds::of(&given.facets), 0)
+            .expect("near the root");
         let share = Ownership::solo();
         let filed = Filed::new(&facets);
         let depth = Depth { surface: rules.level_surface, boxes: vec![] };

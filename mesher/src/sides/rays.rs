@@ -13,11 +13,10 @@ use crate::octant::{ROOT_BITS, ROOT_EDGE};
 /// odd number of these facets, bit `2 a` the one down. Points are in the root and on no facet.
 pub fn parities(facets: &[Facet], points: &[[i64; 3]]) -> Vec<u8> {
     let mut odd = vec![0; points.len()];
-    for a in 0..3 {
-        let grid = Grid::new(points, a);
-        for f in facets {
-            grid.count(f, points, &mut odd);
-        }
+    let grids: [Grid; 3] = std::array::from_fn(|a| Grid::new(points, a));
+    for f in facets {
+        let extent = std::array::from_fn(|a| f.range(a));
+        grids.iter().for_each(|grid| grid.count(f, &extent, points, &mut odd));
     }
     odd
 }
@@ -67,9 +66,10 @@ impl Grid {
     }
 
     /// Flips the parities of the points whose rays along the axis meet the facet.
-    fn count(&self, f: &Facet, points: &[[i64; 3]], odd: &mut [u8]) {
+    #[inline]
+    fn count(&self, f: &Facet, extent: &[(i64, i64); 3], points: &[[i64; 3]], odd: &mut [u8]) {
         let (u, w) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let ((u0, u1), (w0, w1)) = (f.range(u), f.range(w));
+        let ((u0, u1), (w0, w1)) = (extent[u], extent[w]);
         if u1 < 0 || w1 < 0 || u0 > ROOT_EDGE || w0 > ROOT_EDGE {
             return;
         }
