@@ -66,10 +66,11 @@ macro_rules! widest {
                 fn avx2($($arg: $type),*) $(-> $result)? {
                     $lanes($($arg),*)
                 }
-                // SAFETY: the only demand of both functions is that the processor has the features that
-                // they are compiled for, and `width` names a width after detecting them all.
                 match $crate::wide::width() {
+                    // SAFETY: the only demand of the function is that the processor has the features that
+                    // it is compiled for, and `width` names a width after detecting them all.
                     $crate::wide::Width::Avx512 => return unsafe { avx512($($arg),*) },
+                    // SAFETY: as above.
                     $crate::wide::Width::Avx2 => return unsafe { avx2($($arg),*) },
                     $crate::wide::Width::Portable => {}
                 }

@@ -94,7 +94,7 @@ impl<'a> Survey<'a> {
 
     /// The entries of an octant's areas.
     pub fn places(&self, l: Level, code: u64) -> Range<usize> {
-        self.areas.places_within(&(0..self.areas.len()), span(l, code))
+        self.areas.places_within(&self.areas.places(), span(l, code))
     }
 
     /// The same for an octant whose entries are among some.

@@ -68,7 +68,7 @@ mod tests {
     fn all_ranks_get_the_sums_over_all() {
         for ranks in [1, 2, 8, 9, 30] {
             let told = sim::run(ranks, 4, |c| {
-                let mine = (0..200u64).map(|i| [i * i % 97 << 40, c.rank() as u64 + 1]).collect();
+                let mine = (0..200u64).map(|i| [(i * i % 97) << 40, c.rank() as u64 + 1]).collect();
                 gather_merged(mine, |a, b| a + b, c)
             });
             let sum: u64 = (1..=ranks as u64).sum();

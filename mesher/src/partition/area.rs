@@ -91,9 +91,9 @@ impl Areas {
         self.before.extend(sums);
     }
 
-    /// Number of octants with area.
-    pub fn len(&self) -> usize {
-        self.starts.len()
+    /// The octants with area, by number.
+    pub fn places(&self) -> Range<usize> {
+        0..self.starts.len()
     }
 
     /// Those, by number, whose level-19 codes are in `span`, which are among some.
@@ -185,7 +185,7 @@ mod tests {
         let areas = Areas::gather(&[f], &rules(6), 4, &Solo);
         let cells = |l: Level, code: u64| {
             let span = start57(l, code)..start57(l, code + 1);
-            areas.cells(&areas.places_within(&(0..areas.len()), span))
+            areas.cells(&areas.places_within(&areas.places(), span))
         };
         // 32 x 32 finest cells, half of them covered.
         assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
