@@ -134,7 +134,7 @@ pub fn kernels() -> Vec<Kernel> {
                 refine(&p.filed, &p.depth, &[Start { level: 0, code: 0 }]).1.facet_brick_tests
             }),
         ),
-        kernel("flood", bricks, Box::new(move || floods(p.surface().bricks(), surface))),
+        kernel("flood", bricks, Box::new(move || floods(p.surface(), surface))),
         kernel(
             "sides",
             leaves_of(&p.tree),
@@ -197,9 +197,9 @@ fn brick_masks(facets: &[Facet]) -> u64 {
 }
 
 /// Components of what the surface leaves open in its bricks.
-fn floods(bricks: &[Brick], l: u32) -> u64 {
+fn floods(set: &BrickSet, l: u32) -> u64 {
     let mut components = 0;
-    for b in bricks {
+    for b in set.bricks() {
         let mut rest = !b.bits & valid(l);
         while rest != 0 {
             rest &= !flood(rest & rest.wrapping_neg(), rest);
