@@ -78,6 +78,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             useful_s: Spread::of(&both),
             phases: vec![phase("refine"), phase("grade")],
             counters: counters.into_iter().collect(),
+            message_matrix: Vec::new(),
         })))
     };
     (0..6).map(one).collect()

@@ -12,6 +12,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
+/// Most ranks between which messages are told pair by pair: there may be as many entries as pairs.
+pub const MATRIX_RANKS_MAX: usize = 64;
+
 /// What every run of a session has in common.
 #[derive(Debug)]
 pub struct Runner<'a> {
@@ -47,6 +50,8 @@ struct Told {
     phases: Vec<PhaseTold>,
     #[serde(default)]
     counters: BTreeMap<String, Vec<f64>>,
+    #[serde(default)]
+    message_matrix: Vec<[u64; 4]>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -94,6 +99,10 @@ impl Runner<'_> {
         let _ = std::fs::remove_file(&json);
         let mut command = self.command(setup, case);
         command.arg("--json").arg(&json);
+        // The counts of one run are those of all, and gathering them should disturb none that is timed.
+        if warm_up && tells_matrix(setup) {
+            command.arg("--message-matrix");
+        }
         let shown = shown(&command, self.place);
         let finished = self.watched(&mut command, &[0])?;
         let told = std::fs::read_to_string(&json).map_err(|error| error.to_string());
@@ -211,6 +220,12 @@ impl Runner<'_> {
     }
 }
 
+/// Whether messages between pairs of ranks are wanted of a setup: in strong scaling of the mesher.
+pub fn tells_matrix(setup: &Setup) -> bool {
+    let ranks = (2..=MATRIX_RANKS_MAX).contains(&setup.ranks);
+    setup.experiment == "strong" && setup.engine == "mesher" && setup.comm == Comm::Sim && ranks
+}
+
 /// A run as a program tells it; what the harness knows of it is the caller's to add.
 fn of_told(setup: Setup, told: &Told) -> Run {
     let mut useful_s = vec![0.0; setup.ranks];
@@ -222,7 +237,7 @@ fn of_told(setup: Setup, told: &Told) -> Run {
     }
     let phase = |p: &PhaseTold| Phase {
         name: p.name.clone(),
-        useful_s: Spread::brief(&p.useful_s()),
+        useful_s: Spread::of(&p.useful_s()),
         wall_s: Spread::brief(&p.time_wall_s),
         comm_s: Spread::brief(&p.time_comm_wall_s),
         messages: Spread::brief(&p.messages),
@@ -250,6 +265,7 @@ fn of_told(setup: Setup, told: &Told) -> Run {
         useful_s: Spread::of(&useful_s),
         phases: told.phases.iter().map(phase).collect(),
         counters: told.counters.iter().map(|(name, v)| (name.clone(), Spread::brief(v))).collect(),
+        message_matrix: told.message_matrix.clone(),
         setup,
     }
 }
@@ -277,7 +293,7 @@ mod tests {
     use super::*;
 
     const TOLD: &str = r#"{"schema": "octree-mesher-run/1", "facets": 12, "cells": 80, "digest": "00", "ranks": 2,
-        "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
+        "message_matrix": [[0, 1, 3, 96]], "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
         "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0], "time_comm_wall_s": [1.0, 1.0],
           "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
 
@@ -291,6 +307,8 @@ mod tests {
         let run = of_told(setup(Comm::Mpi, 2), &told);
         assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
         assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!(run.message_matrix, [[0, 1, 3, 96]]);
         assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
         // All simulated ranks live in one process.

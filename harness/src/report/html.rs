@@ -60,8 +60,7 @@ fn summary(out: &mut String, groups: &Groups, lines: &[Line]) {
     );
     for group in groups.all.iter().filter(|g| is_told(g)) {
         let network = &groups.network;
-        let told =
-            sentence(group.typical(network), groups.reference(group).typical(network), network);
+        let told = sentence(&group.typical, &groups.reference(group).typical, network);
         let _ = writeln!(
             out,
             "<li><b>{}</b>, {} scaling, {} cells: {}</li>",
@@ -135,7 +134,7 @@ fn tables(out: &mut String, groups: &Groups) {
 fn row(out: &mut String, groups: &Groups, group: &Group) {
     let (s, t) = (&group.setup, group.time_s);
     let e = group.efficiency(groups.reference(group), &groups.network);
-    let leaves = group.typical(&groups.network).counters.get("leaves");
+    let leaves = group.typical.counters.get("leaves");
     let _ = writeln!(
         out,
         "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3} – {:.3}<td>{:.0} %<td>{}<td>{:.3}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}\
@@ -143,7 +142,7 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
         escape(&s.case),
         grouped(group.cells()),
         s.layer_cells_min,
-        division(group),
+        division(s),
         s.ranks,
         group.how(),
         t.value,
@@ -205,8 +204,8 @@ fn phases(out: &mut String, groups: &Groups) {
         }
     }
     for group in shown {
-        let (run, network) = (group.typical(&groups.network), &groups.network);
-        let reference = groups.reference(group).typical(network);
+        let (run, network) = (&group.typical, &groups.network);
+        let reference = &groups.reference(group).typical;
         let total: f64 =
             run.phases.iter().map(|p| p.useful_s.max + pop::messages_s(p, network)).sum();
         let _ = writeln!(

@@ -5,9 +5,11 @@ pub mod canvas;
 pub mod csv;
 pub mod figure;
 pub mod figures;
+pub mod heat;
 pub mod html;
 pub mod latex;
 pub mod lint;
+pub mod matrix;
 pub mod paint;
 pub mod paper;
 #[cfg(feature = "figures")]

@@ -2,6 +2,7 @@
 
 use super::canvas::{Anchor, Canvas, FAINT, HEIGHT, INK, SIZE, WIDTH, colour, draw, width};
 use super::figure::{Axis, Bars, Body, Figure, How, Series, short};
+use super::heat;
 use super::scale::Scale;
 
 /// Where the data is.
@@ -27,6 +28,7 @@ pub fn svg(figure: &Figure) -> String {
     draw(|canvas| match &figure.body {
         Body::Points(series) => points(canvas, figure, series),
         Body::Bars(bars) => paint_bars(canvas, figure, bars),
+        Body::Heat(heat) => heat::paint(canvas, figure, heat),
     })
 }
 
