@@ -103,7 +103,7 @@ pub fn run(arguments: BenchArguments) -> u8 {
         Some(file) => crate::cli_targets::run(&file, arguments),
         None => measure(arguments),
     };
-    match report.map(|directory| crate::cli_report::write(&directory, &[])) {
+    match report.map(|directory| crate::cli_report::write(&directory, &[], None)) {
         // A failed run stays the graver of the two.
         Some(Err(why)) => {
             eprintln!("harness: {why}");

@@ -223,7 +223,7 @@ impl Bench<'_> {
             if warm_up {
                 ", warm-up".to_owned()
             } else {
-                format!(", {} {}, repeat {}", s.partitioner, s.weights, repeat + 1)
+                format!(", {}, repeat {}", table::division(s), repeat + 1)
             }
         ));
         let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
