@@ -9,6 +9,7 @@
 pub mod cause;
 pub mod entry;
 pub mod execute;
+pub mod foreign;
 pub mod group;
 pub mod launcher;
 pub mod machine;
@@ -22,6 +23,7 @@ pub mod table;
 pub mod targets;
 pub mod variant;
 
+use crate::case::Case;
 use crate::engine::programs::Programs;
 use entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
 use execute::{Failed, Runner};
@@ -39,7 +41,7 @@ use variant::Base;
 pub struct Options {
     /// The studies, in order.
     pub studies: Vec<Study>,
-    /// `mesher` or `reference`.
+    /// `mesher`, `reference`, or what the record calls the engine of `Programs`.
     pub engine: String,
     /// How ranks are started.
     pub launcher: Launcher,
@@ -277,6 +279,10 @@ impl Bench<'_> {
             for layout in &study.layouts {
                 for spacing in self.spacings(study, base, layout, &mut sizes)? {
                     let case = base.variant(spacing, n).map_err(BenchError::Input)?;
+                    if let Some(why) = self.declined(&case)? {
+                        (self.say)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
+                        continue;
+                    }
                     for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
                         points.push(Point {
                             setup: self.setup(
@@ -295,6 +301,16 @@ impl Bench<'_> {
             }
         }
         Ok(points)
+    }
+
+    /// Why the engine is not run on a case, by its description.
+    fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
+        let own = foreign::OWN.contains(&self.options.engine.as_str());
+        let Some(engine) = self.runner.programs.engine.as_ref().filter(|_| !own) else {
+            return Ok(None);
+        };
+        let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
+        Ok(engine.description().declines(&case))
     }
 
     fn setup(

@@ -87,7 +87,7 @@ enum Mark {
 
 /// Dashes of a level to compare with; those of two levels are told apart.
 fn dash(nth: usize) -> i32 {
-    [14, 5, 30][nth % 3]
+    [14, 40, 6][nth % 3]
 }
 
 /// Space of a mark in the legend.

@@ -77,10 +77,10 @@ fn plot(out: &mut String, s: &Series) {
             "look{colour}, {}, mark={}{}",
             if joined { if how.is_solid() { "solid" } else { "dashed" } } else { "only marks" },
             if how.is_solid() { solid } else { hollow },
-            ", error bars/.cd, y dir=both, y explicit"
+            ", every mark/.append style={solid}, error bars/.cd, y dir=both, y explicit"
         ),
     };
-    let _ = writeln!(out, "\\addplot+[{style}] coordinates {{");
+    let _ = writeln!(out, "\\addplot[{style}] coordinates {{");
     for p in &s.points {
         let _ = match s.how {
             How::Bound => writeln!(out, "  ({},{})", p.x, p.y),
@@ -121,11 +121,13 @@ fn bars(out: &mut String, mut options: Vec<String>, b: &Bars) {
         );
         let _ = writeln!(out, "\\addlegendentry{{{}}}", escape(name));
     }
-    for (name, level) in &b.lines {
+    for (i, (name, level)) in b.lines.iter().enumerate() {
         let last = b.categories.len() as f64 - 0.5;
+        let dash = ["densely dotted", "dashed", "solid"][i % 3];
         let _ = writeln!(
             out,
-            "\\draw[densely dotted] (axis cs:-0.5,{level}) -- (axis cs:{last},{level}) node[above left, font=\\footnotesize] {{{}}};",
+            "\\draw[{dash}] (axis cs:-0.5,{level}) -- (axis cs:{last},{level});\n\\addlegendimage{{{dash}, legend image code/.code={{\\draw (0,0) \
+             -- (0.6cm,0);}}}}\n\\addlegendentry{{{}}}",
             escape(name)
         );
     }
