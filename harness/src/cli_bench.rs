@@ -133,7 +133,17 @@ fn measure(arguments: BenchArguments) -> u8 {
                 }
             }
             println!("record: {}", options.record.display());
-            if outcome.failures == 0 { EXIT_HOLDS } else { EXIT_FAILED }
+            let measured = outcome.lines.iter().any(|line| matches!(line.what, What::Run(_)));
+            match (outcome.failures, measured) {
+                (0, true) => EXIT_HOLDS,
+                (0, false) => {
+                    eprintln!(
+                        "harness: nothing was measured: ask for fewer cells, or for another experiment"
+                    );
+                    EXIT_MISSING
+                }
+                _ => EXIT_FAILED,
+            }
         }
         Err(error) => refuse(&error),
     }

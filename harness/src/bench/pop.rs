@@ -14,7 +14,7 @@
 //! ```
 //!
 //! What a rank does is the same in every repetition, only the time that the machine takes for it wavers. So
-//! where runs tell it rank by rank, u[p][r] is the median over the repetitions (see [`Group`](super::group::Group)),
+//! where runs tell it rank by rank, `u[p][r]` is the median over the repetitions (see [`Group`](super::group::Group)),
 //! taken before any maximum over ranks: the greatest of many wavering times is the most disturbed rank's.
 //!
 //! C is what the phases would take on a network that costs nothing, as ranks wait for each other at the
