@@ -7,7 +7,7 @@
 //! partition cuts the Morton curve, only the leaves that a cut falls in. Once dealt out, siblings of one owner
 //! are joined: so all that is known to everybody is what separates ranks.
 
-mod cut;
+pub(crate) mod cut;
 mod heaviest;
 mod rehearse;
 mod route;
@@ -26,18 +26,18 @@ use crate::partition::{self, Partitioner, Weights, area};
 use crate::share::{BaseLeaf, Ownership};
 use crate::tree::Tree;
 use crate::voxelise::{Start, Work};
-use cut::{Cut, adaptive, uniform};
+use cut::{Cut, Piece, cut_through};
 use survey::Survey;
 
 /// Base leaves with children per rank that the paper's way, one level for all, aims at.
 const SPLIT_LEAVES_PER_RANK: u64 = 32;
 /// A base leaf heavier than this part of a rank's share is split where that is automatic, if a partitioner
-/// may cut anywhere: it then misses an equal share by a few percent, and what everyone holds stays small.
+/// may take any of them: it then misses an equal share by a few percent.
 const SHARE_PARTS: u64 = 16;
 /// The same for the leaves that a cut through the Morton curve falls in; others need not be small.
 const CUT_PARTS: u64 = 64;
-/// Parts of a share that base leaves have wherever they are, at least, before cuts are looked at.
-const COARSE_PARTS: u64 = 2;
+/// Parts of a share that octants have everywhere, about, before cuts are looked at.
+const COARSE_PARTS: u64 = 1;
 /// Levels from one look at the cuts to the next.
 const LOOK_LEVELS: Level = 2;
 /// Deepest automatic `level_base` of all base leaves alike.
@@ -56,14 +56,12 @@ pub struct Division {
 
 /// The base tree as all ranks know it: splits and crossing leaves down to the base leaves.
 pub struct Base {
-    /// Who owns which base leaf; siblings of one owner are joined.
+    /// Who owns what.
     pub share: Ownership,
-    /// T0 down to the base leaves.
+    /// T0 in top bricks, down to the base leaves.
     pub top: Tree,
-    /// This rank's base leaves that are split in T0.
+    /// This rank's base leaves that are split in T0, siblings joined.
     pub starts: Vec<Start>,
-    /// Levels of base leaves that are split in T0, of any rank; ascending.
-    pub levels_split: Vec<Level>,
     /// This rank's base leaves as they were dealt out, in order.
     pub dealt: Vec<BaseLeaf>,
     /// Level of the deepest base leaves that were dealt out.
@@ -82,31 +80,30 @@ pub fn build(
     let levels = levels(facets, rules, division, comm);
     let with_areas = division.weights != Weights::Unit;
     let mut survey = Survey::new(facets, rules, levels, with_areas, comm);
-    let mut cut = divide(&mut survey, rules, division, comm);
+    let mut cut = divide(&mut survey, division, comm.size());
     let mut weights: Vec<u64> = match division.weights {
-        Weights::Unit => vec![1; cut.leaves.len()],
-        _ => cut.leaves.iter().map(|b| survey.expected(b)).collect(),
+        Weights::Unit => vec![1; cut.pieces.len()],
+        _ => cut.weights(),
     };
     if division.weights == Weights::Rehearsal {
-        let told = rehearse::weights(facets, rules, &survey.marks, &cut, &weights, comm);
+        weights = rehearse::weights(facets, rules, &survey.marks, &cut, comm);
         if cuts_anywhere(division) {
-            survey.calibrate(&cut.leaves, &told);
-            cut = divide(&mut survey, rules, division, comm);
-            weights = cut.leaves.iter().map(|b| survey.expected(b)).collect();
-        } else {
-            weights = told;
+            survey.calibrate(&cut, &weights);
+            cut = divide(&mut survey, division, comm.size());
+            weights = cut.weights();
         }
     }
-    let owners = partition::assign(&cut.leaves, &weights, division.partitioner, comm)?;
-    cut.leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
-    let dealt = cut.leaves.iter().filter(|b| b.owner == comm.rank()).copied().collect();
-    let level_base = cut.level_base;
-    let Survey { marks, work, .. } = survey;
-    let cut = cut.joined(&marks, rules.level_surface);
-    let (starts, levels_split) = (cut.starts(comm.rank()), cut.levels_split());
-    let share = Ownership::new(comm.rank(), comm.size(), cut.internal, cut.leaves);
-    share.check_invariants();
-    Ok(Base { share, top: cut.top, starts, levels_split, dealt, level_base, work })
+    let owners = partition::assign(&cut, &weights, division.partitioner, comm)?;
+    let dealt = cut.dealt(&owners);
+    let share = Ownership::new(comm.rank(), comm.size(), &dealt);
+    Ok(Base {
+        top: cut.top(&survey.marks, rules.level_surface, &share),
+        starts: cut.starts(&owners, comm.rank()),
+        dealt: dealt.into_iter().filter(|b| b.owner == comm.rank()).collect(),
+        level_base: cut.level_base(),
+        share,
+        work: survey.work,
+    })
 }
 
 /// Whether cuts fall where weights ask for them, so that only there base leaves need be small.
@@ -154,58 +151,47 @@ fn level_auto(facets: &[Facet], rules: &Rules, parts: [u64; 2], comm: &dyn Comm)
 }
 
 /// Cuts the tree into base leaves, looking deeper where that is needed. Collective.
-fn divide(survey: &mut Survey, rules: &Rules, division: &Division, comm: &dyn Comm) -> Cut {
-    let (surface, ranks) = (rules.level_surface, comm.size() as u64);
+fn divide(survey: &mut Survey, division: &Division, ranks: usize) -> Cut {
+    let mut cut = Cut::root(survey);
     let whole = survey.levels()[0];
+    let above = |level: Level| move |all: &[Piece]| all.iter().map(|p| p.level < level).collect();
     match (division.level_base, division.weights) {
-        (Some(_), _) => return Cut::new(&survey.marks, uniform(&survey.marks, whole), surface),
+        (Some(_), _) => return cut.split_while(survey, above(whole)),
         (None, Weights::Unit) => {
-            let enough = SPLIT_LEAVES_PER_RANK * ranks;
+            let enough = SPLIT_LEAVES_PER_RANK * ranks as u64;
             let level = (0..whole).find(|&l| survey.marks.split[l as usize].count() >= enough);
-            let internal = uniform(&survey.marks, level.unwrap_or(whole));
-            return Cut::new(&survey.marks, internal, surface);
+            return cut.split_while(survey, above(level.unwrap_or(whole)));
         }
         _ => {}
     }
-    let parts = if cuts_anywhere(division) { CUT_PARTS } else { SHARE_PARTS };
-    let limit = survey.expected(&BaseLeaf { level: 0, code: 0, owner: 0 }) / (ranks * parts);
-    let cut = |survey: &Survey| {
-        let internal = adaptive(
-            &survey.marks,
-            |l, code| survey.may_divide(l, code),
-            |b| survey.expected(b),
-            limit,
-        );
-        Cut::new(&survey.marks, internal, surface)
+    let share = cut.pieces[0].weight / ranks as u64;
+    if !cuts_anywhere(division) {
+        let heavy = |p: &Piece| p.weight > share / SHARE_PARTS;
+        return cut.split_while(survey, |all| all.iter().map(heavy).collect());
+    }
+    let cut_heavy = |all: &[Piece]| -> Vec<bool> {
+        let cuts = cut_through(all, ranks).into_iter().zip(all);
+        cuts.map(|(cut, p)| cut && p.weight > share / CUT_PARTS).collect()
     };
-    for k in 0..survey.levels().len() - 1 {
-        let octants = cut_through(&cut(survey), survey, survey.levels()[k], comm.size());
-        survey.look_deeper(k, octants);
-    }
-    cut(survey)
-}
-
-/// The base leaves of level `l`, split in T0, that a cut into equal shares falls in.
-fn cut_through(cut: &Cut, survey: &Survey, l: Level, ranks: usize) -> BrickSet {
-    let weights: Vec<u64> = cut.leaves.iter().map(|b| survey.expected(b)).collect();
-    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
-    let share_at = |weight: u128| weight * ranks as u128 / total;
-    let mut octants = BrickSet::default();
-    let mut before = 0;
-    for ((b, heavy), weight) in cut.leaves.iter().zip(&cut.heavy).zip(weights) {
-        let after = before + u128::from(weight);
-        if *heavy && b.level == l && share_at(before) != share_at(after) {
-            octants.push(b.code >> 6, 1 << (b.code & 63));
+    for k in 0..survey.levels().len() {
+        cut = cut.split_while(survey, cut_heavy);
+        if k + 1 < survey.levels().len() {
+            let wanted = cut_heavy(&cut.pieces).into_iter().zip(&cut.pieces);
+            let wanted =
+                wanted.filter(|(wanted, p)| *wanted && p.heavy && p.level == survey.levels()[k]);
+            let mut octants = BrickSet::default();
+            wanted.for_each(|(_, p)| octants.push(p.code >> 6, 1 << (p.code & 63)));
+            survey.look_deeper(k, octants);
+            cut.renew(survey);
         }
-        before = after;
     }
-    octants
+    cut
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.
 #[cfg_attr(not(feature = "metis"), allow(dead_code))]
 pub(crate) fn face_neighbours(
-    leaves: &[BaseLeaf],
+    leaves: &[Piece],
     leaf_at: impl Fn(u64) -> usize,
 ) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
@@ -247,8 +233,7 @@ mod tests {
 
     #[test]
     fn neighbours_of_a_uniform_base_tree() {
-        let leaves: Vec<BaseLeaf> =
-            (0..64).map(|code| BaseLeaf { level: 2, code, owner: 0 }).collect();
+        let leaves: Vec<Piece> = (0..64).map(|code| Piece::new(2, code)).collect();
         let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
         assert_eq!(pairs.len(), 3 * 3 * 16);
         let apart = |a: usize, b: usize| -> i64 {

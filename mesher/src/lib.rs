@@ -231,8 +231,8 @@ fn refine(
             voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
         });
         counters.voxelise(&work);
-        let share = Ownership::solo();
-        return Ok(Refined { tree, dealt: share.leaves().to_vec(), share, level_base: 0 });
+        let (share, dealt) = (Ownership::solo(), vec![share::BaseLeaf::ROOT]);
+        return Ok(Refined { tree, dealt, share, level_base: 0 });
     }
     let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
@@ -241,28 +241,19 @@ fn refine(
     let (mut tree, work) =
         record.phase("refine", comm, || voxelise::refine(&filed, &depth, &base.starts));
     counters.voxelise(&work);
-    record.phase("share top", comm, || {
-        share_top(&mut tree, base.top, &base.share, &base.levels_split, comm)
-    });
+    record.phase("share top", comm, || share_top(&mut tree, base.top, &base.share, comm));
     let base::Base { share, dealt, level_base, .. } = base;
     Ok(Refined { tree, share, dealt, level_base })
 }
 
-/// Makes the top bricks of a rank's tree those of the whole tree; `levels_split` are those of base leaves
-/// that are split in T0. Collective.
-fn share_top(
-    tree: &mut Tree,
-    top: Tree,
-    share: &Ownership,
-    levels_split: &[octant::Level],
-    comm: &dyn Comm,
-) {
+/// Makes the top bricks of a rank's tree those of the whole tree. Collective.
+fn share_top(tree: &mut Tree, top: Tree, share: &Ownership, comm: &dyn Comm) {
     for (sets, top) in [(&mut tree.split, top.split), (&mut tree.crossing, top.crossing)] {
         for ((l, set), top) in (0..).zip(sets.iter_mut()).zip(top) {
             let mine = std::mem::take(set);
             // A top brick may hold children of base leaves; their owners know those.
-            let below = l > 0 && levels_split.contains(&(l - 1));
-            *set = if below { share.scatter(l, mine, comm).0 } else { mine }.union(top);
+            let all = if share.is_shared(l) { share.scatter(l, mine, comm).0 } else { mine };
+            *set = all.union(top);
         }
     }
 }

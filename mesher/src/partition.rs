@@ -4,11 +4,11 @@ pub mod area;
 #[cfg(feature = "metis")]
 mod metis;
 
+use crate::base::cut::{Cut, Piece};
 use crate::comm::{Comm, agree};
 use crate::error::Error;
 use crate::lattice::Rules;
-use crate::octant::{corner, edge};
-use crate::share::BaseLeaf;
+use crate::octant::{Level, corner, edge};
 
 /// Who cuts the base tree into parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -32,8 +32,11 @@ pub enum Weights {
 }
 
 /// Leaves that the boxes ask for in an octant.
-pub fn boxed(b: &BaseLeaf, rules: &Rules) -> u64 {
-    let (at, h) = (corner(b.level, b.code), edge(b.level));
+pub fn boxed(l: Level, code: u64, rules: &Rules) -> u64 {
+    if rules.boxes.is_empty() {
+        return 0;
+    }
+    let (at, h) = (corner(l, code), edge(l));
     let volume = |e: &crate::lattice::ExtentBox| {
         let span = |a: usize| (e.max[a].min(at[a] + h) - e.min[a].max(at[a])).max(0);
         (0..3).map(|a| (span(a) as u64).div_ceil(edge(e.level) as u64)).product::<u64>()
@@ -43,17 +46,17 @@ pub fn boxed(b: &BaseLeaf, rules: &Rules) -> u64 {
 
 /// The owner of each base leaf, the same on all ranks. Collective.
 pub fn assign(
-    leaves: &[BaseLeaf],
+    cut: &Cut,
     weights: &[u64],
     partitioner: Partitioner,
     comm: &dyn Comm,
 ) -> Result<Vec<usize>, Error> {
     match partitioner {
-        _ if comm.size() == 1 => Ok(vec![0; leaves.len()]),
+        _ if comm.size() == 1 => Ok(vec![0; weights.len()]),
         Partitioner::Morton => Ok(morton_cuts(weights, comm.size())),
         Partitioner::Metis => {
             let made = if comm.rank() == 0 {
-                metis_cuts(leaves, weights, comm.size())
+                metis_cuts(&cut.pieces, weights, comm.size())
             } else {
                 Ok(Vec::new())
             };
@@ -76,12 +79,12 @@ pub fn morton_cuts(weights: &[u64], ranks: usize) -> Vec<usize> {
 }
 
 #[cfg(feature = "metis")]
-fn metis_cuts(leaves: &[BaseLeaf], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
+fn metis_cuts(leaves: &[Piece], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
     metis::cuts(leaves, weights, ranks)
 }
 
 #[cfg(not(feature = "metis"))]
-fn metis_cuts(_: &[BaseLeaf], _: &[u64], _: usize) -> Result<Vec<usize>, Error> {
+fn metis_cuts(_: &[Piece], _: &[u64], _: usize) -> Result<Vec<usize>, Error> {
     Err(Error::input(
         "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
     ))

@@ -1,18 +1,20 @@
 //! Who holds which bricks.
 //!
 //! The base tree's leaves are dealt out to the ranks. A brick fills an octant; if that octant lies in
-//! a base leaf, the brick is that leaf's owner's alone. If not (it is split in the base tree, or the
+//! a base leaf, or in several of one owner, the brick is that owner's alone. If not (or if the
 //! brick is one of levels 0 and 1) the brick is a *top* brick: all ranks hold a copy, kept equal, and
 //! one of them, the owner of the base leaf at its minimum corner, answers for it: counts it, emits its
 //! leaves and takes its sources.
 //!
-//! Invariants: base leaves tile the root, in Morton order; `internal[l]` are the octants above them.
+//! All that this takes is the owners along the Morton curve, run by run.
+//!
+//! Invariants: runs follow each other from the curve's start, and neighbours have different owners.
 
 use crate::brick::Brick;
 use crate::brickset::BrickSet;
-use crate::comm::Comm;
-use crate::octant::{LEVEL_MAX, Level};
-use crate::tree::{PerLevel, Tree, per_level};
+use crate::comm::{Comm, Entry, gather_merged};
+use crate::octant::{LEVEL_MAX, Level, start57};
+use crate::tree::Tree;
 use std::sync::Arc;
 
 /// A leaf of the base tree.
@@ -26,6 +28,11 @@ pub struct BaseLeaf {
     pub owner: usize,
 }
 
+impl BaseLeaf {
+    /// The root, a single rank's.
+    pub const ROOT: Self = Self { level: 0, code: 0, owner: 0 };
+}
+
 /// Whose a brick is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -37,40 +44,54 @@ pub enum Place {
     Remote(usize),
 }
 
-/// The base tree and the owners of its leaves, as every rank knows them.
+/// Who owns what, as every rank knows it.
 #[derive(Clone, Debug)]
 pub struct Ownership {
     rank: usize,
     ranks: usize,
-    dealt: Arc<Dealt>,
+    runs: Arc<Runs>,
     /// Deepest level that has a top brick.
     level_top: Level,
 }
 
-/// What is the same for all ranks.
+/// Owners along the Morton curve.
 #[derive(Debug)]
-struct Dealt {
-    internal: PerLevel,
-    leaves: Vec<BaseLeaf>,
+struct Runs {
+    /// Level-19 codes at which the owner changes, from 0.
     starts: Vec<u64>,
+    owners: Vec<usize>,
 }
 
 /// The rank of a bystander, who has nothing: see [`Ownership::bystander`].
 const NOBODY: usize = usize::MAX;
 
 impl Ownership {
-    /// The ownership of a single rank, whose base tree is the root.
+    /// The ownership of a single rank.
     pub fn solo() -> Self {
-        Self::new(0, 1, per_level(), vec![BaseLeaf { level: 0, code: 0, owner: 0 }])
+        Self::new(0, 1, &[BaseLeaf::ROOT])
     }
 
-    /// The ownership in which `leaves`, in Morton order, have their owners; `internal` are the octants
-    /// above them.
-    pub fn new(rank: usize, ranks: usize, internal: PerLevel, leaves: Vec<BaseLeaf>) -> Self {
-        let starts = leaves.iter().map(|b| crate::octant::start57(b.level, b.code)).collect();
-        let deepest = internal.iter().rposition(|s| !s.is_empty()).map_or(0, |l| l as Level + 1);
-        let dealt = Arc::new(Dealt { internal, leaves, starts });
-        Self { rank, ranks, dealt, level_top: deepest + 1 }
+    /// The ownership in which base leaves, which tile the root in Morton order, have their owners.
+    ///
+    /// # Panics
+    /// If the leaves do not follow each other, or an owner is no rank.
+    pub fn new(rank: usize, ranks: usize, leaves: &[BaseLeaf]) -> Self {
+        let mut runs = Runs { starts: Vec::new(), owners: Vec::new() };
+        let mut at = 0;
+        for b in leaves {
+            assert_eq!(start57(b.level, b.code), at, "base leaves must follow each other");
+            assert!(b.owner < ranks, "a base leaf's owner is a rank");
+            if runs.owners.last() != Some(&b.owner) {
+                runs.starts.push(at);
+                runs.owners.push(b.owner);
+            }
+            at += 1 << (3 * (LEVEL_MAX - b.level));
+        }
+        assert_eq!(at, 1 << (3 * LEVEL_MAX), "base leaves must tile the root");
+        // An octant above the level to which a change of owner is aligned spans it; its brick is two deeper.
+        let aligned = |s: &u64| LEVEL_MAX - s.trailing_zeros() / 3;
+        let level_top = runs.starts[1..].iter().map(aligned).max().unwrap_or(0) + 1;
+        Self { rank, ranks, runs: Arc::new(runs), level_top }
     }
 
     /// The same as seen by someone who owns nothing: every brick is a top brick or remote.
@@ -81,33 +102,37 @@ impl Ownership {
     /// What of a tree lies in top bricks: the same on all ranks.
     pub fn top_of(&self, tree: &Tree) -> Tree {
         let mut top = Tree::default();
-        let all = [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)];
-        for (to, from) in all {
-            for l in 0..=self.level_top as usize {
-                let mut internal = (l >= 2).then(|| self.dealt.internal[l - 2].cursor());
-                let mut is_top = |key: u64| {
-                    internal.as_mut().is_none_or(|set| set.get(key >> 6) >> (key & 63) & 1 == 1)
-                };
-                let bricks = from[l].bricks().filter(|b| is_top(b.key));
-                bricks.for_each(|b| to[l].push(b.key, b.bits));
+        for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
+            for l in 0..=self.level_top {
+                let bricks = from[l as usize].bricks().filter(|b| self.is_top(l, b.key));
+                bricks.for_each(|b| to[l as usize].push(b.key, b.bits));
             }
         }
         top
     }
 
-    /// The base leaves in Morton order.
-    pub fn leaves(&self) -> &[BaseLeaf] {
-        &self.dealt.leaves
+    /// Deepest level that has a top brick.
+    pub fn level_top(&self) -> Level {
+        self.level_top
     }
 
-    /// The octants above the base leaves.
-    pub fn internal(&self) -> &PerLevel {
-        &self.dealt.internal
+    /// The owner of all of an octant; none if it has several.
+    #[inline]
+    pub fn sole_owner(&self, l: Level, code: u64) -> Option<usize> {
+        let run = self.run_at(start57(l, code));
+        let whole = self.runs.starts.get(run + 1).is_none_or(|&s| s >= start57(l, code + 1));
+        whole.then(|| self.runs.owners[run])
     }
 
-    /// The number of the base leaf at a level-19 Morton code.
-    pub fn leaf_at(&self, start: u64) -> usize {
-        self.dealt.starts.partition_point(|&s| s <= start) - 1
+    /// Whether brick `key` of level `l` is a top brick.
+    #[inline]
+    pub fn is_top(&self, l: Level, key: u64) -> bool {
+        l < 2 || l <= self.level_top && self.sole_owner(l - 2, key).is_none()
+    }
+
+    #[inline]
+    fn run_at(&self, start: u64) -> usize {
+        self.runs.starts.partition_point(|&s| s <= start) - 1
     }
 
     /// Whose brick `key` of level `l` is.
@@ -119,12 +144,14 @@ impl Ownership {
         if self.ranks == 1 {
             return Place::Mine;
         }
-        if l <= self.level_top && self.dealt.internal[l as usize - 2].contains(key) {
-            return Place::Top;
-        }
-        match self.owner(l, key) {
-            r if r == self.rank => Place::Mine,
-            r => Place::Remote(r),
+        let owner = match l <= self.level_top {
+            true => self.sole_owner(l - 2, key),
+            false => Some(self.owner(l, key)),
+        };
+        match owner {
+            None => Place::Top,
+            Some(r) if r == self.rank => Place::Mine,
+            Some(r) => Place::Remote(r),
         }
     }
 
@@ -140,9 +167,9 @@ impl Ownership {
         self.ranks > 1 && l <= self.level_top
     }
 
-    /// Owner of the base leaf at a brick's minimum corner.
+    /// Owner at a brick's minimum corner.
     fn owner(&self, l: Level, key: u64) -> usize {
-        self.dealt.leaves[self.leaf_at(brick_start(l, key))].owner
+        self.runs.owners[self.run_at(brick_start(l, key))]
     }
 
     /// Brings octants to the ranks that hold their bricks: returns those for this rank, from all
@@ -153,37 +180,26 @@ impl Ownership {
         }
         let mut mine = BrickSet::default();
         let mut out: Vec<Vec<u64>> = vec![Vec::new(); self.ranks];
-        let mut top: Vec<u64> = Vec::new();
+        let mut top: Vec<Entry> = Vec::new();
         for b in set.bricks() {
             match self.place(l, b.key) {
                 Place::Mine => mine.push(b.key, b.bits),
                 Place::Remote(r) => out[r].extend([b.key, b.bits]),
-                Place::Top => top.extend([b.key, b.bits]),
+                Place::Top => top.push([b.key, b.bits]),
             }
         }
         let sent = out.iter().map(|w| w.len() as u64 / 2).sum();
-        let mut heard: Vec<Vec<u64>> = comm
-            .exchange(out.into_iter().enumerate().collect())
-            .into_iter()
-            .map(|(_, words)| words)
-            .collect();
+        let heard = comm.exchange(out.into_iter().enumerate().collect());
+        let heard = heard.iter().flat_map(|(_, words)| words.as_chunks().0);
+        let told = heard.map(|&[key, bits]| Brick { key, bits }).collect();
+        let mut all = mine.union(BrickSet::from_unsorted(told));
         if self.is_shared(l) {
-            heard.extend(comm.all_gather(&top).iter().cloned());
+            let mut known = BrickSet::default();
+            let top = gather_merged(top, |a, b| a | b, comm);
+            top.into_iter().for_each(|[key, bits]| known.push(key, bits));
+            all = all.union(known);
         }
-        let more = heard.iter().flat_map(|words| words.chunks_exact(2));
-        let more = more.map(|w| Brick { key: w[0], bits: w[1] }).collect();
-        (mine.union(BrickSet::from_unsorted(more)), sent)
-    }
-
-    /// Checks that the base leaves tile the root.
-    pub fn check_invariants(&self) {
-        let mut at = 0;
-        for (b, &start) in self.dealt.leaves.iter().zip(&self.dealt.starts) {
-            assert_eq!(start, at, "base leaves must follow each other");
-            assert!(b.owner < self.ranks, "a base leaf's owner is a rank");
-            at += 1 << (3 * (LEVEL_MAX - b.level));
-        }
-        assert_eq!(at, 1 << (3 * LEVEL_MAX), "base leaves must tile the root");
+        (all, sent)
     }
 }
 

@@ -1,110 +1,116 @@
-//! A cut through the base tree: its base leaves, and what of T0 lies above them.
+//! A cut through the base tree: its base leaves in Morton order, split further until they suit.
 
-use crate::brickset::{BrickSet, ones};
+use super::survey::Survey;
+use crate::brick;
 use crate::octant::{Level, start57};
-use crate::share::BaseLeaf;
+use crate::share::{BaseLeaf, Ownership};
 use crate::tree::{PerLevel, Tree, per_level};
 use crate::voxelise::Start;
+use std::ops::Range;
 
-/// A cut through the base tree.
+/// A base leaf while the tree is cut.
+#[derive(Clone, Debug)]
+pub struct Piece {
+    /// Its level.
+    pub level: Level,
+    /// Its Morton code.
+    pub code: u64,
+    /// Whether it is split in T0.
+    pub heavy: bool,
+    /// Leaves of the mesh to expect in it.
+    pub weight: u64,
+    /// Its entries in the survey's areas.
+    places: Range<usize>,
+}
+
+/// Base leaves that tile the root, in Morton order.
 #[derive(Clone, Debug)]
 pub struct Cut {
-    /// Octants above the base leaves.
-    pub internal: PerLevel,
-    /// T0 down to the base leaves.
-    pub top: Tree,
-    /// The base leaves in order.
-    pub leaves: Vec<BaseLeaf>,
-    /// Which of them are split in T0.
-    pub heavy: Vec<bool>,
-    /// Level of the deepest base leaves, or of those that there might be.
-    pub level_base: Level,
-}
-
-/// The octants above base leaves of one level.
-pub fn uniform(marks: &Tree, level_base: Level) -> PerLevel {
-    let mut internal = per_level();
-    let above = ..level_base as usize;
-    internal[above].clone_from_slice(&marks.split[above]);
-    internal
-}
-
-/// The octants above base leaves, each of which is light enough, or not split in T0, or one that `may` not
-/// be an internal octant.
-pub fn adaptive(
-    marks: &Tree,
-    may: impl Fn(Level, u64) -> bool,
-    expected: impl Fn(&BaseLeaf) -> u64,
-    limit: u64,
-) -> PerLevel {
-    let mut internal = per_level();
-    for l in 0..internal.len() as Level {
-        let mut heavy = BrickSet::default();
-        let mut split = marks.split[l as usize].cursor();
-        for b in Tree::exists(&internal, l) {
-            for bit in ones(b.bits & split.get(b.key)) {
-                let code = b.key << 6 | u64::from(bit);
-                if may(l, code) && expected(&BaseLeaf { level: l, code, owner: 0 }) > limit {
-                    heavy.push(b.key, 1 << bit);
-                }
-            }
-        }
-        if heavy.is_empty() {
-            break;
-        }
-        internal[l as usize] = heavy;
-    }
-    internal
+    /// The leaves.
+    pub pieces: Vec<Piece>,
 }
 
 impl Cut {
-    /// Cuts marks below the octants `internal`; `surface` is the level from which on leaves cross.
-    pub fn new(marks: &Tree, internal: PerLevel, surface: Level) -> Self {
-        let mut leaves = Vec::new();
-        for l in 0..=deepest_leaf(&internal) {
-            let mut above = internal[l as usize].cursor();
-            for b in Tree::exists(&internal, l) {
-                let codes = ones(b.bits & !above.get(b.key));
-                let codes = codes.map(|bit| b.key << 6 | u64::from(bit));
-                leaves.extend(codes.map(|code| BaseLeaf { level: l, code, owner: 0 }));
-            }
-        }
-        leaves.sort_unstable_by_key(|b| start57(b.level, b.code));
-        Self::of(marks, internal, leaves, surface)
+    /// The root alone.
+    pub fn root(survey: &Survey) -> Self {
+        let places = survey.places(0, 0);
+        let heavy = survey.marks.split[0].contains(0);
+        let weight = survey.weight(0, 0, &places);
+        Self { pieces: vec![Piece { level: 0, code: 0, heavy, weight, places }] }
     }
 
-    /// The same with siblings of one owner joined, as far up as that goes: what only separates leaves of one
-    /// rank need not be known to all.
-    pub fn joined(self, marks: &Tree, surface: Level) -> Self {
-        let mut joined: Vec<BaseLeaf> = Vec::new();
-        for leaf in self.leaves {
-            joined.push(leaf);
+    /// Splits pieces that are split in T0 and may be divided, as long as `wanted` asks for some: it is told all
+    /// pieces and answers for each.
+    pub fn split_while(
+        mut self,
+        survey: &Survey,
+        mut wanted: impl FnMut(&[Piece]) -> Vec<bool>,
+    ) -> Self {
+        loop {
+            let wanted = wanted(&self.pieces);
+            let mut divided = Vec::with_capacity(self.pieces.len());
+            let mut any = false;
+            for (piece, wanted) in self.pieces.into_iter().zip(wanted) {
+                if wanted && piece.heavy && survey.may_divide(piece.level, piece.code) {
+                    any = true;
+                    divided.extend(piece.children(survey));
+                } else {
+                    divided.push(piece);
+                }
+            }
+            self.pieces = divided;
+            if !any {
+                return self;
+            }
+        }
+    }
+
+    /// Finds the pieces' entries again after the survey looked deeper.
+    pub fn renew(&mut self, survey: &Survey) {
+        let mut from = 0;
+        for piece in &mut self.pieces {
+            piece.places = survey.places_from(from, piece.level, piece.code);
+            from = piece.places.end;
+        }
+    }
+
+    /// Weights of the pieces.
+    pub fn weights(&self) -> Vec<u64> {
+        self.pieces.iter().map(|p| p.weight).collect()
+    }
+
+    /// Level of the deepest pieces.
+    pub fn level_base(&self) -> Level {
+        self.pieces.iter().map(|p| p.level).max().unwrap_or(0)
+    }
+
+    /// The pieces, dealt out.
+    pub fn dealt(&self, owners: &[usize]) -> Vec<BaseLeaf> {
+        let leaf = |(p, &owner): (&Piece, &usize)| BaseLeaf { level: p.level, code: p.code, owner };
+        self.pieces.iter().zip(owners).map(leaf).collect()
+    }
+
+    /// A rank's pieces that are split in T0, siblings joined as far up as that goes.
+    pub fn starts(&self, owners: &[usize], rank: usize) -> Vec<Start> {
+        let mut joined: Vec<(Start, bool)> = Vec::new();
+        for (p, _) in self.pieces.iter().zip(owners).filter(|(_, owner)| **owner == rank) {
+            joined.push((Start { level: p.level, code: p.code }, p.heavy));
             while let Some(parent) = parent_of_last(&joined) {
                 joined.truncate(joined.len() - 8);
-                joined.push(parent);
+                // Who has children is split.
+                joined.push((parent, true));
             }
         }
-        let mut internal = per_level();
-        for l in (1..internal.len()).rev() {
-            let here = joined.iter().filter(|b| b.level as usize == l);
-            let mut set = std::mem::take(&mut internal[l]);
-            let above = set.coarsen();
-            internal[l] = std::mem::take(&mut set);
-            let mut parents = BrickSet::default();
-            here.for_each(|b| parents.push(b.code >> 9, 1 << (b.code >> 3 & 63)));
-            internal[l - 1] = above.union(parents);
-        }
-        Self::of(marks, internal, joined, surface)
+        joined.into_iter().filter(|(_, heavy)| *heavy).map(|(start, _)| start).collect()
     }
 
-    fn of(marks: &Tree, internal: PerLevel, leaves: Vec<BaseLeaf>, surface: Level) -> Self {
-        let level_base = deepest_leaf(&internal);
+    /// T0 in top bricks as far as it is known to all: down to the pieces. What is below a piece, its owner knows.
+    pub fn top(&self, marks: &Tree, surface: Level, share: &Ownership) -> Tree {
         let mut top = Tree::default();
-        for l in 0..=level_base {
+        for (l, known) in (0..).zip(self.known()).take(share.level_top() as usize + 1) {
             let mut split = marks.split[l as usize].cursor();
             let mut crossing = marks.crossing[l as usize].cursor();
-            // What is below a base leaf, its owner knows better: marks do not reach far.
-            for b in Tree::exists(&internal, l) {
+            for b in known.bricks().filter(|b| share.is_top(l, b.key)) {
                 let split = b.bits & split.get(b.key);
                 top.split[l as usize].push(b.key, split);
                 if l >= surface {
@@ -114,89 +120,98 @@ impl Cut {
                 }
             }
         }
-        let heavy = leaves.iter().map(|b| marks.split[b.level as usize].contains(b.code)).collect();
-        Self { internal, top, leaves, heavy, level_base }
+        top
     }
 
-    /// Levels of base leaves that are split in T0, ascending.
-    pub fn levels_split(&self) -> Vec<Level> {
-        let split = self.leaves.iter().zip(&self.heavy).filter(|(_, heavy)| **heavy);
-        let mut levels: Vec<Level> = split.map(|(b, _)| b.level).collect();
-        levels.sort_unstable();
-        levels.dedup();
-        levels
-    }
-
-    /// A rank's base leaves that are split in T0.
-    pub fn starts(&self, rank: usize) -> Vec<Start> {
-        let mine =
-            self.leaves.iter().zip(&self.heavy).filter(|(b, heavy)| **heavy && b.owner == rank);
-        mine.map(|(b, _)| Start { level: b.level, code: b.code }).collect()
+    /// The pieces and the octants above them.
+    fn known(&self) -> PerLevel {
+        let mut known = per_level();
+        for p in &self.pieces {
+            known[p.level as usize].push(p.code >> 6, 1 << (p.code & 63));
+        }
+        for l in (1..known.len()).rev() {
+            let above = known[l].coarsen();
+            known[l - 1] = std::mem::take(&mut known[l - 1]).union(above);
+        }
+        known
     }
 }
 
-/// Level of the deepest leaves below `internal`.
-fn deepest_leaf(internal: &PerLevel) -> Level {
-    internal.iter().rposition(|s| !s.is_empty()).map_or(0, |l| l as Level + 1)
+impl Piece {
+    /// An octant of which nothing else is known.
+    #[cfg(test)]
+    pub fn new(level: Level, code: u64) -> Self {
+        Self { level, code, heavy: true, weight: 1, places: 0..0 }
+    }
+
+    fn children(self, survey: &Survey) -> [Self; 8] {
+        let level = self.level + 1;
+        let split = survey.marks.split[level as usize].get(self.code >> 3);
+        let split = brick::byte(split, self.code & 7);
+        let mut places = self.places;
+        std::array::from_fn(|child| {
+            let code = self.code << 3 | child as u64;
+            let mine = survey.places_within(&places, level, code);
+            places.start = mine.end;
+            let weight = survey.weight(level, code, &mine);
+            Self { level, code, heavy: split >> child & 1 == 1, weight, places: mine }
+        })
+    }
 }
 
-/// The parent of the last eight leaves, if they are its children and have one owner.
-fn parent_of_last(leaves: &[BaseLeaf]) -> Option<BaseLeaf> {
-    let last = leaves.last()?;
-    let eight = leaves.len().checked_sub(8).map(|at| &leaves[at..])?;
-    let one = |b: &BaseLeaf| {
-        b.level == last.level && b.code >> 3 == last.code >> 3 && b.owner == last.owner
+/// The pieces that a cut of the Morton curve into equal shares falls in.
+pub fn cut_through(pieces: &[Piece], ranks: usize) -> Vec<bool> {
+    let total: u128 = pieces.iter().map(|p| u128::from(p.weight)).sum();
+    let share_at = |weight: u128| weight * ranks as u128 / total;
+    let mut before = 0;
+    let mut falls_in = |p: &Piece| {
+        let after = before + u128::from(p.weight);
+        let cut = share_at(before) != share_at(after);
+        before = after;
+        cut
     };
-    (last.level > 0 && eight.iter().all(one)).then(|| BaseLeaf {
-        level: last.level - 1,
-        code: last.code >> 3,
-        ..*last
-    })
+    pieces.iter().map(&mut falls_in).collect()
+}
+
+/// The parent of the last eight octants, if they are its children.
+fn parent_of_last(joined: &[(Start, bool)]) -> Option<Start> {
+    let (last, _) = joined.last()?;
+    let eight = joined.len().checked_sub(8).map(|at| &joined[at..])?;
+    let one = |(s, _): &(Start, bool)| s.level == last.level && s.code >> 3 == last.code >> 3;
+    (last.level > 0 && eight.iter().all(one))
+        .then(|| Start { level: last.level - 1, code: last.code >> 3 })
+}
+
+/// The Morton codes at level 19 of an octant: where it starts, and where the next one does.
+pub fn span(level: Level, code: u64) -> Range<u64> {
+    start57(level, code)..start57(level, code + 1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brick::Brick;
 
-    /// Splits of the root, and of octants 0 and 2 of level 1.
-    fn marks() -> Tree {
-        let mut marks = Tree::default();
-        marks.split[0] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: 1 }]);
-        marks.split[1] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: 0b101 }]);
-        marks
+    fn piece(level: Level, code: u64, weight: u64) -> Piece {
+        Piece { weight, ..Piece::new(level, code) }
     }
 
     #[test]
-    fn heavy_octants_are_split_and_light_ones_are_not() {
-        let expected = |b: &BaseLeaf| match (b.level, b.code) {
-            (0, _) => 6400,
-            (1, 0) => 900,
-            _ => 100,
-        };
-        // Octant 2 is split in T0, but light.
-        let internal = adaptive(&marks(), |l, _| l < 2, expected, 200);
-        assert_eq!(internal[0].count(), 1);
-        assert_eq!(internal[1].codes().collect::<Vec<_>>(), [0]);
-        assert_eq!(Cut::new(&marks(), internal, 9).leaves.len(), 7 + 8);
-        let none = adaptive(&marks(), |l, _| l < 1, expected, 200);
-        assert!(none[1].is_empty(), "octants of level 1 may not be internal");
+    fn cuts_fall_in_the_pieces_that_hold_equal_shares_borders() {
+        let pieces: Vec<Piece> = [50, 100, 49, 1, 1, 199].map(|w| piece(1, 0, w)).to_vec();
+        // Shares of 100: borders at 100, 200 and 300; what ends at one is not cut by it but begins the next.
+        assert_eq!(cut_through(&pieces, 4), [false, true, false, true, false, true]);
+        assert_eq!(cut_through(&pieces, 1), [false, false, false, false, false, true]);
     }
 
     #[test]
     fn siblings_of_one_owner_are_joined_all_the_way_up() {
-        let cut = |owner: fn(&BaseLeaf) -> usize| {
-            let mut cut = Cut::new(&marks(), uniform(&marks(), 2), 9);
-            cut.leaves.iter_mut().for_each(|b| b.owner = owner(b));
-            cut.joined(&marks(), 9)
-        };
-        assert_eq!(cut(|_| 5).leaves, [BaseLeaf { level: 0, code: 0, owner: 5 }]);
-        // Octant 0 has one owner, octant 2 two of them.
-        let some = cut(|b| usize::from(b.level == 2 && b.code >= 8 * 2 + 3));
-        assert_eq!(some.leaves.len(), 7 + 8);
-        assert_eq!(some.internal[1].codes().collect::<Vec<_>>(), [2]);
-        assert_eq!(some.internal[0].count(), 1);
-        assert_eq!(some.heavy.iter().filter(|h| **h).count(), 1, "octant 0 is split in T0");
-        assert_eq!(some.starts(0).len(), 1);
+        let pieces: Vec<Piece> = (0..64).map(|code| piece(2, code, 1)).collect();
+        let cut = Cut { pieces };
+        let all = cut.starts(&[0; 64], 0);
+        assert_eq!(all.iter().map(|s| (s.level, s.code)).collect::<Vec<_>>(), [(0, 0)]);
+        let owners: Vec<usize> = (0..64).map(|code| usize::from(code >= 13)).collect();
+        let first: Vec<(Level, u64)> =
+            cut.starts(&owners, 0).iter().map(|s| (s.level, s.code)).collect();
+        assert_eq!(first, [(1, 0), (2, 8), (2, 9), (2, 10), (2, 11), (2, 12)]);
     }
 }

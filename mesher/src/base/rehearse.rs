@@ -1,9 +1,8 @@
 //! The rehearsal: the same mesh made a few levels coarser tells what a base leaf will hold.
 //!
 //! Leaves along a surface grow by four per level, those that its curvature, edges and tips add by two, as
-//! layers there are thicker the coarser the mesh. The facets' area tells the former; what the coarse mesh
-//! holds beyond that is the latter. Parts of the rehearsal are Morton cuts by area, so that it is divided
-//! well itself.
+//! layers there are thicker the coarser the mesh. What is which, the facets' area tells. Parts of the
+//! rehearsal are Morton cuts by area, so that it is divided well itself.
 
 use super::cut::Cut;
 use super::route;
@@ -18,35 +17,47 @@ use crate::tree::Tree;
 use crate::voxelise::{Depth, Filed, refine};
 use crate::{grade, kept, sides};
 
-/// Levels that a rehearsal is coarser: it takes a 64th of the cells.
-const COARSER: Level = 3;
+/// Cells of a rehearsal per rank, at least: it is as many levels coarser as that allows.
+const CELLS_PER_RANK: u64 = 100_000;
 
-/// Leaves to expect in each base leaf, the same on all ranks. `expected` is what area lets expect, and the
-/// answer where the tree is too shallow to rehearse. Collective.
+/// Leaves to expect in each base leaf, the same on all ranks; where the tree is too shallow to rehearse, what
+/// area lets expect. Collective.
 pub fn weights(
     facets: &[Facet],
     rules: &Rules,
     marks: &Tree,
     cut: &Cut,
-    expected: &[u64],
     comm: &dyn Comm,
 ) -> Vec<u64> {
+    let expected = cut.weights();
     // The base leaves of the coarse tree must be those of the fine one.
-    let Some(coarser) = rules.level_surface.checked_sub(cut.level_base + 2) else {
-        return expected.to_vec();
+    let Some(coarser) = rules.level_surface.checked_sub(cut.level_base() + 2) else {
+        return expected;
     };
-    let coarser = coarser.min(COARSER);
+    let share = expected.iter().sum::<u64>() / comm.size() as u64;
+    let coarser = coarser.min((share / CELLS_PER_RANK).max(1).ilog2() / 2);
     if coarser == 0 || comm.size() == 1 {
-        return expected.to_vec();
+        return expected;
     }
-    let coarse = coarsen(rules, coarser, cut.level_base);
-    let mut counts = vec![0u64; cut.leaves.len()];
-    for theirs in comm.all_gather(&rehearse(facets, &coarse, marks, cut, expected, comm)).iter() {
+    let coarse = coarsen(rules, coarser, cut.level_base());
+    let mut counts = vec![0u64; expected.len()];
+    for theirs in comm.all_gather(&rehearse(facets, &coarse, marks, cut, &expected, comm)).iter() {
         theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
     }
-    let scale = 1 << coarser;
-    // With a = area's leaves in the coarse mesh: a * scale^2 + (counted - a) * scale.
-    let weight = |(thought, told): (&u64, u64)| told * scale + thought - thought / scale;
+    extrapolate(&expected, &counts, 1 << coarser)
+}
+
+/// Leaves to expect where a mesh `scale` times coarser has `counts`, and area lets expect `expected`.
+///
+/// The latter is put right in all; what a leaf has more or less than that says is taken to grow with the
+/// size only, be it by curvature, edges and tips, or as layers reach from one leaf into the next.
+fn extrapolate(expected: &[u64], counts: &[u64], scale: u64) -> Vec<u64> {
+    let sum = |all: &[u64]| all.iter().map(|&n| n as f64).sum::<f64>();
+    let scale = scale as f64;
+    let right = sum(counts) * scale * scale / sum(expected).max(1.0);
+    let weight = |(&thought, &told): (&u64, &u64)| {
+        (told as f64 * scale + thought as f64 * right * (1.0 - 1.0 / scale)) as u64
+    };
     expected.iter().zip(counts).map(weight).collect()
 }
 
@@ -70,17 +81,12 @@ fn rehearse(
     expected: &[u64],
     comm: &dyn Comm,
 ) -> Vec<u64> {
-    let mut leaves = cut.leaves.clone();
     let owners = morton_cuts(expected, comm.size());
-    leaves.iter_mut().zip(owners).for_each(|(b, owner)| b.owner = owner);
-    let starts: Vec<u64> = leaves.iter().map(|b| start57(b.level, b.code)).collect();
-    let joined = Cut { leaves, ..cut.clone() }.joined(marks, rules.level_surface);
-    let (mine, levels_split) = (joined.starts(comm.rank()), joined.levels_split());
-    let share = Ownership::new(comm.rank(), comm.size(), joined.internal, joined.leaves);
+    let share = Ownership::new(comm.rank(), comm.size(), &cut.dealt(&owners));
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     let filed = Filed::new(&route(facets, &share, comm));
-    let (mut tree, _): (Tree, _) = refine(&filed, &depth, &mine);
-    crate::share_top(&mut tree, joined.top, &share, &levels_split, comm);
+    let (mut tree, _): (Tree, _) = refine(&filed, &depth, &cut.starts(&owners, comm.rank()));
+    crate::share_top(&mut tree, cut.top(marks, rules.level_surface, &share), &share, comm);
     let sides = sides::decide(&tree, &share, facets, rules.keep, comm);
     let Tree { split, crossing } = tree;
     let (split, _) =
@@ -93,6 +99,7 @@ fn rehearse(
         everything: false,
         rules,
     };
+    let starts: Vec<u64> = cut.pieces.iter().map(|p| start57(p.level, p.code)).collect();
     let mut counts = vec![0; starts.len()];
     let count = |words: &[u64]| {
         words.iter().for_each(|w| counts[starts.partition_point(|&s| s <= w >> 7) - 1] += 1);

@@ -2,8 +2,8 @@
 
 use crate::comm::Comm;
 use crate::facet::Facet;
-use crate::octant::{LEVEL_MAX, Level, corner, edge, start57};
-use crate::share::{BaseLeaf, Ownership};
+use crate::octant::{LEVEL_MAX, Level, corner, edge};
+use crate::share::Ownership;
 use crate::voxelise::Home;
 
 /// Brings every facet to the owners of the base leaves that its extent reaches. Collective.
@@ -14,9 +14,9 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
         let Some(home) = Home::of(f) else { continue };
         let extent = std::array::from_fn(|a| f.range(a));
         let code = home.start() >> (3 * (LEVEL_MAX - home.level()));
-        visit(share, &extent, home.level(), code, &mut |b| {
-            if std::mem::replace(&mut last[b.owner], i) != i {
-                packed[b.owner].push(*f);
+        visit(share, &extent, home.level(), code, &mut |owner| {
+            if std::mem::replace(&mut last[owner], i) != i {
+                packed[owner].push(*f);
             }
         });
     }
@@ -28,17 +28,16 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
     mine
 }
 
-/// Tells `found` the base leaves that an extent, inside an octant's, reaches.
+/// Tells `found` the owners of what an extent, inside an octant's, reaches; some more than once.
 fn visit(
     share: &Ownership,
     extent: &[(i64, i64); 3],
     l: Level,
     code: u64,
-    found: &mut impl FnMut(&BaseLeaf),
+    found: &mut impl FnMut(usize),
 ) {
-    let leaf = &share.leaves()[share.leaf_at(start57(l, code))];
-    if leaf.level <= l {
-        return found(leaf);
+    if let Some(owner) = share.sole_owner(l, code) {
+        return found(owner);
     }
     let (at, half) = (corner(l, code), edge(l + 1));
     // By axis, whether the lower and the upper half are reached; they are closed.
@@ -67,43 +66,40 @@ fn unpack(words: &[u64]) -> Facet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brick::Brick;
-    use crate::brickset::BrickSet;
-    use crate::tree::per_level;
+    use crate::share::BaseLeaf;
     use proptest::prelude::*;
+    use std::collections::BTreeSet;
 
-    /// The root's children, and the children of some of those.
-    fn two_levels(split: u8) -> Ownership {
-        let mut internal = per_level();
-        internal[0] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: 1 }]);
-        internal[1] = BrickSet::from_unsorted(vec![Brick { key: 0, bits: u64::from(split) }]);
-        let leaf = |level, code| BaseLeaf { level, code, owner: 0 };
-        let leaves = (0..8u64).flat_map(|c| match split >> c & 1 {
-            0 => vec![leaf(1, c)],
-            _ => (0..8).map(|d| leaf(2, c << 3 | d)).collect(),
+    /// The root's children, and the children of some of those, each with an owner of its own.
+    fn two_levels(split: u8) -> Vec<BaseLeaf> {
+        let octants = (0..8u64).flat_map(|c| match split >> c & 1 {
+            0 => vec![(1, c)],
+            _ => (0..8).map(|d| (2, c << 3 | d)).collect(),
         });
-        Ownership::new(0, 1, internal, leaves.collect())
+        let leaf = |(owner, (level, code))| BaseLeaf { level, code, owner };
+        octants.enumerate().map(leaf).collect()
     }
 
     proptest! {
         #[test]
-        fn all_leaves_that_an_extent_reaches_are_found(
+        fn all_owners_that_an_extent_reaches_are_found(
             split in 1u8..,
             v in prop::array::uniform3(prop::array::uniform3(-2i32..=10)),
         ) {
             // Corners on and beside the octants' faces, and beyond the root.
             let v = v.map(|p| p.map(|c| (c / 2) * (1 << 25) + c % 2));
-            let (f, share) = (Facet { v }, two_levels(split));
+            let (f, leaves) = (Facet { v }, two_levels(split));
+            let share = Ownership::new(0, leaves.len(), &leaves);
             let reached = |b: &BaseLeaf| (0..3).all(|a| {
                 let at = corner(b.level, b.code)[a];
                 f.range(a).0 <= at + edge(b.level) && f.range(a).1 >= at
             });
-            let mut found = Vec::new();
-            visit(&share, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| found.push(*b));
             // The root itself is taken to be reached; what is outside it has no home.
             prop_assume!(reached(&BaseLeaf { level: 0, code: 0, owner: 0 }));
-            let want: Vec<BaseLeaf> = share.leaves().iter().filter(|b| reached(b)).copied().collect();
-            prop_assert_eq!(found, want);
+            let mut found = BTreeSet::new();
+            visit(&share, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));
+            let want = leaves.iter().filter(|b| reached(b)).map(|b| b.owner);
+            prop_assert!(found.into_iter().eq(want));
         }
     }
 

@@ -3,17 +3,17 @@
 //! To a moderate level everywhere; deeper only where someone asks, as what everybody is told costs every
 //! rank, and most of it would only separate octants of one rank.
 
-use crate::brick::Brick;
+use super::cut::{Cut, Piece, span};
 use crate::brickset::BrickSet;
-use crate::comm::Comm;
+use crate::comm::{Comm, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::Level;
+use crate::octant::{Level, start57};
 use crate::partition::area::Areas;
 use crate::partition::boxed;
-use crate::share::BaseLeaf;
 use crate::tree::Tree;
 use crate::voxelise::{Depth, Filed, Start, Work, refine};
+use std::ops::Range;
 
 /// See the module.
 pub struct Survey<'a> {
@@ -92,18 +92,33 @@ impl<'a> Survey<'a> {
         self.deeper[k] = std::mem::take(&mut self.deeper[k]).union(fresh);
     }
 
-    /// Leaves of the mesh to expect in a base leaf.
-    pub fn expected(&self, b: &BaseLeaf) -> u64 {
-        // A facet's cells come with the layers on its kept side, a third of them being coarser.
-        let thick = (u64::from(self.rules.layer_cells_min) + 2) * 4 / 3;
-        1 + self.areas.cells(b.level, b.code).saturating_mul(thick) + boxed(b, self.rules)
+    /// The entries of an octant's areas.
+    pub fn places(&self, l: Level, code: u64) -> Range<usize> {
+        self.areas.places_within(&(0..self.areas.len()), span(l, code))
     }
 
-    /// Makes expectations those that were told for some base leaves, in order.
-    pub fn calibrate(&mut self, leaves: &[BaseLeaf], told: &[u64]) {
-        let factor = |(b, told): (&BaseLeaf, &u64)| (*b, *told as f64 / self.expected(b) as f64);
-        let factors: Vec<(BaseLeaf, f64)> = leaves.iter().zip(told).map(factor).collect();
-        self.areas.scale(&factors);
+    /// The same for an octant whose entries are among some.
+    pub fn places_within(&self, among: &Range<usize>, l: Level, code: u64) -> Range<usize> {
+        self.areas.places_within(among, span(l, code))
+    }
+
+    /// The same for an octant whose entries start at one.
+    pub fn places_from(&self, from: usize, l: Level, code: u64) -> Range<usize> {
+        self.areas.places_from(from, span(l, code))
+    }
+
+    /// Leaves of the mesh to expect in an octant with these entries.
+    pub fn weight(&self, l: Level, code: u64, places: &Range<usize>) -> u64 {
+        // A facet's cells come with the layers on its kept side, a third of them being coarser.
+        let thick = (u64::from(self.rules.layer_cells_min) + 2) * 4 / 3;
+        1 + self.areas.cells(places).saturating_mul(thick) + boxed(l, code, self.rules)
+    }
+
+    /// Makes expectations those that were told for a cut's pieces.
+    pub fn calibrate(&mut self, cut: &Cut, told: &[u64]) {
+        let factor =
+            |(p, &told): (&Piece, &u64)| (start57(p.level, p.code), told as f64 / p.weight as f64);
+        self.areas.scale(cut.pieces.iter().zip(told).map(factor).collect());
     }
 
     /// Marks what all facets and boxes ask to be split below `starts`, so far that base leaves may be of
@@ -116,25 +131,24 @@ impl<'a> Survey<'a> {
         let (mine, work) = refine(&self.filed, &depth, starts);
         self.work.facet_brick_tests += work.facet_brick_tests;
         self.work.bricks_voxelised += work.bricks_voxelised;
-        let levels = 0..=level as usize;
-        let mut words = Vec::new();
-        for set in [&mine.split, &mine.crossing].into_iter().flat_map(|s| &s[levels.clone()]) {
-            words.push(set.len() as u64);
-            words.extend(set.bricks().flat_map(|b| [b.key, b.bits]));
-        }
-        let all = self.comm.all_gather(&words);
-        let mut rest: Vec<&[u64]> = all.iter().map(Vec::as_slice).collect();
-        for sets in [&mut self.marks.split, &mut self.marks.crossing] {
-            for set in &mut sets[levels.clone()] {
-                // All ranks' bricks at once: a union per rank would copy the set as often as there are ranks.
-                let mut bricks = Vec::new();
-                for words in &mut rest {
-                    let (mine, behind) = words[1..].split_at(2 * words[0] as usize);
-                    bricks.extend(mine.chunks_exact(2).map(|w| Brick { key: w[0], bits: w[1] }));
-                    *words = behind;
-                }
-                *set = std::mem::take(set).union(BrickSet::from_unsorted(bricks));
+        // Level and kind go into the upper bits of a brick's key, which has 54.
+        const KEY_BITS: u32 = 54;
+        let mut entries = Vec::new();
+        for (kind, sets) in (0..).zip([&mine.split, &mine.crossing]) {
+            for (l, set) in (0..=u64::from(level)).zip(sets) {
+                let place = (kind << 5 | l) << KEY_BITS;
+                entries.extend(set.bricks().map(|b| [place | b.key, b.bits]));
             }
+        }
+        let all = gather_merged(entries, |a, b| a | b, self.comm);
+        for told in all.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
+            let place = told[0][0] >> KEY_BITS;
+            let Tree { split, crossing } = &mut self.marks;
+            let sets = if place >> 5 == 0 { split } else { crossing };
+            let set = &mut sets[(place & 31) as usize];
+            let mut fresh = BrickSet::default();
+            told.iter().for_each(|e| fresh.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
+            *set = std::mem::take(set).union(fresh);
         }
     }
 }

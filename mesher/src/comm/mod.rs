@@ -8,9 +8,12 @@
 //! words.
 
 pub mod matrix;
+mod merged;
 #[cfg(feature = "mpi")]
 pub mod mpi;
 pub mod sim;
+
+pub use merged::{Entry, gather_merged};
 
 use crate::error::Error;
 use cpu_time::ThreadTime;
@@ -142,10 +145,10 @@ impl Meter {
         }
     }
 
-    /// Counts a gathering of a rank's words by all: a message for every doubling of the number of ranks
-    /// that have them (recursive doubling, Bruck), the words going once to everybody.
+    /// Counts a gathering of `words` by all, all ranks' together: a message for every doubling of the number
+    /// of ranks that have them (recursive doubling, Bruck), in which all words but a rank's share pass on.
     pub(crate) fn gather(&self, ranks: usize, words: u64) {
-        self.count(doublings(ranks), words * (ranks as u64 - 1));
+        self.count(doublings(ranks), words - words / ranks as u64);
     }
 
     /// Counts what ranks tell each other before an exchange, how many words are to come: one word for

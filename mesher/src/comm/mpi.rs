@@ -94,7 +94,7 @@ impl Mpi {
                 words.extend_from_slice(&buffer[start as usize..(start + n) as usize]);
             }
         }
-        self.meter.gather(self.size(), mine.len() as u64);
+        self.meter.gather(self.size(), counts.iter().sum());
         all
     }
 

@@ -239,9 +239,11 @@ impl Comm for Sim {
     }
 
     fn all_gather(&self, mine: &[u64]) -> ByRank {
-        self.meter.gather(self.size(), mine.len() as u64);
         match self.meter.call(|| self.call(Words::Gather(mine.to_vec()))) {
-            Delivery::Gathered(all) => all,
+            Delivery::Gathered(all) => {
+                self.meter.gather(self.size(), all.iter().map(|w| w.len() as u64).sum());
+                all
+            }
             Delivery::Exchanged(_) => unreachable!("{UNEQUAL}"),
         }
     }

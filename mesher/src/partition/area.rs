@@ -7,11 +7,11 @@
 
 use crate::base::middle;
 use crate::brickset::BrickSet;
-use crate::comm::Comm;
+use crate::comm::{Comm, Entry, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::Rules;
-use crate::octant::{LEVEL_MAX, Level, edge, start57};
-use crate::share::BaseLeaf;
+use crate::octant::{LEVEL_MAX, Level, edge};
+use std::ops::Range;
 
 /// Parts of a finest cell's face: sums of integers do not depend on their order.
 const PARTS: f64 = 1024.0;
@@ -23,8 +23,8 @@ pub struct Areas {
     starts: Vec<u64>,
     /// Area in all octants before each of them, and in all at the end.
     before: Vec<u64>,
-    /// Factors for what is found in some octants, in order.
-    factors: Vec<(BaseLeaf, f64)>,
+    /// Factors for what is found from some level-19 codes on, ascending.
+    factors: Vec<(u64, f64)>,
 }
 
 /// The area of some facets, by the norm above, in lattice units squared.
@@ -55,49 +55,68 @@ impl Areas {
         comm: &dyn Comm,
     ) {
         let wanted = |start: u64| octants.contains(start >> (3 * (LEVEL_MAX - coarse)));
-        let mut all: Vec<(u64, u64)> = self.pairs().filter(|p| !wanted(p.0)).collect();
+        let mut all: Vec<Entry> = self.entries().filter(|e| !wanted(e[0])).collect();
         let fresh = gathered(facets, rules, fine, wanted, comm);
-        all.extend(fresh.into_iter().map(|(start, area)| (start, self.scaled(start, area))));
-        all.sort_unstable();
+        all.extend(fresh.into_iter().map(|e| self.scaled(e)));
+        all.sort();
         self.set(&all);
     }
 
-    /// Multiplies the area in some octants, in order, by factors; also what is gathered later.
-    pub fn scale(&mut self, factors: &[(BaseLeaf, f64)]) {
-        factors.clone_into(&mut self.factors);
-        let all: Vec<(u64, u64)> =
-            self.pairs().map(|(start, area)| (start, self.scaled(start, area))).collect();
+    /// Multiplies the area from some level-19 codes on, ascending, by factors; also what is gathered later.
+    pub fn scale(&mut self, factors: Vec<(u64, f64)>) {
+        self.factors = factors;
+        let all: Vec<Entry> = self.entries().map(|e| self.scaled(e)).collect();
         self.set(&all);
     }
 
-    fn scaled(&self, start: u64, area: u64) -> u64 {
-        let behind = self.factors.partition_point(|(b, _)| start57(b.level, b.code) <= start);
+    fn scaled(&self, [start, area]: Entry) -> Entry {
+        let behind = self.factors.partition_point(|f| f.0 <= start);
         let factor = behind.checked_sub(1).map_or(1.0, |at| self.factors[at].1);
-        (area as f64 * factor) as u64
+        [start, (area as f64 * factor) as u64]
     }
 
     /// Places with their areas.
-    fn pairs(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+    fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
         let areas = self.before.windows(2).map(|w| w[1] - w[0]);
-        self.starts.iter().copied().zip(areas)
+        self.starts.iter().copied().zip(areas).map(Entry::from)
     }
 
-    fn set(&mut self, pairs: &[(u64, u64)]) {
-        self.starts = pairs.iter().map(|p| p.0).collect();
+    fn set(&mut self, entries: &[Entry]) {
+        self.starts = entries.iter().map(|e| e[0]).collect();
         self.before = vec![0];
-        let sums = pairs.iter().scan(0, |sum, p| {
-            *sum += p.1;
+        let sums = entries.iter().scan(0, |sum, e| {
+            *sum += e[1];
             Some(*sum)
         });
         self.before.extend(sums);
     }
 
-    /// Finest cells' faces in an octant that is no finer than the level of gathering.
-    pub fn cells(&self, level: Level, code: u64) -> u64 {
-        let at = |start| {
-            self.before.get(self.starts.partition_point(|s| *s < start)).copied().unwrap_or(0)
-        };
-        (at(start57(level, code + 1)) - at(start57(level, code))) / PARTS as u64
+    /// Number of octants with area.
+    pub fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Those, by number, whose level-19 codes are in `span`, which are among some.
+    pub fn places_within(&self, among: &Range<usize>, span: Range<u64>) -> Range<usize> {
+        let part = &self.starts[among.clone()];
+        let first = part.partition_point(|s| *s < span.start);
+        let count = part[first..].partition_point(|s| *s < span.end);
+        among.start + first..among.start + first + count
+    }
+
+    /// The same if the first is known.
+    pub fn places_from(&self, first: usize, span: Range<u64>) -> Range<usize> {
+        let count = self.starts[first..].iter().take_while(|s| **s < span.end).count();
+        first..first + count
+    }
+
+    /// Finest cells' faces in some of them.
+    pub fn cells(&self, places: &Range<usize>) -> u64 {
+        // Unit weights gather nothing.
+        if places.is_empty() {
+            return 0;
+        }
+        (self.before[places.end] - self.before[places.start]) / PARTS as u64
     }
 }
 
@@ -108,38 +127,18 @@ fn gathered(
     level: Level,
     wanted: impl Fn(u64) -> bool,
     comm: &dyn Comm,
-) -> Vec<(u64, u64)> {
+) -> Vec<Entry> {
     let cell = edge(rules.level_surface) as f64;
     let shift = 3 * (LEVEL_MAX - level);
-    let mut mine: Vec<(u64, u64)> = Vec::new();
+    let mut mine: Vec<Entry> = Vec::new();
     let mut add = |at: u64, area: f64| {
         let at = at >> shift << shift;
         if wanted(at) {
-            mine.push((at, (area * PARTS / (cell * cell)) as u64));
+            mine.push([at, (area * PARTS / (cell * cell)) as u64]);
         }
     };
     facets.iter().for_each(|f| spread(f, edge(level), &mut add));
-    sum(&mut mine);
-    let all = comm.all_gather(mine.iter().map(|m| [m.0, m.1]).collect::<Vec<_>>().as_flattened());
-    let mut pairs: Vec<(u64, u64)> =
-        all.iter().flat_map(|w| w.chunks_exact(2).map(|p| (p[0], p[1]))).collect();
-    sum(&mut pairs);
-    pairs
-}
-
-/// Sorts by place and adds up what lies in the same.
-fn sum(pairs: &mut Vec<(u64, u64)>) {
-    pairs.sort_unstable();
-    let mut kept: usize = 0;
-    for i in 0..pairs.len() {
-        if kept > 0 && pairs[kept - 1].0 == pairs[i].0 {
-            pairs[kept - 1].1 += pairs[i].1;
-        } else {
-            pairs[kept] = pairs[i];
-            kept += 1;
-        }
-    }
-    pairs.truncate(kept);
+    gather_merged(mine, |a, b| a + b, comm)
 }
 
 /// Tells the facet's area to `add`, in pieces whose extent is at most `extent`.
@@ -165,7 +164,7 @@ mod tests {
     use super::*;
     use crate::comm::Solo;
     use crate::lattice::{Keep, Root};
-    use crate::octant::ROOT_EDGE;
+    use crate::octant::{ROOT_EDGE, start57};
 
     fn rules(level_surface: Level) -> Rules {
         Rules {
@@ -184,10 +183,13 @@ mod tests {
         let h = (ROOT_EDGE / 2) as i32;
         let f = Facet { v: [[0, 0, 1], [h, 0, 1], [0, h, 1]] };
         let areas = Areas::gather(&[f], &rules(6), 4, &Solo);
+        let cells = |l: Level, code: u64| {
+            let span = start57(l, code)..start57(l, code + 1);
+            areas.cells(&areas.places_within(&(0..areas.len()), span))
+        };
         // 32 x 32 finest cells, half of them covered.
-        assert_eq!(areas.cells(0, 0), 512);
-        assert_eq!(areas.cells(1, 0), 512);
-        let parts: Vec<u64> = (0..8).map(|child| areas.cells(2, child)).collect();
+        assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
+        let parts: Vec<u64> = (0..8).map(|child| cells(2, child)).collect();
         let total: u64 = parts.iter().sum();
         assert!(total.abs_diff(512) <= 4, "{parts:?}");
         // The octant at the right angle is covered whole, its neighbours half.

@@ -4,16 +4,16 @@
 //! hardly more leaves than ranks, the curve's cuts serve as well.
 
 use super::morton_cuts;
+use crate::base::cut::Piece;
 use crate::base::face_neighbours;
 use crate::error::Error;
 use crate::octant::start57;
-use crate::share::BaseLeaf;
 
 /// Fewest base leaves per rank that METIS is asked to cut, of as many equal ones as they amount to.
 const LEAVES_PER_RANK_METIS: usize = 8;
 
 /// The owner of each base leaf.
-pub fn cuts(leaves: &[BaseLeaf], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
+pub fn cuts(leaves: &[Piece], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
     // METIS bisects again and again, and complains on standard output about parts that get nothing:
     // with hardly more leaves than ranks, or few that hold nearly all, the curve's cuts serve as well.
     let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
@@ -60,8 +60,7 @@ mod tests {
 
     #[test]
     fn parts_are_fair_however_heavy_the_leaves() {
-        let leaves: Vec<BaseLeaf> =
-            (0..512).map(|code| BaseLeaf { level: 3, code, owner: 0 }).collect();
+        let leaves: Vec<Piece> = (0..512).map(|code| Piece::new(3, code)).collect();
         for weight in [1, 1 << 40] {
             let owners = cuts(&leaves, &[weight; 512], 8).unwrap();
             for r in 0..8 {

@@ -1,0 +1,85 @@
+//! Entries that many ranks have parts of, brought together and told to all.
+//!
+//! Facets lie in a file as somebody made them, so that ranks that read slices of it have to do with the same
+//! places, dozens with each. If all told everybody, everybody would do the same sums over dozens of
+//! times the result; so some *collectors* do them first, each for its part of the keys.
+
+use super::Comm;
+
+/// A key and a value.
+pub type Entry = [u64; 2];
+
+/// Groups up to this size tell everybody at once: two steps would cost more than they save.
+const SMALL: usize = 8;
+
+/// All ranks' entries in the order of their keys, each key once, with the values merged by `merge`, which
+/// must not depend on order. Collective; the same on all ranks.
+pub fn gather_merged(
+    mut mine: Vec<Entry>,
+    merge: impl Fn(u64, u64) -> u64 + Copy,
+    comm: &dyn Comm,
+) -> Vec<Entry> {
+    combine(&mut mine, merge);
+    if comm.size() > SMALL {
+        mine = collect(&mine, comm);
+        combine(&mut mine, merge);
+    }
+    let mut all: Vec<Entry> = Vec::new();
+    for theirs in comm.all_gather(mine.as_flattened()).iter() {
+        all.extend_from_slice(theirs.as_chunks().0);
+    }
+    combine(&mut all, merge);
+    all
+}
+
+/// Brings entries to the collectors of their keys: as many as make the two steps alike. Collective.
+fn collect(mine: &[Entry], comm: &dyn Comm) -> Vec<Entry> {
+    let collectors = comm.size().isqrt();
+    let mut out: Vec<Vec<u64>> = vec![Vec::new(); collectors];
+    for entry in mine {
+        // The upper bits of a product depend on all bits of the key.
+        let spread = entry[0].wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        out[spread as usize % collectors].extend(entry);
+    }
+    let apart = comm.size() / collectors;
+    let heard = comm.exchange(out.into_iter().enumerate().map(|(i, w)| (i * apart, w)).collect());
+    heard.iter().flat_map(|(_, words)| words.as_chunks().0).copied().collect()
+}
+
+/// Sorts entries and merges those of one key.
+fn combine(entries: &mut Vec<Entry>, merge: impl Fn(u64, u64) -> u64) {
+    // Stable sorts find the runs that ranks send.
+    entries.sort_by_key(|e| e[0]);
+    entries.dedup_by(|e, before| {
+        let same = e[0] == before[0];
+        if same {
+            before[1] = merge(before[1], e[1]);
+        }
+        same
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::sim;
+
+    #[test]
+    fn all_ranks_get_the_sums_over_all() {
+        for ranks in [1, 2, 8, 9, 30] {
+            let told = sim::run(ranks, 4, |c| {
+                let mine = (0..200u64).map(|i| [i * i % 97 << 40, c.rank() as u64 + 1]).collect();
+                gather_merged(mine, |a, b| a + b, c)
+            });
+            let sum: u64 = (1..=ranks as u64).sum();
+            for key in 0..97u64 {
+                let times = (0..200u64).filter(|i| i * i % 97 == key).count() as u64;
+                let want = (times > 0).then_some(times * sum);
+                let got = told[0].iter().find(|e| e[0] == key << 40).map(|e| e[1]);
+                assert_eq!(got, want, "{ranks} ranks, key {key}");
+            }
+            assert!(told[0].is_sorted_by(|a, b| a[0] < b[0]));
+            assert!(told.iter().all(|t| *t == told[0]));
+        }
+    }
+}
