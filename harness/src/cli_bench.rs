@@ -3,10 +3,12 @@
 use crate::cli::ProgramArguments;
 use clap::Args;
 use harness::bench::entry::{Network, What};
+use harness::bench::foreign::{OWN, label};
 use harness::bench::group::Groups;
 use harness::bench::launcher::Launcher;
 use harness::bench::plan::{self, Experiment, Preset, Wishes, studies};
 use harness::bench::{BenchError, Options, bench, network, record, table};
+use harness::engine::description::Templates;
 use harness::engine::programs::{Given, Programs};
 use harness::verify::report::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING,
@@ -55,8 +57,8 @@ pub struct BenchArguments {
     /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
     #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
     pub network: Option<Network>,
-    /// The program to measure: mesher or reference
-    #[arg(long, default_value = "mesher", value_parser = ["mesher", "reference"])]
+    /// What to measure: mesher, reference, or an engine's description (a name in harness/engines, or a TOML file)
+    #[arg(long, value_name = "NAME|FILE", default_value = "mesher")]
     pub engine: String,
     /// File of JSON lines to append to [default: reports/out/bench.jsonl]
     #[arg(long, value_name = "FILE")]
@@ -103,7 +105,7 @@ pub fn run(arguments: BenchArguments) -> u8 {
         Some(file) => crate::cli_targets::run(&file, arguments),
         None => measure(arguments),
     };
-    match report.map(|directory| crate::cli_report::write(&directory, &[])) {
+    match report.map(|directory| crate::cli_report::write(&directory, &[], None)) {
         // A failed run stays the graver of the two.
         Some(Err(why)) => {
             eprintln!("harness: {why}");
@@ -121,7 +123,7 @@ fn measure(arguments: BenchArguments) -> u8 {
         Ok(programs) => programs,
         Err(code) => return code,
     };
-    let options = options(arguments);
+    let options = options(arguments, &programs);
     match bench(&options, &programs, &mut teller()) {
         Ok(outcome) => {
             print!("{}", table::tables(&Groups::of(&outcome.lines)));
@@ -131,7 +133,17 @@ fn measure(arguments: BenchArguments) -> u8 {
                 }
             }
             println!("record: {}", options.record.display());
-            if outcome.failures == 0 { EXIT_HOLDS } else { EXIT_FAILED }
+            let measured = outcome.lines.iter().any(|line| matches!(line.what, What::Run(_)));
+            match (outcome.failures, measured) {
+                (0, true) => EXIT_HOLDS,
+                (0, false) => {
+                    eprintln!(
+                        "harness: nothing was measured: ask for fewer cells, or for another experiment"
+                    );
+                    EXIT_MISSING
+                }
+                _ => EXIT_FAILED,
+            }
         }
         Err(error) => refuse(&error),
     }
@@ -143,7 +155,20 @@ pub fn programs(arguments: &BenchArguments) -> Result<Programs, u8> {
         mesher: arguments.programs.mesher.clone(),
         reference: arguments.programs.reference.clone(),
     };
-    let programs = Programs::find(given);
+    let mut programs = Programs::find(given);
+    if !OWN.contains(&arguments.engine.as_str()) {
+        if !arguments.weights.is_empty() || !arguments.partitioners.is_empty() {
+            eprintln!(
+                "harness: --weights and --partitioners are the mesher's: leave them out with another --engine"
+            );
+            return Err(EXIT_INPUT);
+        }
+        let limit = Duration::from_secs(arguments.timeout);
+        programs = programs.and_engine(&arguments.engine, limit).map_err(|why| {
+            eprintln!("harness: {why}");
+            EXIT_INPUT
+        })?;
+    }
     let program =
         if arguments.engine == "reference" { &programs.reference } else { &programs.mesher };
     if !program.is_file() {
@@ -194,7 +219,10 @@ pub fn record_path(arguments: &BenchArguments) -> PathBuf {
 }
 
 /// What is asked for, in the library's words.
-pub fn options(arguments: BenchArguments) -> Options {
+pub fn options(arguments: BenchArguments, programs: &Programs) -> Options {
+    let does = programs.engine.as_ref().map(|engine| engine.description().run.clone());
+    let can = |has: fn(&Templates) -> bool| does.as_ref().is_none_or(has);
+    let (sim, mpi) = (can(|t| t.simulated.is_some()), can(|t| t.parallel.is_some()));
     let record = record_path(&arguments);
     let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
     let wishes = Wishes {
@@ -207,12 +235,14 @@ pub fn options(arguments: BenchArguments) -> Options {
         weights: arguments.weights,
         partitioners: arguments.partitioners,
         repeats: arguments.repeat.map(usize::from),
-        no_mpi: arguments.no_mpi || !arguments.launcher.is_found(),
-        serial: arguments.engine == "reference",
+        no_mpi: arguments.no_mpi || !arguments.launcher.is_found() || !mpi,
+        no_sim: !sim,
+        serial: arguments.engine == "reference" || !sim && !mpi,
+        no_choice: does.is_some(),
     };
     Options {
         studies: studies(arguments.preset, &wishes),
-        engine: arguments.engine,
+        engine: label(&arguments.engine),
         launcher: arguments.launcher,
         network: arguments.network,
         record,

@@ -3,6 +3,7 @@
 use clap::Args;
 use harness::bench::record;
 use harness::report::report;
+use harness::track::history::{self, Record};
 use harness::verify::report::{EXIT_HOLDS, EXIT_INPUT};
 use std::path::{Path, PathBuf};
 
@@ -14,11 +15,14 @@ pub struct ReportArguments {
     /// A record of `harness bench`; may be repeated
     #[arg(long, value_name = "FILE")]
     pub record: Vec<PathBuf>,
+    /// A history of `harness track`, whose trend is shown, too
+    #[arg(long, value_name = "FILE")]
+    pub history: Option<PathBuf>,
 }
 
 /// Writes the report; the exit code.
 pub fn run(arguments: &ReportArguments) -> u8 {
-    match write(&arguments.directory, &arguments.record) {
+    match write(&arguments.directory, &arguments.record, arguments.history.as_deref()) {
         Ok(()) => EXIT_HOLDS,
         Err(why) => {
             eprintln!("harness: {why}");
@@ -31,8 +35,11 @@ pub fn run(arguments: &ReportArguments) -> u8 {
 ///
 /// # Errors
 /// One sentence.
-pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
-    let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
+pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Result<(), String> {
+    let mut records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
+    // A history beside the records is none of them.
+    records.retain(|path| Some(path.as_path()) != history);
+    let history = history.map_or(Ok(Vec::new()), history_of)?;
     let mut lines = Vec::new();
     for path in &records {
         let content = record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -47,7 +54,7 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
             "no results to report: {shown} has no record; make one with harness bench"
         ));
     }
-    let written = report(directory, &lines).map_err(|error| error.to_string())?;
+    let written = report(directory, &lines, &history).map_err(|error| error.to_string())?;
     for finding in &written.broken {
         println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
     }
@@ -56,6 +63,17 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
     }
     println!("{} figures; the page is {}", written.figures, written.page.display());
     Ok(())
+}
+
+/// The history; to the tracker one that is not there is empty, but here it was asked for.
+fn history_of(path: &Path) -> Result<Vec<Record>, String> {
+    if !path.is_file() {
+        return Err(format!(
+            "{}: there is no such history; harness track makes it",
+            path.display()
+        ));
+    }
+    history::read(path)
 }
 
 fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {

@@ -38,7 +38,7 @@ fn measure(targets: &Targets, arguments: BenchArguments) -> u8 {
         no_mpi: arguments.no_mpi,
         no_launcher: !arguments.launcher.is_found(),
     };
-    let options = cli_bench::options(arguments);
+    let options = cli_bench::options(arguments, &programs);
     let mut say = cli_bench::teller();
     let outcome = match targets::measure(&options, targets, &wishes, &programs, &mut say) {
         Ok(outcome) => outcome,

@@ -4,6 +4,7 @@ use harness::bench::entry::{
     Comm, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread, What,
 };
 use harness::report::report;
+use harness::track::history::Record;
 use std::path::Path;
 
 fn line(what: What) -> Line {
@@ -78,14 +79,24 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             useful_s: Spread::of(&both),
             phases: vec![phase("refine"), phase("grade")],
             counters: counters.into_iter().collect(),
+            message_matrix: Vec::new(),
         })))
     };
     (0..6).map(one).collect()
 }
 
+/// A warm-up that tells who sent how much to whom.
+fn warm_up() -> Line {
+    let mut line = run("strong", Comm::Sim, 4, 50_000_000, 4, "").remove(0);
+    if let What::Run(run) = &mut line.what {
+        (run.warm_up, run.message_matrix) = (true, vec![[0, 1, 3, 96], [3, 0, 1, 4096]]);
+    }
+    line
+}
+
 fn record() -> Vec<Line> {
     let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
-    let mut lines = vec![session(), line(What::Network(network))];
+    let mut lines = vec![session(), line(What::Network(network)), warm_up()];
     for ranks in [1, 2, 4, 16, 32, 64] {
         lines.extend(run("strong", Comm::Sim, ranks, 50_000_000, 4, ""));
         lines.extend(run("weak", Comm::Sim, ranks, 1_000_000 * ranks as u64, 4, ""));
@@ -117,7 +128,7 @@ fn files(place: &Path, kind: &str) -> Vec<String> {
 #[test]
 fn numbers_and_tikz_are_beside_every_figure() {
     let place = tempfile::tempdir().unwrap();
-    let written = report(place.path(), &record()).unwrap();
+    let written = report(place.path(), &record(), &[]).unwrap();
     let drawn = files(place.path(), "svg");
     assert_eq!(drawn.len(), written.figures);
     let mut kinds = vec!["csv", "tex"];
@@ -138,6 +149,7 @@ fn numbers_and_tikz_are_beside_every_figure() {
         "per-rank-uav-32",
         "per-rank-uav-64",
         "balance-uav-4M-64",
+        "messages-uav-50M-4",
         "rate",
         "memory",
     ] {
@@ -154,9 +166,27 @@ fn numbers_and_tikz_are_beside_every_figure() {
 }
 
 #[test]
+fn a_history_adds_its_trend() {
+    let commit = |i: u32| Record {
+        metrics: [("uav/rays".to_owned(), 100.0 + f64::from(i))].into(),
+        ..Record::new(format!("{i:040}"))
+    };
+    let place = tempfile::tempdir().unwrap();
+    let page = |history: &[Record]| {
+        std::fs::read_to_string(report(place.path(), &record(), history).unwrap().page).unwrap()
+    };
+    assert!(!page(&[]).contains("trend"));
+    let with = page(&[commit(0), commit(1), commit(2)]);
+    assert!(with.contains("<a href=\"#trend\">") && with.contains("id=\"trend-uav\""));
+    assert!(with.contains("<h2 id=\"trend\">") && with.contains("no change points"));
+    let numbers = std::fs::read_to_string(place.path().join("figures/trend-uav.csv")).unwrap();
+    assert!(numbers.contains("rays,measured,2,1.02,"), "{numbers}");
+}
+
+#[test]
 fn the_page_needs_nothing_but_itself() {
     let place = tempfile::tempdir().unwrap();
-    let page = std::fs::read_to_string(report(place.path(), &record()).unwrap().page).unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &record(), &[]).unwrap().page).unwrap();
     for asks in ["<script", "<link", "<img", "<iframe", "src=", "@import", "url("] {
         assert!(!page.contains(asks), "{asks}");
     }

@@ -23,6 +23,9 @@ pub struct Args {
     /// Write the report as JSON to this file, too
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+    /// Have in it who sent how much to whom in exchanges: [from, to, messages, bytes] of each pair that did
+    #[arg(long, requires = "json")]
+    pub message_matrix: bool,
     /// Stop at the base tree T0: all leaves with their sides, nothing deleted or graded
     #[arg(long)]
     pub ungraded: bool,

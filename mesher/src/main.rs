@@ -152,7 +152,10 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         ungraded: args.ungraded,
         out: args.out.clone(),
     };
-    let report = mesh(&case, &options, comm, record)?;
+    let mut report = mesh(&case, &options, comm, record)?;
+    if args.message_matrix {
+        report = report.with_message_matrix(comm);
+    }
     comm.agree(json.map_or(Ok(()), |json| json.finish(&report)))?;
     Ok(report)
 }

@@ -1,6 +1,6 @@
 //! What a run says at its end: a table for people, JSON for programs.
 
-use crate::comm::{Comm, Traffic};
+use crate::comm::{Comm, Traffic, matrix};
 use crate::digest::{Digests, hex};
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level};
@@ -129,6 +129,9 @@ pub struct Report {
     pub phases: Vec<PhaseEntry>,
     /// Counters by rank.
     pub counters: BTreeMap<&'static str, Vec<u64>>,
+    /// Who sent how much to whom, where asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub message_matrix: Option<Vec<matrix::Entry>>,
 }
 
 impl Report {
@@ -198,7 +201,13 @@ impl Report {
             peak_rss_bytes: column(0),
             phases,
             counters: COUNTERS.iter().enumerate().map(|(i, n)| (*n, column(1 + i))).collect(),
+            message_matrix: None,
         }
+    }
+
+    /// Adds the message matrix of the run to rank 0's report. Collective.
+    pub fn with_message_matrix(self, comm: &dyn Comm) -> Self {
+        Self { message_matrix: Some(matrix::gather(comm)), ..self }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Invariants: a line stands by itself but for its session, whose first line describes the machine; seconds,
 //! bytes and counts are plain numbers in the units of their names; ranks are told by sum and greatest value,
-//! and one by one only in a run's useful time, up to [`BY_RANK_MAX`] ranks, so that a record stays small.
+//! and one by one only in useful times, up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-bench/1";
 /// Most ranks whose values are kept one by one.
-pub const BY_RANK_MAX: usize = 64;
+pub const BY_RANK_MAX: usize = 1024;
 
 /// One line of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -207,6 +207,10 @@ pub struct Run {
     pub phases: Vec<Phase>,
     /// The program's counters.
     pub counters: BTreeMap<String, Spread>,
+    /// Who sent how much to whom in exchanges, where that was asked for: sender, receiver, messages and
+    /// bytes of every pair that exchanged anything.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub message_matrix: Vec<[u64; 4]>,
 }
 
 /// A run that came to nothing.
@@ -297,7 +301,7 @@ mod tests {
         assert_eq!((few.sum, few.max, few.at, few.by_rank.len()), (6.0, 3.0, 1, 3));
         assert_eq!(few.lambda(3), 1.5);
         let many = Spread::of(&[1.0; BY_RANK_MAX + 1]);
-        assert_eq!((many.sum, many.by_rank.len()), (65.0, 0));
+        assert_eq!((many.sum, many.by_rank.len()), ((BY_RANK_MAX + 1) as f64, 0));
         assert_eq!(Spread::of(&[0.0, 0.0]).lambda(2), 1.0);
     }
 

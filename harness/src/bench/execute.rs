@@ -4,6 +4,7 @@ use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::launcher::Launcher;
 use super::machine;
 use crate::audit::record::AuditRecord;
+use crate::engine::memory::Scales;
 use crate::engine::process::{self, End, Finished, Watch};
 use crate::engine::programs::Programs;
 use serde::Deserialize;
@@ -11,6 +12,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+
+/// Most ranks between which messages are told pair by pair: there may be as many entries as pairs.
+pub const MATRIX_RANKS_MAX: usize = 64;
 
 /// What every run of a session has in common.
 #[derive(Debug)]
@@ -35,46 +39,74 @@ pub enum Failed {
 }
 
 /// A program's `--json`, as far as it has it: the reference knows neither ranks nor phases.
-#[derive(Debug, Deserialize)]
-struct Told {
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Told {
     #[serde(default)]
     facets: u64,
     cells: u64,
     digest: String,
-    time_wall_s: f64,
-    peak_rss_bytes: OneOrMany,
     #[serde(default)]
-    phases: Vec<PhaseTold>,
+    time_wall_s: Option<f64>,
+    #[serde(default)]
+    peak_rss_bytes: Option<OneOrMany>,
+    #[serde(default)]
+    pub(super) phases: Vec<PhaseTold>,
     #[serde(default)]
     counters: BTreeMap<String, Vec<f64>>,
+    #[serde(default)]
+    message_matrix: Vec<[u64; 4]>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
-enum OneOrMany {
+pub(super) enum OneOrMany {
     One(f64),
     Many(Vec<f64>),
 }
 
+impl Told {
+    /// Reads `--json`.
+    pub(super) fn read(json: &Path) -> Result<Self, String> {
+        let text = std::fs::read_to_string(json).map_err(|error| error.to_string());
+        text.and_then(|text| serde_json::from_str(&text).map_err(|error| error.to_string()))
+            .map_err(|error| format!("its --json cannot be read: {error}"))
+    }
+
+    /// A program that told nothing but its mesh.
+    pub(super) fn of_mesh(cells: u64, digest: String) -> Self {
+        Self { cells, digest, ..Self::default() }
+    }
+
+    /// Adds what was seen from outside where the program does not tell it.
+    pub(super) fn seen(&mut self, time_wall_s: f64, peak_rss_bytes: u64) {
+        self.time_wall_s.get_or_insert(time_wall_s);
+        self.peak_rss_bytes.get_or_insert(OneOrMany::One(peak_rss_bytes as f64));
+    }
+}
+
+/// A phase; another program than the mesher may tell no more than its CPU time.
 #[derive(Debug, Deserialize)]
-struct PhaseTold {
+pub(super) struct PhaseTold {
     name: String,
+    #[serde(default)]
     time_wall_s: Vec<f64>,
+    #[serde(default)]
     time_cpu_s: Vec<f64>,
+    #[serde(default)]
     time_comm_wall_s: Vec<f64>,
+    #[serde(default)]
     time_comm_cpu_s: Vec<f64>,
+    #[serde(default)]
     messages: Vec<f64>,
+    #[serde(default)]
     message_bytes: Vec<f64>,
 }
 
 impl PhaseTold {
     /// CPU time outside calls to other ranks, by rank. The clocks' ticks may make a difference negative.
     fn useful_s(&self) -> Vec<f64> {
-        self.time_cpu_s
-            .iter()
-            .zip(&self.time_comm_cpu_s)
-            .map(|(all, comm)| (all - comm).max(0.0))
-            .collect()
+        let comm = self.time_comm_cpu_s.iter().copied().chain(std::iter::repeat(0.0));
+        self.time_cpu_s.iter().zip(comm).map(|(all, comm)| (all - comm).max(0.0)).collect()
     }
 }
 
@@ -90,22 +122,37 @@ impl Runner<'_> {
         repeat: usize,
         warm_up: bool,
     ) -> Result<Run, Failed> {
-        let json = self.place.join("run.json");
-        let _ = std::fs::remove_file(&json);
-        let mut command = self.command(setup, case);
-        command.arg("--json").arg(&json);
-        let shown = shown(&command, self.place);
-        let finished = self.watched(&mut command, &[0])?;
-        let told = std::fs::read_to_string(&json).map_err(|error| error.to_string());
-        let told =
-            told.and_then(|text| serde_json::from_str::<Told>(&text).map_err(|e| e.to_string()));
-        let told =
-            told.map_err(|error| Failed::Because(format!("its --json cannot be read: {error}")))?;
+        let _ = std::fs::remove_file(self.place.join("run.json"));
+        let (told, shown, finished) = match self.foreign(setup) {
+            Some(engine) => self.told_by_engine(engine, setup, case)?,
+            None => self.told_by_own(setup, case, warm_up)?,
+        };
         let mut run = of_told(setup.clone(), &told);
         (run.repeat, run.warm_up, run.command) = (repeat, warm_up, shown);
         run.time_launch_s = finished.time_wall_s;
         run.oversubscribed = setup.comm == Comm::Mpi && setup.ranks > machine::cores();
         Ok(run)
+    }
+
+    /// Runs the mesher or the reference; what it tells, its command line, how it ended.
+    fn told_by_own(
+        &self,
+        setup: &Setup,
+        case: &Path,
+        warm_up: bool,
+    ) -> Result<(Told, String, Finished), Failed> {
+        let json = self.place.join("run.json");
+        let mut command = self.command(setup, case);
+        command.arg("--json").arg(&json);
+        // The counts of one run are those of all, and gathering them should disturb none that is timed.
+        if warm_up && tells_matrix(setup) {
+            command.arg("--message-matrix");
+        }
+        let shown = shown(&command, self.place);
+        let finished = self.watched(&mut command, &[0], None)?;
+        let mut told = Told::read(&json).map_err(Failed::Because)?;
+        told.seen(finished.time_wall_s, 0);
+        Ok((told, shown, finished))
     }
 
     /// Has the mesh of `setup` written into a directory of its own in `disk`, and `harness audit` read it; the
@@ -120,14 +167,14 @@ impl Runner<'_> {
         let mesh = place.path().join("mesh");
         let mut command = self.command(setup, case);
         command.arg("--out").arg(&mesh);
-        self.watched(&mut command, &[0])?;
+        self.watched(&mut command, &[0], None)?;
         let json = self.place.join("audit.json");
         let _ = std::fs::remove_file(&json);
         let mut command = Command::new(&self.programs.harness);
         command.arg("audit").arg(&mesh).arg("--json").arg(&json);
         let shown = shown(&command, self.place);
         // 1: a check failed, which the record tells.
-        self.watched(&mut command, &[0, 1])?;
+        self.watched(&mut command, &[0, 1], None)?;
         let told = AuditRecord::read(&json).map_err(Failed::Because)?;
         let found = told.checks.iter().filter(|c| c.findings > 0).map(|c| c.name.clone());
         Ok(Audited {
@@ -142,10 +189,19 @@ impl Runner<'_> {
         })
     }
 
-    /// Runs a command to its end, which must be one of these exit codes.
-    fn watched(&self, command: &mut Command, codes: &[i32]) -> Result<Finished, Failed> {
+    /// Runs a command to its end, which must be one of these exit codes, and weighs it where there are scales.
+    pub(super) fn watched(
+        &self,
+        command: &mut Command,
+        codes: &[i32],
+        scales: Option<&mut Scales>,
+    ) -> Result<Finished, Failed> {
         let watch = Watch { limit: self.limit, logs: self.place, name: "run", status: None };
-        let finished = process::run(command, &watch)
+        let finished = match scales {
+            Some(scales) => process::run_weighed(command, &watch, scales),
+            None => process::run(command, &watch),
+        };
+        let finished = finished
             .map_err(|error| Failed::Because(format!("it could not be started: {error}")))?;
         let why = match finished.end {
             End::Exited(code) if codes.contains(&code) => return Ok(finished),
@@ -211,30 +267,38 @@ impl Runner<'_> {
     }
 }
 
+/// Whether messages between pairs of ranks are wanted of a setup: in strong scaling of the mesher.
+pub fn tells_matrix(setup: &Setup) -> bool {
+    let ranks = (2..=MATRIX_RANKS_MAX).contains(&setup.ranks);
+    setup.experiment == "strong" && setup.engine == "mesher" && setup.comm == Comm::Sim && ranks
+}
+
 /// A run as a program tells it; what the harness knows of it is the caller's to add.
 fn of_told(setup: Setup, told: &Told) -> Run {
     let mut useful_s = vec![0.0; setup.ranks];
     for phase in &told.phases {
         useful_s.iter_mut().zip(phase.useful_s()).for_each(|(sum, u)| *sum += u);
     }
+    let time_wall_s = told.time_wall_s.unwrap_or(0.0);
     if told.phases.is_empty() {
-        useful_s = vec![told.time_wall_s];
+        useful_s = vec![time_wall_s; setup.ranks];
     }
     let phase = |p: &PhaseTold| Phase {
         name: p.name.clone(),
-        useful_s: Spread::brief(&p.useful_s()),
+        useful_s: Spread::of(&p.useful_s()),
         wall_s: Spread::brief(&p.time_wall_s),
         comm_s: Spread::brief(&p.time_comm_wall_s),
         messages: Spread::brief(&p.messages),
         message_bytes: Spread::brief(&p.message_bytes),
     };
     let peak = match &told.peak_rss_bytes {
-        OneOrMany::One(bytes) => vec![*bytes],
+        None => Vec::new(),
+        Some(OneOrMany::One(bytes)) => vec![*bytes],
         // One process holds all simulated ranks, and each tells its peak.
-        OneOrMany::Many(bytes) if setup.comm == Comm::Sim => {
+        Some(OneOrMany::Many(bytes)) if setup.comm == Comm::Sim => {
             vec![bytes.iter().copied().fold(0.0, f64::max)]
         }
-        OneOrMany::Many(bytes) => bytes.clone(),
+        Some(OneOrMany::Many(bytes)) => bytes.clone(),
     };
     Run {
         repeat: 0,
@@ -244,18 +308,19 @@ fn of_told(setup: Setup, told: &Told) -> Run {
         facets: told.facets,
         cells: told.cells,
         digest: told.digest.clone(),
-        time_wall_s: told.time_wall_s,
+        time_wall_s,
         time_launch_s: 0.0,
         peak_rss_bytes: Spread::brief(&peak),
         useful_s: Spread::of(&useful_s),
         phases: told.phases.iter().map(phase).collect(),
         counters: told.counters.iter().map(|(name, v)| (name.clone(), Spread::brief(v))).collect(),
+        message_matrix: told.message_matrix.clone(),
         setup,
     }
 }
 
 /// A command line for people, with the directories of programs and of this session's files left out.
-fn shown(command: &Command, place: &Path) -> String {
+pub(super) fn shown(command: &Command, place: &Path) -> String {
     let word = |w: &std::ffi::OsStr| {
         let path = Path::new(w);
         let local = path
@@ -277,7 +342,7 @@ mod tests {
     use super::*;
 
     const TOLD: &str = r#"{"schema": "octree-mesher-run/1", "facets": 12, "cells": 80, "digest": "00", "ranks": 2,
-        "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
+        "message_matrix": [[0, 1, 3, 96]], "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
         "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0], "time_comm_wall_s": [1.0, 1.0],
           "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
 
@@ -291,6 +356,8 @@ mod tests {
         let run = of_told(setup(Comm::Mpi, 2), &told);
         assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
         assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!(run.message_matrix, [[0, 1, 3, 96]]);
         assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
         // All simulated ranks live in one process.

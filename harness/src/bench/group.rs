@@ -1,6 +1,6 @@
 //! Runs of the same setup together: what is said of a measurement is said of all its repetitions.
 
-use super::entry::{Comm, Line, Network, Run, Setup, What};
+use super::entry::{Comm, Line, Network, Phase, Run, Setup, Spread, What};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use super::stats::{Median, median};
@@ -12,15 +12,43 @@ pub struct Group {
     pub setup: Setup,
     /// The runs, warm-ups left out, in the order in which they were made.
     pub runs: Vec<Run>,
-    /// Time, measured or projected (see [`pop::time_s`]).
+    /// Time, measured or projected (see [`pop::time_s`]). Where it is projected and ranks are told one by one, it
+    /// is the typical run's; the interval is that of the repetitions' own projections, reaching to it.
     pub time_s: Median,
+    /// What is said of single ranks is said of it: the run whose time is nearest to the median, with every
+    /// rank's useful time in every phase replaced by its median over the repetitions where they tell it.
+    pub typical: Run,
+    /// Whether they do, and there are several.
+    pub by_rank: bool,
 }
 
 impl Group {
-    /// The run whose time is nearest to the median: what is said of single ranks is said of it.
-    pub fn typical(&self, network: &Network) -> &Run {
-        let off = |run: &&Run| (pop::time_s(run, network) - self.time_s.value).abs();
-        self.runs.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a group has runs")
+    /// Of repetitions of one setup; nothing of none.
+    fn of(setup: Setup, runs: Vec<Run>, network: &Network) -> Option<Self> {
+        let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, network)).collect();
+        let mut time_s = median(&times)?;
+        let off = |run: &&Run| (pop::time_s(run, network) - time_s.value).abs();
+        let mut typical = runs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.clone();
+        let medians = medians_by_rank(&runs);
+        let by_rank = medians.is_some();
+        if let Some(phases) = medians {
+            quiet(&mut typical, &phases);
+            if setup.comm == Comm::Sim {
+                time_s.value = pop::time_s(&typical, network);
+                time_s.low = time_s.low.min(time_s.value);
+                time_s.high = time_s.high.max(time_s.value);
+            }
+        }
+        Some(Self { setup, runs, time_s, typical, by_rank })
+    }
+
+    /// Where times of single ranks are from, for a caption.
+    pub fn ranks_told(&self) -> String {
+        let n = self.runs.len();
+        match self.by_rank {
+            true => format!("Times of a rank in a phase are medians of {n} runs"),
+            false => format!("Run of median time of {n}"),
+        }
     }
 
     /// Cells of the mesh.
@@ -56,8 +84,46 @@ impl Group {
 
     /// Efficiencies of the typical run against the typical one of `reference`.
     pub fn efficiency(&self, reference: &Group, network: &Network) -> Efficiency {
-        pop::efficiency(self.typical(network), reference.typical(network), network)
+        pop::efficiency(&self.typical, &reference.typical, network)
     }
+
+    /// The critical path of CPU times alone.
+    fn path_s(&self) -> f64 {
+        if self.by_rank {
+            return pop::path_s(&self.typical);
+        }
+        let paths: Vec<f64> = self.runs.iter().map(pop::path_s).collect();
+        median(&paths).map_or(f64::NAN, |m| m.value)
+    }
+}
+
+/// Useful time by phase and rank, each the median over runs; nothing where there is one run only, or one of them
+/// does not tell them all.
+fn medians_by_rank(runs: &[Run]) -> Option<Vec<Vec<f64>>> {
+    let (first, rest) = runs.split_first()?;
+    if rest.is_empty() || first.phases.is_empty() {
+        return None;
+    }
+    let told = |r: &Run| r.phases.iter().all(|p| p.useful_s.by_rank.len() == r.setup.ranks);
+    let names = |r: &Run| r.phases.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
+    if !runs.iter().all(|r| told(r) && names(r) == names(first)) {
+        return None;
+    }
+    let of = |phase: usize, rank: usize| {
+        let values: Vec<f64> =
+            runs.iter().map(|r| r.phases[phase].useful_s.by_rank[rank]).collect();
+        median(&values).map(|m| m.value)
+    };
+    let ranks = first.setup.ranks;
+    (0..first.phases.len()).map(|p| (0..ranks).map(|r| of(p, r)).collect()).collect()
+}
+
+/// Replaces a run's useful times, by phase and rank.
+fn quiet(run: &mut Run, useful_s: &[Vec<f64>]) {
+    let put = |(phase, values): (&mut Phase, &Vec<f64>)| phase.useful_s = Spread::of(values);
+    run.phases.iter_mut().zip(useful_s).for_each(put);
+    let of_rank = |r: usize| useful_s.iter().map(|phase| phase[r]).sum();
+    run.useful_s = Spread::of(&(0..run.setup.ranks).map(of_rank).collect::<Vec<f64>>());
 }
 
 /// What lines say, in groups.
@@ -65,6 +131,8 @@ impl Group {
 pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
+    /// Runs that tell who sent how much to whom, warm-ups among them; the last one of every setup.
+    pub matrices: Vec<Run>,
     /// The last network that was measured or given.
     pub network: Network,
 }
@@ -74,6 +142,7 @@ impl Groups {
     pub fn of(lines: &[Line]) -> Self {
         let mut network = ASSUMED;
         let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
+        let mut matrices: Vec<Run> = Vec::new();
         for line in lines {
             match &line.what {
                 What::Network(n) => network = *n,
@@ -86,11 +155,16 @@ impl Groups {
                 _ => {}
             }
         }
-        let group = |(setup, runs): (Setup, Vec<Run>)| {
-            let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, &network)).collect();
-            Some(Group { setup, time_s: median(&times)?, runs })
-        };
-        Self { all: by_setup.into_iter().filter_map(group).collect(), network }
+        let told = lines.iter().filter_map(|line| match &line.what {
+            What::Run(run) if !run.message_matrix.is_empty() => Some(&**run),
+            _ => None,
+        });
+        for run in told {
+            matrices.retain(|other| other.setup != run.setup);
+            matrices.push(run.clone());
+        }
+        let group = |(setup, runs): (Setup, Vec<Run>)| Group::of(setup, runs, &network);
+        Self { all: by_setup.into_iter().filter_map(group).collect(), matrices, network }
     }
 
     /// The groups of an experiment on one case, in the order of `key`.
@@ -165,11 +239,7 @@ impl Projection<'_> {
     /// The same for CPU times alone: how much longer the simulated ranks' critical path is than the one of
     /// the real ranks' CPU times. Medians of both.
     pub fn path_error(&self) -> f64 {
-        let path = |g: &Group| {
-            let paths: Vec<f64> = g.runs.iter().map(pop::path_s).collect();
-            median(&paths).map_or(f64::NAN, |m| m.value)
-        };
-        path(self.sim) / path(self.measured) - 1.0
+        self.sim.path_s() / self.measured.path_s() - 1.0
     }
 }
 
@@ -207,11 +277,53 @@ pub(crate) mod tests {
         assert_eq!(groups.all.len(), 2);
         let two = &groups.all[0];
         assert_eq!((two.time_s.value, two.time_s.count, two.how()), (2.0, 3, "projected"));
-        assert_eq!(two.typical(&groups.network).useful_s.sum, 4.0);
+        assert_eq!(two.typical.useful_s.sum, 4.0);
         let reference = groups.reference(two);
         assert_eq!(reference.setup.ranks, 1);
         let e = two.efficiency(reference, &groups.network);
         assert!((e.global() - 9.0 / 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn noise_in_one_repetition_changes_nothing() {
+        let quiet: &[(&str, &[f64])] = &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])];
+        let of = |disturbed: [&[(&str, &[f64])]; 3]| {
+            let mut lines = vec![free()];
+            lines.extend(disturbed.map(|useful| line_of(run(Comm::Sim, 9, useful))));
+            Groups::of(&lines).all.remove(0)
+        };
+        let clean = of([quiet; 3]);
+        // Every repetition is disturbed, each on another rank or in another phase.
+        let noisy = of([
+            &[("a", &[9.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])],
+            &[("a", &[1.0, 7.0, 3.0]), ("b", &[8.0, 2.0, 2.5])],
+            &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 6.0, 2.5])],
+        ]);
+        assert!(noisy.by_rank);
+        assert_eq!(noisy.typical.useful_s, clean.typical.useful_s);
+        assert_eq!(noisy.typical.useful_s.lambda(3), 5.5 * 3.0 / 12.5);
+        assert_eq!((noisy.time_s.value, noisy.path_s()), (5.5, 5.5));
+        // The repetitions' own critical paths are all longer; the bar says so, and reaches the point.
+        assert_eq!((noisy.time_s.low, noisy.time_s.high), (5.5, 15.0));
+    }
+
+    #[test]
+    fn records_without_ranks_by_phase_are_told_by_a_run() {
+        let mut brief = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
+        brief.phases[0].useful_s.by_rank.clear();
+        let lines =
+            [free(), line_of(brief.clone()), line_of(run(Comm::Sim, 9, &[("a", &[3.0, 2.0])]))];
+        let group = Groups::of(&lines).all.remove(0);
+        assert!(!group.by_rank && group.runs.contains(&group.typical));
+        assert!(group.ranks_told().starts_with("Run of median time"));
+    }
+
+    #[test]
+    fn message_matrices_are_taken_from_warm_ups() {
+        let mut warm = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
+        (warm.warm_up, warm.message_matrix) = (true, vec![[0, 1, 1, 8]]);
+        let groups = Groups::of(&[line_of(warm.clone()), line_of(warm)]);
+        assert_eq!((groups.all.len(), groups.matrices.len()), (0, 1));
     }
 
     #[test]

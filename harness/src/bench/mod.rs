@@ -9,6 +9,7 @@
 pub mod cause;
 pub mod entry;
 pub mod execute;
+pub mod foreign;
 pub mod group;
 pub mod launcher;
 pub mod machine;
@@ -22,6 +23,7 @@ pub mod table;
 pub mod targets;
 pub mod variant;
 
+use crate::case::Case;
 use crate::engine::programs::Programs;
 use entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
 use execute::{Failed, Runner};
@@ -39,7 +41,7 @@ use variant::Base;
 pub struct Options {
     /// The studies, in order.
     pub studies: Vec<Study>,
-    /// `mesher` or `reference`.
+    /// `mesher`, `reference`, or what the record calls the engine of `Programs`.
     pub engine: String,
     /// How ranks are started.
     pub launcher: Launcher,
@@ -198,14 +200,10 @@ impl Bench<'_> {
         Base::read(&path, self.runner.place).map_err(BenchError::Input)
     }
 
-    /// The first setup of every mesh once, unrecorded in statistics: it brings files into memory.
+    /// Every mesh once, unrecorded in statistics: it brings files into memory.
     fn warm_up(&mut self, points: &mut [Point]) -> Result<(), BenchError> {
-        let mut warm: Vec<PathBuf> = Vec::new();
-        for point in points {
-            if !warm.contains(&point.case) {
-                warm.push(point.case.clone());
-                self.run(point, 0, true)?;
-            }
+        for at in warmers(points) {
+            self.run(&mut points[at], 0, true)?;
         }
         Ok(())
     }
@@ -227,7 +225,7 @@ impl Bench<'_> {
             if warm_up {
                 ", warm-up".to_owned()
             } else {
-                format!(", {} {}, repeat {}", s.partitioner, s.weights, repeat + 1)
+                format!(", {}, repeat {}", table::division(s), repeat + 1)
             }
         ));
         let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
@@ -281,6 +279,10 @@ impl Bench<'_> {
             for layout in &study.layouts {
                 for spacing in self.spacings(study, base, layout, &mut sizes)? {
                     let case = base.variant(spacing, n).map_err(BenchError::Input)?;
+                    if let Some(why) = self.declined(&case)? {
+                        (self.say)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
+                        continue;
+                    }
                     for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
                         points.push(Point {
                             setup: self.setup(
@@ -299,6 +301,16 @@ impl Bench<'_> {
             }
         }
         Ok(points)
+    }
+
+    /// Why the engine is not run on a case, by its description.
+    fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
+        let own = foreign::OWN.contains(&self.options.engine.as_str());
+        let Some(engine) = self.runner.programs.engine.as_ref().filter(|_| !own) else {
+            return Ok(None);
+        };
+        let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
+        Ok(engine.description().declines(&case))
     }
 
     fn setup(
@@ -372,6 +384,24 @@ impl Bench<'_> {
     }
 }
 
+/// The setup of every mesh that warms it up: the one whose message matrix is wanted, on most ranks where
+/// there are several; else the first.
+fn warmers(points: &[Point]) -> Vec<usize> {
+    let worth = |point: &Point| match execute::tells_matrix(&point.setup) {
+        true => point.setup.ranks,
+        false => 0,
+    };
+    let mut best: Vec<usize> = Vec::new();
+    for (at, point) in points.iter().enumerate() {
+        match best.iter_mut().find(|b| points[**b].case == point.case) {
+            Some(before) if worth(point) > worth(&points[*before]) => *before = at,
+            Some(_) => {}
+            None => best.push(at),
+        }
+    }
+    best
+}
+
 fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<(&'a str, &'a str)> {
     weights
         .iter()
@@ -392,4 +422,30 @@ fn in_catalogue(name: &str, catalogue: &Path) -> Result<PathBuf, String> {
         wrong(format!("no case {name} in it, and no file of a case (.toml) either"))
     })?;
     Ok(catalogue.parent().unwrap_or(Path::new(".")).join(file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(comm: Comm, ranks: usize, case: &str) -> Point {
+        let setup = pop::tests::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
+        Point { setup, case: case.into(), failed: false }
+    }
+
+    #[test]
+    fn meshes_are_warmed_up_once_where_messages_can_be_told() {
+        let points = [
+            point(Comm::Sim, 1, "a"),
+            point(Comm::Sim, 64, "a"),
+            point(Comm::Sim, 16, "a"),
+            point(Comm::Sim, 1024, "a"),
+            point(Comm::Mpi, 2, "b"),
+            point(Comm::Mpi, 4, "b"),
+        ];
+        assert_eq!(warmers(&points), [1, 4]);
+        let mut weak = points;
+        weak.iter_mut().for_each(|p| p.setup.experiment = "weak".into());
+        assert_eq!(warmers(&weak), [0, 4]);
+    }
 }

@@ -93,8 +93,12 @@ pub struct Wishes {
     pub repeats: Option<usize>,
     /// No runs on MPI.
     pub no_mpi: bool,
+    /// No runs on simulated ranks, for a program that has none.
+    pub no_sim: bool,
     /// Serial runs only, for a program that knows no ranks.
     pub serial: bool,
+    /// The program has no choice of weights and partitioners.
+    pub no_choice: bool,
 }
 
 const MILLION: u64 = 1_000_000;
@@ -108,6 +112,7 @@ pub fn studies(preset: Preset, wishes: &Wishes) -> Vec<Study> {
         Preset::Full => full(),
     };
     of_preset.retain(wanted);
+    of_preset.retain(|s| !(wishes.no_choice && s.experiment == Experiment::Weights));
     if !wishes.cases.is_empty() {
         of_preset = on_cases(of_preset, &wishes.cases);
     }
@@ -166,6 +171,9 @@ fn change(study: &mut Study, wishes: &Wishes) {
         let serial = study.layouts.iter().any(|l| l.comm == Comm::Mpi);
         study.layouts.retain(|l| l.comm != Comm::Mpi);
         study.layouts.extend(serial.then_some(Layout { comm: Comm::Solo, ranks: 1 }));
+    }
+    if wishes.no_sim {
+        study.layouts.retain(|l| l.comm != Comm::Sim);
     }
     if wishes.serial {
         study.layouts = vec![Layout { comm: Comm::Solo, ranks: 1 }];
@@ -305,6 +313,10 @@ mod tests {
         let all = studies(Preset::Small, &serial);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Solo && l.ranks == 1));
         assert!(all.iter().all(|s| s.experiment != Experiment::Weights));
+        let real = Wishes { no_sim: true, no_choice: true, ..Wishes::default() };
+        let all = studies(Preset::Small, &real);
+        assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Mpi));
+        assert!(!all.is_empty() && all.iter().all(|s| s.experiment != Experiment::Weights));
     }
 
     #[test]

@@ -13,6 +13,10 @@
 //!   global            = parallel * computation scaling
 //! ```
 //!
+//! What a rank does is the same in every repetition, only the time that the machine takes for it wavers. So
+//! where runs tell it rank by rank, `u[p][r]` is the median over the repetitions (see [`Group`](super::group::Group)),
+//! taken before any maximum over ranks: the greatest of many wavering times is the most disturbed rank's.
+//!
 //! C is what the phases would take on a network that costs nothing, as ranks wait for each other at the
 //! end of a phase. Where ranks are simulated, T is projected: C plus what a latency-bandwidth model says
 //! of the counted messages.
@@ -64,8 +68,11 @@ pub fn projected_s(run: &Run, network: &Network) -> f64 {
 }
 
 /// The critical path on a network that costs nothing: what simulated and real ranks must have in common,
-/// also on a machine that is busy with other work.
+/// also on a machine that is busy with other work. A program that tells no phases has one.
 pub fn path_s(run: &Run) -> f64 {
+    if run.phases.is_empty() {
+        return run.useful_s.max;
+    }
     run.phases.iter().map(|p| p.useful_s.max).sum()
 }
 
@@ -166,6 +173,7 @@ pub(crate) mod tests {
             useful_s: Spread::of(&total),
             phases,
             counters: Default::default(),
+            message_matrix: Vec::new(),
         }
     }
 
@@ -211,6 +219,15 @@ pub(crate) mod tests {
         let one = run(Comm::Sim, 100, &[("a", &[4.0])]);
         let two = run(Comm::Sim, 200, &[("a", &[4.0, 4.0])]);
         close(efficiency(&two, &one, &FREE).global(), 1.0);
+    }
+
+    #[test]
+    fn a_program_without_phases_loses_nothing_between_them() {
+        let mut silent = run(Comm::Solo, 100, &[("all", &[3.0])]);
+        silent.phases.clear();
+        let e = efficiency(&silent, &silent.clone(), &FREE);
+        close(e.serialisation * e.transfer, 1.0);
+        close(e.global(), 1.0);
     }
 
     #[test]

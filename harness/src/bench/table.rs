@@ -1,7 +1,7 @@
 //! Measurements as tables for people.
 
 use super::cause::sentence;
-use super::entry::{Comm, Network};
+use super::entry::{Comm, Network, Setup};
 use super::group::{Group, Groups};
 use super::pop;
 use std::fmt::Write;
@@ -60,8 +60,8 @@ fn experiment_table(out: &mut String, groups: &Groups, experiment: &str) {
     }
     let last: Vec<&Group> = groups.all.iter().filter(of).filter(|g| g.setup.ranks > 1).collect();
     for group in last {
-        let (run, reference) = (group.typical(&groups.network), groups.reference(group));
-        let told = sentence(run, reference.typical(&groups.network), &groups.network);
+        let (run, reference) = (&group.typical, groups.reference(group));
+        let told = sentence(run, &reference.typical, &groups.network);
         let _ = writeln!(out, "  {}, {}: {told}", group.setup.case, group.how());
     }
 }
@@ -76,7 +76,7 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
         s.case,
         grouped(group.cells()),
         s.layer_cells_min,
-        division(group),
+        division(s),
         s.ranks,
         group.how(),
         t.value,
@@ -94,8 +94,7 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
 }
 
 /// How the work was divided, in words.
-pub fn division(group: &Group) -> String {
-    let s = &group.setup;
+pub fn division(s: &Setup) -> String {
     match (s.partitioner.as_str(), s.weights.as_str()) {
         ("", "") => "default".to_owned(),
         (p, w) => format!("{p} {w}").trim().to_owned(),
@@ -104,7 +103,7 @@ pub fn division(group: &Group) -> String {
 
 /// Phases of a group's typical run: useful time, balance, messages, share.
 pub fn phases(group: &Group, reference: &Group, network: &Network) -> String {
-    let (run, one) = (group.typical(network), reference.typical(network));
+    let (run, one) = (&group.typical, &reference.typical);
     let mut out = String::new();
     let _ = writeln!(
         out,

@@ -3,6 +3,7 @@
 
 pub mod description;
 pub mod interrupt;
+pub mod memory;
 pub mod mesher;
 pub mod mpi;
 pub mod p4est;

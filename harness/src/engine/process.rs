@@ -7,6 +7,7 @@
 //! - what the child printed is in files, so that no pipe can fill and no output is lost with a hang.
 
 use super::interrupt;
+use super::memory::Scales;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, setsid};
 use std::fs::{self, File};
 use std::io;
@@ -81,6 +82,27 @@ pub struct Watch<'a> {
 /// # Errors
 /// Where the child could not be started or its output files not be made.
 pub fn run(command: &mut Command, watch: &Watch) -> io::Result<Finished> {
+    run_seen(command, watch, &mut |_| {})
+}
+
+/// The same, with the memory of the child and of all that it starts weighed.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn run_weighed(
+    command: &mut Command,
+    watch: &Watch,
+    scales: &mut Scales,
+) -> io::Result<Finished> {
+    run_seen(command, watch, &mut |leader| scales.weigh(leader))
+}
+
+/// Runs the child; while it is waited for, `look` is called with its id.
+fn run_seen(
+    command: &mut Command,
+    watch: &Watch,
+    look: &mut dyn FnMut(u32),
+) -> io::Result<Finished> {
     let stdout = watch.logs.join(format!("{}.stdout", watch.name));
     let stderr = watch.logs.join(format!("{}.stderr", watch.name));
     command.stdin(Stdio::null()).stdout(File::create(&stdout)?).stderr(File::create(&stderr)?);
@@ -88,7 +110,7 @@ pub fn run(command: &mut Command, watch: &Watch) -> io::Result<Finished> {
     unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
     let start = Instant::now();
     let mut child = command.spawn()?;
-    let (end, last_doing) = wait(&mut child, start, watch)?;
+    let (end, last_doing) = wait(&mut child, start, watch, look)?;
     kill_session(child.id());
     Ok(Finished { end, time_wall_s: start.elapsed().as_secs_f64(), stdout, stderr, last_doing })
 }
@@ -97,6 +119,7 @@ fn wait(
     child: &mut Child,
     start: Instant,
     watch: &Watch,
+    look: &mut dyn FnMut(u32),
 ) -> io::Result<(End, Vec<(usize, String)>)> {
     let mut pause = Duration::from_millis(1);
     loop {
@@ -114,6 +137,7 @@ fn wait(
             end_child(child)?;
             return Ok((End::TimedOut, last_doing));
         }
+        look(child.id());
         std::thread::sleep(pause);
         pause = (pause * 2).min(Duration::from_millis(20));
     }
@@ -162,7 +186,7 @@ fn kill_session(leader: u32) {
 }
 
 /// The living processes of a session, its leader excepted once that has been waited for.
-fn session_members(leader: u32) -> Vec<Pid> {
+pub(super) fn session_members(leader: u32) -> Vec<Pid> {
     let Ok(entries) = fs::read_dir("/proc") else {
         return Vec::new();
     };

@@ -81,6 +81,15 @@ impl Programs {
         let engine = Engine::new(description, &self, limit);
         Ok(Self { mesher: engine.program().to_owned(), engine: Some(engine), ..self })
     }
+
+    /// The same with an engine besides the mesher, which stays our own.
+    ///
+    /// # Errors
+    /// One sentence, where there is no such engine.
+    pub fn and_engine(self, name: &str, limit: Duration) -> Result<Self, String> {
+        let mesher = self.harness.with_file_name("mesher");
+        Ok(Self { mesher, ..self.with_engine(name, limit)? })
+    }
 }
 
 /// The repository's root: the nearest directory above the harness, or above where it is run, that holds

@@ -19,14 +19,13 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
             // Of several meshes the one that is nearest to the paper's.
             let off = |g: &&&Group| (g.cells() as f64 / 50e6).ln().abs();
             out.extend(
-                sims.min_by(|a, b| off(a).total_cmp(&off(b)))
-                    .and_then(|g| per_rank(groups, case, g)),
+                sims.min_by(|a, b| off(a).total_cmp(&off(b))).and_then(|g| per_rank(case, g)),
             );
         }
     }
     for (case, all) in by_case(groups, "weights") {
         for (mesh, of) in by_mesh(&all) {
-            out.push(imbalance(groups, case, mesh, &of));
+            out.push(imbalance(case, mesh, &of));
         }
     }
     out
@@ -45,8 +44,8 @@ fn by_mesh<'a>(all: &[&'a Group]) -> Vec<((u64, usize), Vec<&'a Group>)> {
 }
 
 /// The paper's Figures 21 to 23.
-fn per_rank(groups: &Groups, case: &str, group: &Group) -> Option<Figure> {
-    let run = group.typical(&groups.network);
+fn per_rank(case: &str, group: &Group) -> Option<Figure> {
+    let run = &group.typical;
     if run.useful_s.by_rank.is_empty() {
         return None;
     }
@@ -59,9 +58,9 @@ fn per_rank(groups: &Groups, case: &str, group: &Group) -> Option<Figure> {
         title: format!("Time working per rank: {case}, {ranks} ranks"),
         caption: format!(
             "CPU time outside calls to other ranks, by rank: {case}, {} cells on {ranks} simulated ranks (the paper's Figures 21 to 23). λ = \
-             max/mean = {lambda:.3} by time, {cells:.3} by cells. Run of median time of {}.",
+             max/mean = {lambda:.3} by time, {cells:.3} by cells. {}.",
             grouped(run.cells),
-            group.time_s.count
+            group.ranks_told()
         ),
         x: Axis::linear("rank"),
         y: Axis::linear("time working / s"),
@@ -76,13 +75,13 @@ fn per_rank(groups: &Groups, case: &str, group: &Group) -> Option<Figure> {
 }
 
 /// Greatest over mean by cells, for weights and partitioners.
-fn imbalance(groups: &Groups, case: &str, (cells, ranks): (u64, usize), of: &[&Group]) -> Figure {
+fn imbalance(case: &str, (cells, ranks): (u64, usize), of: &[&Group]) -> Figure {
     let lambda = |g: &&Group| {
-        let run = g.typical(&groups.network);
+        let run = &g.typical;
         run.counters.get("leaves").map_or(f64::NAN, |l| l.lambda(ranks))
     };
     // No cut is better than the one in which the rank with the heaviest base leaf has nothing else.
-    let bounds = of.iter().filter_map(|g| heaviest_base_leaf(g.typical(&groups.network)));
+    let bounds = of.iter().filter_map(|g| heaviest_base_leaf(&g.typical));
     let bound = bounds.fold(None, |b: Option<f64>, h| Some(b.map_or(h, |b| b.min(h))));
     let best = bound.map(|h| (h * ranks as f64).max(1.0));
     let mut lines = vec![("target, 1.10".to_owned(), 1.1)];
@@ -101,7 +100,7 @@ fn imbalance(groups: &Groups, case: &str, (cells, ranks): (u64, usize), of: &[&G
         x: Axis::linear("partitioner and weights"),
         y: Axis::linear("λ = max/mean of cells per rank"),
         body: Body::Bars(Bars {
-            categories: of.iter().map(|g| division(g)).collect(),
+            categories: of.iter().map(|g| division(&g.setup)).collect(),
             parts: vec![("by cells".into(), of.iter().map(lambda).collect())],
             lines,
             how: How::Measured,

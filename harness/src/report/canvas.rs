@@ -130,6 +130,11 @@ impl Canvas<'_> {
         self.put(Rectangle::new([(x0, y0), (x1, y1)], c.stroke_width(2)));
     }
 
+    /// A filled rectangle without an edge.
+    pub fn fill(&self, from: (i32, i32), to: (i32, i32), colour: RGBColor) {
+        self.put(Rectangle::new([from, to], colour.filled()));
+    }
+
     /// Diagonals within a rectangle.
     fn hatch(&self, (x0, y0): (i32, i32), (x1, y1): (i32, i32), c: RGBColor) {
         let mut d = 0;

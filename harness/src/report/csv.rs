@@ -44,6 +44,14 @@ pub fn csv(figure: &Figure) -> String {
                 let _ = writeln!(out, ",{},bound,{level}", quoted(name));
             }
         }
+        Body::Heat(heat) => {
+            let _ = writeln!(out, "# {}\nrow,column,quantity,value", heat.command);
+            for layer in &heat.layers {
+                for (row, column, value) in &layer.cells {
+                    let _ = writeln!(out, "{row},{column},{},{value}", quoted(&layer.label));
+                }
+            }
+        }
     }
     out
 }
@@ -62,6 +70,13 @@ mod tests {
     use super::super::figure::How;
     use super::super::paint::tests::{figure, series};
     use super::*;
+
+    #[test]
+    fn a_matrix_has_its_command_and_a_line_for_every_cell() {
+        let text = csv(&super::super::heat::tests::figure());
+        assert!(text.contains("# mesher a,b\nrow,column,quantity,value\n0,1,bytes,10\n"), "{text}");
+        assert_eq!(text.lines().count(), 4 + 3);
+    }
 
     #[test]
     fn every_point_is_a_line() {

@@ -118,6 +118,26 @@ pub struct Bars {
     pub how: How,
 }
 
+/// Square matrices, side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heat {
+    /// Number of rows, and of columns.
+    pub side: usize,
+    /// The matrices.
+    pub layers: Vec<Layer>,
+    /// The command whose run they are of.
+    pub command: String,
+}
+
+/// A matrix of which most may be missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// Quantity and unit.
+    pub label: String,
+    /// Row, column and value.
+    pub cells: Vec<(usize, usize, f64)>,
+}
+
 /// What is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Body {
@@ -125,6 +145,8 @@ pub enum Body {
     Points(Vec<Series>),
     /// Bars over names.
     Bars(Bars),
+    /// Matrices in colours; the first row is on top.
+    Heat(Heat),
 }
 
 /// A figure.
@@ -168,7 +190,7 @@ impl Figure {
             Body::Points(all) => {
                 all.iter().flat_map(|s| s.points.iter().map(|p| (s.how, *p))).collect()
             }
-            Body::Bars(_) => Vec::new(),
+            Body::Bars(_) | Body::Heat(_) => Vec::new(),
         }
     }
 }

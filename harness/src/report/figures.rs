@@ -2,6 +2,7 @@
 
 use super::balance;
 use super::figure::{Axis, Body, Claims, Figure, How, Point, Series};
+use super::matrix;
 use super::paper;
 use super::scaling;
 use crate::bench::entry::{Comm, Setup};
@@ -15,6 +16,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     all.extend(time_over_layers(groups));
     all.extend(scaling::figures(groups));
     all.extend(balance::figures(groups));
+    all.extend(matrix::figures(groups));
     all.extend(rate(groups));
     all.extend(memory(groups));
     all
@@ -42,8 +44,13 @@ pub fn repetitions(groups: &[&Group]) -> String {
     let covered = groups.iter().map(|g| g.time_s.coverage).fold(1.0, f64::min);
     let n = if least == most { format!("{least}") } else { format!("{least} to {most}") };
     format!(
-        "Medians of {n} runs; bars are nonparametric intervals that contain the true median with at least {:.0} % probability",
-        covered * 100.0
+        "Medians of {n} runs; bars are nonparametric intervals that contain the true median with at least {:.0} % probability{}",
+        covered * 100.0,
+        if groups.iter().any(|g| g.by_rank && g.setup.comm == Comm::Sim) {
+            "; where projected, medians are taken rank by rank, and bars are of the runs' own projections"
+        } else {
+            ""
+        }
     )
 }
 

@@ -23,14 +23,20 @@ pub struct Drawn<'a> {
     pub csv: String,
 }
 
-/// The page.
-pub fn page(groups: &Groups, drawn: &[Drawn], findings: &[Finding], lines: &[Line]) -> String {
+/// The page; `trend` tells where tracked numbers changed.
+pub fn page(
+    groups: &Groups,
+    drawn: &[Drawn],
+    findings: &[Finding],
+    lines: &[Line],
+    trend: Option<&str>,
+) -> String {
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, \
          initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>Oct-tree meshing: scaling and load \
          balance</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>Scaling and load balance</h1>\n"
     );
-    summary(&mut out, groups, lines);
+    summary(&mut out, groups, lines, trend.is_some());
     out.push_str("<h2 id=\"figures\">Figures</h2>\n<p>Solid points were measured on as many cores as ranks; hollow ones were measured with \
         more ranks than cores, projected from simulated ranks, or are the paper's.</p>\n");
     drawn.iter().for_each(|d| figure(&mut out, d));
@@ -38,30 +44,34 @@ pub fn page(groups: &Groups, drawn: &[Drawn], findings: &[Finding], lines: &[Lin
     tables(&mut out, groups);
     projections(&mut out, groups);
     phases(&mut out, groups);
+    if let Some(told) = trend {
+        let told = escape(told);
+        let _ = writeln!(out, "<h2 id=\"trend\">Changes over commits</h2>\n<pre>{told}</pre>");
+    }
     rules(&mut out, findings);
     machine(&mut out, lines);
     out.push_str("</main>\n</body>\n</html>\n");
     out
 }
 
-fn summary(out: &mut String, groups: &Groups, lines: &[Line]) {
+fn summary(out: &mut String, groups: &Groups, lines: &[Line], trend: bool) {
     let runs: usize = groups.all.iter().map(|g| g.runs.len()).sum();
     let failed = lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
     let _ = writeln!(
         out,
         "<p>{runs} runs of {} setups{}. Where ranks are simulated, time is the critical path: the sum over phases of the slowest rank's CPU \
          time, plus {:.2} µs per message and {:.2} GB/s ({}).</p>\n<nav><a href=\"#figures\">figures</a> <a href=\"#tables\">tables</a> \
-         <a href=\"#rules\">twelve rules</a> <a href=\"#machine\">machine and commands</a></nav>\n<h2>Why efficiency falls</h2>\n<ul>",
+         {}<a href=\"#rules\">twelve rules</a> <a href=\"#machine\">machine and commands</a></nav>\n<h2>Why efficiency falls</h2>\n<ul>",
         groups.all.len(),
         if failed > 0 { format!(", {failed} failed") } else { String::new() },
         groups.network.latency_s * 1e6,
         groups.network.bandwidth_bytes_per_s / 1e9,
-        if groups.network.measured { "measured by a ping-pong" } else { "given" }
+        if groups.network.measured { "measured by a ping-pong" } else { "given" },
+        if trend { "<a href=\"#trend\">changes over commits</a> " } else { "" }
     );
     for group in groups.all.iter().filter(|g| is_told(g)) {
         let network = &groups.network;
-        let told =
-            sentence(group.typical(network), groups.reference(group).typical(network), network);
+        let told = sentence(&group.typical, &groups.reference(group).typical, network);
         let _ = writeln!(
             out,
             "<li><b>{}</b>, {} scaling, {} cells: {}</li>",
@@ -135,7 +145,7 @@ fn tables(out: &mut String, groups: &Groups) {
 fn row(out: &mut String, groups: &Groups, group: &Group) {
     let (s, t) = (&group.setup, group.time_s);
     let e = group.efficiency(groups.reference(group), &groups.network);
-    let leaves = group.typical(&groups.network).counters.get("leaves");
+    let leaves = group.typical.counters.get("leaves");
     let _ = writeln!(
         out,
         "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3} – {:.3}<td>{:.0} %<td>{}<td>{:.3}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}\
@@ -143,7 +153,7 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
         escape(&s.case),
         grouped(group.cells()),
         s.layer_cells_min,
-        division(group),
+        division(s),
         s.ranks,
         group.how(),
         t.value,
@@ -205,8 +215,8 @@ fn phases(out: &mut String, groups: &Groups) {
         }
     }
     for group in shown {
-        let (run, network) = (group.typical(&groups.network), &groups.network);
-        let reference = groups.reference(group).typical(network);
+        let (run, network) = (&group.typical, &groups.network);
+        let reference = &groups.reference(group).typical;
         let total: f64 =
             run.phases.iter().map(|p| p.useful_s.max + pop::messages_s(p, network)).sum();
         let _ = writeln!(

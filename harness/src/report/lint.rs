@@ -94,6 +94,15 @@ fn of_figure(f: &Figure) -> Vec<Finding> {
         let bound = matches!(&f.body, Body::Points(all) if all.iter().any(|s| s.how == How::Bound));
         check(11, bound, "an ideal line is drawn", "no ideal line is drawn");
     }
+    if let Body::Heat(_) = f.body {
+        let told = ["ranks", "simulated", "ollective calls"].iter().all(|w| f.caption.contains(w));
+        check(
+            9,
+            told,
+            "the caption tells the ranks, that they are simulated, and that collective calls are left out",
+            "the caption does not tell whose messages are counted, and which",
+        );
+    }
     let (holds, why) = intervals(f);
     check(5, holds, &why, &why);
     if f.claims.compares {
@@ -106,12 +115,11 @@ fn of_figure(f: &Figure) -> Vec<Finding> {
     }
     let joined_names =
         matches!(&f.body, Body::Points(all) if all.iter().any(|s| s.joined && s.how == How::Cited));
-    check(
-        12,
-        !joined_names,
-        "lines join neighbours of one family only",
-        "points of different origin are joined",
-    );
+    let kept = match f.body {
+        Body::Heat(_) => "nothing is joined; what was not sent has no colour, and more is darker",
+        _ => "lines join neighbours of one family only",
+    };
+    check(12, !joined_names, kept, "points of different origin are joined");
     out
 }
 
@@ -280,6 +288,21 @@ mod tests {
         let mut rivals = speedup();
         rivals.claims.compares = true;
         assert_eq!(verdict(&lint(&[rivals], &[]), 7, "speedup"), Verdict::Broken);
+    }
+
+    #[test]
+    fn a_matrix_must_tell_whose_messages_it_counts() {
+        let mut matrix = super::super::heat::tests::figure();
+        assert_eq!(
+            verdict(&lint(std::slice::from_ref(&matrix), &[]), 9, "messages"),
+            Verdict::Kept
+        );
+        assert_eq!(
+            verdict(&lint(std::slice::from_ref(&matrix), &[]), 5, "messages"),
+            Verdict::Kept
+        );
+        matrix.caption = "On 3 ranks.".into();
+        assert_eq!(verdict(&lint(&[matrix], &[]), 9, "messages"), Verdict::Broken);
     }
 
     #[test]

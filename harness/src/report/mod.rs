@@ -5,9 +5,11 @@ pub mod canvas;
 pub mod csv;
 pub mod figure;
 pub mod figures;
+pub mod heat;
 pub mod html;
 pub mod latex;
 pub mod lint;
+pub mod matrix;
 pub mod paint;
 pub mod paper;
 #[cfg(feature = "figures")]
@@ -15,9 +17,13 @@ pub mod raster;
 pub mod scale;
 pub mod scaling;
 pub mod tikz;
+pub mod trend;
 
 use crate::bench::entry::Line;
 use crate::bench::group::Groups;
+use crate::track::analyse;
+use crate::track::divisive::Rules;
+use crate::track::history::Record;
 use html::Drawn;
 use lint::{Finding, Verdict};
 use std::fs;
@@ -35,13 +41,16 @@ pub struct Written {
     pub broken: Vec<Finding>,
 }
 
-/// Writes everything that the lines of a record give into `directory`.
+/// Writes everything that the lines of a record give into `directory`, and the trend of a history that is not empty.
 ///
 /// # Errors
 /// Where a file cannot be written.
-pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
+pub fn report(directory: &Path, lines: &[Line], history: &[Record]) -> io::Result<Written> {
     let groups = Groups::of(lines);
-    let figures = figures::figures(&groups);
+    let tracked = analyse(history, &Rules::default());
+    let mut figures = figures::figures(&groups);
+    figures.extend(trend::figures(history, &tracked));
+    let trend = (!history.is_empty()).then(|| trend::told(history, &tracked));
     let place = directory.join("figures");
     fs::create_dir_all(&place)?;
     let mut drawn = Vec::new();
@@ -57,7 +66,8 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     }
     let findings = lint::lint(&figures, lines);
     let page = directory.join("index.html");
-    write(&page, html::page(&groups, &drawn, &findings, lines).as_bytes())?;
+    let text = html::page(&groups, &drawn, &findings, lines, trend.as_deref());
+    write(&page, text.as_bytes())?;
     write(&directory.join("figures.tex"), latex::fragment(&figures).as_bytes())?;
     write(&directory.join("artifact.md"), latex::artifact(&figures, lines).as_bytes())?;
     let broken = findings.into_iter().filter(|f| f.verdict == Verdict::Broken).collect();

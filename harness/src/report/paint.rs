@@ -2,6 +2,7 @@
 
 use super::canvas::{Anchor, Canvas, FAINT, HEIGHT, INK, SIZE, WIDTH, colour, draw, width};
 use super::figure::{Axis, Bars, Body, Figure, How, Series, short};
+use super::heat;
 use super::scale::Scale;
 
 /// Where the data is.
@@ -10,6 +11,8 @@ struct Frame {
     right: i32,
     top: i32,
     bottom: i32,
+    /// Additional space between the lower edge and the axis's label.
+    below: i32,
 }
 
 impl Frame {
@@ -27,6 +30,7 @@ pub fn svg(figure: &Figure) -> String {
     draw(|canvas| match &figure.body {
         Body::Points(series) => points(canvas, figure, series),
         Body::Bars(bars) => paint_bars(canvas, figure, bars),
+        Body::Heat(heat) => heat::paint(canvas, figure, heat),
     })
 }
 
@@ -69,9 +73,21 @@ fn paint_series(canvas: &Canvas, frame: &Frame, s: &Series, x: &Scale, y: &Scale
 
 /// What a legend shows beside a name.
 enum Mark {
-    Series { look: usize, how: How, joined: bool },
-    Bar { look: usize },
-    Line,
+    Series {
+        look: usize,
+        how: How,
+        joined: bool,
+    },
+    Bar {
+        look: usize,
+    },
+    /// The how-manieth of the levels to compare with.
+    Line(usize),
+}
+
+/// Dashes of a level to compare with; those of two levels are told apart.
+fn dash(nth: usize) -> i32 {
+    [14, 40, 6][nth % 3]
 }
 
 /// Space of a mark in the legend.
@@ -90,15 +106,14 @@ fn frame(canvas: &Canvas, entries: &[(&str, Mark)]) -> Frame {
         canvas.text(name, (x + MARK, y), Anchor::Left);
         x += wide;
     }
-    Frame { left, right, top: y + 46, bottom: HEIGHT as i32 - 150 }
+    Frame { left, right, top: y + 46, bottom: HEIGHT as i32 - 150, below: 0 }
 }
 
 fn legend_mark(canvas: &Canvas, (x, y): (i32, i32), mark: &Mark) {
     let (from, to, middle) = ((x, y), (x + MARK - 18, y), (x + (MARK - 18) / 2, y));
     match mark {
-        Mark::Line | Mark::Series { how: How::Bound, .. } => {
-            canvas.line(&[from, to], INK, 3, Some(14))
-        }
+        Mark::Line(nth) => canvas.line(&[from, to], INK, 3, Some(dash(*nth))),
+        Mark::Series { how: How::Bound, .. } => canvas.line(&[from, to], INK, 3, Some(14)),
         Mark::Series { look, how, joined } => {
             if *joined {
                 canvas.line(&[from, to], colour(*look), 4, (!how.is_solid()).then_some(22));
@@ -143,7 +158,11 @@ fn border(canvas: &Canvas, frame: &Frame, x: &str, y: &str) {
         (frame.left, frame.top),
     ];
     canvas.line(&corners, INK, 2, None);
-    canvas.text(x, ((frame.left + frame.right) / 2, frame.bottom + 82), Anchor::Below);
+    canvas.text(
+        x,
+        ((frame.left + frame.right) / 2, frame.bottom + frame.below + 82),
+        Anchor::Below,
+    );
     canvas.text(y, (62, (frame.top + frame.bottom) / 2), Anchor::Turned);
 }
 
@@ -152,19 +171,20 @@ fn paint_bars(canvas: &Canvas, figure: &Figure, bars: &Bars) {
     let names: Vec<(usize, String)> = bars.parts.iter().enumerate().map(named).collect();
     let mut entries: Vec<(&str, Mark)> =
         names.iter().map(|(look, name)| (name.as_str(), Mark::Bar { look: *look })).collect();
-    entries.extend(bars.lines.iter().map(|(name, _)| (name.as_str(), Mark::Line)));
-    let frame = frame(canvas, &entries);
+    entries.extend(bars.lines.iter().enumerate().map(|(i, l)| (l.0.as_str(), Mark::Line(i))));
+    let mut frame = frame(canvas, &entries);
+    let step = f64::from(frame.right - frame.left) / bars.categories.len().max(1) as f64;
+    let labels = labels(&bars.categories, step);
+    let below = labels.iter().map(Vec::len).max().unwrap_or(1).saturating_sub(1) as i32 * LINE;
+    frame.bottom -= below;
+    frame.below = below;
     let total = |i: usize| bars.parts.iter().map(|p| p.1[i]).sum::<f64>();
     let count = bars.categories.len();
     let heights = (0..count).map(total).chain(bars.lines.iter().map(|l| l.1)).collect::<Vec<_>>();
     let y = Scale::of(&figure.y, &heights);
     let names = Scale::of(&figure.x, &[]).bare();
     axes(canvas, &frame, (&figure.x, &names), (&figure.y, &y));
-    let step = f64::from(frame.right - frame.left) / count.max(1) as f64;
     let gap = if count > 20 { 0.1 } else { 0.2 };
-    // Names that would run into each other are left out evenly.
-    let widest = bars.categories.iter().map(|c| width(c)).max().unwrap_or(0) + 16;
-    let every = (f64::from(widest) / step).ceil().max(1.0) as usize;
     for i in 0..count {
         let left = f64::from(frame.left) + step * (i as f64 + gap);
         let right = f64::from(frame.left) + step * (i as f64 + 1.0 - gap);
@@ -176,15 +196,32 @@ fn paint_bars(canvas: &Canvas, figure: &Figure, bars: &Bars) {
             }
             below += values[i];
         }
-        if i % every == 0 {
-            let middle = ((left + right) / 2.0) as i32;
-            canvas.text(&bars.categories[i], (middle, frame.bottom + 22), Anchor::Below);
+        let middle = ((left + right) / 2.0) as i32;
+        for (line, words) in (0..).zip(&labels[i]) {
+            canvas.text(words, (middle, frame.bottom + 22 + LINE * line), Anchor::Below);
         }
     }
-    for (_, level) in &bars.lines {
+    for (i, (_, level)) in bars.lines.iter().enumerate() {
         let at = frame.up(y.at(*level));
-        canvas.line(&[(frame.left, at), (frame.right, at)], INK, 3, Some(14));
+        canvas.line(&[(frame.left, at), (frame.right, at)], INK, 3, Some(dash(i)));
     }
+}
+
+/// From one line of a bar's name to the next.
+const LINE: i32 = SIZE + 4;
+
+/// The lines below every bar. Names too long for their bars are broken at spaces; where that does not suffice, they
+/// are left out evenly.
+fn labels(names: &[String], step: f64) -> Vec<Vec<String>> {
+    let widest =
+        |all: &[Vec<String>]| all.iter().flatten().map(|w| width(w)).max().unwrap_or(0) + 16;
+    let whole: Vec<Vec<String>> = names.iter().map(|n| vec![n.clone()]).collect();
+    let broken: Vec<Vec<String>> =
+        names.iter().map(|n| n.split(' ').map(str::to_owned).collect()).collect();
+    let mut chosen = if f64::from(widest(&whole)) <= step { whole } else { broken };
+    let every = (f64::from(widest(&chosen)) / step).ceil().max(1.0) as usize;
+    chosen.iter_mut().enumerate().filter(|(i, _)| i % every != 0).for_each(|(_, l)| l.clear());
+    chosen
 }
 
 #[cfg(test)]
@@ -232,6 +269,15 @@ pub(crate) mod tests {
         assert_eq!((circles(&solid, "fill=\"#"), circles(&solid, "fill=\"none\"")), (4, 0));
         assert_eq!((circles(&hollow, "fill=\"#"), circles(&hollow, "fill=\"none\"")), (0, 4));
         assert!(solid.contains("ranks") && solid.contains("UAV, measured"));
+    }
+
+    #[test]
+    fn names_are_broken_before_they_are_left_out() {
+        let names: Vec<String> = ["metis unit", "morton rehearsal"].map(str::to_owned).to_vec();
+        assert_eq!(labels(&names, 500.0), [vec!["metis unit"], vec!["morton rehearsal"]]);
+        let broken = [vec!["metis", "unit"], vec!["morton", "rehearsal"]];
+        assert_eq!(labels(&names, 228.0), broken);
+        assert_eq!(labels(&names, 120.0), [vec!["metis", "unit"], vec![]]);
     }
 
     #[test]

@@ -43,7 +43,7 @@ fn meshes<'a>(all: &[&'a Group]) -> Vec<Vec<&'a Group>> {
 }
 
 /// About how many cells, for names of files.
-fn about(cells: u64) -> String {
+pub fn about(cells: u64) -> String {
     let (value, unit) =
         if cells >= 1_000_000_000 { (cells as f64 / 1e9, "G") } else { (cells as f64 / 1e6, "M") };
     let text = if value < 9.5 { format!("{value:.1}") } else { format!("{value:.0}") };
@@ -197,13 +197,13 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
         id: format!("efficiency-{experiment}-{case}{suffix}"),
         title: format!("Efficiency in {experiment} scaling: {case}, {size}"),
         caption: format!(
-            "Efficiencies by the POP definitions in {experiment} scaling of {case}, {size}, n = {}; the base is {} {} taking {:.3} s. Of the \
-             run of median time among {}; projected from simulated ranks, hence hollow. Lines join powers of two.",
+            "Efficiencies by the POP definitions in {experiment} scaling of {case}, {size}, n = {}; the base is {} {} taking {:.3} s. \
+             {}; projected from simulated ranks, hence hollow. Lines join powers of two.",
             last.setup.layer_cells_min,
             base.setup.ranks,
             if base.setup.ranks == 1 { "simulated rank" } else { "simulated ranks" },
             base.time_s.value,
-            last.time_s.count
+            last.ranks_told()
         ),
         x: ranks_axis(&of),
         y: Axis { range: Some((0.0, most * 1.1)), ..Axis::linear("efficiency") },
@@ -220,10 +220,10 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
 /// Rank time by phase: the height is what all ranks together spend, so that ideal scaling is level.
 fn phases(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Option<Figure> {
     let of = of_how(all, How::Projected);
-    let last = of.last()?.typical(&groups.network);
+    let last = &of.last()?.typical;
     let network = &groups.network;
     let time = |g: &Group, name: &str| {
-        let run = g.typical(network);
+        let run = &g.typical;
         let phase = run.phases.iter().find(|p| p.name == name);
         phase.map_or(0.0, |p| (p.useful_s.max + messages_s(p, network)) * g.setup.ranks as f64)
     };
@@ -248,11 +248,11 @@ fn phases(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Opti
         id: format!("phases-{experiment}-{case}{suffix}"),
         title: format!("Time by phase in {experiment} scaling: {case}"),
         caption: format!(
-            "Critical path by phase times ranks, in {unit}, in {experiment} scaling of {case} ({} cells on {} ranks): level bars are ideal. Run \
-             of median time of {}; projected from simulated ranks.",
+            "Critical path by phase times ranks, in {unit}, in {experiment} scaling of {case} ({} cells on {} ranks): level bars are ideal. {}; \
+             projected from simulated ranks.",
             grouped(cells),
             last.setup.ranks,
-            of[0].time_s.count
+            of[0].ranks_told()
         ),
         x: Axis::linear("ranks"),
         y: Axis::linear(unit),

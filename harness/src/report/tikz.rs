@@ -1,6 +1,7 @@
 //! A figure as PGF/TikZ, so that it takes the paper's fonts. Wants `\usepackage{pgfplots}`, compat 1.16.
 
-use super::figure::{Axis, Bars, Body, Figure, How, Series};
+use super::figure::{Axis, Bars, Body, Figure, Heat, How, Layer, Series};
+use super::heat;
 use std::fmt::Write;
 
 const COLOURS: [&str; 7] =
@@ -39,6 +40,7 @@ pub fn tikz(figure: &Figure) -> String {
             series.iter().for_each(|s| plot(&mut out, s));
         }
         Body::Bars(b) => bars(&mut out, options, b),
+        Body::Heat(h) => return out + &heat_maps(figure, h) + "\\end{tikzpicture}\n",
     }
     out.push_str("\\end{axis}\n\\end{tikzpicture}\n");
     out
@@ -75,10 +77,10 @@ fn plot(out: &mut String, s: &Series) {
             "look{colour}, {}, mark={}{}",
             if joined { if how.is_solid() { "solid" } else { "dashed" } } else { "only marks" },
             if how.is_solid() { solid } else { hollow },
-            ", error bars/.cd, y dir=both, y explicit"
+            ", every mark/.append style={solid}, error bars/.cd, y dir=both, y explicit"
         ),
     };
-    let _ = writeln!(out, "\\addplot+[{style}] coordinates {{");
+    let _ = writeln!(out, "\\addplot[{style}] coordinates {{");
     for p in &s.points {
         let _ = match s.how {
             How::Bound => writeln!(out, "  ({},{})", p.x, p.y),
@@ -119,14 +121,69 @@ fn bars(out: &mut String, mut options: Vec<String>, b: &Bars) {
         );
         let _ = writeln!(out, "\\addlegendentry{{{}}}", escape(name));
     }
-    for (name, level) in &b.lines {
+    for (i, (name, level)) in b.lines.iter().enumerate() {
         let last = b.categories.len() as f64 - 0.5;
+        let dash = ["densely dotted", "dashed", "solid"][i % 3];
         let _ = writeln!(
             out,
-            "\\draw[densely dotted] (axis cs:-0.5,{level}) -- (axis cs:{last},{level}) node[above left, font=\\footnotesize] {{{}}};",
+            "\\draw[{dash}] (axis cs:-0.5,{level}) -- (axis cs:{last},{level});\n\\addlegendimage{{{dash}, legend image code/.code={{\\draw (0,0) \
+             -- (0.6cm,0);}}}}\n\\addlegendentry{{{}}}",
             escape(name)
         );
     }
+}
+
+/// An axis for every layer, each with its own scale below it.
+fn heat_maps(figure: &Figure, h: &Heat) -> String {
+    let mut out = String::new();
+    for step in 0..heat::STEPS {
+        let [r, g, b] = heat::shade(step);
+        let _ = writeln!(out, "\\definecolor{{shade{step}}}{{RGB}}{{{r},{g},{b}}}");
+    }
+    let shades = (0..heat::STEPS).map(|s| format!("color=(shade{s})")).collect::<Vec<_>>();
+    let _ = writeln!(out, "\\pgfplotsset{{colormap={{shades}}{{{}}}}}", shades.join(" "));
+    for (i, layer) in h.layers.iter().enumerate() {
+        heat_map(&mut out, figure, h.side, layer, i as f64 / h.layers.len() as f64);
+    }
+    out
+}
+
+fn heat_map(out: &mut String, figure: &Figure, side: usize, layer: &Layer, at: f64) {
+    let ticks = heat::ticks(side).iter().map(usize::to_string).collect::<Vec<_>>().join(",");
+    let (low, high) = heat::ends(layer);
+    let (low, high) = (low.log10().round() as i32, high.log10().round() as i32);
+    let every = ((high - low) as usize).div_ceil(4).max(1);
+    let powers: Vec<String> = (low..=high).step_by(every).map(|p| p.to_string()).collect();
+    let raised: Vec<String> = powers.iter().map(|p| format!("$10^{{{p}}}$")).collect();
+    let last = side as f64 - 0.5;
+    let options = [
+        format!("at={{({at}\\linewidth,0)}}"),
+        "width=0.36\\linewidth, height=0.36\\linewidth, scale only axis".to_owned(),
+        format!("xmin=-0.5, xmax={last}, ymin=-0.5, ymax={last}, y dir=reverse"),
+        format!("xtick={{{ticks}}}, ytick={{{ticks}}}, tick align=outside"),
+        format!("xlabel={{{}}}, ylabel={{{}}}", escape(&figure.x.label), escape(&figure.y.label)),
+        "colorbar horizontal, colormap name=shades".to_owned(),
+        format!("point meta min={low}, point meta max={high}"),
+        format!(
+            "colorbar style={{xlabel={{{}}}, xtick={{{}}}, xticklabels={{{}}}, at={{(0,-0.32)}}, anchor=north west}}",
+            escape(&layer.label),
+            powers.join(","),
+            raised.join(",")
+        ),
+    ];
+    open(out, &options);
+    // Something has to be plotted for a scale to be drawn.
+    out.push_str("\\addplot[draw=none, point meta=0] coordinates {(0,0)};\n");
+    for s in heat::spans(layer) {
+        let (x0, x1) = (s.first as f64 - 0.5, s.end as f64 - 0.5);
+        let (y0, y1) = (s.row as f64 - 0.5, s.row as f64 + 0.5);
+        let _ = writeln!(
+            out,
+            "\\fill[shade{}] (axis cs:{x0},{y0}) rectangle (axis cs:{x1},{y1});",
+            s.step
+        );
+    }
+    out.push_str("\\end{axis}\n");
 }
 
 /// Words as LaTeX wants them.
@@ -164,6 +221,17 @@ mod tests {
             tikz(&figure(Body::Points(vec![series(How::Measured), series(How::Oversubscribed)])));
         assert!(text.contains("mark=*") && text.contains("mark=o"));
         assert!(text.contains("xmode=log") && text.contains("xtick={1,2,4}"));
+        let count = |c| text.chars().filter(|x| *x == c).count();
+        assert_eq!(count('{'), count('}'));
+        assert_eq!(text.matches("\\begin").count(), text.matches("\\end").count());
+    }
+
+    #[test]
+    fn maps_are_rectangles_with_a_scale() {
+        let text = tikz(&heat::tests::figure());
+        assert_eq!(text.matches("\\fill[").count(), 2, "{text}");
+        assert!(text.contains("\\fill[shade0] (axis cs:0.5,-0.5) rectangle (axis cs:2.5,0.5);"));
+        assert!(text.contains("xticklabels={$10^{1}$,$10^{3}$,$10^{5}$}"), "{text}");
         let count = |c| text.chars().filter(|x| *x == c).count();
         assert_eq!(count('{'), count('}'));
         assert_eq!(text.matches("\\begin").count(), text.matches("\\end").count());

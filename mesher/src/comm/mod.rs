@@ -7,6 +7,7 @@
 //! Every call is collective: all ranks make the same calls in the same order. Payloads are `u64`
 //! words.
 
+pub mod matrix;
 mod merged;
 #[cfg(feature = "mpi")]
 pub mod mpi;
@@ -59,6 +60,9 @@ pub trait Comm {
 
     /// What this rank has sent.
     fn traffic(&self) -> Traffic;
+
+    /// What it has sent in exchanges, by receiver; collective calls are between no pair.
+    fn sent(&self) -> Vec<matrix::Entry>;
 
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
@@ -121,12 +125,24 @@ fn unpack(words: &[u64]) -> Error {
 
 /// Counts what an implementation sends, and times its calls.
 #[derive(Debug, Default)]
-pub(crate) struct Meter(Cell<Traffic>);
+pub(crate) struct Meter {
+    total: Cell<Traffic>,
+    row: matrix::Row,
+}
 
 impl Meter {
-    pub(crate) fn count(&self, messages: u64, words: u64) {
-        let t = self.0.get();
-        self.0.set(Traffic { messages: t.messages + messages, bytes: t.bytes + 8 * words, ..t });
+    fn count(&self, messages: u64, words: u64) {
+        let t = self.total.get();
+        let (messages, bytes) = (t.messages + messages, t.bytes + 8 * words);
+        self.total.set(Traffic { messages, bytes, ..t });
+    }
+
+    /// Counts a message of an exchange to another rank; one without words is not sent.
+    pub(crate) fn send(&self, to: usize, words: usize) {
+        if words > 0 {
+            self.count(1, words as u64);
+            self.row.count(to, 8 * words as u64);
+        }
     }
 
     /// Counts a gathering of `words` by all, all ranks' together: a message for every doubling of the number
@@ -145,17 +161,22 @@ impl Meter {
     pub(crate) fn call<T>(&self, body: impl FnOnce() -> T) -> T {
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = body();
-        let t = self.0.get();
+        let t = self.total.get();
         let (time_wall_s, time_cpu_s) = (
             t.time_wall_s + wall.elapsed().as_secs_f64(),
             t.time_cpu_s + cpu.elapsed().as_secs_f64(),
         );
-        self.0.set(Traffic { time_wall_s, time_cpu_s, ..t });
+        self.total.set(Traffic { time_wall_s, time_cpu_s, ..t });
         result
     }
 
     pub(crate) fn get(&self) -> Traffic {
-        self.0.get()
+        self.total.get()
+    }
+
+    /// What `rank`, whose meter it is, has sent to whom.
+    pub(crate) fn sent(&self, rank: usize) -> Vec<matrix::Entry> {
+        self.row.entries(rank)
     }
 }
 
@@ -187,6 +208,10 @@ impl Comm for Solo {
 
     fn traffic(&self) -> Traffic {
         Traffic::default()
+    }
+
+    fn sent(&self) -> Vec<matrix::Entry> {
+        Vec::new()
     }
 }
 

@@ -4,7 +4,7 @@
 //! of mostly empty messages costs a hundred times a sparse one when ranks share cores. Messages are cut
 //! into chunks, as MPI counts in i32.
 
-use super::{ByRank, Comm, Meter, Traffic};
+use super::{ByRank, Comm, Meter, Traffic, matrix};
 use mpi::environment::Universe;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
 
@@ -65,6 +65,10 @@ impl Comm for Mpi {
     fn traffic(&self) -> Traffic {
         self.meter.get()
     }
+
+    fn sent(&self) -> Vec<matrix::Entry> {
+        self.meter.sent(self.rank())
+    }
 }
 
 impl Mpi {
@@ -117,7 +121,7 @@ impl Mpi {
             for (to, words) in to.iter().filter(|m| m.0 != me) {
                 let process = self.world.process_at_rank(*to as i32);
                 sends.extend(words.chunks(CHUNK).map(|c| process.immediate_send(scope, c)));
-                self.meter.count(u64::from(!words.is_empty()), words.len() as u64);
+                self.meter.send(*to, words.len());
             }
             requests.into_iter().for_each(|r| _ = r.wait());
             sends.into_iter().for_each(|r| _ = r.wait());

@@ -4,7 +4,7 @@
 //! has to wait for others. Who gets it next, and in which order messages arrive, is drawn from a seed: a
 //! failure is replayed by its seed, and a rank's CPU time is not disturbed by the others.
 
-use super::{ByRank, Comm, Meter, Traffic};
+use super::{ByRank, Comm, Meter, Traffic, matrix};
 use std::any::Any;
 use std::cell::Cell;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -252,7 +252,7 @@ impl Comm for Sim {
         self.meter.announce(self.size());
         let to: Messages = to.into_iter().filter(|m| !m.1.is_empty()).collect();
         let sent = to.iter().filter(|m| m.0 != self.rank);
-        sent.for_each(|m| self.meter.count(1, m.1.len() as u64));
+        sent.for_each(|m| self.meter.send(m.0, m.1.len()));
         match self.meter.call(|| self.call(Words::Exchange(to))) {
             Delivery::Exchanged(messages) => messages,
             Delivery::Gathered(_) => unreachable!("{UNEQUAL}"),
@@ -265,6 +265,10 @@ impl Comm for Sim {
 
     fn traffic(&self) -> Traffic {
         self.meter.get()
+    }
+
+    fn sent(&self) -> Vec<matrix::Entry> {
+        self.meter.sent(self.rank)
     }
 }
 

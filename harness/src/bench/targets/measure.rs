@@ -34,7 +34,7 @@ pub enum Measure {
     TimePerCellGrowth,
     /// Greatest over mean number of cells of the ranks.
     LambdaCells,
-    /// Greatest over mean CPU time of the ranks outside calls.
+    /// Greatest over mean CPU time of the ranks outside calls, each the median over repetitions.
     LambdaCpu,
     /// The other run's CPU time per cell over ranks * time per cell of this one: the other one being on one
     /// rank, speed-up over ranks where the mesh is the same, and weak efficiency where cells grow with ranks.
@@ -151,8 +151,8 @@ impl Measure {
             Self::BytesPerCell => run.bytes_per_cell().value,
             Self::BytesPerCellBeyond => beyond(run, other()?)?,
             Self::TimePerCellGrowth => growth(sample.runs),
-            Self::LambdaCells => lambda_cells(run, sample.network)?,
-            Self::LambdaCpu => run.typical(sample.network).useful_s.lambda(run.setup.ranks),
+            Self::LambdaCells => lambda_cells(run)?,
+            Self::LambdaCpu => run.typical.useful_s.lambda(run.setup.ranks),
             Self::Efficiency => efficiency(run, other()?, sample.network)?,
             Self::ParallelEfficiency => run.efficiency(run, sample.network).parallel(),
             Self::PhaseShare => share(run, sample.phase.unwrap_or_default(), sample.network)?,
@@ -219,8 +219,8 @@ fn growth(runs: &[&Group]) -> f64 {
     worst
 }
 
-fn lambda_cells(run: &Group, network: &Network) -> Result<f64, String> {
-    let counters = &run.typical(network).counters;
+fn lambda_cells(run: &Group) -> Result<f64, String> {
+    let counters = &run.typical.counters;
     let leaves = counters.get("leaves").ok_or("the program does not count leaves by rank")?;
     Ok(leaves.lambda(run.setup.ranks))
 }
@@ -233,7 +233,7 @@ fn efficiency(run: &Group, other: &Group, network: &Network) -> Result<f64, Stri
 }
 
 fn share(run: &Group, name: &str, network: &Network) -> Result<f64, String> {
-    let typical = run.typical(network);
+    let typical = &run.typical;
     let phase = typical.phases.iter().find(|p| p.name == name);
     let names = || typical.phases.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join(", ");
     let phase = phase.ok_or_else(|| format!("it has no phase {name:?}, but {}", names()))?;
