@@ -2,7 +2,7 @@
 #![allow(dead_code, missing_docs)]
 
 use mesher::base::Division;
-use mesher::brick::{Brick, flood, valid};
+use mesher::brick::{flood, valid};
 use mesher::brickset::BrickSet;
 use mesher::case::{Case, RootSpec};
 use mesher::comm::Solo;
