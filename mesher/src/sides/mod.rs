@@ -53,13 +53,10 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Sides {
     let nodes = nodes::Nodes::new(tree, share);
-
     let mut local = components::join(&nodes);
     let faces = std::mem::take(&mut local.faces);
     let classes = local.classes();
-
     let names = global::names(&nodes, tree, share, faces, &classes, comm);
-
     let candidates = vote::candidates(&nodes, tree, &classes.of, &names, share, comm);
     // The largest thing in memory; for the sides, bricks are flooded once more.
     drop(nodes);
