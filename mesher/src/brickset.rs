@@ -324,6 +324,12 @@ impl Cursor<'_> {
     #[inline(always)]
     pub fn get(&mut self, key: u64) -> u64 {
         if self.high == high_of(key) {
+            // Most often it is the next one.
+            if let [low, rest @ ..] = self.low
+                && *low < key as u32
+            {
+                self.low = rest;
+            }
             match self.low {
                 [low, ..] if *low == key as u32 => return self.set.bits[self.end - self.low.len()],
                 [low, ..] if *low > key as u32 => return 0,

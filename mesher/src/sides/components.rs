@@ -5,7 +5,7 @@
 //! the higher side; a leaf and a coarser one from the finer leaf, which climbs the way until it finds the leaf
 //! that covers the octant it faces.
 
-use super::nodes::{Component, Node, Nodes};
+use super::nodes::{Component, Family, Node, Nodes};
 use crate::brick;
 use crate::brickset::ones;
 use crate::octant::{Level, neighbour};
@@ -97,6 +97,15 @@ struct Frame {
     across: [[Across; 2]; 3],
 }
 
+/// What lies across a brick's face, for its children to step across.
+#[derive(Clone, Copy)]
+enum Beyond {
+    /// No bricks of the children's level.
+    Never(Across),
+    /// The children of a brick.
+    Here(Family),
+}
+
 /// Joins all components that share part of a face.
 pub fn join(nodes: &Nodes) -> Local {
     let mut w = Walk {
@@ -104,8 +113,8 @@ pub fn join(nodes: &Nodes) -> Local {
         local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
         way: Vec::new(),
     };
-    w.way.push(Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] });
-    w.visit(0);
+    let root = Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] };
+    w.visit(0, &root);
     w.local
 }
 
@@ -117,56 +126,27 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    fn visit(&mut self, l: Level) {
-        let frame = self.way[l as usize];
-        self.join_brick(l, &frame);
-        let split = self.nodes.split(l, frame.node);
-        for j in ones(u64::from(brick::parents(split))) {
-            let Some(child) = self.step_down(l, &frame, u64::from(j)) else {
-                continue;
-            };
-            self.way.push(child);
-            self.visit(l + 1);
-            self.way.pop();
+    fn visit(&mut self, l: Level, frame: &Frame) {
+        self.join_brick(l, frame);
+        let nodes = self.nodes;
+        let family = nodes.family(l, frame.node);
+        if family.bricks() == 0 {
+            return;
         }
-    }
-
-    /// The frame of child brick `j`; none if it is another rank's.
-    fn step_down(&self, l: Level, frame: &Frame, j: u64) -> Option<Frame> {
-        let (node, exists) = self.nodes.child(l, frame.node, j)?;
-        if let Place::Remote(_) = self.nodes.place(l + 1, node) {
-            return None;
-        }
-        let mut across = [[Across::Nothing; 2]; 3];
-        if l >= 2 {
-            for axis in 0..3 {
-                for up in 0..2 {
-                    across[axis][up] = self.step_across(l, frame, j, axis, up);
-                }
+        // Found once for all children, each of which steps across three of them.
+        let beyond = frame.across.map(|sides| {
+            sides.map(|across| match across {
+                Across::Here(n, _) => Beyond::Here(nodes.family(l, n)),
+                other => Beyond::Never(other),
+            })
+        });
+        self.way.push(*frame);
+        for j in ones(u64::from(family.bricks())) {
+            if let Some(child) = step_down(nodes, l, frame, &family, &beyond, u64::from(j)) {
+                self.visit(l + 1, &child);
             }
         }
-        Some(Frame { key: frame.key << 3 | j, node, exists, across })
-    }
-
-    /// What lies across a face of child brick `j`.
-    #[inline]
-    fn step_across(&self, l: Level, frame: &Frame, j: u64, axis: usize, up: usize) -> Across {
-        let stays = j >> axis & 1 != up as u64;
-        let node = if stays {
-            frame.node
-        } else {
-            match frame.across[axis][up] {
-                Across::Here(n, _) => n,
-                other => return other,
-            }
-        };
-        match self.nodes.child(l, node, j ^ 1 << axis) {
-            None => Across::Coarser,
-            Some((n, exists)) => match self.nodes.place(l + 1, n) {
-                Place::Remote(r) => Across::Remote(r),
-                _ => Across::Here(n, exists),
-            },
-        }
+        self.way.pop();
     }
 
     /// Joins the components of one brick with what they face.
@@ -264,5 +244,48 @@ impl Walk<'_> {
                 faced &= !exists;
             }
         }
+    }
+}
+
+/// The frame of child brick `j`; none if it is another rank's.
+#[inline]
+fn step_down(
+    nodes: &Nodes,
+    l: Level,
+    frame: &Frame,
+    family: &Family,
+    beyond: &[[Beyond; 2]; 3],
+    j: u64,
+) -> Option<Frame> {
+    let (node, exists) = family.child(j)?;
+    if let Place::Remote(_) = nodes.place(l + 1, node) {
+        return None;
+    }
+    let mut across = [[Across::Nothing; 2]; 3];
+    if l >= 2 {
+        for axis in 0..3 {
+            for up in 0..2 {
+                let stays = j >> axis & 1 != up as u64;
+                let beyond = if stays { &Beyond::Here(*family) } else { &beyond[axis][up] };
+                across[axis][up] = step_across(nodes, l, beyond, j ^ 1 << axis);
+            }
+        }
+    }
+    Some(Frame { key: frame.key << 3 | j, node, exists, across })
+}
+
+/// What lies across a face of a child brick, which is to be octant group `j` there.
+#[inline]
+fn step_across(nodes: &Nodes, l: Level, beyond: &Beyond, j: u64) -> Across {
+    let family = match beyond {
+        Beyond::Never(across) => return *across,
+        Beyond::Here(family) => family,
+    };
+    match family.child(j) {
+        None => Across::Coarser,
+        Some((n, exists)) => match nodes.place(l + 1, n) {
+            Place::Remote(r) => Across::Remote(r),
+            _ => Across::Here(n, exists),
+        },
     }
 }

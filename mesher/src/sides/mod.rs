@@ -62,7 +62,6 @@ pub fn decide(
     drop(nodes);
 
     let verdict = vote::decide(&candidates, facets, comm);
-
     let inside: Vec<bool> = names.iter().map(|n| verdict.inside.contains(n)).collect();
     let mut inside = classes.of.into_iter().map(|c| inside[c as usize]);
     let mut sides = Sides {

@@ -81,6 +81,32 @@ pub fn parts(mut open: u64) -> impl Iterator<Item = u64> {
     })
 }
 
+/// A node's children.
+#[derive(Clone, Copy)]
+pub struct Family {
+    split: u64,
+    /// One bit for each child brick.
+    bricks: u8,
+    first: Node,
+}
+
+impl Family {
+    /// One bit for each octant group whose brick is a child.
+    #[inline]
+    pub fn bricks(&self) -> u8 {
+        self.bricks
+    }
+
+    /// The child whose brick is octant group `j`, with the octants that it has; none if that group is not
+    /// split further.
+    #[inline]
+    pub fn child(&self, j: u64) -> Option<(Node, u64)> {
+        let before = self.bricks & ((1u16 << j) - 1) as u8;
+        let child = self.first + before.count_ones();
+        (self.bricks >> j & 1 == 1).then(|| (child, brick::children(brick::byte(self.split, j))))
+    }
+}
+
 impl Nodes {
     /// Links the bricks of a base tree.
     pub fn new(tree: &Tree, share: &Ownership) -> Self {
@@ -130,16 +156,17 @@ impl Nodes {
         self.levels[l as usize].split.get(n as usize).copied().unwrap_or(0)
     }
 
-    /// The child of node `n` whose brick is octant group `j`, if that group is split further.
+    /// The children of a node.
     #[inline]
-    pub fn child(&self, l: Level, n: Node, j: u64) -> Option<(Node, u64)> {
-        let split = self.split(l, n);
-        let byte = brick::byte(split, j);
-        if byte == 0 {
-            return None;
+    pub fn family(&self, l: Level, n: Node) -> Family {
+        let level = &self.levels[l as usize];
+        match level.split.get(n as usize) {
+            Some(&split) => {
+                let (bricks, first) = (brick::parents(split), level.first_child[n as usize]);
+                Family { split, bricks, first }
+            }
+            None => Family { split: 0, bricks: 0, first: 0 },
         }
-        let before = (brick::parents(split) & ((1u16 << j) - 1) as u8).count_ones();
-        Some((self.levels[l as usize].first_child[n as usize] + before, brick::children(byte)))
     }
 
     /// Whose the node's brick is.
@@ -188,7 +215,7 @@ impl Nodes {
                 1 => key & 7,
                 up => key >> (3 * (up - 2) + 3) & 7,
             };
-            let Some((below, _)) = self.child(m, node, group) else { return };
+            let Some((below, _)) = self.family(m, node).child(group) else { return };
             node = below;
         }
     }
