@@ -80,18 +80,22 @@ pub fn build(
     let levels = levels(facets, rules, division, comm);
     let with_areas = division.weights != Weights::Unit;
     let mut survey = Survey::new(facets, rules, levels, with_areas, comm);
-    let mut cut = divide(&mut survey, division, comm.size());
+    let ranks = comm.size();
+    let mut cut = match (division.level_base, division.weights) {
+        (Some(_), _) => by_level(&survey, survey.levels()[0]),
+        (None, Weights::Unit) => by_level(&survey, level_of_pieces(&survey, ranks)),
+        (None, Weights::Area) if cuts_anywhere(division) => at_cuts(&mut survey, ranks),
+        _ => by_weight(&survey, ranks),
+    };
     let mut weights: Vec<u64> = match division.weights {
         Weights::Unit => vec![1; cut.pieces.len()],
-        _ => cut.weights(),
+        Weights::Area => cut.weights(),
+        Weights::Rehearsal => rehearse::weights(facets, rules, &survey.marks, &cut, comm),
     };
-    if division.weights == Weights::Rehearsal {
-        weights = rehearse::weights(facets, rules, &survey.marks, &cut, comm);
-        if cuts_anywhere(division) {
-            survey.calibrate(&cut, &weights);
-            cut = divide(&mut survey, division, comm.size());
-            weights = cut.weights();
-        }
+    if division.weights == Weights::Rehearsal && cuts_anywhere(division) {
+        survey.calibrate(&cut, &weights);
+        cut = at_cuts(&mut survey, ranks);
+        weights = cut.weights();
     }
     let owners = partition::assign(&cut, &weights, division.partitioner, comm)?;
     let dealt = cut.dealt(&owners);
@@ -120,7 +124,11 @@ fn levels(facets: &[Facet], rules: &Rules, division: &Division, comm: &dyn Comm)
         return vec![level.min(deepest)];
     }
     let [first, last] = if cuts_anywhere(division) {
-        level_auto(facets, rules, [COARSE_PARTS, CUT_PARTS], comm)
+        // A rehearsal tells more of smaller leaves; but as much shallower as it is coarser.
+        let parts = if division.weights == Weights::Rehearsal { SHARE_PARTS } else { COARSE_PARTS };
+        let [first, last] = level_auto(facets, rules, [parts, CUT_PARTS], comm);
+        let rehearsed = division.weights == Weights::Rehearsal;
+        [if rehearsed { first.min(rehearse::deepest(rules)) } else { first }, last]
     } else {
         level_auto(facets, rules, [SHARE_PARTS; 2], comm).map(|l| l.min(LEVEL_BASE_AUTO_MAX))
     };
@@ -150,42 +158,53 @@ fn level_auto(facets: &[Facet], rules: &Rules, parts: [u64; 2], comm: &dyn Comm)
     })
 }
 
-/// Cuts the tree into base leaves, looking deeper where that is needed. Collective.
-fn divide(survey: &mut Survey, division: &Division, ranks: usize) -> Cut {
-    let mut cut = Cut::root(survey);
+/// The level of the paper's base leaves, all alike: enough of them for every rank.
+fn level_of_pieces(survey: &Survey, ranks: usize) -> Level {
+    let enough = SPLIT_LEAVES_PER_RANK * ranks as u64;
     let whole = survey.levels()[0];
-    let above = |level: Level| move |all: &[Piece]| all.iter().map(|p| p.level < level).collect();
-    match (division.level_base, division.weights) {
-        (Some(_), _) => return cut.split_while(survey, above(whole)),
-        (None, Weights::Unit) => {
-            let enough = SPLIT_LEAVES_PER_RANK * ranks as u64;
-            let level = (0..whole).find(|&l| survey.marks.split[l as usize].count() >= enough);
-            return cut.split_while(survey, above(level.unwrap_or(whole)));
-        }
-        _ => {}
-    }
-    let share = cut.pieces[0].weight / ranks as u64;
-    if !cuts_anywhere(division) {
-        let heavy = |p: &Piece| p.weight > share / SHARE_PARTS;
-        return cut.split_while(survey, |all| all.iter().map(heavy).collect());
-    }
-    let cut_heavy = |all: &[Piece]| -> Vec<bool> {
-        let cuts = cut_through(all, ranks).into_iter().zip(all);
-        cuts.map(|(cut, p)| cut && p.weight > share / CUT_PARTS).collect()
+    (0..whole).find(|&l| survey.marks.split[l as usize].count() >= enough).unwrap_or(whole)
+}
+
+/// Base leaves of one level.
+fn by_level(survey: &Survey, level: Level) -> Cut {
+    Cut::root(survey).split_while(survey, |all| all.iter().map(|p| p.level < level).collect())
+}
+
+/// Base leaves that are light, wherever they are.
+fn by_weight(survey: &Survey, ranks: usize) -> Cut {
+    let cut = Cut::root(survey);
+    let light = cut.pieces[0].weight / (ranks as u64 * SHARE_PARTS);
+    // Not as deep as one may look where cuts are.
+    let deepest = survey.levels()[0];
+    cut.split_while(survey, |all| {
+        all.iter().map(|p| p.level < deepest && p.weight > light).collect()
+    })
+}
+
+/// Base leaves that are light where cuts into equal shares fall, looking deeper where that is needed.
+/// Collective.
+fn at_cuts(survey: &mut Survey, ranks: usize) -> Cut {
+    let mut cut = Cut::root(survey);
+    let light = cut.pieces[0].weight / (ranks as u64 * CUT_PARTS);
+    let wanted = |all: &[Piece]| -> Vec<bool> {
+        cut_through(all, ranks)
+            .into_iter()
+            .zip(all)
+            .map(|(cut, p)| cut && p.weight > light)
+            .collect()
     };
-    for k in 0..survey.levels().len() {
-        cut = cut.split_while(survey, cut_heavy);
-        if k + 1 < survey.levels().len() {
-            let wanted = cut_heavy(&cut.pieces).into_iter().zip(&cut.pieces);
-            let wanted =
-                wanted.filter(|(wanted, p)| *wanted && p.heavy && p.level == survey.levels()[k]);
-            let mut octants = BrickSet::default();
-            wanted.for_each(|(_, p)| octants.push(p.code >> 6, 1 << (p.code & 63)));
-            survey.look_deeper(k, octants);
-            cut.renew(survey);
-        }
+    for k in 0..survey.levels().len() - 1 {
+        cut = cut.split_while(survey, wanted);
+        let level = survey.levels()[k];
+        let deeper = wanted(&cut.pieces).into_iter().zip(&cut.pieces);
+        let mut octants = BrickSet::default();
+        deeper
+            .filter(|(wanted, p)| *wanted && p.heavy && p.level == level)
+            .for_each(|(_, p)| octants.push(p.code >> 6, 1 << (p.code & 63)));
+        survey.look_deeper(k, octants);
+        cut.renew(survey);
     }
-    cut
+    cut.split_while(survey, wanted)
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.

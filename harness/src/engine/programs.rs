@@ -30,7 +30,8 @@ pub struct Programs {
     pub python: PathBuf,
     /// The directory of the oracles' programs.
     pub oracles: PathBuf,
-    /// The p4est engine: `HARNESS_P4EST` or `engines/p4est-balance` of the target directory.
+    /// The p4est engine: `HARNESS_P4EST`, or `engines/p4est-balance` of the harness's target directory or the
+    /// repository's.
     pub p4est: PathBuf,
     /// The catalogue of cases.
     pub catalogue: PathBuf,
@@ -61,8 +62,7 @@ impl Programs {
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
             oracles: root.join("harness/oracles"),
-            p4est: from_env("HARNESS_P4EST")
-                .unwrap_or_else(|| target.join("engines/p4est-balance")),
+            p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| p4est_below(&target, &root)),
             catalogue: root.join("geometries/catalogue.toml"),
             engines: root.join("harness/engines"),
             root,
@@ -90,6 +90,14 @@ impl Programs {
         let mesher = self.harness.with_file_name("mesher");
         Ok(Self { mesher, ..self.with_engine(name, limit)? })
     }
+}
+
+/// The p4est engine in the harness's target directory or, for a harness that was copied, in the repository's.
+fn p4est_below(target: &Path, root: &Path) -> PathBuf {
+    let places = [target.to_owned(), root.join("target")];
+    let mut found = places.map(|place| place.join("engines/p4est-balance")).into_iter();
+    let first = found.next().unwrap_or_default();
+    if first.is_file() { first } else { found.find(|engine| engine.is_file()).unwrap_or(first) }
 }
 
 /// The repository's root: the nearest directory above the harness, or above where it is run, that holds

@@ -17,8 +17,14 @@ use crate::tree::Tree;
 use crate::voxelise::{Depth, Filed, refine};
 use crate::{grade, kept, sides};
 
-/// Cells of a rehearsal per rank, at least: it is as many levels coarser as that allows.
-const CELLS_PER_RANK: u64 = 100_000;
+/// Levels that a rehearsal is coarser: it takes a 64th of the cells. With fewer it costs more and tells less,
+/// as what a base leaf has beyond its area is taken to grow with the size only.
+const COARSER: Level = 3;
+
+/// Deepest level of base leaves that can be rehearsed as it should be.
+pub fn deepest(rules: &Rules) -> Level {
+    rules.level_surface.saturating_sub(COARSER + 2)
+}
 
 /// Leaves to expect in each base leaf, the same on all ranks; where the tree is too shallow to rehearse, what
 /// area lets expect. Collective.
@@ -34,8 +40,7 @@ pub fn weights(
     let Some(coarser) = rules.level_surface.checked_sub(cut.level_base() + 2) else {
         return expected;
     };
-    let share = expected.iter().sum::<u64>() / comm.size() as u64;
-    let coarser = coarser.min((share / CELLS_PER_RANK).max(1).ilog2() / 2);
+    let coarser = coarser.min(COARSER);
     if coarser == 0 || comm.size() == 1 {
         return expected;
     }

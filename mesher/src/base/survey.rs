@@ -3,7 +3,7 @@
 //! To a moderate level everywhere; deeper only where someone asks, as what everybody is told costs every
 //! rank, and most of it would only separate octants of one rank.
 
-use super::cut::{Cut, Piece, span};
+use super::cut::{Cut, span};
 use crate::brickset::BrickSet;
 use crate::comm::{Comm, gather_merged};
 use crate::facet::Facet;
@@ -24,6 +24,9 @@ pub struct Survey<'a> {
     /// Octants that split in T0, and its crossing leaves: exact as far as `may_divide`.
     pub marks: Tree,
     areas: Areas,
+    /// Level-19 codes from which on leaves were told to be more or fewer than expected, ascending, and by how
+    /// many, all before it together.
+    told: Vec<(u64, i64)>,
     /// Levels that base leaves may have, ascending: the first everywhere.
     levels: Vec<Level>,
     /// For each level but the last, the octants within which base leaves may be of the next.
@@ -53,6 +56,7 @@ impl<'a> Survey<'a> {
             comm,
             marks: Tree::default(),
             areas,
+            told: Vec::new(),
             deeper: vec![BrickSet::default(); levels.len() - 1],
             levels,
             work: Work::default(),
@@ -111,14 +115,27 @@ impl<'a> Survey<'a> {
     pub fn weight(&self, l: Level, code: u64, places: &Range<usize>) -> u64 {
         // A facet's cells come with the layers on its kept side, a third of them being coarser.
         let thick = (u64::from(self.rules.layer_cells_min) + 2) * 4 / 3;
-        1 + self.areas.cells(places).saturating_mul(thick) + boxed(l, code, self.rules)
+        let expected =
+            1 + self.areas.cells(places).saturating_mul(thick) + boxed(l, code, self.rules);
+        if self.told.is_empty() {
+            return expected;
+        }
+        let before = |at: u64| {
+            let behind = self.told.partition_point(|t| t.0 < at);
+            behind.checked_sub(1).map_or(0, |last| self.told[last].1)
+        };
+        let span = span(l, code);
+        expected.saturating_add_signed(before(span.end) - before(span.start)).max(1)
     }
 
-    /// Makes expectations those that were told for a cut's pieces.
+    /// Makes expectations those that were told for a cut's pieces. What a piece has more or less is taken to be
+    /// at its corner; pieces are small where that matters.
     pub fn calibrate(&mut self, cut: &Cut, told: &[u64]) {
-        let factor =
-            |(p, &told): (&Piece, &u64)| (start57(p.level, p.code), told as f64 / p.weight as f64);
-        self.areas.scale(cut.pieces.iter().zip(told).map(factor).collect());
+        let more = cut.pieces.iter().zip(told).scan(0, |sum, (p, &told)| {
+            *sum += told as i64 - p.weight as i64;
+            Some((start57(p.level, p.code), *sum))
+        });
+        self.told = more.collect();
     }
 
     /// Marks what all facets and boxes ask to be split below `starts`, so far that base leaves may be of

@@ -23,8 +23,6 @@ pub struct Areas {
     starts: Vec<u64>,
     /// Area in all octants before each of them, and in all at the end.
     before: Vec<u64>,
-    /// Factors for what is found from some level-19 codes on, ascending.
-    factors: Vec<(u64, f64)>,
 }
 
 /// The area of some facets, by the norm above, in lattice units squared.
@@ -57,22 +55,9 @@ impl Areas {
         let wanted = |start: u64| octants.contains(start >> (3 * (LEVEL_MAX - coarse)));
         let mut all: Vec<Entry> = self.entries().filter(|e| !wanted(e[0])).collect();
         let fresh = gathered(facets, rules, fine, wanted, comm);
-        all.extend(fresh.into_iter().map(|e| self.scaled(e)));
+        all.extend(fresh);
         all.sort();
         self.set(&all);
-    }
-
-    /// Multiplies the area from some level-19 codes on, ascending, by factors; also what is gathered later.
-    pub fn scale(&mut self, factors: Vec<(u64, f64)>) {
-        self.factors = factors;
-        let all: Vec<Entry> = self.entries().map(|e| self.scaled(e)).collect();
-        self.set(&all);
-    }
-
-    fn scaled(&self, [start, area]: Entry) -> Entry {
-        let behind = self.factors.partition_point(|f| f.0 <= start);
-        let factor = behind.checked_sub(1).map_or(1.0, |at| self.factors[at].1);
-        [start, (area as f64 * factor) as u64]
     }
 
     /// Places with their areas.
