@@ -66,7 +66,8 @@ pub fn assign(
     }
 }
 
-/// Cuts the curve so that each leaf goes to the rank whose equal share its middle falls in.
+/// Cuts the curve so that each leaf goes to the rank whose equal share its middle falls in. Weights are not all
+/// zero.
 pub fn morton_cuts(weights: &[u64], ranks: usize) -> Vec<usize> {
     let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
     let mut before = 0u128;

@@ -61,7 +61,9 @@ fn extrapolate(expected: &[u64], counts: &[u64], scale: u64) -> Vec<u64> {
     let scale = scale as f64;
     let right = sum(counts) * scale * scale / sum(expected).max(1.0);
     let weight = |(&thought, &told): (&u64, &u64)| {
-        (told as f64 * scale + thought as f64 * right * (1.0 - 1.0 / scale)) as u64
+        let leaves = told as f64 * scale + thought as f64 * right * (1.0 - 1.0 / scale);
+        // A base leaf is a leaf at least; where a rehearsal kept nothing, they are all alike.
+        (leaves as u64).max(1)
     };
     expected.iter().zip(counts).map(weight).collect()
 }
