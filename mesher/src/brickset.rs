@@ -6,6 +6,11 @@
 //! Invariants: keys strictly ascend; no brick is empty; runs have ascending upper halves, and at least a
 //! brick each.
 
+mod read;
+mod union;
+
+pub use read::{Bricks, ChildBricks, Cursor};
+
 use crate::brick::{self, Brick};
 
 /// Bits of a key that are kept per brick.
@@ -85,7 +90,7 @@ impl BrickSet {
     /// The bricks in order.
     #[inline]
     pub fn bricks(&self) -> Bricks<'_> {
-        Bricks { set: self, at: 0, run_end: 0, high: 0, runs: &self.runs }
+        Bricks::new(self)
     }
 
     /// Number of bricks.
@@ -120,52 +125,7 @@ impl BrickSet {
 
     /// A reader that must be asked for keys in ascending order.
     pub fn cursor(&self) -> Cursor<'_> {
-        let mut cursor = Cursor { set: self, low: &[], end: 0, high: u64::MAX, runs: &self.runs };
-        cursor.next_run();
-        cursor
-    }
-
-    /// The union of two sets. In place, from the back, as sets can be a good part of all memory.
-    pub fn union(self, other: Self) -> Self {
-        let (mut set, rest) = if self.len() < other.len() { (other, self) } else { (self, other) };
-        if rest.is_empty() {
-            return set;
-        }
-        let mut there = set.cursor();
-        let common = rest.bricks().filter(|b| there.get(b.key) != 0).count();
-        let (mut mine, mut theirs) = (Back::new(&set), Back::new(&rest));
-        let mut k = set.len() + rest.len() - common;
-        set.reserve_exact(k - set.len());
-        set.low.resize(k, 0);
-        set.bits.resize(k, 0);
-        // Runs behind those that stay as they are, from the last.
-        let mut runs: Vec<Run> = Vec::new();
-        while let Some(r) = theirs.last(&rest) {
-            k -= 1;
-            let b = mine.last(&set);
-            let (from_mine, from_theirs) =
-                (b.is_some_and(|b| b.key >= r.key), b.is_none_or(|b| b.key <= r.key));
-            let key = if from_theirs { r.key } else { b.map_or(r.key, |b| b.key) };
-            let part = |from: bool, bits: u64| if from { bits } else { 0 };
-            set.low[k] = key as u32;
-            set.bits[k] = part(from_theirs, r.bits) | part(from_mine, b.map_or(0, |b| b.bits));
-            match runs.last_mut() {
-                Some(run) if run.high == high_of(key) => run.start = k,
-                _ => runs.push(Run { high: high_of(key), start: k }),
-            }
-            if from_mine {
-                mine.step(&set);
-            }
-            if from_theirs {
-                theirs.step(&rest);
-            }
-        }
-        set.runs.truncate(mine.runs);
-        if set.runs.last().is_some_and(|r| runs.last().is_some_and(|n| n.high == r.high)) {
-            runs.pop();
-        }
-        set.runs.extend(runs.into_iter().rev());
-        set
+        Cursor::new(self)
     }
 
     /// Changes the bits of every brick, in order, to what `keep` makes of them.
@@ -209,7 +169,7 @@ impl BrickSet {
     /// The children of the set's octants, brick by brick in Morton order.
     #[inline]
     pub fn child_bricks(&self) -> ChildBricks<'_> {
-        ChildBricks { bricks: self.bricks(), now: Brick { key: 0, bits: 0 }, left: 0 }
+        ChildBricks::new(self)
     }
 
     /// The codes of the set's octants in Morton order.
@@ -223,154 +183,6 @@ impl BrickSet {
         assert!(self.bits.iter().all(|b| *b != 0), "no brick may be empty");
         assert_eq!(self.low.len(), self.bits.len(), "every key has bits");
         assert!(self.runs.is_sorted_by(|a, b| a.high < b.high && a.start < b.start));
-    }
-}
-
-/// The bricks of a set in order.
-#[derive(Clone)]
-pub struct Bricks<'a> {
-    set: &'a BrickSet,
-    at: usize,
-    /// End of the current run, and its keys' upper half.
-    run_end: usize,
-    high: u64,
-    /// Runs behind.
-    runs: &'a [Run],
-}
-
-impl Iterator for Bricks<'_> {
-    type Item = Brick;
-
-    #[inline]
-    fn next(&mut self) -> Option<Brick> {
-        if self.at == self.run_end {
-            let (run, behind) = self.runs.split_first()?;
-            self.high = run.high;
-            self.run_end = behind.first().map_or(self.set.len(), |r| r.start);
-            self.runs = behind;
-        }
-        let at = self.at;
-        self.at += 1;
-        Some(Brick { key: self.high | u64::from(self.set.low[at]), bits: self.set.bits[at] })
-    }
-}
-
-/// See [`BrickSet::child_bricks`].
-#[derive(Clone)]
-pub struct ChildBricks<'a> {
-    bricks: Bricks<'a>,
-    now: Brick,
-    /// Groups of the brick that are not told yet.
-    left: u8,
-}
-
-impl Iterator for ChildBricks<'_> {
-    type Item = Brick;
-
-    #[inline]
-    fn next(&mut self) -> Option<Brick> {
-        if self.left == 0 {
-            self.now = self.bricks.next()?;
-            self.left = brick::parents(self.now.bits);
-        }
-        let j = u64::from(self.left.trailing_zeros());
-        self.left &= self.left - 1;
-        let bits = brick::children(brick::byte(self.now.bits, j));
-        Some(Brick { key: self.now.key << 3 | j, bits })
-    }
-}
-
-/// Reads a set from the back; the set may change behind the bricks still to be read.
-struct Back {
-    /// Bricks still to be read.
-    left: usize,
-    /// Runs that have some of them.
-    runs: usize,
-}
-
-impl Back {
-    fn new(set: &BrickSet) -> Self {
-        Self { left: set.len(), runs: set.runs.len() }
-    }
-
-    #[inline]
-    fn last(&self, set: &BrickSet) -> Option<Brick> {
-        let at = self.left.checked_sub(1)?;
-        let key = set.runs[self.runs - 1].high | u64::from(set.low[at]);
-        Some(Brick { key, bits: set.bits[at] })
-    }
-
-    #[inline]
-    fn step(&mut self, set: &BrickSet) {
-        self.left -= 1;
-        self.runs -= usize::from(set.runs[self.runs - 1].start == self.left);
-    }
-}
-
-/// Reads a set in ascending order of keys; see [`BrickSet::cursor`].
-pub struct Cursor<'a> {
-    set: &'a BrickSet,
-    /// What is left of the current run.
-    low: &'a [u32],
-    /// The run's end, and its keys' upper half; behind the last run higher than any.
-    end: usize,
-    high: u64,
-    /// Runs behind.
-    runs: &'a [Run],
-}
-
-impl Cursor<'_> {
-    /// The bits of the brick `key`, which is not before any key asked for earlier.
-    #[inline(always)]
-    pub fn get(&mut self, key: u64) -> u64 {
-        if self.high == high_of(key) {
-            // Most often it is the next one.
-            if let [low, rest @ ..] = self.low
-                && *low < key as u32
-            {
-                self.low = rest;
-            }
-            match self.low {
-                [low, ..] if *low == key as u32 => return self.set.bits[self.end - self.low.len()],
-                [low, ..] if *low > key as u32 => return 0,
-                _ => {}
-            }
-        }
-        self.seek(key)
-    }
-
-    /// Goes on to a brick behind the one that is next.
-    fn seek(&mut self, key: u64) -> u64 {
-        while self.high < high_of(key) {
-            self.next_run();
-        }
-        if self.high != high_of(key) {
-            return 0;
-        }
-        let want = key as u32;
-        // A gallop: what the reader skips (another rank's share, deleted parts) may be long.
-        let mut step = 1;
-        while self.low.get(step).is_some_and(|low| *low < want) {
-            step *= 2;
-        }
-        let near = &self.low[step / 2..self.low.len().min(step + 1)];
-        let skip = step / 2 + near.partition_point(|low| *low < want);
-        self.low = &self.low[skip..];
-        match self.low {
-            [low, ..] if *low == want => self.set.bits[self.end - self.low.len()],
-            _ => 0,
-        }
-    }
-
-    fn next_run(&mut self) {
-        let Some((run, behind)) = self.runs.split_first() else {
-            (self.low, self.high) = (&[], u64::MAX);
-            return;
-        };
-        self.high = run.high;
-        self.end = behind.first().map_or(self.set.len(), |r| r.start);
-        self.low = &self.set.low[run.start..self.end];
-        self.runs = behind;
     }
 }
 
