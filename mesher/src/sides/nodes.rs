@@ -183,12 +183,6 @@ impl Nodes {
         range.clone().zip(self.masks[range.start as usize..range.end as usize].iter().copied())
     }
 
-    /// The component of the leaf `bit` of a node; none if that leaf crosses the surface.
-    #[inline]
-    pub fn component_of(&self, l: Level, n: Node, bit: u64) -> Option<Component> {
-        self.components(l, n).find(|c| c.1 >> bit & 1 == 1).map(|c| c.0)
-    }
-
     /// The nodes of a level that may be another's too.
     pub fn shared(&self, l: Level) -> Range<Node> {
         0..self.levels[l as usize].places.len() as Node
