@@ -1,22 +1,23 @@
-//! The base tree and its partition (the paper's sections II.A and III): the top of T0, whose leaves
-//! are dealt out to the ranks; and the facets' journey to them.
+//! The partition of T0 (the paper's sections II.A and III), and the facets' journey to the ranks.
 //!
-//! Every rank marks the octants that its share of the facets asks to split; the union of the marks is
-//! the same tree for all. Where the cut through it goes is a matter of balance: a base leaf that is
-//! heavier than a small part of one rank's share is split further, as no partition can divide it; where the
-//! partition cuts the Morton curve, only the leaves that a cut falls in. Once dealt out, siblings of one owner
-//! are joined: so all that is known to everybody is what separates ranks.
+//! By default the Morton curve is cut into equal shares of the leaves to expect, wherever that is ([`shares`]): each rank
+//! needs to know the owners along the curve, and no more.
+//!
+//! The paper's way, which METIS, weights of 1 and a chosen `level_base` ask for, cuts T0 itself into *base leaves* and
+//! deals those out. For that all ranks survey T0's top: every rank marks the octants that its share of the facets
+//! asks to split; the union of the marks is the same tree for all. A base leaf that is heavier than a small part of one
+//! rank's share is split further, as no partition can divide it.
 
 pub(crate) mod cut;
 mod heaviest;
 mod rehearse;
 mod route;
+mod shares;
 mod survey;
 
 pub use heaviest::cells_heaviest;
 pub use route::route;
 
-use crate::brickset::BrickSet;
 use crate::comm::Comm;
 use crate::error::Error;
 use crate::facet::Facet;
@@ -24,22 +25,19 @@ use crate::lattice::{ExtentBox, Rules};
 use crate::octant::{LEVEL_MAX, Level, edge, start57};
 use crate::partition::{self, Partitioner, Weights, area};
 use crate::share::{BaseLeaf, Ownership};
-use crate::tree::Tree;
 use crate::voxelise::{Start, Work};
-use cut::{Cut, Piece, cut_through};
+use cut::{Cut, Piece};
 use survey::Survey;
 
 /// Base leaves with children per rank that the paper's way, one level for all, aims at.
 const SPLIT_LEAVES_PER_RANK: u64 = 32;
-/// A base leaf heavier than this part of a rank's share is split where that is automatic, if a partitioner
-/// may take any of them: it then misses an equal share by a few percent.
+/// A base leaf heavier than this part of a rank's share is split where that is automatic: a partition then
+/// misses an equal share by a few percent.
 const SHARE_PARTS: u64 = 16;
-/// The same for the leaves that a cut through the Morton curve falls in; others need not be small.
+/// Parts of a share that a cut of the Morton curve keeps or gives away as one.
 const CUT_PARTS: u64 = 64;
-/// Parts of a share that octants have everywhere, about, before cuts are looked at.
+/// Parts of a share, about, by which all ranks know where the weight lies before the curve is cut.
 const COARSE_PARTS: u64 = 1;
-/// Levels from one look at the cuts to the next.
-const LOOK_LEVELS: Level = 2;
 /// Deepest automatic `level_base` of all base leaves alike.
 const LEVEL_BASE_AUTO_MAX: Level = 12;
 
@@ -52,95 +50,108 @@ pub struct Division {
     pub weights: Weights,
     /// Level at which the tree is cut into base leaves; chosen by ranks and weights if none.
     pub level_base: Option<Level>,
+    /// Whether to divide anew what there is after refinement and after gradation, where the division is one
+    /// of the Morton curve by weights.
+    pub rebalance: bool,
 }
 
-/// The base tree as all ranks know it: splits and crossing leaves down to the base leaves.
+impl Division {
+    /// Whether the Morton curve is cut wherever weights ask for it, not between base leaves made beforehand.
+    pub fn is_of_curve(&self) -> bool {
+        self.level_base.is_none()
+            && self.partitioner == Partitioner::Morton
+            && self.weights != Weights::Unit
+    }
+}
+
+/// The division of T0 as this rank needs to know it.
 pub struct Base {
     /// Who owns what.
     pub share: Ownership,
-    /// T0 in top bricks, down to the base leaves.
-    pub top: Tree,
-    /// This rank's base leaves that are split in T0, siblings joined.
-    pub starts: Vec<Start>,
-    /// This rank's base leaves as they were dealt out, in order.
+    /// This rank's base leaves as they were dealt out, in order; none where the Morton curve is cut anywhere.
     pub dealt: Vec<BaseLeaf>,
-    /// Level of the deepest base leaves that were dealt out.
+    /// Level of the deepest base leaves, or of the octants that the curve is cut between.
     pub level_base: Level,
     /// Work done.
     pub work: Work,
 }
 
-/// Builds the base tree and deals it out. Collective.
+/// Divides T0 among the ranks. Collective.
 pub fn build(
     facets: &[Facet],
     rules: &Rules,
     division: &Division,
     comm: &dyn Comm,
 ) -> Result<Base, Error> {
-    let levels = levels(facets, rules, division, comm);
-    let with_areas = division.weights != Weights::Unit;
-    let mut survey = Survey::new(facets, rules, levels, with_areas, comm);
-    let ranks = comm.size();
-    let mut cut = match (division.level_base, division.weights) {
-        (Some(_), _) => by_level(&survey, survey.levels()[0]),
-        (None, Weights::Unit) => by_level(&survey, level_of_pieces(&survey, ranks)),
-        (None, Weights::Area) if cuts_anywhere(division) => at_cuts(&mut survey, ranks),
-        _ => by_weight(&survey, ranks),
+    if !division.is_of_curve() {
+        return of_leaves(facets, rules, division, comm);
+    }
+    let rehearsed = division.weights == Weights::Rehearsal;
+    // A rehearsal tells more of smaller leaves; but as much shallower as it is coarser.
+    let parts = [if rehearsed { SHARE_PARTS } else { COARSE_PARTS }, CUT_PARTS];
+    let [coarse, fine] = levels_auto(facets, rules, parts, comm);
+    let (share, work) = if rehearsed {
+        let coarse = coarse.min(rehearse::deepest(rules));
+        let survey = Survey::new(facets, rules, coarse, true, comm);
+        let cut = by_weight(&survey, comm.size());
+        let told = rehearse::weights(facets, rules, &cut, comm);
+        (shares::by_rehearsal(facets, rules, &cut, &told, fine, comm), survey.work)
+    } else {
+        (shares::by_area(facets, rules, [coarse, fine], comm), Work::default())
     };
-    let mut weights: Vec<u64> = match division.weights {
+    Ok(Base { share, dealt: Vec::new(), level_base: fine, work })
+}
+
+/// Deals out base leaves, as the paper does. Collective.
+fn of_leaves(
+    facets: &[Facet],
+    rules: &Rules,
+    division: &Division,
+    comm: &dyn Comm,
+) -> Result<Base, Error> {
+    let level = match division.level_base {
+        Some(level) => level.min(level_last(rules)),
+        None => levels_auto(facets, rules, [SHARE_PARTS], comm)[0].min(LEVEL_BASE_AUTO_MAX),
+    };
+    let survey = Survey::new(facets, rules, level, division.weights != Weights::Unit, comm);
+    let cut = match (division.level_base, division.weights) {
+        (Some(_), _) => by_level(&survey, level),
+        (None, Weights::Unit) => by_level(&survey, level_of_pieces(&survey, comm.size())),
+        (None, _) => by_weight(&survey, comm.size()),
+    };
+    let weights = match division.weights {
         Weights::Unit => vec![1; cut.pieces.len()],
         Weights::Area => cut.weights(),
-        Weights::Rehearsal => rehearse::weights(facets, rules, &survey.marks, &cut, comm),
+        Weights::Rehearsal => rehearse::weights(facets, rules, &cut, comm),
     };
-    if division.weights == Weights::Rehearsal && cuts_anywhere(division) {
-        survey.calibrate(&cut, &weights);
-        cut = at_cuts(&mut survey, ranks);
-        weights = cut.weights();
-    }
     let owners = partition::assign(&cut, &weights, division.partitioner, comm)?;
     let dealt = cut.dealt(&owners);
-    let share = Ownership::new(comm.rank(), comm.size(), &dealt);
     Ok(Base {
-        top: cut.top(&survey.marks, rules.level_surface, &share),
-        starts: cut.starts(&owners, comm.rank()),
+        share: Ownership::new(comm.rank(), comm.size(), &dealt),
         dealt: dealt.into_iter().filter(|b| b.owner == comm.rank()).collect(),
         level_base: cut.level_base(),
-        share,
         work: survey.work,
     })
 }
 
-/// Whether cuts fall where weights ask for them, so that only there base leaves need be small.
-fn cuts_anywhere(division: &Division) -> bool {
-    division.level_base.is_none()
-        && division.partitioner == Partitioner::Morton
-        && division.weights != Weights::Unit
+/// Where a rank begins to refine: the largest octants that it owns all of.
+pub fn starts(share: &Ownership) -> Vec<Start> {
+    share.octants().into_iter().map(|(level, code)| Start { level, code }).collect()
 }
 
-/// Levels that base leaves may have: the first everywhere, others where cuts are. Collective.
-fn levels(facets: &[Facet], rules: &Rules, division: &Division, comm: &dyn Comm) -> Vec<Level> {
-    let deepest = rules.level_deepest().max(1) - 1;
-    if let Some(level) = division.level_base {
-        return vec![level.min(deepest)];
-    }
-    let [first, last] = if cuts_anywhere(division) {
-        // A rehearsal tells more of smaller leaves; but as much shallower as it is coarser.
-        let parts = if division.weights == Weights::Rehearsal { SHARE_PARTS } else { COARSE_PARTS };
-        let [first, last] = level_auto(facets, rules, [parts, CUT_PARTS], comm);
-        let rehearsed = division.weights == Weights::Rehearsal;
-        [if rehearsed { first.min(rehearse::deepest(rules)) } else { first }, last]
-    } else {
-        level_auto(facets, rules, [SHARE_PARTS; 2], comm).map(|l| l.min(LEVEL_BASE_AUTO_MAX))
-    };
-    let (first, last) = (first.min(deepest), last.min(deepest));
-    let mut levels: Vec<Level> = (first..last).step_by(LOOK_LEVELS as usize).collect();
-    levels.push(last);
-    levels
+/// Deepest level that base leaves may have.
+fn level_last(rules: &Rules) -> Level {
+    rules.level_deepest().max(1) - 1
 }
 
 /// The levels of base leaves that are small enough for such parts of a fair share even where the facets lie
 /// closest, by the facets' area and the boxes' volume. Collective.
-fn level_auto(facets: &[Facet], rules: &Rules, parts: [u64; 2], comm: &dyn Comm) -> [Level; 2] {
+fn levels_auto<const N: usize>(
+    facets: &[Facet],
+    rules: &Rules,
+    parts: [u64; N],
+    comm: &dyn Comm,
+) -> [Level; N] {
     // Whole finest faces: a sum of integers is the same on all ranks.
     let face = (edge(rules.level_surface) as f64).powi(2);
     let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
@@ -154,57 +165,27 @@ fn level_auto(facets: &[Facet], rules: &Rules, parts: [u64; 2], comm: &dyn Comm)
             let h = edge(*l) as f64;
             h * h <= area / parts && (volume == 0.0 || h.powi(3) <= volume / parts)
         };
-        (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX)
+        (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
     })
 }
 
 /// The level of the paper's base leaves, all alike: enough of them for every rank.
 fn level_of_pieces(survey: &Survey, ranks: usize) -> Level {
     let enough = SPLIT_LEAVES_PER_RANK * ranks as u64;
-    let whole = survey.levels()[0];
-    (0..whole).find(|&l| survey.marks.split[l as usize].count() >= enough).unwrap_or(whole)
+    let whole = survey.level();
+    (0..whole).find(|&l| survey.split[l as usize].count() >= enough).unwrap_or(whole)
 }
 
 /// Base leaves of one level.
 fn by_level(survey: &Survey, level: Level) -> Cut {
-    Cut::root(survey).split_while(survey, |all| all.iter().map(|p| p.level < level).collect())
+    Cut::root(survey).split_while(survey, |p| p.level < level)
 }
 
 /// Base leaves that are light, wherever they are.
 fn by_weight(survey: &Survey, ranks: usize) -> Cut {
     let cut = Cut::root(survey);
     let light = cut.pieces[0].weight / (ranks as u64 * SHARE_PARTS);
-    // Not as deep as one may look where cuts are.
-    let deepest = survey.levels()[0];
-    cut.split_while(survey, |all| {
-        all.iter().map(|p| p.level < deepest && p.weight > light).collect()
-    })
-}
-
-/// Base leaves that are light where cuts into equal shares fall, looking deeper where that is needed.
-/// Collective.
-fn at_cuts(survey: &mut Survey, ranks: usize) -> Cut {
-    let mut cut = Cut::root(survey);
-    let light = cut.pieces[0].weight / (ranks as u64 * CUT_PARTS);
-    let wanted = |all: &[Piece]| -> Vec<bool> {
-        cut_through(all, ranks)
-            .into_iter()
-            .zip(all)
-            .map(|(cut, p)| cut && p.weight > light)
-            .collect()
-    };
-    for k in 0..survey.levels().len() - 1 {
-        cut = cut.split_while(survey, wanted);
-        let level = survey.levels()[k];
-        let deeper = wanted(&cut.pieces).into_iter().zip(&cut.pieces);
-        let mut octants = BrickSet::default();
-        deeper
-            .filter(|(wanted, p)| *wanted && p.heavy && p.level == level)
-            .for_each(|(_, p)| octants.push(p.code >> 6, 1 << (p.code & 63)));
-        survey.look_deeper(k, octants);
-        cut.renew(survey);
-    }
-    cut.split_while(survey, wanted)
+    cut.split_while(survey, |p| p.weight > light)
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.

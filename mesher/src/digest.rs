@@ -97,9 +97,11 @@ impl Digests {
         self.octants.iter().fold(0, |s, d| s.wrapping_add(*d))
     }
 
-    /// Adds another part's digests.
-    pub fn merge(&mut self, other: &[u128]) {
-        self.octants.iter_mut().zip(other).for_each(|(a, b)| *a = a.wrapping_add(*b));
+    /// Adds another part's digests, by octant.
+    pub fn merge(&mut self, other: impl IntoIterator<Item = (usize, u128)>) {
+        for (octant, digest) in other {
+            self.octants[octant] = self.octants[octant].wrapping_add(digest);
+        }
     }
 }
 
@@ -120,7 +122,7 @@ mod tests {
         words.chunks(77).for_each(|c| d.add(c));
         assert_eq!(d.whole(), naive);
         let mut other = Digests::default();
-        other.merge(&d.octants);
+        other.merge(d.octants.iter().copied().enumerate());
         assert_eq!(other, d);
     }
 }

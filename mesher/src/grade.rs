@@ -97,7 +97,7 @@ struct Gradation<'a> {
 
 impl Gradation<'_> {
     /// Splits the parents of what is split at level `l`, and marks those that are impure. Collective
-    /// where bricks are shared: a rank's own brick may have its parents in a top brick.
+    /// where bricks are shared: a rank's own brick may have its parents in one of several ranks.
     fn close(&mut self, l: Level) {
         let above = self.split[l as usize].coarsen();
         let there = std::mem::take(&mut self.split[l as usize - 1]);
@@ -105,8 +105,7 @@ impl Gradation<'_> {
         let mut impure =
             std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone()).coarsen();
         if self.share.is_shared(l - 1) {
-            fresh = self.share.scatter(l - 1, fresh, self.comm).0;
-            impure = self.share.scatter(l - 1, impure, self.comm).0;
+            [fresh, impure] = self.share.scatter(l - 1, [fresh, impure], self.comm).0;
         }
         self.split[l as usize - 1] = there.union(fresh);
         self.impure = impure;
@@ -157,7 +156,7 @@ impl Gradation<'_> {
     /// The paper's exchange of extent boxes: what was reached goes to whoever holds it, and is split
     /// there where it is kept. Collective.
     fn split_where_kept(&mut self, l: Level, reached: BrickSet) {
-        let (reached, sent) = self.share.scatter(l, reached, self.comm);
+        let ([reached], sent) = self.share.scatter(l, [reached], self.comm);
         self.work.bricks_sent += sent;
         let before = std::mem::take(&mut self.split[l as usize]);
         let fresh = self.kept.only(&self.split, l, reached.without(&before));

@@ -22,6 +22,7 @@ pub mod kept;
 pub mod lattice;
 pub mod octant;
 pub mod partition;
+pub mod rebalance;
 pub mod record;
 pub mod report;
 pub mod share;
@@ -168,7 +169,7 @@ fn build(
     let mut refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
     comm.agree(check_interrupt())?;
 
-    let sides = record.phase("sides", comm, || {
+    let mut sides = record.phase("sides", comm, || {
         sides::decide(&refined.tree, &refined.share, &facets, rules.keep, comm)
     });
     drop(facets);
@@ -182,10 +183,19 @@ fn build(
             grade::grade(split, &refined.tree.crossing, &kept, &rules, &refined.share, comm)
         });
         counters.grade(&work);
-        counters.base_leaf(base::cells_heaviest(&split, &sides.deleted, &refined.dealt));
         split
     });
     comm.agree(check_interrupt())?;
+    let graded = graded.map(|mut split| {
+        let heaviest = match refined.level_cut {
+            None => base::cells_heaviest(&split, &sides.deleted, &refined.dealt),
+            Some(_) => record.phase("rebalance", comm, || {
+                deal_leaves(&mut split, &mut refined, &mut sides, &rules, options, comm)
+            }),
+        };
+        counters.base_leaf(heaviest);
+        split
+    });
     Ok((Meshed { facets: total, rules, refined, sides, graded }, counters))
 }
 
@@ -211,9 +221,11 @@ fn quantise(
 struct Refined {
     tree: Tree,
     share: Ownership,
-    /// This rank's base leaves as they were dealt out.
+    /// This rank's base leaves as they were dealt out, if there are any.
     dealt: Vec<share::BaseLeaf>,
     level_base: octant::Level,
+    /// Level of the octants between which the Morton curve is cut, if it is.
+    level_cut: Option<octant::Level>,
 }
 
 /// Base tree, partition, and refinement of this rank's part. Collective.
@@ -233,30 +245,49 @@ fn refine(
         });
         counters.voxelise(&work);
         let (share, dealt) = (Ownership::solo(), vec![share::BaseLeaf::ROOT]);
-        return Ok(Refined { tree, dealt, share, level_base: 0 });
+        return Ok(Refined { tree, dealt, share, level_base: 0, level_cut: None });
     }
     let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
-    let filed = record
-        .phase("route", comm, || voxelise::Filed::new(&base::route(facets, &base.share, comm)));
-    let (mut tree, work) =
-        record.phase("refine", comm, || voxelise::refine(&filed, &depth, &base.starts));
+    let base::Base { mut share, dealt, level_base, .. } = base;
+    let filed =
+        record.phase("route", comm, || voxelise::Filed::new(&base::route(facets, &share, comm)));
+    let (mut tree, work) = record
+        .phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&share)));
     counters.voxelise(&work);
-    record.phase("share top", comm, || share_top(&mut tree, base.top, &base.share, comm));
-    let base::Base { share, dealt, level_base, .. } = base;
-    Ok(Refined { tree, share, dealt, level_base })
+    let level_cut = division.is_of_curve().then_some(level_base);
+    let settle = if division.rebalance && level_cut.is_some() { "rebalance" } else { "share top" };
+    record.phase(settle, comm, || {
+        if let Some(level) = level_cut.filter(|_| division.rebalance) {
+            share = rebalance::of_base_tree(&tree, &share, level, comm);
+        }
+        // What several ranks hold of T0, each knows as far as its own octants ask for it.
+        share.settle(&mut [&mut tree.split, &mut tree.crossing], comm);
+    });
+    Ok(Refined { tree, share, dealt, level_base, level_cut })
 }
 
-/// Makes the top bricks of a rank's tree those of the whole tree. Collective.
-fn share_top(tree: &mut Tree, top: Tree, share: &Ownership, comm: &dyn Comm) {
-    for (sets, top) in [(&mut tree.split, top.split), (&mut tree.crossing, top.crossing)] {
-        for ((l, set), top) in (0..).zip(sets.iter_mut()).zip(top) {
-            let mine = std::mem::take(set);
-            // A top brick may hold children of base leaves; their owners know those.
-            let all = if share.is_shared(l) { share.scatter(l, mine, comm).0 } else { mine };
-            *set = all.union(top);
-        }
+/// Deals the leaves of the finished tree out anew, if that is wanted; returns how many there are in the octant that
+/// has most of those that are not divided. Collective.
+fn deal_leaves(
+    split: &mut PerLevel,
+    refined: &mut Refined,
+    sides: &mut Sides,
+    rules: &Rules,
+    options: &Options,
+    comm: &dyn Comm,
+) -> u64 {
+    let Some(level) = refined.level_cut else { return 0 };
+    let Refined { tree, share, .. } = refined;
+    let (crossing, inside, deleted) =
+        (&mut tree.crossing, &mut sides.inside, &mut sides.deleted);
+    let parts = rebalance::Parts { split, crossing, inside, deleted };
+    let weighed = rebalance::Weighed::new(&parts, share, level, rules.keep_crossing);
+    let heaviest = weighed.heaviest();
+    if options.division.rebalance {
+        *share = weighed.deal(parts, share, comm);
     }
+    heaviest
 }
 
 /// Streams the leaves into the digest, and to disk if asked. Collective.

@@ -1,6 +1,7 @@
 //! Dealing base leaves out to ranks: what they weigh, and where the cuts go.
 
 pub mod area;
+pub mod curve;
 #[cfg(feature = "metis")]
 mod metis;
 
@@ -29,6 +30,12 @@ pub enum Weights {
     Area,
     /// By the leaves of the same mesh made a few levels coarser.
     Rehearsal,
+}
+
+/// Leaves of the mesh that a finest cell's face of a facet brings: a facet's cells come with the layers on its
+/// kept side, a third of them being coarser.
+pub fn thickness(rules: &Rules) -> u64 {
+    (u64::from(rules.layer_cells_min) + 2) * 4 / 3
 }
 
 /// Leaves that the boxes ask for in an octant.

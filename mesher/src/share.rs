@@ -1,21 +1,27 @@
 //! Who holds which bricks.
 //!
-//! The base tree's leaves are dealt out to the ranks. A brick fills an octant; if that octant lies in
-//! a base leaf, or in several of one owner, the brick is that owner's alone. If not (or if the
-//! brick is one of levels 0 and 1) the brick is a *top* brick: all ranks hold a copy, kept equal, and
-//! one of them, the owner of the base leaf at its minimum corner, answers for it: counts it, emits its
-//! leaves and takes its sources.
+//! The Morton curve is dealt out to the ranks. A brick fills an octant; if one rank owns all of that, the brick
+//! is that rank's alone. If several do, each of them holds a copy (it has bricks below), and all copies are kept
+//! equal; if *many* do, or if the brick is one of levels 0 and 1, it is a *top* brick, and all ranks hold a
+//! copy. One rank, the owner of the octant's minimum corner, answers for a brick: counts it, emits its leaves and takes
+//! its sources.
 //!
-//! All that this takes is the owners along the Morton curve, run by run.
+//! All that this takes is the owners along the Morton curve, run by run. With a brick a rank holds all bricks above
+//! it.
 //!
 //! Invariants: runs follow each other from the curve's start, and neighbours have different owners.
 
-use crate::brick::Brick;
 use crate::brickset::BrickSet;
 use crate::comm::{Comm, Entry, gather_merged};
 use crate::octant::{LEVEL_MAX, Level, start57};
-use crate::tree::Tree;
+use crate::tree::{PerLevel, Tree};
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
+
+/// Runs that make an octant one of many owners. Up to here each owner is told of a brick by itself, which costs
+/// messages; beyond, everybody is told of it, which costs every rank time.
+const MANY: usize = 9;
 
 /// A leaf of the base tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,11 +42,13 @@ impl BaseLeaf {
 /// Whose a brick is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Above the base leaves: everyone holds a copy.
+    /// Many ranks': everyone holds a copy.
     Top,
+    /// A few ranks', each of which holds a copy; this one is among them.
+    Shared,
     /// This rank's alone.
     Mine,
-    /// Another rank's.
+    /// Others'; the one that answers for it.
     Remote(usize),
 }
 
@@ -50,12 +58,14 @@ pub struct Ownership {
     rank: usize,
     ranks: usize,
     runs: Arc<Runs>,
+    /// Deepest level that has a brick of several owners.
+    level_shared: Level,
     /// Deepest level that has a top brick.
     level_top: Level,
 }
 
 /// Owners along the Morton curve.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Runs {
     /// Level-19 codes at which the owner changes, from 0.
     starts: Vec<u64>,
@@ -76,22 +86,37 @@ impl Ownership {
     /// # Panics
     /// If the leaves do not follow each other, or an owner is no rank.
     pub fn new(rank: usize, ranks: usize, leaves: &[BaseLeaf]) -> Self {
-        let mut runs = Runs { starts: Vec::new(), owners: Vec::new() };
         let mut at = 0;
         for b in leaves {
             assert_eq!(start57(b.level, b.code), at, "base leaves must follow each other");
-            assert!(b.owner < ranks, "a base leaf's owner is a rank");
-            if runs.owners.last() != Some(&b.owner) {
-                runs.starts.push(at);
-                runs.owners.push(b.owner);
-            }
-            at += 1 << (3 * (LEVEL_MAX - b.level));
+            at = start57(b.level, b.code + 1);
         }
         assert_eq!(at, 1 << (3 * LEVEL_MAX), "base leaves must tile the root");
-        // An octant above the level to which a change of owner is aligned spans it; its brick is two deeper.
-        let aligned = |s: &u64| LEVEL_MAX - s.trailing_zeros() / 3;
-        let level_top = runs.starts[1..].iter().map(aligned).max().unwrap_or(0) + 1;
-        Self { rank, ranks, runs: Arc::new(runs), level_top }
+        Self::along(rank, ranks, leaves.iter().map(|b| (start57(b.level, b.code), b.owner)))
+    }
+
+    /// The ownership in which owners change at some level-19 codes, ascending from 0.
+    ///
+    /// # Panics
+    /// If the codes do not ascend from 0, or an owner is no rank.
+    pub fn along(
+        rank: usize,
+        ranks: usize,
+        changes: impl IntoIterator<Item = (u64, usize)>,
+    ) -> Self {
+        let mut runs = Runs::default();
+        for (start, owner) in changes {
+            assert!(owner < ranks, "an owner is a rank");
+            let behind = runs.starts.last().map_or(start == 0, |&last| last < start);
+            assert!(behind, "owners change at ascending codes, the first of which is 0");
+            if runs.owners.last() != Some(&owner) {
+                runs.starts.push(start);
+                runs.owners.push(owner);
+            }
+        }
+        assert!(!runs.starts.is_empty(), "all is somebody's");
+        let (level_shared, level_top) = (runs.deepest_brick_of(2), runs.deepest_brick_of(MANY));
+        Self { rank, ranks, runs: Arc::new(runs), level_shared, level_top }
     }
 
     /// The same as seen by someone who owns nothing: every brick is a top brick or remote.
@@ -111,28 +136,43 @@ impl Ownership {
         top
     }
 
-    /// Deepest level that has a top brick.
-    pub fn level_top(&self) -> Level {
-        self.level_top
+    /// The largest octants that this rank owns all of, in Morton order: level and code.
+    pub fn octants(&self) -> Vec<(Level, u64)> {
+        let mut octants = Vec::new();
+        for Range { start: mut at, end } in self.stretches() {
+            while at < end {
+                // As large as its corner allows, and as there is room for.
+                let aligned = (at.trailing_zeros() / 3).min(LEVEL_MAX);
+                let up = aligned.min((end - at).ilog2() / 3);
+                octants.push((LEVEL_MAX - up, at >> (3 * up)));
+                at += 1 << (3 * up);
+            }
+        }
+        octants
+    }
+
+    /// The level-19 codes that this rank owns, in order.
+    pub fn stretches(&self) -> impl Iterator<Item = Range<u64>> + '_ {
+        let owners = self.runs.owners.iter().enumerate();
+        owners.filter(|o| *o.1 == self.rank).map(|(run, _)| self.runs.span(run))
+    }
+
+    /// The owner at a level-19 code.
+    #[inline]
+    pub fn owner_at(&self, start: u64) -> usize {
+        self.runs.owners[self.runs.at(start)]
     }
 
     /// The owner of all of an octant; none if it has several.
     #[inline]
     pub fn sole_owner(&self, l: Level, code: u64) -> Option<usize> {
-        let run = self.run_at(start57(l, code));
-        let whole = self.runs.starts.get(run + 1).is_none_or(|&s| s >= start57(l, code + 1));
-        whole.then(|| self.runs.owners[run])
+        let run = self.runs.at(start57(l, code));
+        (self.runs.end(run) >= start57(l, code + 1)).then(|| self.runs.owners[run])
     }
 
     /// Whether brick `key` of level `l` is a top brick.
-    #[inline]
-    pub fn is_top(&self, l: Level, key: u64) -> bool {
-        l < 2 || l <= self.level_top && self.sole_owner(l - 2, key).is_none()
-    }
-
-    #[inline]
-    fn run_at(&self, start: u64) -> usize {
-        self.runs.starts.partition_point(|&s| s <= start) - 1
+    fn is_top(&self, l: Level, key: u64) -> bool {
+        l < 2 || l <= self.level_top && self.runs.of_brick(l, key).len() >= MANY
     }
 
     /// Whose brick `key` of level `l` is.
@@ -144,66 +184,201 @@ impl Ownership {
         if self.ranks == 1 {
             return Place::Mine;
         }
-        let owner = match l <= self.level_top {
-            true => self.sole_owner(l - 2, key),
-            false => Some(self.owner(l, key)),
-        };
-        match owner {
-            None => Place::Top,
-            Some(r) if r == self.rank => Place::Mine,
-            Some(r) => Place::Remote(r),
+        if l > self.level_shared {
+            return self.place_of(self.answerer(l, key));
         }
+        let owners = &self.runs.owners[self.runs.of_brick(l, key)];
+        match owners.len() {
+            1 => self.place_of(owners[0]),
+            MANY.. => Place::Top,
+            _ if owners.contains(&self.rank) => Place::Shared,
+            _ => Place::Remote(owners[0]),
+        }
+    }
+
+    fn place_of(&self, owner: usize) -> Place {
+        if owner == self.rank { Place::Mine } else { Place::Remote(owner) }
+    }
+
+    /// The rank that answers for brick `key` of level `l`.
+    #[inline]
+    pub fn answerer(&self, l: Level, key: u64) -> usize {
+        self.owner_at(brick_start(l, key))
     }
 
     /// Whether this rank counts and emits the leaves of a brick that it holds.
     #[inline]
     pub fn answers_for(&self, l: Level, key: u64) -> bool {
-        // Deeper than a child of a top brick, whatever a rank holds is its own.
-        self.ranks == 1 || l > self.level_top + 1 || self.owner(l, key) == self.rank
+        // Deeper than a child of a shared brick, whatever a rank holds is its own.
+        self.ranks == 1 || l > self.level_shared + 1 || self.answerer(l, key) == self.rank
     }
 
     /// Whether any brick of level `l` is held by several ranks.
     pub fn is_shared(&self, l: Level) -> bool {
-        self.ranks > 1 && l <= self.level_top
-    }
-
-    /// Owner at a brick's minimum corner.
-    fn owner(&self, l: Level, key: u64) -> usize {
-        self.runs.owners[self.run_at(brick_start(l, key))]
+        self.ranks > 1 && l <= self.level_shared
     }
 
     /// Brings octants to the ranks that hold their bricks: returns those for this rank, from all
     /// ranks together, and the number of bricks sent. Collective, unless there is one rank.
-    pub fn scatter(&self, l: Level, set: BrickSet, comm: &dyn Comm) -> (BrickSet, u64) {
-        if self.ranks == 1 {
-            return (set, 0);
+    pub fn scatter<const N: usize>(
+        &self,
+        l: Level,
+        sets: [BrickSet; N],
+        comm: &dyn Comm,
+    ) -> ([BrickSet; N], u64) {
+        let sets = sets.into_iter().map(|set| (l, set)).collect();
+        let (sets, sent) = self.scatter_all(sets, comm);
+        (sets.try_into().expect("as many sets as were scattered"), sent)
+    }
+
+    /// Brings all levels of some sets to the ranks that hold their bricks, as if each level of each were
+    /// [scattered](Self::scatter). Collective, unless there is one rank.
+    pub fn settle(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
+        let levels = |set: &mut &mut PerLevel| (0..).zip(std::mem::take(*set)).collect::<Vec<_>>();
+        let (told, _) = self.scatter_all(sets.iter_mut().flat_map(levels).collect(), comm);
+        let mut told = told.into_iter();
+        for set in sets {
+            **set = told.by_ref().take(crate::tree::LEVELS).collect();
         }
-        let mut mine = BrickSet::default();
-        let mut out: Vec<Vec<u64>> = vec![Vec::new(); self.ranks];
-        let mut top: Vec<Entry> = Vec::new();
-        for b in set.bricks() {
-            match self.place(l, b.key) {
-                Place::Mine => mine.push(b.key, b.bits),
-                Place::Remote(r) => out[r].extend([b.key, b.bits]),
-                Place::Top => top.push([b.key, b.bits]),
+    }
+
+    /// Brings octants of several sets to the ranks that hold their bricks. Collective, unless there is one rank.
+    fn scatter_all(
+        &self,
+        sets: Vec<(Level, BrickSet)>,
+        comm: &dyn Comm,
+    ) -> (Vec<BrickSet>, u64) {
+        if self.ranks == 1 {
+            return (sets.into_iter().map(|(_, set)| set).collect(), 0);
+        }
+        let any_top = sets.iter().any(|(l, _)| *l <= self.level_top);
+        let mut out = Parcels { to: vec![Vec::new(); self.ranks], sent: 0, top: Vec::new() };
+        let pick = |(number, (l, set))| vec![self.pick(number, l, set, &mut out)];
+        // What this rank holds of each set, in parts.
+        let mut parts: Vec<Vec<BrickSet>> = (0..).zip(sets).map(pick).collect();
+        for (_, words) in comm.exchange(out.to.into_iter().enumerate().collect()) {
+            let mut left = words.as_slice();
+            while let Some((&number, packed)) = left.split_first() {
+                let (set, behind) = BrickSet::unpack(packed);
+                parts[number as usize].push(set);
+                left = behind;
             }
         }
-        let sent = out.iter().map(|w| w.len() as u64 / 2).sum();
-        let heard = comm.exchange(out.into_iter().enumerate().collect());
-        let heard = heard.iter().flat_map(|(_, words)| words.as_chunks().0);
-        let told = heard.map(|&[key, bits]| Brick { key, bits }).collect();
-        let mut all = mine.union(BrickSet::from_unsorted(told));
-        if self.is_shared(l) {
-            let mut known = BrickSet::default();
-            let top = gather_merged(top, |a, b| a | b, comm);
-            top.into_iter().for_each(|[key, bits]| known.push(key, bits));
-            all = all.union(known);
+        if any_top {
+            let told = gather_merged(out.top, |a, b| a | b, comm);
+            for told in told.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
+                let mut set = BrickSet::default();
+                told.iter().for_each(|e| set.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
+                parts[(told[0][0] >> KEY_BITS) as usize].push(set);
+            }
         }
-        (all, sent)
+        (parts.into_iter().map(BrickSet::union_of).collect(), out.sent)
+    }
+
+    /// Takes out of set `number` what others hold; returns what this rank does. Of top bricks it holds what
+    /// everybody is told.
+    fn pick(&self, number: u64, l: Level, mut set: BrickSet, out: &mut Parcels) -> BrickSet {
+        let mut stretches = self.stretches();
+        if let (Some(stretch), None) = (stretches.next(), stretches.next())
+            && l > self.level_shared
+        {
+            // Where no brick has several owners, each one's are beside each other.
+            let key = |at: u64| at >> (3 * (LEVEL_MAX + 2 - l));
+            let before = set.take_before(key(stretch.start));
+            let behind = set.take_from(key(stretch.end));
+            for mut part in [before, behind] {
+                while let Some((first, _)) = part.ends() {
+                    let run = self.runs.at(brick_start(l, first));
+                    let theirs = part.take_before(key(self.runs.end(run)));
+                    out.send(number, &theirs, self.runs.owners[run]);
+                }
+            }
+            return set;
+        }
+        let mut others: BTreeMap<usize, BrickSet> = BTreeMap::new();
+        set.retain(|b| {
+            let place = self.place(l, b.key);
+            if place == Place::Top {
+                out.top.push([number << KEY_BITS | b.key, b.bits]);
+                return 0;
+            }
+            if place != Place::Mine {
+                // With METIS an owner may have several of the runs: it is told once, as it is last told of this brick.
+                for &owner in &self.runs.owners[self.runs.of_brick(l, b.key)] {
+                    others.entry(owner).or_default().push(b.key, b.bits);
+                }
+            }
+            if matches!(place, Place::Mine | Place::Shared) { b.bits } else { 0 }
+        });
+        others.remove(&self.rank);
+        others.into_iter().for_each(|(owner, set)| out.send(number, &set, owner));
+        set
+    }
+}
+
+/// Bits of a brick's key; above them is room for the number of the set that it belongs to.
+pub const KEY_BITS: u32 = 54;
+
+/// What is to be sent.
+struct Parcels {
+    /// Sets by receiver: the number of each, then itself.
+    to: Vec<Vec<u64>>,
+    /// Bricks in them.
+    sent: u64,
+    /// Bricks for everybody, their set's number above the key.
+    top: Vec<Entry>,
+}
+
+impl Parcels {
+    fn send(&mut self, number: u64, set: &BrickSet, to: usize) {
+        self.sent += set.len() as u64;
+        self.to[to].push(number);
+        set.pack(&mut self.to[to]);
+    }
+}
+
+impl Runs {
+    /// The run that a position lies in.
+    #[inline]
+    fn at(&self, start: u64) -> usize {
+        self.starts.partition_point(|&s| s <= start) - 1
+    }
+
+    /// Where a run ends.
+    #[inline]
+    fn end(&self, run: usize) -> u64 {
+        self.starts.get(run + 1).copied().unwrap_or(1 << (3 * LEVEL_MAX))
+    }
+
+    /// From where to where a run goes.
+    fn span(&self, run: usize) -> Range<u64> {
+        self.starts[run]..self.end(run)
+    }
+
+    /// The runs that a brick has part of; of many, some.
+    #[inline]
+    fn of_brick(&self, l: Level, key: u64) -> Range<usize> {
+        let first = self.at(brick_start(l, key));
+        let end = if l < 2 { 1 << (3 * LEVEL_MAX) } else { brick_start(l, key + 1) };
+        let more = self.starts[first + 1..].iter().take(MANY).take_while(|&&s| s < end).count();
+        first..first + 1 + more
+    }
+
+    /// The deepest level with a brick that has part of `n` runs or more, `n` being two at least; 1 if there is
+    /// none, as the bricks of levels 0 and 1 are everybody's.
+    fn deepest_brick_of(&self, n: usize) -> Level {
+        let spanned = self.starts[1..].windows(n - 1).map(|inner| {
+            // The octant that holds the end of the first run and the start of the last.
+            let differ = (inner[0] - 1) ^ inner[n - 2];
+            let up = (64 - differ.leading_zeros()).div_ceil(3);
+            LEVEL_MAX - up + 2
+        });
+        spanned.max().unwrap_or(1)
     }
 }
 
 /// Level-19 Morton code of a brick's minimum corner.
-fn brick_start(l: Level, key: u64) -> u64 {
+#[inline]
+pub fn brick_start(l: Level, key: u64) -> u64 {
     if l < 2 { 0 } else { key << (3 * (LEVEL_MAX + 2 - l)) }
 }

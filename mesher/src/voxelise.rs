@@ -106,7 +106,7 @@ pub struct Depth {
 }
 
 /// An octant to refine from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// Its level.
     pub level: Level,
@@ -123,12 +123,14 @@ pub struct Work {
     pub bricks_voxelised: u64,
 }
 
-/// Refines the octants of `starts`, which are known to be split, ascending and disjoint; for the
-/// lone start "root" nothing need be known. The tree holds them and what is below them.
+/// Refines the octants of `starts`, ascending and disjoint, as far as they are in T0 at all. The tree holds them, what
+/// is below them, and of what is above them that which these octants alone ask for: united over starts
+/// that tile the root, and over all facets, it is T0.
 pub fn refine(filed: &Filed, depth: &Depth, starts: &[Start]) -> (Tree, Work) {
     let mut v = Voxeliser {
         filed,
         surface: depth.surface,
+        boxes: &depth.boxes,
         tree: Tree::default(),
         lists: Vec::new(),
         pairs: Vec::new(),
@@ -136,7 +138,7 @@ pub fn refine(filed: &Filed, depth: &Depth, starts: &[Start]) -> (Tree, Work) {
     };
     let astray = v.straddlers(starts);
     for (start, list) in starts.iter().zip(astray) {
-        v.start(start, &depth.boxes, list);
+        v.start(start, list);
     }
     (v.tree, v.work)
 }
@@ -144,6 +146,7 @@ pub fn refine(filed: &Filed, depth: &Depth, starts: &[Start]) -> (Tree, Work) {
 struct Voxeliser<'a> {
     filed: &'a Filed,
     surface: Level,
+    boxes: &'a [ExtentBox],
     tree: Tree,
     /// Facets of the bricks on the way down, one list behind the other.
     lists: Vec<u32>,
@@ -179,9 +182,13 @@ impl Voxeliser<'_> {
         lists
     }
 
-    fn start(&mut self, start: &Start, boxes: &[ExtentBox], straddlers: Vec<u32>) {
+    fn start(&mut self, start: &Start, straddlers: Vec<u32>) {
         let Start { level: m, code } = *start;
         let residents = self.filed.residents(m, code);
+        // A root that is not split has its own brick, which tells so.
+        if m > 0 && !self.way_down(start, &residents, &straddlers) {
+            return;
+        }
         let begin = self.lists.len();
         self.lists.extend(straddlers);
         let load = Load { residents, straddlers: begin..self.lists.len() };
@@ -191,8 +198,32 @@ impl Voxeliser<'_> {
             (m, 0) => (m + 2, code, u64::MAX),
             (m, _) => (m + 1, code >> 3, 0xff << (8 * (code & 7))),
         };
-        self.brick(l, key, load, boxes, allowed);
+        self.brick(l, key, load, self.boxes, allowed);
         self.lists.truncate(begin);
+    }
+
+    /// Records what a start asks for from the root down to itself; returns whether it is split.
+    fn way_down(&mut self, start: &Start, residents: &Range<usize>, straddlers: &[u32]) -> bool {
+        let Start { level: m, code } = *start;
+        let at = corner(m, code);
+        let crosses = |i: &u32| crossed(&self.filed.facets[*i as usize], at, m) & 1 == 1;
+        let crossing = !residents.is_empty() || straddlers.iter().any(crosses);
+        for l in 0..=m {
+            let above = code >> (3 * (m - l));
+            let (key, bit) = (above >> 6, 1 << (above & 63));
+            let asked = |b: &ExtentBox| b.level > l && b.meets(corner(l, above), edge(l));
+            let asked = self.boxes.iter().any(asked);
+            if l < self.surface && crossing || asked {
+                self.tree.split[l as usize].push(key, bit);
+                continue;
+            }
+            // A leaf of T0, the start itself or above it.
+            if crossing {
+                self.tree.crossing[l as usize].push(key, bit);
+            }
+            return false;
+        }
+        true
     }
 
     /// Decides the octants of level `l` in a brick, and of `l - 1` above them; goes on below.

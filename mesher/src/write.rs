@@ -4,7 +4,7 @@
 //! the manifest last. After an error nothing is left behind.
 
 use crate::comm::Comm;
-use crate::digest::{Digests, OCTANTS, hex};
+use crate::digest::{Digests, hex};
 use crate::error::Error;
 use crate::lattice::{Keep, Rules};
 use crate::octant::LEVEL_MAX;
@@ -243,17 +243,16 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     let split = |d: u128| [(d >> 64) as u64, d as u64];
     let whole = split(mine.digests.whole());
     let mut words = vec![mine.leaves, whole[0], whole[1]];
-    words.extend(mine.digests.octants.iter().flat_map(|&d| split(d)));
+    // A rank's leaves are in few of the octants.
+    let octants = (0..).zip(&mine.digests.octants).filter(|(_, d)| **d != 0);
+    words.extend(octants.flat_map(|(i, &d)| [i, split(d)[0], split(d)[1]]));
     let mut digests = Digests::default();
     let mut parts = Vec::new();
     for theirs in comm.all_gather(&words).iter() {
-        parts.push([theirs[0], theirs[1], theirs[2]]);
-        let octants: Vec<u128> = theirs[3..]
-            .chunks_exact(2)
-            .map(|w| u128::from(w[0]) << 64 | u128::from(w[1]))
-            .collect();
-        debug_assert_eq!(octants.len(), OCTANTS);
-        digests.merge(&octants);
+        let (whole, octants) = theirs.split_at(3);
+        parts.push([whole[0], whole[1], whole[2]]);
+        let octants = octants.chunks_exact(3);
+        digests.merge(octants.map(|w| (w[0] as usize, u128::from(w[1]) << 64 | u128::from(w[2]))));
     }
     (digests, parts)
 }

@@ -28,11 +28,11 @@ fn by_mesher(case: &Small) -> Firsts {
     tree.check_invariants();
     let share = Ownership::solo();
     let nodes = Nodes::new(&tree, &share);
-    let mut local = components::join(&nodes);
+    let mut local = components::join(&nodes, &share);
     let faces = std::mem::take(&mut local.faces);
     let classes = local.classes();
     let names = global::names(&nodes, &tree, &share, faces, &classes, &Solo);
-    let found = vote::candidates(&nodes, &tree, &classes.of, &names, &share, &Solo);
+    let found = vote::candidates(&nodes, &tree, &classes.of, &names, &share);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 

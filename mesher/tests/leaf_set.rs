@@ -197,7 +197,7 @@ fn digests_merge() {
         let part: Vec<u64> = words.iter().copied().skip(r).step_by(7).collect();
         let mut digests = Digests::default();
         part.chunks(50).for_each(|c| digests.add(c));
-        merged.merge(&digests.octants);
+        merged.merge(digests.octants.into_iter().enumerate());
     }
     assert_eq!(merged.whole(), sum(&words));
 }

@@ -270,10 +270,11 @@ fn divisions() -> impl Iterator<Item = Run> {
         .flat_map(|p| [Weights::Unit, Weights::Area, Weights::Rehearsal].map(|w| (p, w)));
     ways.flat_map(move |(partitioner, weights)| {
         levels.into_iter().flat_map(move |level_base| {
-            [(2, 1), (3, 2), (8, 3), (8, 4), (33, 5)].map(move |(ranks, seed)| Run {
-                ranks,
-                seed,
-                division: Division { partitioner, weights, level_base },
+            [(2, 1), (3, 2), (8, 3), (8, 4), (33, 5)].into_iter().flat_map(move |(ranks, seed)| {
+                let division = Division { partitioner, weights, level_base, rebalance: true };
+                let kept = Division { rebalance: false, ..division };
+                let divisions = if division.is_of_curve() { &[division, kept][..] } else { &[division] };
+                divisions.iter().map(|&division| Run { ranks, seed, division }).collect::<Vec<_>>()
             })
         })
     })

@@ -5,7 +5,7 @@
 //! rehearsal are Morton cuts by area, so that it is divided well itself.
 
 use super::cut::Cut;
-use super::route;
+use super::{route, starts};
 use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
@@ -31,7 +31,6 @@ pub fn deepest(rules: &Rules) -> Level {
 pub fn weights(
     facets: &[Facet],
     rules: &Rules,
-    marks: &Tree,
     cut: &Cut,
     comm: &dyn Comm,
 ) -> Vec<u64> {
@@ -46,7 +45,7 @@ pub fn weights(
     }
     let coarse = coarsen(rules, coarser, cut.level_base());
     let mut counts = vec![0u64; expected.len()];
-    for theirs in comm.all_gather(&rehearse(facets, &coarse, marks, cut, &expected, comm)).iter() {
+    for theirs in comm.all_gather(&rehearse(facets, &coarse, cut, &expected, comm)).iter() {
         theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
     }
     extrapolate(&expected, &counts, 1 << coarser)
@@ -83,17 +82,16 @@ fn coarsen(rules: &Rules, coarser: Level, level_base: Level) -> Rules {
 fn rehearse(
     facets: &[Facet],
     rules: &Rules,
-    marks: &Tree,
     cut: &Cut,
     expected: &[u64],
     comm: &dyn Comm,
 ) -> Vec<u64> {
     let owners = morton_cuts(expected, comm.size());
     let share = Ownership::new(comm.rank(), comm.size(), &cut.dealt(&owners));
-    let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     let filed = Filed::new(&route(facets, &share, comm));
-    let (mut tree, _): (Tree, _) = refine(&filed, &depth, &cut.starts(&owners, comm.rank()));
-    crate::share_top(&mut tree, cut.top(marks, rules.level_surface, &share), &share, comm);
+    let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
+    let (mut tree, _) = refine(&filed, &depth, &starts(&share));
+    share.settle(&mut [&mut tree.split, &mut tree.crossing], comm);
     let sides = sides::decide(&tree, &share, facets, rules.keep, comm);
     let Tree { split, crossing } = tree;
     let (split, _) =

@@ -6,15 +6,15 @@
 //! not.
 
 use crate::base::middle;
-use crate::brickset::BrickSet;
 use crate::comm::{Comm, Entry, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level, edge};
+use crate::partition::curve::Bin;
 use std::ops::Range;
 
 /// Parts of a finest cell's face: sums of integers do not depend on their order.
-const PARTS: f64 = 1024.0;
+pub const PARTS: u64 = 1024;
 
 /// Area by place.
 #[derive(Debug, Default)]
@@ -38,32 +38,9 @@ impl Areas {
     /// Gathers the area of all ranks' facets by octants of a level. Collective.
     pub fn gather(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> Self {
         let mut areas = Self::default();
-        areas.set(&gathered(facets, rules, level, |_| true, comm));
+        let mine = of(facets, rules, level).into_iter().map(Entry::from).collect();
+        areas.set(&gather_merged(mine, |a, b| a + b, comm));
         areas
-    }
-
-    /// Gathers the area in some octants of level `coarse` anew, by octants of level `fine`. Collective.
-    pub fn refine(
-        &mut self,
-        facets: &[Facet],
-        rules: &Rules,
-        coarse: Level,
-        octants: &BrickSet,
-        fine: Level,
-        comm: &dyn Comm,
-    ) {
-        let wanted = |start: u64| octants.contains(start >> (3 * (LEVEL_MAX - coarse)));
-        let mut all: Vec<Entry> = self.entries().filter(|e| !wanted(e[0])).collect();
-        let fresh = gathered(facets, rules, fine, wanted, comm);
-        all.extend(fresh);
-        all.sort();
-        self.set(&all);
-    }
-
-    /// Places with their areas.
-    fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
-        let areas = self.before.windows(2).map(|w| w[1] - w[0]);
-        self.starts.iter().copied().zip(areas).map(Entry::from)
     }
 
     fn set(&mut self, entries: &[Entry]) {
@@ -89,41 +66,31 @@ impl Areas {
         among.start + first..among.start + first + count
     }
 
-    /// The same if the first is known.
-    pub fn places_from(&self, first: usize, span: Range<u64>) -> Range<usize> {
-        let count = self.starts[first..].iter().take_while(|s| **s < span.end).count();
-        first..first + count
-    }
-
     /// Finest cells' faces in some of them.
     pub fn cells(&self, places: &Range<usize>) -> u64 {
         // Unit weights gather nothing.
         if places.is_empty() {
             return 0;
         }
-        (self.before[places.end] - self.before[places.start]) / PARTS as u64
+        (self.before[places.end] - self.before[places.start]) / PARTS
     }
 }
 
-/// The area of all ranks' facets by octants of a level, as far as `wanted`. Collective.
-fn gathered(
-    facets: &[Facet],
-    rules: &Rules,
-    level: Level,
-    wanted: impl Fn(u64) -> bool,
-    comm: &dyn Comm,
-) -> Vec<Entry> {
+/// The area of some facets by octants of a level, in `PARTS` of a finest cell's face; some octants more than once.
+pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     let cell = edge(rules.level_surface) as f64;
     let shift = 3 * (LEVEL_MAX - level);
-    let mut mine: Vec<Entry> = Vec::new();
+    let mut bins: Vec<Bin> = Vec::new();
     let mut add = |at: u64, area: f64| {
-        let at = at >> shift << shift;
-        if wanted(at) {
-            mine.push([at, (area * PARTS / (cell * cell)) as u64]);
+        let (at, area) = (at >> shift << shift, (area * PARTS as f64 / (cell * cell)) as u64);
+        // Facets in a file often lie beside each other.
+        match bins.last_mut().filter(|last| last.0 == at) {
+            Some(last) => last.1 += area,
+            None => bins.push((at, area)),
         }
     };
     facets.iter().for_each(|f| spread(f, edge(level), &mut add));
-    gather_merged(mine, |a, b| a + b, comm)
+    bins
 }
 
 /// Tells the facet's area to `add`, in pieces whose extent is at most `extent`.

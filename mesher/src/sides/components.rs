@@ -9,12 +9,13 @@ use super::nodes::{Component, Family, Node, Nodes};
 use crate::brick;
 use crate::brickset::ones;
 use crate::octant::{Level, neighbour};
-use crate::share::Place;
+use crate::share::{Ownership, Place};
 
 /// The joined components, and the faces that another rank must look at.
 pub struct Local {
     parent: Vec<Component>,
-    /// Octants of other ranks' bricks that a component of this rank faces.
+    /// What other ranks must be asked about: octants of theirs that a component of this rank faces, and components
+    /// in bricks that several ranks hold and another answers for.
     pub faces: Vec<Face>,
 }
 
@@ -26,18 +27,18 @@ pub struct Classes {
     pub count: u32,
 }
 
-/// Octants of a brick, of leaf size or finer, that a component faces.
+/// Octants of a brick, of leaf size or finer, that a component faces or has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
-    /// The rank whose brick it is.
+    /// The rank that answers for the brick.
     pub rank: usize,
     /// The level of the facing leaf.
     pub level: Level,
-    /// The brick, of that level, that is faced.
+    /// The brick, of that level.
     pub key: u64,
-    /// The component that faces it.
+    /// The component.
     pub component: Component,
-    /// The octants faced.
+    /// The octants.
     pub bits: u64,
 }
 
@@ -81,8 +82,8 @@ enum Across {
     Nothing,
     /// Leaves coarser than this level.
     Coarser,
-    /// Another rank's bricks.
-    Remote(usize),
+    /// Other ranks' bricks.
+    Remote,
     /// A node of this level and which of its octants exist.
     Here(Node, u64),
 }
@@ -106,10 +107,11 @@ enum Beyond {
     Here(Family),
 }
 
-/// Joins all components that share part of a face.
-pub fn join(nodes: &Nodes) -> Local {
+/// Joins all components that share part of a face, as far as this rank's nodes tell.
+pub fn join(nodes: &Nodes, share: &Ownership) -> Local {
     let mut w = Walk {
         nodes,
+        share,
         local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
         way: Vec::new(),
     };
@@ -120,6 +122,7 @@ pub fn join(nodes: &Nodes) -> Local {
 
 struct Walk<'a> {
     nodes: &'a Nodes,
+    share: &'a Ownership,
     local: Local,
     /// The bricks on the way down, by level.
     way: Vec<Frame>,
@@ -152,7 +155,13 @@ impl Walk<'_> {
     /// Joins the components of one brick with what they face.
     fn join_brick(&mut self, l: Level, frame: &Frame) {
         let nodes = self.nodes;
+        let elsewhere = nodes.place(l, frame.node) == Place::Shared
+            && !self.share.answers_for(l, frame.key);
         for (c, bits) in nodes.components(l, frame.node) {
+            if elsewhere {
+                // Whoever answers for the brick joins it with what it faces, and this rank's copy with its own.
+                self.tell(l, frame.key, c, bits);
+            }
             let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
             self.join_coarser(l, c, frame.key, inner, None);
             for axis in 0..3 {
@@ -183,16 +192,15 @@ impl Walk<'_> {
         match frame.across[axis][up] {
             Across::Nothing => {}
             Across::Coarser => self.join_coarser(l, c, there(), faced, Some((axis, up))),
-            Across::Remote(rank) => {
-                // What a top brick faces, the other rank sees itself.
-                if nodes.place(l, frame.node) == Place::Mine {
-                    self.local.faces.push(Face {
-                        rank,
-                        level: l,
-                        key: there(),
-                        component: c,
-                        bits: faced,
-                    });
+            Across::Remote => {
+                let asks = match nodes.place(l, frame.node) {
+                    Place::Mine => true,
+                    Place::Shared => self.share.answers_for(l, frame.key),
+                    // What a top brick faces, the other rank sees itself.
+                    Place::Top | Place::Remote(_) => false,
+                };
+                if asks {
+                    self.tell(l, there(), c, faced);
                 }
             }
             Across::Here(n, exists) => {
@@ -208,6 +216,12 @@ impl Walk<'_> {
                 }
             }
         }
+    }
+
+    /// Has the rank that answers for a brick told which of its octants a component meets.
+    fn tell(&mut self, level: Level, key: u64, component: Component, bits: u64) {
+        let rank = self.share.answerer(level, key);
+        self.local.faces.push(Face { rank, level, key, component, bits });
     }
 
     /// Joins a component with the leaves coarser than level `l` that cover the octants `faced` of brick
@@ -284,7 +298,7 @@ fn step_across(nodes: &Nodes, l: Level, beyond: &Beyond, j: u64) -> Across {
     match family.child(j) {
         None => Across::Coarser,
         Some((n, exists)) => match nodes.place(l + 1, n) {
-            Place::Remote(r) => Across::Remote(r),
+            Place::Remote(_) => Across::Remote,
             _ => Across::Here(n, exists),
         },
     }

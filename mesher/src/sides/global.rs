@@ -53,7 +53,7 @@ fn name_by_top(
 ) -> Vec<[Name; 2]> {
     let bystander = share.bystander();
     let top = Nodes::new(&share.top_of(tree), &bystander);
-    let of_top = components::join(&top).classes().of;
+    let of_top = components::join(&top, &bystander).classes().of;
     let here = top_components(nodes);
     assert_eq!(here.len(), of_top.len(), "all ranks hold the same top bricks");
     let mut pairs = Vec::new();

@@ -53,11 +53,11 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Sides {
     let nodes = nodes::Nodes::new(tree, share);
-    let mut local = components::join(&nodes);
+    let mut local = components::join(&nodes, share);
     let faces = std::mem::take(&mut local.faces);
     let classes = local.classes();
     let names = global::names(&nodes, tree, share, faces, &classes, comm);
-    let candidates = vote::candidates(&nodes, tree, &classes.of, &names, share, comm);
+    let candidates = vote::candidates(&nodes, tree, &classes.of, &names, share);
     // The largest thing in memory; for the sides, bricks are flooded once more.
     drop(nodes);
 
@@ -67,7 +67,7 @@ pub fn decide(
     let mut sides = Sides {
         inside: per_level(),
         deleted: per_level(),
-        components: candidates.len() as u64,
+        components: verdict.components,
         ambiguous: verdict.ambiguous,
         rays: verdict.rays,
     };

@@ -6,7 +6,7 @@ use super::nodes::Nodes;
 use super::rays::parities;
 use crate::brick::Brick;
 use crate::brickset::ones;
-use crate::comm::Comm;
+use crate::comm::{Comm, gather_merged};
 use crate::facet::Facet;
 use crate::octant::{Level, corner, edge};
 use crate::share::Ownership;
@@ -32,15 +32,14 @@ impl Candidate {
     }
 }
 
-/// For each component of the whole tree its first leaves. Collective; the same on all ranks.
+/// The first leaves of the components that this rank has part of, as far as it answers for them.
 pub fn candidates(
     nodes: &Nodes,
     tree: &Tree,
     class: &[u32],
     names: &[Name],
     share: &Ownership,
-    comm: &dyn Comm,
-) -> BTreeMap<Name, Vec<Candidate>> {
+) -> Firsts {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); names.len()];
     let mut here: Vec<(u32, u64)> = Vec::new();
     for l in 0..LEVELS as Level {
@@ -66,16 +65,16 @@ pub fn candidates(
             }
         }
     }
-    let flat: Vec<u64> = names
-        .iter()
-        .zip(&first)
-        .flat_map(|(&n, list)| list.iter().flat_map(move |c| [n, c.0]))
-        .collect();
-    drop(first);
-    let mut all: BTreeMap<Name, Vec<Candidate>> = BTreeMap::new();
-    for words in comm.all_gather(&flat).iter() {
-        words.chunks_exact(2).for_each(|w| all.entry(w[0]).or_default().push(Candidate(w[1])));
-    }
+    merged(names.iter().copied().zip(first).filter(|(_, list)| !list.is_empty()))
+}
+
+/// Components' first leaves, in order.
+pub type Firsts = BTreeMap<Name, Vec<Candidate>>;
+
+/// The first of several lists for each name.
+fn merged(lists: impl Iterator<Item = (Name, Vec<Candidate>)>) -> Firsts {
+    let mut all = Firsts::new();
+    lists.for_each(|(name, list)| all.entry(name).or_default().extend(list));
     for list in all.values_mut() {
         list.sort_unstable();
         list.truncate(CANDIDATES);
@@ -84,51 +83,86 @@ pub fn candidates(
 }
 
 /// What the vote came to.
+#[derive(Default)]
 pub struct Verdict {
     /// The components that are inside.
     pub inside: HashSet<Name>,
     /// Those decided by majority.
     pub ambiguous: Option<Ambiguous>,
+    /// All components of the tree.
+    pub components: u64,
     /// Rays cast.
     pub rays: u64,
 }
 
-/// Casts the rays, each rank against its share of the facets. Collective; the same on all ranks.
-pub fn decide(
-    candidates: &BTreeMap<Name, Vec<Candidate>>,
-    facets: &[Facet],
-    comm: &dyn Comm,
-) -> Verdict {
-    let mut verdict = Verdict { inside: HashSet::new(), ambiguous: None, rays: 0 };
-    // Components still open, with the number of their rays so far that say inside.
-    let mut open: Vec<(Name, &[Candidate], u32)> =
-        candidates.iter().map(|(&n, list)| (n, list.as_slice(), 0)).collect();
-    for round in 0..CANDIDATES {
-        let points: Vec<[i64; 3]> =
-            open.iter().filter_map(|c| c.1.get(round)).map(|c| c.centroid()).collect();
-        if points.is_empty() {
+/// A component that is not decided yet.
+struct Open {
+    name: Name,
+    /// Its rays so far that say inside.
+    votes: u32,
+}
+
+/// Casts the rays, each rank against its share of the facets; `mine` are this rank's [`candidates`]. Collective;
+/// the same on all ranks.
+pub fn decide(mine: &Firsts, facets: &[Facet], comm: &dyn Comm) -> Verdict {
+    let mut verdict = Verdict::default();
+    // Nearly always the very first leaf's rays agree: only that is told of every component.
+    let firsts = mine.iter().map(|(&name, list)| [name, list[0].0]).collect();
+    let firsts = gather_merged(firsts, u64::min, comm);
+    verdict.components = firsts.len() as u64;
+    let ask = |asked: Vec<(Open, Candidate)>, verdict: &mut Verdict| -> Vec<Open> {
+        let points: Vec<[i64; 3]> = asked.iter().map(|(_, c)| c.centroid()).collect();
+        verdict.rays += 6 * points.len() as u64;
+        let odd = xor_over_ranks(parities(facets, &points), comm);
+        let told = asked.into_iter().zip(odd).filter_map(|((open, _), rays)| {
+            if rays == 63 {
+                verdict.inside.insert(open.name);
+            }
+            let votes = open.votes + rays.count_ones();
+            (rays != 0 && rays != 63).then_some(Open { votes, ..open })
+        });
+        told.collect()
+    };
+    let asked = firsts.iter().map(|e| (Open { name: e[0], votes: 0 }, Candidate(e[1])));
+    let mut open = ask(asked.collect(), &mut verdict);
+    if open.is_empty() {
+        return verdict;
+    }
+    let lists = all_of(mine, &open, comm);
+    // Those that have no more leaves to be asked.
+    let mut exhausted = Vec::new();
+    for round in 1..CANDIDATES {
+        let (next, done) = open.into_iter().partition(|c: &Open| lists[&c.name].len() > round);
+        open = next;
+        exhausted.extend::<Vec<Open>>(done);
+        if open.is_empty() {
             break;
         }
-        verdict.rays += 6 * points.len() as u64;
-        let mut odd = xor_over_ranks(parities(facets, &points), comm).into_iter();
-        open.retain_mut(|(name, list, votes)| {
-            let Some(rays) = (round < list.len()).then(|| odd.next()).flatten() else {
-                return true;
-            };
-            if rays == 63 {
-                verdict.inside.insert(*name);
-            }
-            *votes += rays.count_ones();
-            rays != 0 && rays != 63
+        let asked = open.into_iter().map(|c| {
+            let candidate = lists[&c.name][round];
+            (c, candidate)
         });
+        open = ask(asked.collect(), &mut verdict);
     }
-    let first = open.iter().map(|c| c.1[0]).min();
+    exhausted.extend(open);
+    let list = |c: &Open| &lists[&c.name];
+    let first = exhausted.iter().map(|c| list(c)[0]).min();
     verdict.ambiguous =
-        first.map(|c| Ambiguous { count: open.len() as u64, example: c.centroid() });
+        first.map(|c| Ambiguous { count: exhausted.len() as u64, example: c.centroid() });
     verdict.inside.extend(
-        open.iter().filter(|(_, list, votes)| *votes as usize > 3 * list.len()).map(|c| c.0),
+        exhausted.iter().filter(|c| c.votes as usize > 3 * list(c).len()).map(|c| c.name),
     );
     verdict
+}
+
+/// The candidates of some components, from all ranks. Collective; the same on all ranks.
+fn all_of(mine: &Firsts, open: &[Open], comm: &dyn Comm) -> Firsts {
+    let told = open.iter().filter_map(|c| Some((c.name, mine.get(&c.name)?)));
+    let flat: Vec<u64> =
+        told.flat_map(|(name, list)| list.iter().flat_map(move |c| [name, c.0])).collect();
+    let all = comm.all_gather(&flat);
+    let pairs = all.iter().flat_map(|words| words.chunks_exact(2));
+    merged(pairs.map(|w| (w[0], vec![Candidate(w[1])])))
 }
 
 /// Parities over all facets from those over each rank's. Collective.

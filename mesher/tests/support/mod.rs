@@ -148,6 +148,7 @@ impl Run {
             partitioner: Partitioner::Morton,
             weights: Weights::Area,
             level_base: None,
+            rebalance: true,
         },
     };
 }
@@ -160,7 +161,7 @@ pub struct Outcome {
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
-    Division { partitioner, weights: Weights::Area, level_base }
+    Division { partitioner, weights: Weights::Area, level_base, rebalance: true }
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {

@@ -1,0 +1,103 @@
+//! Equal shares of the Morton curve, by the leaves to expect.
+//!
+//! Nobody need know all of it. Where the weight lies roughly, all ranks are told; that cuts the curve roughly. What a
+//! rank's facets weigh in small octants goes to whoever has the rough share that they lie in; so each rank knows one
+//! stretch of the curve exactly, and the true cuts follow from the sums of the stretches.
+
+use super::cut::Cut;
+use crate::comm::{Comm, gather_merged};
+use crate::facet::Facet;
+use crate::lattice::Rules;
+use crate::octant::{Level, start57};
+use crate::partition::area::{self, PARTS};
+use crate::partition::curve::{self, Bin};
+use crate::partition::thickness;
+use crate::share::Ownership;
+
+/// Shares by the facets' area, roughly in octants of the first level, finally in those of the second. Collective.
+pub fn by_area(facets: &[Facet], rules: &Rules, levels: [Level; 2], comm: &dyn Comm) -> Ownership {
+    let [coarse, fine] = levels;
+    let mine = expected(facets, rules, coarse).into_iter().map(|b| [b.0, b.1]).collect();
+    let told = gather_merged(mine, |a, b| a + b, comm);
+    let mut bins: Vec<Bin> = told.into_iter().map(|e| (e[0], e[1])).collect();
+    let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / PARTS).sum::<u64>();
+    let light = leaves(&bins) / comm.size() as u64;
+    curve::add_boxes(&mut bins, rules, coarse, light, PARTS, &curve::ALL);
+    curve::merge(&mut bins);
+    let bins = Bins { light: leaves(&bins) / (comm.size() as u64 * super::CUT_PARTS), bins };
+    finely(&bins, expected(facets, rules, fine), rules, fine, |_, _| {}, comm)
+}
+
+/// Shares by what a rehearsal told of the pieces of a cut; within a piece by the facets' area, in octants of level
+/// `fine`. Collective.
+pub fn by_rehearsal(
+    facets: &[Facet],
+    rules: &Rules,
+    cut: &Cut,
+    told: &[u64],
+    fine: Level,
+    comm: &dyn Comm,
+) -> Ownership {
+    let start = |i: usize| start57(cut.pieces[i].level, cut.pieces[i].code);
+    let bins = told.iter().enumerate().map(|(i, &leaves)| (start(i), leaves.saturating_mul(PARTS)));
+    let light = told.iter().sum::<u64>() / (comm.size() as u64 * super::CUT_PARTS);
+    let mut mine = expected(facets, rules, fine);
+    for b in &mut mine {
+        let i = cut.pieces.partition_point(|p| start57(p.level, p.code) <= b.0) - 1;
+        let ratio = told[i] as f64 / cut.pieces[i].weight as f64;
+        b.1 = (b.1 as f64 * ratio.min(1.0)) as u64;
+    }
+    // What a piece has more than area lets expect is taken to be at its corner; pieces are small.
+    let more = |bins: &mut Vec<Bin>, share: &Ownership| {
+        for (i, (piece, &leaves)) in cut.pieces.iter().zip(told).enumerate() {
+            if share.owner_at(start(i)) == comm.rank() {
+                bins.push((start(i), leaves.saturating_sub(piece.weight).saturating_mul(PARTS)));
+            }
+        }
+    };
+    finely(&Bins { bins: bins.collect(), light }, mine, rules, fine, more, comm)
+}
+
+/// Leaves to expect along some facets, in `PARTS`, by octants of a level.
+fn expected(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
+    let mut bins = area::of(facets, rules, level);
+    bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(thickness(rules)));
+    curve::merge(&mut bins);
+    bins
+}
+
+/// What all ranks know.
+struct Bins {
+    bins: Vec<Bin>,
+    /// Leaves that need not be told apart.
+    light: u64,
+}
+
+/// Cuts the curve where bins in which all ranks have parts, `mine` here, ask for it; `more` adds what is this
+/// rank's to know in rough shares. Collective.
+fn finely(
+    known: &Bins,
+    mine: Vec<Bin>,
+    rules: &Rules,
+    fine: Level,
+    more: impl Fn(&mut Vec<Bin>, &Ownership),
+    comm: &dyn Comm,
+) -> Ownership {
+    let everything = || vec![(0, 0)];
+    let changes = curve::cut_known(&known.bins, comm.size()).unwrap_or_else(everything);
+    let roughly = Ownership::along(comm.rank(), comm.size(), changes);
+    let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size()];
+    for (start, weight) in mine {
+        out[roughly.owner_at(start)].extend([start, weight]);
+    }
+    let heard = comm.exchange(out.into_iter().enumerate().collect());
+    let pairs = heard.iter().flat_map(|(_, words)| words.chunks_exact(2));
+    let mut bins: Vec<Bin> = pairs.map(|w| (w[0], w[1])).collect();
+    more(&mut bins, &roughly);
+    for stretch in roughly.stretches() {
+        curve::add_boxes(&mut bins, rules, fine, known.light, PARTS, &stretch);
+    }
+    curve::merge(&mut bins);
+    let changes = curve::cut(&bins, comm).unwrap_or_else(everything);
+    Ownership::along(comm.rank(), comm.size(), changes)
+}

@@ -1,0 +1,109 @@
+//! Cutting the Morton curve into parts of equal weight.
+//!
+//! What lies along the curve is weighed in *bins*: octants of one level, small enough that an equal share need
+//! not fall within one.
+
+use crate::comm::Comm;
+use crate::lattice::Rules;
+use crate::octant::{LEVEL_MAX, Level, start57};
+use crate::partition::boxed;
+use std::ops::Range;
+
+/// The level-19 Morton code of a bin's minimum corner, and what the bin weighs.
+pub type Bin = (u64, u64);
+
+/// The whole curve.
+pub const ALL: Range<u64> = 0..1 << (3 * LEVEL_MAX);
+
+/// Sorts bins, and merges those of one place.
+pub fn merge(bins: &mut Vec<Bin>) {
+    bins.sort_by_key(|b| b.0);
+    bins.dedup_by(|b, before| {
+        let same = b.0 == before.0;
+        if same {
+            before.1 += b.1;
+        }
+        same
+    });
+}
+
+/// Where owners change: each bin goes to the rank whose equal share its middle falls in. The bins are this rank's, in
+/// order, and all behind those of lower ranks. None where nothing weighs anything. Collective; the same on
+/// all ranks.
+pub fn cut(bins: &[Bin], comm: &dyn Comm) -> Option<Vec<(u64, usize)>> {
+    let sums: Vec<u64> = {
+        let mine = bins.iter().map(|b| b.1).sum();
+        comm.all_gather(&[mine]).iter().map(|w| w[0]).collect()
+    };
+    let before = sums[..comm.rank()].iter().map(|&s| u128::from(s)).sum();
+    let total = sums.iter().map(|&s| u128::from(s)).sum();
+    if total == 0 {
+        return None;
+    }
+    let mine: Vec<u64> = changes(bins, before, total, comm.size())
+        .into_iter()
+        .flat_map(|(start, owner)| [start, owner as u64])
+        .collect();
+    let all = comm.all_gather(&mine);
+    let pairs = all.iter().flat_map(|words| words.chunks_exact(2));
+    Some(joined(pairs.map(|w| (w[0], w[1] as usize))))
+}
+
+/// The same for bins that all ranks have all of.
+pub fn cut_known(bins: &[Bin], ranks: usize) -> Option<Vec<(u64, usize)>> {
+    let total = bins.iter().map(|b| u128::from(b.1)).sum();
+    (total > 0).then(|| joined(changes(bins, 0, total, ranks).into_iter()))
+}
+
+/// Where owners change along some bins, `before` of the total weight being before them.
+fn changes(bins: &[Bin], mut before: u128, total: u128, ranks: usize) -> Vec<(u64, usize)> {
+    let mut changes: Vec<(u64, usize)> = Vec::new();
+    for &(start, weight) in bins {
+        let middle = 2 * before + u128::from(weight);
+        before += u128::from(weight);
+        let owner = ((middle * ranks as u128 / (2 * total)) as usize).min(ranks - 1);
+        if changes.last().is_none_or(|c| c.1 != owner) {
+            changes.push((start, owner));
+        }
+    }
+    changes
+}
+
+/// Changes along the whole curve: what is before the first bin is its owner's too.
+fn joined(changes: impl Iterator<Item = (u64, usize)>) -> Vec<(u64, usize)> {
+    let mut all: Vec<(u64, usize)> = changes.collect();
+    all.dedup_by_key(|c| c.1);
+    if let Some(first) = all.first_mut() {
+        first.0 = 0;
+    }
+    all
+}
+
+/// Adds the leaves that the boxes ask for within a stretch of the curve: by octants of `level`, or larger ones where
+/// those hold no more than `light`. Each leaf weighs `each`.
+pub fn add_boxes(
+    bins: &mut Vec<Bin>,
+    rules: &Rules,
+    level: Level,
+    light: u64,
+    each: u64,
+    within: &Range<u64>,
+) {
+    if rules.boxes.is_empty() {
+        return;
+    }
+    let mut open = vec![(0, 0)];
+    while let Some((l, code)) = open.pop() {
+        let span = start57(l, code)..start57(l, code + 1);
+        let leaves = boxed(l, code, rules);
+        if leaves == 0 || span.end <= within.start || within.end <= span.start {
+            continue;
+        }
+        let inside = within.start <= span.start && span.end <= within.end;
+        if l >= level || inside && leaves <= light {
+            bins.push((span.start, leaves.saturating_mul(each)));
+        } else {
+            open.extend((0..8).map(|child| (l + 1, code << 3 | child)));
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Dealing out anew what there is, where the Morton curve is cut.
+//!
+//! What work a place will make is guessed before refinement, known better when T0 is there, and exactly when the mesh
+//! is. So the curve is cut again, twice: after refinement by what sides and gradation take, after gradation by
+//! leaves. Each rank weighs what it has; cuts follow from the ranks' sums; and bricks go to their new holders.
+//! The paper asks for this in its conclusions.
+
+use crate::brick;
+use crate::brickset::ones;
+use crate::comm::Comm;
+use crate::octant::{LEVEL_MAX, Level};
+use crate::partition::curve::{self, Bin};
+use crate::share::{Ownership, brick_start};
+use crate::sides::nodes::parts;
+use crate::tree::{PerLevel, Tree};
+
+/// What a brick, a component, a second one in a brick, and a component of a single octant take in sides and gradation
+/// together, in units of some 70 ns: fitted to what the ranks of several meshes took. Surfaces that lie obliquely to the axes
+/// leave more components; uneven ones leave small ones, and steps that a processor does not foresee.
+const COSTS: [u64; 4] = [2, 2, 2, 13];
+/// Groups of bricks that are looked at to find what a level takes, about.
+const SAMPLE: usize = 1024;
+
+/// The ownership that divides the work on T0, once it is refined, into equal parts; `tree` need not be settled.
+/// Cuts fall between octants of a level. Collective.
+pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Comm) -> Ownership {
+    let mut scale = Scale::new(share, level);
+    for l in 1..tree.split.len() as Level {
+        weigh_level(tree, l, &mut scale);
+    }
+    scale.cut(comm).unwrap_or_else(|| share.clone())
+}
+
+/// Weighs the bricks of a level, of which it looks at some.
+fn weigh_level(tree: &Tree, l: Level, scale: &mut Scale) {
+    let above = &tree.split[l as usize - 1];
+    let every = (above.len() / SAMPLE).clamp(1, 16) as u64;
+    let (mut split, mut crossing) =
+        (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
+    // Spread by a product: neighbours in space have keys alike.
+    let seen = |key: u64| (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) % every == 0;
+    for b in above.bricks().filter(|b| seen(b.key)) {
+        for j in ones(u64::from(brick::parents(b.bits))).map(u64::from) {
+            let key = b.key << 3 | j;
+            let leaves = brick::children(brick::byte(b.bits, j)) & !split.get(key);
+            scale.add(l, key, cost(leaves & !crossing.get(key)) * every as i64);
+        }
+    }
+}
+
+/// What a brick with these non-crossing leaves takes.
+fn cost(open: u64) -> i64 {
+    let (mut components, mut single) = (0, 0);
+    for part in parts(open) {
+        components += 1;
+        single += u64::from(part.is_power_of_two());
+    }
+    let counts = [1, components, u64::from(components > 1), single];
+    counts.iter().zip(COSTS).map(|(n, each)| n * each).sum::<u64>() as i64
+}
+
+/// What a mesh is made of, level by level.
+pub struct Parts<'a> {
+    /// Split octants of the graded tree.
+    pub split: &'a mut PerLevel,
+    /// Crossing leaves of T0.
+    pub crossing: &'a mut PerLevel,
+    /// Leaves of T0 that are inside.
+    pub inside: &'a mut PerLevel,
+    /// Those that were deleted.
+    pub deleted: &'a mut PerLevel,
+}
+
+/// Leaves by place, on this rank.
+pub struct Weighed(Vec<Bin>);
+
+impl Weighed {
+    /// Weighs the leaves of a mesh in octants of a level; crossing leaves are in it if `with_crossing`.
+    pub fn new(parts: &Parts, share: &Ownership, level: Level, with_crossing: bool) -> Self {
+        let mut scale = Scale::new(share, level);
+        let mut add = |sets: &PerLevel, each: i64| {
+            for (l, set) in (0..).zip(sets) {
+                for b in set.bricks().filter(|b| share.answers_for(l, b.key)) {
+                    scale.add(l, b.key, each * i64::from(b.bits.count_ones()));
+                }
+            }
+        };
+        // A leaf that splits makes eight of one.
+        add(parts.split, 7);
+        add(parts.deleted, -1);
+        if !with_crossing {
+            add(parts.crossing, -1);
+        }
+        Self(scale.bins())
+    }
+
+    /// The most that is in one place.
+    pub fn heaviest(&self) -> u64 {
+        self.0.iter().map(|b| b.1).max().unwrap_or(0)
+    }
+
+    /// Deals the leaves out anew, in equal shares. Collective.
+    pub fn deal(self, parts: Parts, share: &Ownership, comm: &dyn Comm) -> Ownership {
+        let Some(changes) = curve::cut(&self.0, comm) else { return share.clone() };
+        let fresh = Ownership::along(comm.rank(), comm.size(), changes);
+        let mut sets = [parts.split, parts.crossing, parts.inside, parts.deleted];
+        for set in &mut sets {
+            for (l, bricks) in (0..).zip(set.iter_mut()).filter(|(l, _)| share.is_shared(*l)) {
+                // Of several equal copies one moves.
+                bricks.retain(|b| if share.answers_for(l, b.key) { b.bits } else { 0 });
+            }
+        }
+        fresh.settle(&mut sets, comm);
+        fresh
+    }
+}
+
+/// Weighs what this rank has in octants of a level.
+struct Scale {
+    /// Where what this rank owns begins: shared bricks may begin before.
+    first: u64,
+    shift: u32,
+    bins: Vec<(u64, i64)>,
+}
+
+impl Scale {
+    fn new(share: &Ownership, level: Level) -> Self {
+        let first = share.stretches().next().map_or(0, |s| s.start);
+        Self { first, shift: 3 * (LEVEL_MAX - level), bins: Vec::new() }
+    }
+
+    /// Adds a brick; those of one level come in order.
+    #[inline]
+    fn add(&mut self, l: Level, key: u64, weight: i64) {
+        let at = brick_start(l, key).max(self.first) >> self.shift << self.shift;
+        match self.bins.last_mut().filter(|last| last.0 == at) {
+            Some(last) => last.1 += weight,
+            None => self.bins.push((at, weight)),
+        }
+    }
+
+    /// The bins in order. What is negative, as leaves may be deleted in one and their parents split in another, is
+    /// nothing.
+    fn bins(mut self) -> Vec<Bin> {
+        self.bins.sort_by_key(|b| b.0);
+        let sums = self.bins.chunk_by(|a, b| a.0 == b.0);
+        sums.map(|all| (all[0].0, all.iter().map(|b| b.1).sum::<i64>().max(0) as u64)).collect()
+    }
+
+    fn cut(self, comm: &dyn Comm) -> Option<Ownership> {
+        let changes = curve::cut(&self.bins(), comm)?;
+        Some(Ownership::along(comm.rank(), comm.size(), changes))
+    }
+}
