@@ -69,16 +69,15 @@ pub fn grade(
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
     }
+    // What balance reaches two levels up goes to its holders together with what is closed there.
+    let mut touched = BrickSet::default();
     for l in (1..=rules.level_deepest()).rev() {
-        g.close(l);
+        g.close(l, touched);
         if rules.layer_cells_min > 1 {
             let reached = g.reach(l, rules.layer_cells_min - 1);
             g.split_where_kept(l - 1, reached);
         }
-        if l > 1 {
-            let touched = g.reach(l, 1).coarsen();
-            g.split_where_kept(l - 2, touched);
-        }
+        touched = if l > 1 { g.reach(l, 1).coarsen() } else { BrickSet::default() };
     }
     (g.split, g.work)
 }
@@ -96,19 +95,28 @@ struct Gradation<'a> {
 }
 
 impl Gradation<'_> {
-    /// Splits the parents of what is split at level `l`, and marks those that are impure. Collective
-    /// where bricks are shared: a rank's own brick may have its parents in one of several ranks.
-    fn close(&mut self, l: Level) {
-        let above = self.split[l as usize].coarsen();
-        let there = std::mem::take(&mut self.split[l as usize - 1]);
-        let mut fresh = above.without(&there);
-        let mut impure =
-            std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone()).coarsen();
-        if self.share.is_shared(l - 1) {
-            [fresh, impure] = self.share.scatter(l - 1, [fresh, impure], self.comm).0;
-        }
-        self.split[l as usize - 1] = there.union(fresh);
+    /// Splits the parents of what is split at level `l`, marks those that are impure, and splits what was `touched` of
+    /// their level where it is kept. Collective: a rank's own brick may have its parents in one of several ranks.
+    fn close(&mut self, l: Level, touched: BrickSet) {
+        let impure = std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone());
+        let [above, impure] = [&self.split[l as usize], &impure].map(|set| self.parents(l, set));
+        let fresh = above.without(&self.split[l as usize - 1]);
+        let ([fresh, impure, touched], sent) =
+            self.share.scatter(l - 1, [fresh, impure, touched], self.comm);
+        self.work.bricks_sent += sent;
         self.impure = impure;
+        self.split_more(l - 1, fresh);
+        self.split_kept(l - 1, touched);
+    }
+
+    /// The parents of octants of level `l` in bricks that this rank answers for: of several equal copies one tells.
+    fn parents(&self, l: Level, set: &BrickSet) -> BrickSet {
+        if !self.share.is_shared(l) {
+            return set.coarsen();
+        }
+        let mut mine = set.clone();
+        mine.retain(|b| if self.share.answers_for(l, b.key) { b.bits } else { 0 });
+        mine.coarsen()
     }
 
     /// The parents, of level `l - 1`, that the kept leaves of level `l` in bricks that this rank answers
@@ -158,12 +166,22 @@ impl Gradation<'_> {
     fn split_where_kept(&mut self, l: Level, reached: BrickSet) {
         let ([reached], sent) = self.share.scatter(l, [reached], self.comm);
         self.work.bricks_sent += sent;
-        let before = std::mem::take(&mut self.split[l as usize]);
-        let fresh = self.kept.only(&self.split, l, reached.without(&before));
+        self.split_kept(l, reached);
+    }
+
+    /// Splits what is kept of some octants in bricks that this rank holds.
+    fn split_kept(&mut self, l: Level, reached: BrickSet) {
+        let fresh = reached.without(&self.split[l as usize]);
+        self.split_more(l, self.kept.only(&self.split, l, fresh));
+    }
+
+    /// Splits octants, not split yet, in bricks that this rank holds.
+    fn split_more(&mut self, l: Level, fresh: BrickSet) {
         self.work.octants_split += (fresh.bricks())
             .filter(|b| self.share.answers_for(l, b.key))
             .map(|b| u64::from(b.bits.count_ones()))
             .sum::<u64>();
+        let before = std::mem::take(&mut self.split[l as usize]);
         self.split[l as usize] = before.union(fresh);
     }
 

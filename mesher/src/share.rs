@@ -12,7 +12,7 @@
 //! Invariants: runs follow each other from the curve's start, and neighbours have different owners.
 
 use crate::brickset::BrickSet;
-use crate::comm::{Comm, Entry, gather_merged};
+use crate::comm::{Comm, Entry, collector, for_collectors, gather_collected};
 use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::tree::{PerLevel, Tree};
 use std::collections::BTreeMap;
@@ -187,8 +187,19 @@ impl Ownership {
         if l > self.level_shared {
             return self.place_of(self.answerer(l, key));
         }
-        let owners = &self.runs.owners[self.runs.of_brick(l, key)];
+        self.place_among(l, self.owners_of(l, key))
+    }
+
+    /// The owners, run by run, of what a brick fills; of many, some.
+    #[inline]
+    fn owners_of(&self, l: Level, key: u64) -> &[usize] {
+        &self.runs.owners[self.runs.of_brick(l, key)]
+    }
+
+    #[inline]
+    fn place_among(&self, l: Level, owners: &[usize]) -> Place {
         match owners.len() {
+            _ if l < 2 => Place::Top,
             1 => self.place_of(owners[0]),
             MANY.. => Place::Top,
             _ if owners.contains(&self.rank) => Place::Shared,
@@ -252,27 +263,44 @@ impl Ownership {
             return (sets.into_iter().map(|(_, set)| set).collect(), 0);
         }
         let any_top = sets.iter().any(|(l, _)| *l <= self.level_top);
-        let mut out = Parcels { to: vec![Vec::new(); self.ranks], sent: 0, top: Vec::new() };
+        let mut out = Parcels::default();
         let pick = |(number, (l, set))| vec![self.pick(number, l, set, &mut out)];
         // What this rank holds of each set, in parts.
         let mut parts: Vec<Vec<BrickSet>> = (0..).zip(sets).map(pick).collect();
-        for (_, words) in comm.exchange(out.to.into_iter().enumerate().collect()) {
+        let mut top = std::mem::take(&mut out.top);
+        if any_top && let Some(collected) = for_collectors(&mut top, |a, b| a | b, comm) {
+            top.clear();
+            for (i, entries) in collected.iter().enumerate() {
+                out.tell(TOP, entries.as_chunks().0.iter().copied(), collector(i, comm));
+            }
+        }
+        let sent = out.sent + out.loose.len() as u64;
+        let mut told: Vec<Entry> = Vec::new();
+        for (_, words) in comm.exchange(out.parcels()) {
             let mut left = words.as_slice();
             while let Some((&number, packed)) = left.split_first() {
-                let (set, behind) = BrickSet::unpack(packed);
-                parts[number as usize].push(set);
+                if number < LOOSE {
+                    let (set, behind) = BrickSet::unpack(packed);
+                    parts[number as usize].push(set);
+                    left = behind;
+                    continue;
+                }
+                let (entries, behind) = packed[1..].split_at(2 * packed[0] as usize);
+                let to = if number == TOP { &mut top } else { &mut told };
+                to.extend_from_slice(entries.as_chunks().0);
                 left = behind;
             }
         }
         if any_top {
-            let told = gather_merged(out.top, |a, b| a | b, comm);
-            for told in told.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
-                let mut set = BrickSet::default();
-                told.iter().for_each(|e| set.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
-                parts[(told[0][0] >> KEY_BITS) as usize].push(set);
-            }
+            told.extend(gather_collected(top, |a, b| a | b, comm));
         }
-        (parts.into_iter().map(BrickSet::union_of).collect(), out.sent)
+        told.sort_by_key(|e| e[0]);
+        for told in told.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
+            let mut set = BrickSet::default();
+            told.iter().for_each(|e| set.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
+            parts[(told[0][0] >> KEY_BITS) as usize].push(set);
+        }
+        (parts.into_iter().map(BrickSet::union_of).collect(), sent)
     }
 
     /// Takes out of set `number` what others hold; returns what this rank does. Of top bricks it holds what
@@ -295,23 +323,21 @@ impl Ownership {
             }
             return set;
         }
-        let mut others: BTreeMap<usize, BrickSet> = BTreeMap::new();
         set.retain(|b| {
-            let place = self.place(l, b.key);
+            let owners = self.owners_of(l, b.key);
+            let place = self.place_among(l, owners);
+            let entry = [number << KEY_BITS | b.key, b.bits];
             if place == Place::Top {
-                out.top.push([number << KEY_BITS | b.key, b.bits]);
+                out.top.push(entry);
                 return 0;
             }
             if place != Place::Mine {
-                // With METIS an owner may have several of the runs: it is told once, as it is last told of this brick.
-                for &owner in &self.runs.owners[self.runs.of_brick(l, b.key)] {
-                    others.entry(owner).or_default().push(b.key, b.bits);
-                }
+                // Few, and for many owners: told brick by brick.
+                let others = owners.iter().filter(|&&owner| owner != self.rank);
+                out.loose.extend(others.map(|&owner| (owner, entry)));
             }
             if matches!(place, Place::Mine | Place::Shared) { b.bits } else { 0 }
         });
-        others.remove(&self.rank);
-        others.into_iter().for_each(|(owner, set)| out.send(number, &set, owner));
         set
     }
 }
@@ -319,21 +345,49 @@ impl Ownership {
 /// Bits of a brick's key; above them is room for the number of the set that it belongs to.
 pub const KEY_BITS: u32 = 54;
 
-/// What is to be sent.
+/// In place of a set's number, before the number of some bricks and those, each with its set's number.
+const LOOSE: u64 = 1 << 32;
+/// The same for top bricks that a rank collects.
+const TOP: u64 = LOOSE + 1;
+
+/// What is to be sent. Entries have their set's number above the key.
+#[derive(Default)]
 struct Parcels {
-    /// Sets by receiver: the number of each, then itself.
-    to: Vec<Vec<u64>>,
-    /// Bricks in them.
-    sent: u64,
-    /// Bricks for everybody, their set's number above the key.
+    /// By receiver: sets, each behind its number, and entries.
+    to: BTreeMap<usize, Vec<u64>>,
+    /// Entries with their receivers.
+    loose: Vec<(usize, Entry)>,
+    /// Entries for everybody.
     top: Vec<Entry>,
+    /// Bricks in sets.
+    sent: u64,
 }
 
 impl Parcels {
     fn send(&mut self, number: u64, set: &BrickSet, to: usize) {
         self.sent += set.len() as u64;
-        self.to[to].push(number);
-        set.pack(&mut self.to[to]);
+        let parcel = self.to.entry(to).or_default();
+        parcel.push(number);
+        set.pack(parcel);
+    }
+
+    fn tell(&mut self, kind: u64, entries: impl ExactSizeIterator<Item = Entry>, to: usize) {
+        if entries.len() > 0 {
+            let parcel = self.to.entry(to).or_default();
+            parcel.extend([kind, entries.len() as u64]);
+            parcel.extend(entries.flatten());
+        }
+    }
+
+    fn parcels(mut self) -> Vec<(usize, Vec<u64>)> {
+        let mut loose = std::mem::take(&mut self.loose);
+        loose.sort_by_key(|l| l.0);
+        // With METIS an owner may have several runs of an octant.
+        loose.dedup();
+        for told in loose.chunk_by(|a, b| a.0 == b.0) {
+            self.tell(LOOSE, told.iter().map(|l| l.1), told[0].0);
+        }
+        self.to.into_iter().collect()
     }
 }
 

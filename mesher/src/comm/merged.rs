@@ -19,31 +19,54 @@ pub fn gather_merged(
     merge: impl Fn(u64, u64) -> u64 + Copy,
     comm: &dyn Comm,
 ) -> Vec<Entry> {
-    combine(&mut mine, merge);
-    if comm.size() > SMALL {
-        mine = collect(&mine, comm);
-        combine(&mut mine, merge);
+    if let Some(parcels) = for_collectors(&mut mine, merge, comm) {
+        let parcels = parcels.into_iter().enumerate().map(|(i, w)| (collector(i, comm), w));
+        let heard = comm.exchange(parcels.collect());
+        mine = heard.iter().flat_map(|(_, words)| words.as_chunks().0).copied().collect();
     }
+    gather_collected(mine, merge, comm)
+}
+
+/// The first step, as far as it needs no others: what is to be sent to each collector, in the order of their
+/// numbers; none where no step is to be taken before [`gather_collected`].
+pub fn for_collectors(
+    mine: &mut Vec<Entry>,
+    merge: impl Fn(u64, u64) -> u64,
+    comm: &dyn Comm,
+) -> Option<Vec<Vec<u64>>> {
+    combine(mine, merge);
+    if comm.size() <= SMALL {
+        return None;
+    }
+    // As many collectors as make the two steps alike.
+    let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size().isqrt()];
+    let collectors = out.len();
+    for entry in mine {
+        // The upper bits of a product depend on all bits of the key.
+        let spread = entry[0].wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        out[spread as usize % collectors].extend(&*entry);
+    }
+    Some(out)
+}
+
+/// The rank that is collector number `i`.
+pub fn collector(i: usize, comm: &dyn Comm) -> usize {
+    i * (comm.size() / comm.size().isqrt())
+}
+
+/// The second step: tells all ranks what each has collected. Collective; the same on all ranks.
+pub fn gather_collected(
+    mut mine: Vec<Entry>,
+    merge: impl Fn(u64, u64) -> u64 + Copy,
+    comm: &dyn Comm,
+) -> Vec<Entry> {
+    combine(&mut mine, merge);
     let mut all: Vec<Entry> = Vec::new();
     for theirs in comm.all_gather(mine.as_flattened()).iter() {
         all.extend_from_slice(theirs.as_chunks().0);
     }
     combine(&mut all, merge);
     all
-}
-
-/// Brings entries to the collectors of their keys: as many as make the two steps alike. Collective.
-fn collect(mine: &[Entry], comm: &dyn Comm) -> Vec<Entry> {
-    let collectors = comm.size().isqrt();
-    let mut out: Vec<Vec<u64>> = vec![Vec::new(); collectors];
-    for entry in mine {
-        // The upper bits of a product depend on all bits of the key.
-        let spread = entry[0].wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-        out[spread as usize % collectors].extend(entry);
-    }
-    let apart = comm.size() / collectors;
-    let heard = comm.exchange(out.into_iter().enumerate().map(|(i, w)| (i * apart, w)).collect());
-    heard.iter().flat_map(|(_, words)| words.as_chunks().0).copied().collect()
 }
 
 /// Sorts entries and merges those of one key.

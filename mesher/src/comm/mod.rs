@@ -13,7 +13,7 @@ mod merged;
 pub mod mpi;
 pub mod sim;
 
-pub use merged::{Entry, gather_merged};
+pub use merged::{Entry, collector, for_collectors, gather_collected, gather_merged};
 
 use crate::error::Error;
 use cpu_time::ThreadTime;

@@ -31,13 +31,22 @@ pub fn names(
     }
     let mut pairs = name_by_top(&mut names, nodes, tree, share, classes);
     pairs.extend(across_ranks(nodes, faces, classes, &names, comm));
-    pairs.sort_unstable();
-    pairs.dedup();
     let mut joined = Joined::default();
-    for theirs in comm.all_gather(pairs.as_flattened()).iter() {
-        theirs.chunks_exact(2).for_each(|p| joined.join(p[0], p[1]));
+    for theirs in comm.all_gather(&summed_up(pairs, comm)).iter() {
+        theirs.as_chunks().0.iter().for_each(|&[a, b]| joined.join(a, b));
     }
     names.iter().map(|&n| joined.find(n)).collect()
+}
+
+/// Pairs of names, few, that join what all ranks' pairs join. Neighbours see the same from both sides, and ranks that
+/// follow each other are neighbours: so one for each group of ranks does their joining first. Collective.
+fn summed_up(pairs: Vec<[Name; 2]>, comm: &dyn Comm) -> Vec<u64> {
+    let mine = Joined::of(&pairs).pairs();
+    let group = comm.size().isqrt();
+    let first = comm.rank() / group * group;
+    let heard = comm.exchange(vec![(first, mine)]);
+    let heard = heard.iter().flat_map(|(_, words)| words.as_chunks().0);
+    Joined::of(heard).pairs()
 }
 
 /// Gives the classes that a top brick has part of the name that they have for all ranks: the number of
@@ -121,6 +130,19 @@ struct Joined {
 }
 
 impl Joined {
+    fn of<'a>(pairs: impl IntoIterator<Item = &'a [Name; 2]>) -> Self {
+        let mut joined = Self::default();
+        pairs.into_iter().for_each(|&[a, b]| joined.join(a, b));
+        joined
+    }
+
+    /// Each name that is joined to a lesser one, and the least.
+    fn pairs(&self) -> Vec<u64> {
+        let mut pairs: Vec<[Name; 2]> = self.up.keys().map(|&n| [n, self.find(n)]).collect();
+        pairs.sort_unstable();
+        pairs.into_flattened()
+    }
+
     fn find(&self, mut n: Name) -> Name {
         while let Some(&up) = self.up.get(&n) {
             n = up;
