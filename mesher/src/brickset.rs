@@ -88,13 +88,6 @@ impl BrickSet {
         self.bits.push(bits);
     }
 
-    /// The first brick's key and the last one's; none if the set is empty.
-    pub fn ends(&self) -> Option<(u64, u64)> {
-        let (first, last) = (self.runs.first()?, self.runs.last()?);
-        let (low, end) = (self.low.first()?, self.low.last()?);
-        Some((first.high | u64::from(*low), last.high | u64::from(*end)))
-    }
-
     /// The bricks in order.
     #[inline]
     pub fn bricks(&self) -> Bricks<'_> {
@@ -279,25 +272,30 @@ mod tests {
             some.retain(|b| if b.key % 3 != 0 && b.bits & mask != 0 { b.bits } else { 0 });
             prop_assert_eq!(some, of(&kept));
             prop_assert!(x.bricks().map(|b| (b.key, b.bits)).eq(a.iter().map(|(k, v)| (*k, *v))));
-            let at = b.keys().nth(b.len() / 2).copied().unwrap_or(3);
-            let mut middle = x.clone();
-            let (mut before, behind) = (middle.take_before(at), middle.take_from(2 * at));
-            [&before, &middle, &behind].map(BrickSet::check_invariants);
-            prop_assert!(before.ends().is_none_or(|e| e.1 < at));
-            prop_assert!(middle.ends().is_none_or(|e| at <= e.0 && e.1 < 2 * at));
-            let mut words = vec![7];
-            [&behind, &middle, &before].map(|set| set.pack(&mut words));
-            let mut rest = &words[1..];
-            let parts = [(); 3].map(|()| {
-                let (set, behind) = BrickSet::unpack(rest);
-                rest = behind;
-                set
+            let key = b.keys().nth(b.len() / 2).copied().unwrap_or(3);
+            let (i, j) = (x.position(key), x.position(2 * key));
+            prop_assert_eq!((i, j), (a.range(..key).count(), a.range(..2 * key).count()));
+            prop_assert!((0..x.len()).map(|i| x.key_at(i)).eq(a.keys().copied()));
+            let ranges = [0..i, i..j, j..x.len()];
+            let stretches = ranges.clone().map(|range| {
+                let mut stretch = x.clone();
+                stretch.keep(range);
+                stretch.check_invariants();
+                stretch
             });
+            let mut words = vec![7];
+            ranges.into_iter().for_each(|range| x.pack(range, &mut words));
+            let mut rest = &words[1..];
+            for stretch in &stretches {
+                let (set, behind) = BrickSet::unpack(rest);
+                prop_assert_eq!(&set, stretch);
+                rest = behind;
+            }
             prop_assert!(rest.is_empty());
-            prop_assert_eq!(BrickSet::union_of(parts.to_vec()), x.clone());
-            before.append(middle);
-            before.append(behind);
-            prop_assert_eq!(before, x.clone());
+            let [before, middle, behind] = stretches;
+            let around = before.clone().union(behind.clone());
+            prop_assert_eq!(BrickSet::union_of(vec![around, middle.clone()]), x.clone());
+            prop_assert_eq!(BrickSet::union_of(vec![behind, middle, before]), x.clone());
             prop_assert_eq!(BrickSet::union_of(vec![y, x.clone()]), of(&both));
             let mut cursor = x.cursor();
             for key in both.keys() {

@@ -311,16 +311,18 @@ impl Ownership {
             && l > self.level_shared
         {
             // Where no brick has several owners, each one's are beside each other.
-            let key = |at: u64| at >> (3 * (LEVEL_MAX + 2 - l));
-            let before = set.take_before(key(stretch.start));
-            let behind = set.take_from(key(stretch.end));
-            for mut part in [before, behind] {
-                while let Some((first, _)) = part.ends() {
-                    let run = self.runs.at(brick_start(l, first));
-                    let theirs = part.take_before(key(self.runs.end(run)));
-                    out.send(number, &theirs, self.runs.owners[run]);
+            let position = |set: &BrickSet, at: u64| set.position(at >> (3 * (LEVEL_MAX + 2 - l)));
+            let mine = position(&set, stretch.start)..position(&set, stretch.end);
+            for others in [0..mine.start, mine.end..set.len()] {
+                let mut at = others.start;
+                while at < others.end {
+                    let run = self.runs.at(brick_start(l, set.key_at(at)));
+                    let theirs = at..position(&set, self.runs.end(run));
+                    at = theirs.end;
+                    out.send(number, &set, theirs, self.runs.owners[run]);
                 }
             }
+            set.keep(mine);
             return set;
         }
         set.retain(|b| {
@@ -364,11 +366,11 @@ struct Parcels {
 }
 
 impl Parcels {
-    fn send(&mut self, number: u64, set: &BrickSet, to: usize) {
-        self.sent += set.len() as u64;
+    fn send(&mut self, number: u64, set: &BrickSet, bricks: Range<usize>, to: usize) {
+        self.sent += bricks.len() as u64;
         let parcel = self.to.entry(to).or_default();
         parcel.push(number);
-        set.pack(parcel);
+        set.pack(bricks, parcel);
     }
 
     fn tell(&mut self, kind: u64, entries: impl ExactSizeIterator<Item = Entry>, to: usize) {

@@ -1,10 +1,11 @@
-//! Stretches of a set: taken off its ends, put on, and sent.
+//! Stretches of a set: by key, taken off its ends, put on, and sent.
 
 use super::{BrickSet, LOW_BITS, Run, high_of};
+use std::ops::Range;
 
 impl BrickSet {
     /// Number of bricks before `key`.
-    fn position(&self, key: u64) -> usize {
+    pub fn position(&self, key: u64) -> usize {
         let run = self.runs.partition_point(|r| r.high < high_of(key));
         let start = |run: usize| self.runs.get(run).map_or(self.len(), |r| r.start);
         match self.runs.get(run).filter(|r| r.high == high_of(key)) {
@@ -16,29 +17,34 @@ impl BrickSet {
         }
     }
 
-    /// Takes off the bricks before `key`.
-    pub fn take_before(&mut self, key: u64) -> Self {
-        let at = self.position(key);
-        let behind = self.runs_from(at);
-        let mut runs = std::mem::replace(&mut self.runs, behind);
-        runs.retain(|r| r.start < at);
-        Self { low: self.low.drain(..at).collect(), bits: self.bits.drain(..at).collect(), runs }
+    /// The key of the brick that so many are before.
+    pub fn key_at(&self, position: usize) -> u64 {
+        let run = self.runs.partition_point(|r| r.start <= position) - 1;
+        self.runs[run].high | u64::from(self.low[position])
     }
 
-    /// Takes off the bricks from `key` on.
-    pub fn take_from(&mut self, key: u64) -> Self {
-        let at = self.position(key);
-        let runs = self.runs_from(at);
-        self.runs.retain(|r| r.start < at);
-        Self { low: self.low.split_off(at), bits: self.bits.split_off(at), runs }
+    /// The first brick's key and the last one's; none if the set is empty.
+    pub fn ends(&self) -> Option<(u64, u64)> {
+        (!self.is_empty()).then(|| (self.key_at(0), self.key_at(self.len() - 1)))
     }
 
-    /// The runs of the bricks from position `at` on, as if those were all.
-    fn runs_from(&self, at: usize) -> Vec<Run> {
-        let first = self.runs.partition_point(|r| r.start <= at).max(1) - 1;
-        let runs = self.runs.get(first..).unwrap_or_default().iter();
-        let behind = runs.map(|r| Run { start: r.start.max(at) - at, ..*r });
-        if at < self.len() { behind.collect() } else { Vec::new() }
+    /// Forgets all bricks but those of a range of positions.
+    pub fn keep(&mut self, range: Range<usize>) {
+        self.runs = self.runs_of(&range);
+        self.low.truncate(range.end);
+        self.bits.truncate(range.end);
+        self.low.drain(..range.start);
+        self.bits.drain(..range.start);
+    }
+
+    /// The runs of some bricks, as if those were all.
+    fn runs_of(&self, range: &Range<usize>) -> Vec<Run> {
+        if range.is_empty() {
+            return Vec::new();
+        }
+        let first = self.runs.partition_point(|r| r.start <= range.start) - 1;
+        let runs = self.runs[first..].iter().take_while(|r| r.start < range.end);
+        runs.map(|r| Run { start: r.start.max(range.start) - range.start, ..*r }).collect()
     }
 
     /// Puts on bricks that are all behind those of the set.
@@ -46,19 +52,38 @@ impl BrickSet {
     /// # Panics
     /// If they are not.
     pub fn append(&mut self, behind: Self) {
-        let (Some((_, last)), Some((first, _))) = (self.ends(), behind.ends()) else {
+        let Some(runs) = self.runs_with(&behind) else {
             return if self.is_empty() { *self = behind };
         };
-        assert!(last < first, "bricks must be added in Morton order");
-        let before = self.len();
-        let same = usize::from(high_of(last) == high_of(first));
-        let runs = behind.runs[same..].iter();
-        self.runs.extend(runs.map(|r| Run { start: r.start + before, ..*r }));
-        self.low.extend(behind.low);
-        self.bits.extend(behind.bits);
+        self.runs = runs;
+        self.low.extend_from_slice(&behind.low);
+        self.bits.extend_from_slice(&behind.bits);
     }
 
-    /// The union of sets; quick where they follow each other, or one is much larger than the others.
+    /// Puts on bricks that are all before those of the set.
+    ///
+    /// # Panics
+    /// If they are not.
+    pub fn prepend(&mut self, before: Self) {
+        let Some(runs) = before.runs_with(self) else {
+            return if self.is_empty() { *self = before };
+        };
+        self.runs = runs;
+        self.low.splice(..0, before.low);
+        self.bits.splice(..0, before.bits);
+    }
+
+    /// The runs of this set and one behind it; none if one of them is empty.
+    fn runs_with(&self, behind: &Self) -> Option<Vec<Run>> {
+        let ((_, last), (first, _)) = (self.ends()?, behind.ends()?);
+        assert!(last < first, "bricks must be added in Morton order");
+        let same = usize::from(high_of(last) == high_of(first));
+        let theirs = behind.runs[same..].iter();
+        let theirs = theirs.map(|r| Run { start: r.start + self.len(), ..*r });
+        Some(self.runs.iter().copied().chain(theirs).collect())
+    }
+
+    /// The union of sets; quick where they follow each other, and where one is much larger than the others.
     pub fn union_of(mut sets: Vec<Self>) -> Self {
         sets.retain(|s| !s.is_empty());
         sets.sort_by_key(Self::ends);
@@ -67,23 +92,31 @@ impl BrickSet {
             sets.sort_by_key(Self::len);
             return sets.into_iter().reduce(Self::union).unwrap_or_default();
         }
-        let more = sets.iter().skip(1).map(Self::len).sum();
-        let mut sets = sets.into_iter();
-        let mut all = sets.next().unwrap_or_default();
-        all.reserve_exact(more);
-        sets.for_each(|set| all.append(set));
+        let Some(largest) = (0..sets.len()).max_by_key(|&i| sets[i].len()) else {
+            return Self::default();
+        };
+        let (more, behind) = (sets.iter().map(Self::len).sum::<usize>(), sets.split_off(largest + 1));
+        let mut all = sets.pop().unwrap_or_default();
+        all.reserve_exact(more - all.len());
+        let mut before = Self::default();
+        sets.into_iter().for_each(|set| before.append(set));
+        all.prepend(before);
+        behind.into_iter().for_each(|set| all.append(set));
         all
     }
 
-    /// Writes the set behind some words: how many runs and bricks, the runs, the lower halves of the keys two to a
-    /// word, the bits.
-    pub fn pack(&self, words: &mut Vec<u64>) {
-        words.extend([self.runs.len() as u64, self.len() as u64]);
-        words.extend(self.runs.iter().flat_map(|r| [r.high, r.start as u64]));
-        let (pairs, last) = self.low.as_chunks::<2>();
+    /// Writes the bricks of a range of positions behind some words: how many runs and bricks, the runs, the lower halves
+    /// of the keys two to a word, the bits.
+    pub fn pack(&self, range: Range<usize>, words: &mut Vec<u64>) {
+        let runs = self.runs_of(&range);
+        let (low, bits) = (&self.low[range.clone()], &self.bits[range]);
+        words.reserve(2 + 2 * runs.len() + low.len().div_ceil(2) + bits.len());
+        words.extend([runs.len() as u64, bits.len() as u64]);
+        words.extend(runs.iter().flat_map(|r| [r.high, r.start as u64]));
+        let (pairs, last) = low.as_chunks::<2>();
         words.extend(pairs.iter().map(|&[a, b]| u64::from(a) | u64::from(b) << LOW_BITS));
         words.extend(last.iter().map(|&low| u64::from(low)));
-        words.extend_from_slice(&self.bits);
+        words.extend_from_slice(bits);
     }
 
     /// Reads what [`pack`](Self::pack) wrote at the front of some words; returns the others, too.
@@ -95,11 +128,13 @@ impl BrickSet {
         let (runs, words) = words.split_at(2 * head[0] as usize);
         let (low, words) = words.split_at((head[1] as usize).div_ceil(2));
         let (bits, words) = words.split_at(head[1] as usize);
+        let runs = runs.as_chunks().0.iter();
         let mut set = Self {
-            low: low.iter().flat_map(|w| [*w as u32, (w >> LOW_BITS) as u32]).collect(),
+            low: Vec::with_capacity(2 * low.len()),
             bits: bits.to_vec(),
-            runs: runs.as_chunks().0.iter().map(|&[high, start]| Run { high, start: start as usize }).collect(),
+            runs: runs.map(|&[high, start]| Run { high, start: start as usize }).collect(),
         };
+        low.iter().for_each(|w| set.low.extend([*w as u32, (w >> LOW_BITS) as u32]));
         set.low.truncate(bits.len());
         (set, words)
     }
