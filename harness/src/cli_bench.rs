@@ -42,7 +42,7 @@ pub struct BenchArguments {
     /// Values of n in the experiment `layers`
     #[arg(long, value_delimiter = ',')]
     pub layers: Vec<u32>,
-    /// Weights of base leaves: unit, area, rehearsal
+    /// Weights of base leaves: unit, area, rehearsal, rebalance
     #[arg(long, value_delimiter = ',')]
     pub weights: Vec<String>,
     /// Partitioners: metis, morton

@@ -50,9 +50,6 @@ pub struct Division {
     pub weights: Weights,
     /// Level at which the tree is cut into base leaves; chosen by ranks and weights if none.
     pub level_base: Option<Level>,
-    /// Whether to divide anew what there is after refinement and after gradation, where the division is one
-    /// of the Morton curve by weights.
-    pub rebalance: bool,
 }
 
 impl Division {
@@ -61,6 +58,11 @@ impl Division {
         self.level_base.is_none()
             && self.partitioner == Partitioner::Morton
             && self.weights != Weights::Unit
+    }
+
+    /// Whether it is made anew when it is known what there is.
+    pub fn rebalances(&self) -> bool {
+        self.is_of_curve() && self.weights == Weights::Rebalance
     }
 }
 
@@ -121,7 +123,7 @@ fn of_leaves(
     };
     let weights = match division.weights {
         Weights::Unit => vec![1; cut.pieces.len()],
-        Weights::Area => cut.weights(),
+        Weights::Area | Weights::Rebalance => cut.weights(),
         Weights::Rehearsal => rehearse::weights(facets, rules, &cut, comm),
     };
     let owners = partition::assign(&cut, &weights, division.partitioner, comm)?;

@@ -33,15 +33,11 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "morton")]
     pub partitioner: Partitioner,
     /// What a base leaf weighs in the partition
-    #[arg(long, value_enum, default_value = "area")]
+    #[arg(long, value_enum, default_value = "rebalance")]
     pub weights: Weights,
     /// Level at which the tree is cut into base leaves: a number, or auto
     #[arg(long, default_value = "auto", value_parser = level_base)]
     pub level_base: LevelBase,
-    /// Keep the partition that refinement began with. Otherwise the Morton curve is cut anew after refinement and
-    /// after gradation, except with METIS, unit weights or a level of base leaves
-    #[arg(long)]
-    pub no_rebalance: bool,
     /// How ranks talk: auto, solo, mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
     #[arg(long, default_value = "auto", value_parser = comm_choice)]
     pub comm: CommChoice,

@@ -187,13 +187,15 @@ fn build(
     });
     comm.agree(check_interrupt())?;
     let graded = graded.map(|mut split| {
-        let heaviest = match refined.level_cut {
+        counters.base_leaf(match refined.level_cut {
             None => base::cells_heaviest(&split, &sides.deleted, &refined.dealt),
-            Some(_) => record.phase("rebalance", comm, || {
-                deal_leaves(&mut split, &mut refined, &mut sides, &rules, options, comm)
-            }),
-        };
-        counters.base_leaf(heaviest);
+            Some(level) => {
+                let anew = options.division.rebalances();
+                let mut deal =
+                    || deal_leaves(level, anew, &mut split, &mut refined, &mut sides, &rules, comm);
+                if anew { record.phase("rebalance", comm, deal) } else { deal() }
+            }
+        });
         split
     });
     Ok((Meshed { facets: total, rules, refined, sides, graded }, counters))
@@ -252,14 +254,14 @@ fn refine(
     let base::Base { mut share, dealt, level_base, .. } = base;
     let filed =
         record.phase("route", comm, || voxelise::Filed::new(&base::route(facets, &share, comm)));
-    let (mut tree, work) = record
-        .phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&share)));
+    let (mut tree, work) =
+        record.phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&share)));
     counters.voxelise(&work);
     let level_cut = division.is_of_curve().then_some(level_base);
-    let settle = if division.rebalance && level_cut.is_some() { "rebalance" } else { "share top" };
+    let settle = if division.rebalances() { "rebalance" } else { "share top" };
     record.phase(settle, comm, || {
-        if let Some(level) = level_cut.filter(|_| division.rebalance) {
-            share = rebalance::of_base_tree(&tree, &share, level, comm);
+        if division.rebalances() {
+            share = rebalance::of_base_tree(&tree, &share, level_base, comm);
         }
         // What several ranks hold of T0, each knows as far as its own octants ask for it.
         share.settle(&mut [&mut tree.split, &mut tree.crossing], comm);
@@ -267,24 +269,23 @@ fn refine(
     Ok(Refined { tree, share, dealt, level_base, level_cut })
 }
 
-/// Deals the leaves of the finished tree out anew, if that is wanted; returns how many there are in the octant that
-/// has most of those that are not divided. Collective.
+/// Weighs the leaves of the finished tree by octants of a level, and deals them out `anew` or not. Returns how many are in
+/// the octant that has most. Collective.
 fn deal_leaves(
+    level: octant::Level,
+    anew: bool,
     split: &mut PerLevel,
     refined: &mut Refined,
     sides: &mut Sides,
     rules: &Rules,
-    options: &Options,
     comm: &dyn Comm,
 ) -> u64 {
-    let Some(level) = refined.level_cut else { return 0 };
     let Refined { tree, share, .. } = refined;
-    let (crossing, inside, deleted) =
-        (&mut tree.crossing, &mut sides.inside, &mut sides.deleted);
+    let (crossing, inside, deleted) = (&mut tree.crossing, &mut sides.inside, &mut sides.deleted);
     let parts = rebalance::Parts { split, crossing, inside, deleted };
     let weighed = rebalance::Weighed::new(&parts, share, level, rules.keep_crossing);
     let heaviest = weighed.heaviest();
-    if options.division.rebalance {
+    if anew {
         *share = weighed.deal(parts, share, comm);
     }
     heaviest

@@ -148,7 +148,6 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
             partitioner: args.partitioner,
             weights: args.weights,
             level_base: args.level_base.0,
-            rebalance: !args.no_rebalance,
         },
         ungraded: args.ungraded,
         out: args.out.clone(),

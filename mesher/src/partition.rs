@@ -30,6 +30,9 @@ pub enum Weights {
     Area,
     /// By the leaves of the same mesh made a few levels coarser.
     Rehearsal,
+    /// By area at first; then by what there is, after refinement and once more after gradation. With METIS or a chosen
+    /// level of base leaves, which stay where they are, the same as area.
+    Rebalance,
 }
 
 /// Leaves of the mesh that a finest cell's face of a facet brings: a facet's cells come with the layers on its

@@ -5,14 +5,15 @@
 //! leaves. Each rank weighs what it has; cuts follow from the ranks' sums; and bricks go to their new holders.
 //! The paper asks for this in its conclusions.
 
-use crate::brick;
+use crate::brick::{self, Brick};
 use crate::brickset::ones;
 use crate::comm::Comm;
-use crate::octant::{LEVEL_MAX, Level};
+use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::curve::{self, Bin};
 use crate::share::{Ownership, brick_start};
 use crate::sides::nodes::parts;
-use crate::tree::{PerLevel, Tree};
+use crate::tree::{LEVELS, PerLevel, Tree};
+use std::ops::Range;
 
 /// What a brick, a component, a second one in a brick, and a component of a single octant take in sides and gradation
 /// together, in units of some 70 ns: fitted to what the ranks of several meshes took. Surfaces that lie obliquely to the axes
@@ -38,7 +39,7 @@ fn weigh_level(tree: &Tree, l: Level, scale: &mut Scale) {
     let (mut split, mut crossing) =
         (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
     // Spread by a product: neighbours in space have keys alike.
-    let seen = |key: u64| (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) % every == 0;
+    let seen = |key: u64| (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32).is_multiple_of(every);
     for b in above.bricks().filter(|b| seen(b.key)) {
         for j in ones(u64::from(brick::parents(b.bits))).map(u64::from) {
             let key = b.key << 3 | j;
@@ -78,18 +79,19 @@ impl Weighed {
     /// Weighs the leaves of a mesh in octants of a level; crossing leaves are in it if `with_crossing`.
     pub fn new(parts: &Parts, share: &Ownership, level: Level, with_crossing: bool) -> Self {
         let mut scale = Scale::new(share, level);
-        let mut add = |sets: &PerLevel, each: i64| {
-            for (l, set) in (0..).zip(sets) {
-                for b in set.bricks().filter(|b| share.answers_for(l, b.key)) {
-                    scale.add(l, b.key, each * i64::from(b.bits.count_ones()));
-                }
-            }
+        let mut add = |l: Level, sets: &PerLevel, each: i64| {
+            let bricks = sets[l as usize].bricks();
+            bricks
+                .filter(|b| share.answers_for(l, b.key))
+                .for_each(|b| scale.add_octants(l, b, each));
         };
-        // A leaf that splits makes eight of one.
-        add(parts.split, 7);
-        add(parts.deleted, -1);
-        if !with_crossing {
-            add(parts.crossing, -1);
+        for l in 0..LEVELS as Level {
+            // A leaf that splits makes eight of one.
+            add(l, parts.split, 7);
+            add(l, parts.deleted, -1);
+            if !with_crossing {
+                add(l, parts.crossing, -1);
+            }
         }
         Self(scale.bins())
     }
@@ -117,22 +119,46 @@ impl Weighed {
 
 /// Weighs what this rank has in octants of a level.
 struct Scale {
-    /// Where what this rank owns begins: shared bricks may begin before.
-    first: u64,
+    /// What this rank owns, as bins have to be in it: shared bricks may begin before, and end behind.
+    own: Range<u64>,
+    level: Level,
     shift: u32,
     bins: Vec<(u64, i64)>,
 }
 
 impl Scale {
     fn new(share: &Ownership, level: Level) -> Self {
-        let first = share.stretches().next().map_or(0, |s| s.start);
-        Self { first, shift: 3 * (LEVEL_MAX - level), bins: Vec::new() }
+        let own = share.stretches().next().unwrap_or(0..1);
+        Self { own, level, shift: 3 * (LEVEL_MAX - level), bins: Vec::new() }
+    }
+
+    /// Adds so much for each octant of a brick.
+    #[inline]
+    fn add_octants(&mut self, l: Level, brick: Brick, each: i64) {
+        if l >= self.level + 2 {
+            return self.add(l, brick.key, each * i64::from(brick.bits.count_ones()));
+        }
+        // The brick has several bins; an octant that has several counts by its children, which have one or more.
+        for bit in ones(brick.bits) {
+            let code = brick.key << 6 | u64::from(bit);
+            if l >= self.level || each < 0 {
+                self.add_at(start57(l, code), each);
+            } else {
+                self.add_at(start57(l, code), -1);
+                (0..8).for_each(|child| self.add_at(start57(l + 1, code << 3 | child), 1));
+            }
+        }
     }
 
     /// Adds a brick; those of one level come in order.
     #[inline]
     fn add(&mut self, l: Level, key: u64, weight: i64) {
-        let at = brick_start(l, key).max(self.first) >> self.shift << self.shift;
+        self.add_at(brick_start(l, key), weight);
+    }
+
+    #[inline]
+    fn add_at(&mut self, at: u64, weight: i64) {
+        let at = at.clamp(self.own.start, self.own.end - 1) >> self.shift << self.shift;
         match self.bins.last_mut().filter(|last| last.0 == at) {
             Some(last) => last.1 += weight,
             None => self.bins.push((at, weight)),

@@ -254,11 +254,7 @@ impl Ownership {
     }
 
     /// Brings octants of several sets to the ranks that hold their bricks. Collective, unless there is one rank.
-    fn scatter_all(
-        &self,
-        sets: Vec<(Level, BrickSet)>,
-        comm: &dyn Comm,
-    ) -> (Vec<BrickSet>, u64) {
+    fn scatter_all(&self, sets: Vec<(Level, BrickSet)>, comm: &dyn Comm) -> (Vec<BrickSet>, u64) {
         if self.ranks == 1 {
             return (sets.into_iter().map(|(_, set)| set).collect(), 0);
         }
@@ -437,4 +433,148 @@ impl Runs {
 #[inline]
 pub fn brick_start(l: Level, key: u64) -> u64 {
     if l < 2 { 0 } else { key << (3 * (LEVEL_MAX + 2 - l)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::sim;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    /// Level of the octants that are dealt out here; bricks are looked at down to one level below those that fill them.
+    const FINE: Level = 3;
+    const RANKS: usize = 12;
+
+    /// Owners of all octants of level [`FINE`]: runs as a curve cut in shares has them, or as METIS leaves them.
+    fn owners() -> impl Strategy<Value = Vec<usize>> {
+        let octants = 1usize << (3 * FINE);
+        let ascending = prop::collection::vec(0..octants, RANKS - 1).prop_map(move |mut cuts| {
+            cuts.sort_unstable();
+            (0..octants).map(|o| cuts.partition_point(|&c| c <= o)).collect()
+        });
+        let any = prop::collection::vec((0..RANKS, 1usize..90), octants).prop_map(move |runs| {
+            let all = runs.into_iter().flat_map(|(owner, n)| std::iter::repeat_n(owner, n));
+            all.take(octants).collect()
+        });
+        prop_oneof![ascending, any]
+    }
+
+    fn ownership(rank: usize, owners: &[usize]) -> Ownership {
+        let leaf = |(code, &owner)| BaseLeaf { level: FINE, code, owner };
+        let leaves: Vec<BaseLeaf> = (0..).zip(owners).map(leaf).collect();
+        Ownership::new(rank, RANKS, &leaves)
+    }
+
+    /// All bricks down to one level below the finest that could be shared, and the runs of owners in each.
+    fn bricks(owners: &[usize]) -> Vec<(Level, u64, Vec<usize>)> {
+        let runs = |first: usize, n: usize| {
+            let mut runs = owners[first..first + n].to_vec();
+            runs.dedup();
+            runs
+        };
+        let of_level = |l: Level| {
+            let up = (FINE + 2).saturating_sub(l.max(2));
+            let n = 1usize << (3 * up);
+            (0..owners.len() / n).map(move |key| (l, key as u64, runs(key * n, n)))
+        };
+        (0..=FINE + 2).flat_map(of_level).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn bricks_are_held_by_those_who_own_part_of_them(owners in owners()) {
+            let shares: Vec<Ownership> = (0..RANKS).map(|r| ownership(r, &owners)).collect();
+            let (mut shared, mut top) = (1, 1);
+            for (l, key, runs) in bricks(&owners) {
+                let many = l < 2 || runs.len() >= MANY;
+                if l >= 2 && runs.len() > 1 { shared = shared.max(l); }
+                if many { top = top.max(l); }
+                for (rank, share) in shares.iter().enumerate() {
+                    let want = match () {
+                        () if many => Place::Top,
+                        () if runs == [rank] => Place::Mine,
+                        () if runs.contains(&rank) => Place::Shared,
+                        () => Place::Remote(runs[0]),
+                    };
+                    prop_assert_eq!(share.place(l, key), want, "level {} key {}", l, key);
+                    prop_assert_eq!(share.answerer(l, key), runs[0]);
+                    prop_assert_eq!(share.is_top(l, key), many);
+                    let holds = !matches!(want, Place::Remote(_));
+                    prop_assert!(!holds || share.answers_for(l, key) == (runs[0] == rank));
+                }
+                let place = shares[0].bystander().place(l, key);
+                prop_assert_eq!(place, if many { Place::Top } else { Place::Remote(runs[0]) });
+            }
+            prop_assert_eq!((shares[0].level_shared, shares[0].level_top), (shared, top));
+        }
+
+        #[test]
+        fn octants_tile_what_a_rank_owns(owners in owners()) {
+            for rank in 0..RANKS {
+                let share = ownership(rank, &owners);
+                let octants = share.octants();
+                let fine: Vec<u64> = octants
+                    .iter()
+                    .flat_map(|&(l, code)| code << (3 * (FINE - l))..(code + 1) << (3 * (FINE - l)))
+                    .collect();
+                let mine = (0..owners.len() as u64).filter(|&o| owners[o as usize] == rank);
+                prop_assert!(fine.into_iter().eq(mine));
+                // None is one of eight that could be one.
+                for w in octants.chunk_by(|a, b| a.0 == b.0 && a.1 >> 3 == b.1 >> 3) {
+                    prop_assert!(w.len() < 8);
+                }
+            }
+        }
+
+        #[test]
+        fn what_is_scattered_reaches_all_holders(
+            owners in owners(),
+            told in prop::collection::vec((0..RANKS, 0usize..2, 0..FINE + 3, any::<u64>(), 1u64..8), 0..80),
+        ) {
+            let all = bricks(&owners);
+            let key = |l: Level, draw: u64| {
+                let keys = all.iter().filter(|b| b.0 == l).count() as u64;
+                draw % keys
+            };
+            let got = sim::run(RANKS, 7, |comm| {
+                let mut sets = [crate::tree::per_level(), crate::tree::per_level()];
+                let mut mine: Vec<_> = told.iter().filter(|t| t.0 == comm.rank()).collect();
+                mine.sort_by_key(|t| key(t.2, t.3));
+                for &&(_, set, l, draw, bits) in &mine {
+                    sets[set][l as usize].push(key(l, draw), bits);
+                }
+                let [a, b] = &mut sets;
+                ownership(comm.rank(), &owners).settle(&mut [a, b], comm);
+                sets
+            });
+            for (rank, sets) in got.iter().enumerate() {
+                let share = ownership(rank, &owners);
+                for (number, set) in sets.iter().enumerate() {
+                    for &(l, brick, _) in &all {
+                        let of = |t: &&(usize, usize, Level, u64, u64)| {
+                            (t.1, t.2, key(t.2, t.3)) == (number, l, brick)
+                        };
+                        let sum = told.iter().filter(of).fold(0, |bits, t| bits | t.4);
+                        let holds = !matches!(share.place(l, brick), Place::Remote(_));
+                        prop_assert_eq!(set[l as usize].get(brick), if holds { sum } else { 0 });
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_brick_of_many_owners_is_everybodys() {
+        // Nine octants beside each other with an owner each, then all others one rank's.
+        let owners: Vec<usize> = (0..1 << (3 * FINE)).map(|o: usize| o.min(9)).collect();
+        let share = ownership(11, &owners);
+        assert_eq!(share.place(FINE + 1, 0), Place::Remote(0));
+        assert_eq!(share.place(FINE, 0), Place::Top);
+        let places: BTreeSet<String> =
+            (1..64).map(|key| format!("{:?}", share.place(FINE + 1, key))).collect();
+        assert_eq!(places.into_iter().collect::<Vec<_>>(), ["Remote(8)", "Remote(9)"]);
+    }
 }

@@ -3,6 +3,7 @@
 
 mod support;
 
+use clap::ValueEnum;
 use mesher::base::Division;
 use mesher::lattice::{Keep, Root};
 use mesher::partition::{Partitioner, Weights};
@@ -267,14 +268,13 @@ fn divisions() -> impl Iterator<Item = Run> {
     let levels = [None, Some(0), Some(1), Some(2), Some(4), Some(6), Some(19)];
     let ways = [Partitioner::Metis, Partitioner::Morton]
         .into_iter()
-        .flat_map(|p| [Weights::Unit, Weights::Area, Weights::Rehearsal].map(|w| (p, w)));
+        .flat_map(|p| Weights::value_variants().iter().map(move |&w| (p, w)));
     ways.flat_map(move |(partitioner, weights)| {
         levels.into_iter().flat_map(move |level_base| {
-            [(2, 1), (3, 2), (8, 3), (8, 4), (33, 5)].into_iter().flat_map(move |(ranks, seed)| {
-                let division = Division { partitioner, weights, level_base, rebalance: true };
-                let kept = Division { rebalance: false, ..division };
-                let divisions = if division.is_of_curve() { &[division, kept][..] } else { &[division] };
-                divisions.iter().map(|&division| Run { ranks, seed, division }).collect::<Vec<_>>()
+            [(2, 1), (3, 2), (8, 3), (8, 4), (33, 5)].map(move |(ranks, seed)| Run {
+                ranks,
+                seed,
+                division: Division { partitioner, weights, level_base },
             })
         })
     })

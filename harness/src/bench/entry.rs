@@ -172,7 +172,7 @@ pub struct Setup {
     pub comm: Comm,
     /// `metis` or `morton`; empty for a program that has no choice.
     pub partitioner: String,
-    /// `unit`, `area` or `rehearsal`; empty likewise.
+    /// `unit`, `area`, `rehearsal` or `rebalance`; empty likewise.
     pub weights: String,
 }
 

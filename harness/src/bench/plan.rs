@@ -238,7 +238,10 @@ fn study(
         _ => Vec::new(),
     };
     let (weights, partitioners) = match experiment {
-        Experiment::Weights => (words(&["unit", "area", "rehearsal"]), words(&["metis", "morton"])),
+        Experiment::Weights => {
+            let weights = words(&["unit", "area", "rehearsal", "rebalance"]);
+            (weights, words(&["metis", "morton"]))
+        }
         // The mesher's own choice.
         _ => (words(&[""]), words(&[""])),
     };

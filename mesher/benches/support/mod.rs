@@ -51,7 +51,7 @@ pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Cas
 /// One rank, nothing written.
 pub fn options() -> Options {
     let (partitioner, weights) = (Partitioner::Morton, Weights::Area);
-    let division = Division { partitioner, weights, level_base: None, rebalance: true };
+    let division = Division { partitioner, weights, level_base: None };
     Options { division, ungraded: false, out: None }
 }
 

@@ -28,12 +28,7 @@ pub fn deepest(rules: &Rules) -> Level {
 
 /// Leaves to expect in each base leaf, the same on all ranks; where the tree is too shallow to rehearse, what
 /// area lets expect. Collective.
-pub fn weights(
-    facets: &[Facet],
-    rules: &Rules,
-    cut: &Cut,
-    comm: &dyn Comm,
-) -> Vec<u64> {
+pub fn weights(facets: &[Facet], rules: &Rules, cut: &Cut, comm: &dyn Comm) -> Vec<u64> {
     let expected = cut.weights();
     // The base leaves of the coarse tree must be those of the fine one.
     let Some(coarser) = rules.level_surface.checked_sub(cut.level_base() + 2) else {

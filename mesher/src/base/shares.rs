@@ -101,3 +101,89 @@ fn finely(
     let changes = curve::cut(&bins, comm).unwrap_or_else(everything);
     Ownership::along(comm.rank(), comm.size(), changes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::sim;
+    use crate::lattice::{ExtentBox, Keep, Root};
+    use crate::octant::{ROOT_BITS, ROOT_EDGE};
+
+    const RANKS: usize = 9;
+    const FINE: Level = 7;
+
+    fn rules(boxes: Vec<ExtentBox>) -> Rules {
+        Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface: 9,
+            layer_cells_min: 4,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes,
+        }
+    }
+
+    /// A sheet of facets, oblique and of all sizes, denser to one side.
+    fn sheet() -> Vec<Facet> {
+        let at = |i: i32, j: i32| {
+            let (x, y) = (i * i * (1 << 15), j * (1 << 21));
+            [x, y, (1 << 24) + x / 3 + y / 2]
+        };
+        let square = |i: i32, j: i32| {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+            [Facet { v: [a, b, c] }, Facet { v: [b, d, c] }]
+        };
+        (0..50).flat_map(|i| (0..40).flat_map(move |j| square(i, j))).collect()
+    }
+
+    /// The shares as all ranks see them, facet number `i` being on rank `dealt(i)`.
+    fn shares(rules: &Rules, dealt: impl Fn(usize) -> usize + Sync) -> Vec<usize> {
+        let all = sheet();
+        let seen = sim::run(RANKS, 5, |comm| {
+            let on_this = |(i, f): (usize, &Facet)| (dealt(i) == comm.rank()).then_some(*f);
+            let mine: Vec<Facet> = all.iter().enumerate().filter_map(on_this).collect();
+            let share = by_area(&mine, rules, [4, FINE], comm);
+            (0..1 << (3 * FINE)).map(|code| share.owner_at(start57(FINE, code))).collect::<Vec<_>>()
+        });
+        assert!(seen.iter().all(|s| *s == seen[0]), "all ranks see the same");
+        seen.into_iter().next().unwrap_or_default()
+    }
+
+    /// What each rank has, by the area and the boxes.
+    fn weights(rules: &Rules, owners: &[usize]) -> Vec<u64> {
+        let mut bins = expected(&sheet(), rules, FINE);
+        curve::add_boxes(&mut bins, rules, FINE, 0, PARTS, &curve::ALL);
+        let mut sums = vec![0; RANKS];
+        for (start, weight) in bins {
+            sums[owners[(start / start57(FINE, 1)) as usize]] += weight;
+        }
+        sums
+    }
+
+    #[test]
+    fn shares_are_equal_however_the_facets_come() {
+        let h = ROOT_EDGE >> 3;
+        let slab = ExtentBox { min: [h, h, 5 * h], max: [6 * h, 6 * h, 6 * h], level: 8 };
+        assert_eq!(ROOT_EDGE, 1 << ROOT_BITS);
+        for boxes in [vec![], vec![slab]] {
+            let rules = rules(boxes);
+            let owners = shares(&rules, |i| i % RANKS);
+            assert_eq!(owners, shares(&rules, |i| i * RANKS / 4000));
+            assert_eq!(owners, shares(&rules, |_| 3), "one rank may have all facets");
+            assert!(owners.is_sorted());
+            let sums = weights(&rules, &owners);
+            let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
+            let far = |&w: &u64| (w as f64 / mean - 1.0).abs() > 0.1;
+            assert!(!sums.iter().any(far), "{sums:?}");
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_one_rank_has_all() {
+        let owners = sim::run(3, 1, |comm| {
+            let share = by_area(&[], &rules(vec![]), [2, 3], comm);
+            share.octants().len()
+        });
+        assert_eq!(owners, [1, 0, 0]);
+    }
+}

@@ -35,11 +35,8 @@ impl<'a> Survey<'a> {
         with_areas: bool,
         comm: &dyn Comm,
     ) -> Self {
-        let areas = if with_areas {
-            Areas::gather(facets, rules, level, comm)
-        } else {
-            Areas::default()
-        };
+        let areas =
+            if with_areas { Areas::gather(facets, rules, level, comm) } else { Areas::default() };
         let work = Work::default();
         let mut survey = Self { rules, split: per_level(), areas, level, work };
         survey.mark(facets, comm);

@@ -53,7 +53,9 @@ impl BrickSet {
     /// If they are not.
     pub fn append(&mut self, behind: Self) {
         let Some(runs) = self.runs_with(&behind) else {
-            return if self.is_empty() { *self = behind };
+            return if self.is_empty() {
+                *self = behind
+            };
         };
         self.runs = runs;
         self.low.extend_from_slice(&behind.low);
@@ -66,7 +68,9 @@ impl BrickSet {
     /// If they are not.
     pub fn prepend(&mut self, before: Self) {
         let Some(runs) = before.runs_with(self) else {
-            return if self.is_empty() { *self = before };
+            return if self.is_empty() {
+                *self = before
+            };
         };
         self.runs = runs;
         self.low.splice(..0, before.low);
@@ -95,7 +99,8 @@ impl BrickSet {
         let Some(largest) = (0..sets.len()).max_by_key(|&i| sets[i].len()) else {
             return Self::default();
         };
-        let (more, behind) = (sets.iter().map(Self::len).sum::<usize>(), sets.split_off(largest + 1));
+        let (more, behind) =
+            (sets.iter().map(Self::len).sum::<usize>(), sets.split_off(largest + 1));
         let mut all = sets.pop().unwrap_or_default();
         all.reserve_exact(more - all.len());
         let mut before = Self::default();

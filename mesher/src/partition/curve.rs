@@ -107,3 +107,84 @@ pub fn add_boxes(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::sim;
+    use crate::lattice::{Keep, Root};
+    use crate::octant::ROOT_BITS;
+    use proptest::prelude::*;
+
+    /// Bins of level 3, in order, some without weight.
+    fn bins() -> impl Strategy<Value = Vec<Bin>> {
+        prop::collection::btree_map(0u64..512, prop_oneof![4 => 0u64..1000, 1 => Just(0)], 1..60)
+            .prop_map(|all| all.into_iter().map(|(code, w)| (start57(3, code), w)).collect())
+    }
+
+    proptest! {
+        #[test]
+        fn shares_are_equal_but_for_a_bin(bins in bins(), ranks in 1usize..9) {
+            let total: u64 = bins.iter().map(|b| b.1).sum();
+            let Some(cuts) = cut_known(&bins, ranks) else {
+                prop_assert_eq!(total, 0);
+                return Ok(());
+            };
+            prop_assert_eq!(cuts[0].0, 0);
+            prop_assert!(cuts.is_sorted_by(|a, b| a.0 < b.0 && a.1 < b.1));
+            let heaviest = bins.iter().map(|b| b.1).max().unwrap_or(0) as f64;
+            for rank in 0..ranks {
+                let owner = |start: u64| cuts[cuts.partition_point(|c| c.0 <= start) - 1].1;
+                let share: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
+                prop_assert!((share as f64 - total as f64 / ranks as f64).abs() <= heaviest);
+            }
+        }
+
+        #[test]
+        fn stretches_of_the_curve_are_cut_as_all_of_it(
+            bins in bins(),
+            mut ends in prop::collection::vec(0usize..60, 4),
+        ) {
+            ends.sort_unstable();
+            let all = cut_known(&bins, 5);
+            let told = sim::run(5, 3, |comm| {
+                let end = |i: usize| ends[i].min(bins.len());
+                let from = if comm.rank() == 0 { 0 } else { end(comm.rank() - 1) };
+                let to = if comm.rank() == 4 { bins.len() } else { end(comm.rank()) };
+                cut(&bins[from..to], comm)
+            });
+            prop_assert!(told.into_iter().all(|t| t == all));
+        }
+    }
+
+    #[test]
+    fn bins_of_boxes_hold_what_the_boxes_ask_for() {
+        let h = 1i64 << (ROOT_BITS - 6);
+        // 5 x 20 x 33 cells of level 6, at odd places.
+        let (min, max) = ([h * 3, h * 7, h * 11], [h * 8, h * 27, h * 44]);
+        let rules = Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface: 6,
+            layer_cells_min: 1,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: vec![crate::lattice::ExtentBox { min, max, level: 6 }],
+        };
+        let weigh = |level: Level, light: u64, within: &Range<u64>| {
+            let mut bins = Vec::new();
+            add_boxes(&mut bins, &rules, level, light, 10, within);
+            merge(&mut bins);
+            bins
+        };
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        for (level, light) in [(2, 0), (5, 0), (6, 0), (5, 100), (5, 3300)] {
+            let bins = weigh(level, light, &ALL);
+            assert_eq!(sum(&bins), 10 * 5 * 20 * 33, "level {level}, light {light}");
+            assert!(bins.iter().all(|b| b.0.trailing_zeros() >= 3 * (LEVEL_MAX - level)));
+            let middle = start57(5, 12_345);
+            let halves = [0..middle, middle..ALL.end].map(|half| sum(&weigh(5, light, &half)));
+            assert_eq!(halves[0] + halves[1], 33_000, "each bin belongs to one stretch");
+        }
+        assert_eq!(weigh(5, 3300, &ALL).len(), 1, "what is light is not told apart");
+    }
+}

@@ -155,8 +155,8 @@ impl Walk<'_> {
     /// Joins the components of one brick with what they face.
     fn join_brick(&mut self, l: Level, frame: &Frame) {
         let nodes = self.nodes;
-        let elsewhere = nodes.place(l, frame.node) == Place::Shared
-            && !self.share.answers_for(l, frame.key);
+        let elsewhere =
+            nodes.place(l, frame.node) == Place::Shared && !self.share.answers_for(l, frame.key);
         for (c, bits) in nodes.components(l, frame.node) {
             if elsewhere {
                 // Whoever answers for the brick joins it with what it faces, and this rank's copy with its own.

@@ -149,9 +149,9 @@ pub fn decide(mine: &Firsts, facets: &[Facet], comm: &dyn Comm) -> Verdict {
     let first = exhausted.iter().map(|c| list(c)[0]).min();
     verdict.ambiguous =
         first.map(|c| Ambiguous { count: exhausted.len() as u64, example: c.centroid() });
-    verdict.inside.extend(
-        exhausted.iter().filter(|c| c.votes as usize > 3 * list(c).len()).map(|c| c.name),
-    );
+    verdict
+        .inside
+        .extend(exhausted.iter().filter(|c| c.votes as usize > 3 * list(c).len()).map(|c| c.name));
     verdict
 }
 

@@ -11,18 +11,22 @@ use proptest::prelude::*;
 pub fn run() -> impl Strategy<Value = Run> {
     let ranks = prop_oneof![2 => Just(1usize), 4 => 2usize..9, 1 => 9usize..65];
     let partitioner = prop_oneof![Just(Partitioner::Metis), Just(Partitioner::Morton)];
-    let weights = prop_oneof![Just(Weights::Area), Just(Weights::Unit), Just(Weights::Rehearsal)];
+    let weights = prop_oneof![
+        2 => Just(Weights::Rebalance),
+        1 => Just(Weights::Area),
+        1 => Just(Weights::Unit),
+        1 => Just(Weights::Rehearsal),
+    ];
     let level_base = prop_oneof![2 => Just(None), 1 => (0u32..6).prop_map(Some)];
-    let rebalance = prop_oneof![2 => Just(true), 1 => Just(false)];
-    let division = (partitioner, weights, level_base, rebalance).prop_map(
-        |(partitioner, weights, level_base, rebalance)| Division {
-            partitioner,
-            weights,
-            level_base,
-            rebalance,
-        },
-    );
-    (ranks, any::<u64>(), division).prop_map(|(ranks, seed, division)| Run { ranks, seed, division })
+    let division =
+        (partitioner, weights, level_base).prop_map(|(partitioner, weights, level_base)| {
+            Division { partitioner, weights, level_base }
+        });
+    (ranks, any::<u64>(), division).prop_map(|(ranks, seed, division)| Run {
+        ranks,
+        seed,
+        division,
+    })
 }
 
 /// As many cases as asked for by `PROPTEST_CASES`, else `cases`.

@@ -146,9 +146,8 @@ impl Run {
         seed: 0,
         division: Division {
             partitioner: Partitioner::Morton,
-            weights: Weights::Area,
+            weights: Weights::Rebalance,
             level_base: None,
-            rebalance: true,
         },
     };
 }
@@ -161,7 +160,7 @@ pub struct Outcome {
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
-    Division { partitioner, weights: Weights::Area, level_base, rebalance: true }
+    Division { partitioner, weights: Weights::Rebalance, level_base }
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {

@@ -69,7 +69,7 @@ pub struct WantedRun {
     /// `metis` or `morton`; the mesher's own choice if empty.
     #[serde(default)]
     pub partitioner: String,
-    /// `unit`, `area` or `rehearsal`; likewise.
+    /// `unit`, `area`, `rehearsal` or `rebalance`; likewise.
     #[serde(default)]
     pub weights: String,
     /// Repetitions, of which medians are taken.
@@ -102,15 +102,15 @@ pub struct Row {
     pub against: Option<String>,
     /// What is measured.
     pub measure: Measure,
-    /// The phase, for measures of one.
-    pub phase: Option<String>,
+    /// The phase, or several together, for measures of those.
+    pub phase: Option<OneOrMany>,
     /// Least value wanted.
     pub at_least: Option<f64>,
     /// Greatest value wanted.
     pub at_most: Option<f64>,
 }
 
-/// Names of runs.
+/// Names of runs or phases.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum OneOrMany {

@@ -1,6 +1,6 @@
 //! Rows judged: a function of the declaration and of a record's lines alone.
 
-use super::declare::{Row, Targets};
+use super::declare::{OneOrMany, Row, Targets};
 use super::measure::{Kind, Sample};
 use crate::bench::entry::{Audited, Judged, Line, Verdict, What};
 use crate::bench::group::{Group, Groups};
@@ -73,8 +73,8 @@ fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String
     };
     let runs = row.run.all().iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
     let against = row.against.as_ref().map(find).transpose()?;
-    let (phase, network) = (row.phase.as_deref(), &groups.network);
-    let sample = Sample { runs: &runs, against, phase, network };
+    let phases = row.phase.as_ref().map(OneOrMany::all).unwrap_or_default();
+    let sample = Sample { runs: &runs, against, phases, network: &groups.network };
     Ok((row.measure.of(&sample)?, worst_how(&runs).to_owned()))
 }
 

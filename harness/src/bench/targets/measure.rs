@@ -1,6 +1,6 @@
 //! What may be measured of runs: a small function each, on the medians of their repetitions.
 
-use crate::bench::entry::{Audited, Comm, Network};
+use crate::bench::entry::{Audited, Comm, Network, Phase};
 use crate::bench::group::Group;
 use crate::bench::pop;
 use crate::bench::stats::median;
@@ -71,8 +71,8 @@ pub struct Sample<'a> {
     pub runs: &'a [&'a Group],
     /// The run that it is held against.
     pub against: Option<&'a Group>,
-    /// The phase, where one is asked for.
-    pub phase: Option<&'a str>,
+    /// The phases, where some are asked for.
+    pub phases: &'a [String],
     /// What a message costs.
     pub network: &'a Network,
 }
@@ -155,7 +155,7 @@ impl Measure {
             Self::LambdaCpu => run.typical.useful_s.lambda(run.setup.ranks),
             Self::Efficiency => efficiency(run, other()?, sample.network)?,
             Self::ParallelEfficiency => run.efficiency(run, sample.network).parallel(),
-            Self::PhaseShare => share(run, sample.phase.unwrap_or_default(), sample.network)?,
+            Self::PhaseShare => share(run, sample.phases, sample.network)?,
             Self::AuditHolds | Self::AuditCellsPerSecondPerCore | Self::AuditPeakBytes => {
                 return Err(format!("{self} is measured of a mesh on disk"));
             }
@@ -232,16 +232,20 @@ fn efficiency(run: &Group, other: &Group, network: &Network) -> Result<f64, Stri
     Ok(run.efficiency(other, network).global())
 }
 
-fn share(run: &Group, name: &str, network: &Network) -> Result<f64, String> {
+/// The part of the time that some phases take; those that a run does not have take none, but one it must have.
+fn share(run: &Group, names: &[String], network: &Network) -> Result<f64, String> {
     let typical = &run.typical;
-    let phase = typical.phases.iter().find(|p| p.name == name);
-    let names = || typical.phases.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join(", ");
-    let phase = phase.ok_or_else(|| format!("it has no phase {name:?}, but {}", names()))?;
-    let time = match run.setup.comm {
+    let wanted = typical.phases.iter().filter(|p| names.contains(&p.name));
+    let time = |phase: &Phase| match run.setup.comm {
         Comm::Sim => phase.useful_s.max + pop::messages_s(phase, network),
         Comm::Mpi | Comm::Solo => phase.wall_s.max,
     };
-    Ok(time / pop::time_s(typical, network))
+    let times: Vec<f64> = wanted.map(time).collect();
+    if times.is_empty() {
+        let there: Vec<&str> = typical.phases.iter().map(|p| p.name.as_str()).collect();
+        return Err(format!("it has no phase {}, but {}", names.join(" or "), there.join(", ")));
+    }
+    Ok(times.iter().sum::<f64>() / pop::time_s(typical, network))
 }
 
 #[cfg(test)]
@@ -260,7 +264,7 @@ mod tests {
     }
 
     fn value(measure: Measure, runs: &[&Group], against: Option<&Group>) -> Result<f64, String> {
-        measure.of(&Sample { runs, against, phase: Some("b"), network: &FREE })
+        measure.of(&Sample { runs, against, phases: &["b".into()], network: &FREE })
     }
 
     /// On so many ranks for as long, with as many cells.
@@ -329,8 +333,14 @@ mod tests {
         let weak = group(run(Comm::Sim, 200, &[("a", &[6.0, 6.0]), ("b", &[2.0, 2.0])]));
         assert!((value(Measure::Efficiency, &[&weak], Some(&one)).unwrap() - 1.0).abs() < 1e-9);
         assert!(value(Measure::Efficiency, &[&weak], Some(&two)).is_err());
-        let sample = Sample { runs: &[&two], against: None, phase: Some("c"), network: &FREE };
-        assert!(Measure::PhaseShare.of(&sample).unwrap_err().contains("but a, b"));
+        let share = |phases: &[&str]| {
+            let phases: Vec<String> = phases.iter().map(|p| (*p).to_owned()).collect();
+            let sample = Sample { runs: &[&two], against: None, phases: &phases, network: &FREE };
+            Measure::PhaseShare.of(&sample)
+        };
+        assert_eq!(share(&["a", "b", "c"]), Ok(1.0));
+        assert_eq!(share(&["c", "b"]), share(&["b"]));
+        assert!(share(&["c"]).unwrap_err().contains("no phase c, but a, b"));
     }
 
     #[test]
