@@ -15,6 +15,7 @@ pub mod launcher;
 pub mod machine;
 pub mod network;
 pub mod plan;
+mod points;
 pub mod pop;
 pub mod record;
 pub mod sizing;
@@ -23,15 +24,14 @@ pub mod table;
 pub mod targets;
 pub mod variant;
 
-use crate::case::Case;
 use crate::engine::programs::Programs;
-use entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
+use entry::{Comm, Failure, Line, Network, Run, Session, What};
 use execute::{Failed, Runner};
 use launcher::Launcher;
-use plan::{Experiment, Layout, Study};
+use plan::Study;
+use points::{Point, in_catalogue, warmers};
 use record::Record;
-use sizing::Sizes;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use variant::Base;
@@ -89,7 +89,6 @@ pub fn bench(
 ) -> Result<Outcome, BenchError> {
     let place = temporary_directory()?;
     let mut bench = Bench::open(options, programs, place.path(), say)?;
-    bench.begin()?;
     if options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim) {
         bench.measure_network()?;
     }
@@ -118,15 +117,8 @@ struct Bench<'a> {
     digests: HashMap<Mesh, String>,
 }
 
-/// A run to be repeated.
-struct Point {
-    setup: Setup,
-    case: PathBuf,
-    failed: bool,
-}
-
 impl<'a> Bench<'a> {
-    /// Opens the record; runs leave their files in `place`.
+    /// Opens the record and begins a session; runs leave their files in `place`.
     fn open(
         options: &'a Options,
         programs: &'a Programs,
@@ -137,7 +129,10 @@ impl<'a> Bench<'a> {
             .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
         let (launcher, limit) = (&options.launcher, options.limit);
         let runner = Runner { programs, launcher, limit, place };
-        Ok(Self { options, runner, record, say, lines: Vec::new(), digests: HashMap::new() })
+        let (lines, digests) = (Vec::new(), HashMap::new());
+        let mut bench = Self { options, runner, record, say, lines, digests };
+        bench.begin()?;
+        Ok(bench)
     }
 }
 
@@ -268,184 +263,5 @@ impl Bench<'_> {
             return Ok(());
         }
         Err(format!("its mesh has the digest {}, where another run of it had {first}", run.digest))
-    }
-
-    fn points(&mut self, study: &Study, base: &Base) -> Result<Vec<Point>, BenchError> {
-        let mut sizes: BTreeMap<u32, Sizes> = BTreeMap::new();
-        let own = [base.layer_cells_min];
-        let layers = if study.layers.is_empty() { &own[..] } else { &study.layers };
-        let mut points = Vec::new();
-        for &n in layers {
-            for layout in &study.layouts {
-                for spacing in self.spacings(study, base, layout, &mut sizes)? {
-                    let case = base.variant(spacing, n).map_err(BenchError::Input)?;
-                    if let Some(why) = self.declined(&case)? {
-                        (self.say)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
-                        continue;
-                    }
-                    for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
-                        points.push(Point {
-                            setup: self.setup(
-                                study,
-                                base,
-                                layout,
-                                spacing,
-                                n,
-                                [weights, partitioner],
-                            ),
-                            case: case.clone(),
-                            failed: false,
-                        });
-                    }
-                }
-            }
-        }
-        Ok(points)
-    }
-
-    /// Why the engine is not run on a case, by its description.
-    fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
-        let own = foreign::OWN.contains(&self.options.engine.as_str());
-        let Some(engine) = self.runner.programs.engine.as_ref().filter(|_| !own) else {
-            return Ok(None);
-        };
-        let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
-        Ok(engine.description().declines(&case))
-    }
-
-    fn setup(
-        &self,
-        study: &Study,
-        base: &Base,
-        layout: &Layout,
-        spacing_min: f64,
-        layer_cells_min: u32,
-        [weights, partitioner]: [&str; 2],
-    ) -> Setup {
-        Setup {
-            experiment: study.experiment.to_string(),
-            engine: self.options.engine.clone(),
-            case: base.name.clone(),
-            spacing_min,
-            layer_cells_min,
-            ranks: layout.ranks,
-            comm: layout.comm,
-            partitioner: partitioner.to_owned(),
-            weights: weights.to_owned(),
-        }
-    }
-
-    /// The spacings of a study's meshes for a number of ranks.
-    fn spacings(
-        &mut self,
-        study: &Study,
-        base: &Base,
-        layout: &Layout,
-        sizes: &mut BTreeMap<u32, Sizes>,
-    ) -> Result<Vec<f64>, BenchError> {
-        let Some(cells) = study.cells else { return Ok(vec![base.spacing_min]) };
-        let n = base.layer_cells_min;
-        let known = sizes.entry(n).or_default();
-        let wanted = match study.experiment {
-            Experiment::Weak => cells as f64 * layout.ranks as f64,
-            _ => cells as f64,
-        };
-        let coarse = base.coarse();
-        let finest = known.spacing(wanted, coarse, |spacing| self.count(base, spacing, n))?;
-        Ok(match study.experiment {
-            Experiment::Spacing => {
-                // Coarser by factors of two, while there are enough cells to measure.
-                let halvings = (wanted / 1e5).log(4.0).max(0.0) as i32;
-                (0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect()
-            }
-            _ => vec![finest],
-        })
-    }
-
-    /// Cells of a mesh, made on one rank.
-    fn count(&self, base: &Base, spacing: f64, n: u32) -> Result<u64, BenchError> {
-        let case = base.variant(spacing, n).map_err(BenchError::Input)?;
-        let setup = Setup {
-            experiment: String::new(),
-            engine: "mesher".to_owned(),
-            case: base.name.clone(),
-            spacing_min: spacing,
-            layer_cells_min: n,
-            ranks: 1,
-            comm: Comm::Solo,
-            partitioner: String::new(),
-            weights: String::new(),
-        };
-        match self.runner.run(&setup, &case, 0, true) {
-            Ok(run) => Ok(run.cells),
-            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
-            Err(Failed::Because(why)) => Err(BenchError::Input(format!("{}: {why}", base.name))),
-        }
-    }
-}
-
-/// The setup of every mesh that warms it up: the one whose message matrix is wanted, on most ranks where
-/// there are several; else the first.
-fn warmers(points: &[Point]) -> Vec<usize> {
-    let worth = |point: &Point| match execute::tells_matrix(&point.setup) {
-        true => point.setup.ranks,
-        false => 0,
-    };
-    let mut best: Vec<usize> = Vec::new();
-    for (at, point) in points.iter().enumerate() {
-        match best.iter_mut().find(|b| points[**b].case == point.case) {
-            Some(before) if worth(point) > worth(&points[*before]) => *before = at,
-            Some(_) => {}
-            None => best.push(at),
-        }
-    }
-    best
-}
-
-/// Each with each, but for rebalancing by METIS, which does not do that: it would be `area` once more.
-fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<(&'a str, &'a str)> {
-    let all =
-        weights.iter().flat_map(|w| partitioners.iter().map(move |p| (w.as_str(), p.as_str())));
-    all.filter(|pair| partitioners.len() == 1 || *pair != ("rebalance", "metis")).collect()
-}
-
-/// The file of a case by its name.
-fn in_catalogue(name: &str, catalogue: &Path) -> Result<PathBuf, String> {
-    let wrong = |why: String| format!("{}: {why}", catalogue.display());
-    let text = std::fs::read_to_string(catalogue).map_err(|error| wrong(error.to_string()))?;
-    let table: toml::Table = text.parse().map_err(|error| wrong(format!("{error}")))?;
-    let entries = table.get("case").and_then(toml::Value::as_array).cloned().unwrap_or_default();
-    let named =
-        entries.iter().find(|entry| entry.get("name").and_then(toml::Value::as_str) == Some(name));
-    let file = named.and_then(|entry| entry.get("file")?.as_str());
-    let file = file.ok_or_else(|| {
-        wrong(format!("no case {name} in it, and no file of a case (.toml) either"))
-    })?;
-    Ok(catalogue.parent().unwrap_or(Path::new(".")).join(file))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn point(comm: Comm, ranks: usize, case: &str) -> Point {
-        let setup = pop::tests::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
-        Point { setup, case: case.into(), failed: false }
-    }
-
-    #[test]
-    fn meshes_are_warmed_up_once_where_messages_can_be_told() {
-        let points = [
-            point(Comm::Sim, 1, "a"),
-            point(Comm::Sim, 64, "a"),
-            point(Comm::Sim, 16, "a"),
-            point(Comm::Sim, 1024, "a"),
-            point(Comm::Mpi, 2, "b"),
-            point(Comm::Mpi, 4, "b"),
-        ];
-        assert_eq!(warmers(&points), [1, 4]);
-        let mut weak = points;
-        weak.iter_mut().for_each(|p| p.setup.experiment = "weak".into());
-        assert_eq!(warmers(&weak), [0, 4]);
     }
 }

@@ -38,8 +38,7 @@ pub fn measure(
     say: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
     let place = temporary_directory()?;
-    let mut bench = Bench::open(options, programs, place.path(), say)?;
-    bench.begin()?;
+    let bench = Bench::open(options, programs, place.path(), say)?;
     let mut session = Session::new(bench, targets, wishes);
     let mut rows = Vec::new();
     let mut interrupted = false;
