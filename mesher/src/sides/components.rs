@@ -186,12 +186,9 @@ impl Walk<'_> {
         up: usize,
     ) {
         let nodes = self.nodes;
-        let there = || {
-            neighbour(l - 2, frame.key, axis, up == 1).expect("a brick faces one inside the root")
-        };
         match frame.across[axis][up] {
             Across::Nothing => {}
-            Across::Coarser => self.join_coarser(l, c, there(), faced, Some((axis, up))),
+            Across::Coarser => self.join_coarser(l, c, frame.key, faced, Some((axis, up))),
             Across::Remote => {
                 let asks = match nodes.place(l, frame.node) {
                     Place::Mine => true,
@@ -200,7 +197,8 @@ impl Walk<'_> {
                     Place::Top | Place::Remote(_) => false,
                 };
                 if asks {
-                    self.tell(l, there(), c, faced);
+                    let there = neighbour(l - 2, frame.key, axis, up == 1);
+                    self.tell(l, there.expect("a brick faces one inside the root"), c, faced);
                 }
             }
             Across::Here(n, exists) => {
@@ -212,7 +210,7 @@ impl Walk<'_> {
                     }
                 }
                 if faced & !exists != 0 {
-                    self.join_coarser(l, c, there(), faced & !exists, Some((axis, up)));
+                    self.join_coarser(l, c, frame.key, faced & !exists, Some((axis, up)));
                 }
             }
         }
@@ -224,8 +222,8 @@ impl Walk<'_> {
         self.local.faces.push(Face { rank, level, key, component, bits });
     }
 
-    /// Joins a component with the leaves coarser than level `l` that cover the octants `faced` of brick
-    /// `key`, which is the brick on the way (`side` none) or its neighbour there.
+    /// Joins a component of a brick, which has key `key`, with the leaves coarser than level `l` that cover the octants
+    /// `faced` of the brick itself (`side` none) or of its neighbour there.
     #[inline]
     fn join_coarser(
         &mut self,
@@ -233,21 +231,28 @@ impl Walk<'_> {
         c: Component,
         mut key: u64,
         mut faced: u64,
-        side: Option<(usize, usize)>,
+        mut side: Option<(usize, usize)>,
     ) {
         let mut m = l;
         while faced != 0 && m > 0 {
-            faced = u64::from(brick::parents(faced)) << (8 * (key & 7));
+            let mut group = key & 7;
+            if let Some((axis, up)) = side {
+                // Beside its own group, and in the same brick if that is on the way there.
+                if group >> axis & 1 != up as u64 {
+                    side = None;
+                }
+                group ^= 1 << axis;
+            }
+            faced = u64::from(brick::parents(faced)) << (8 * group);
             key >>= 3;
             m -= 1;
             let frame = &self.way[m as usize];
             let (node, exists) = match side {
-                _ if frame.key == key => (frame.node, frame.exists),
+                None => (frame.node, frame.exists),
                 Some((axis, up)) => match frame.across[axis][up] {
                     Across::Here(n, exists) => (n, exists),
                     _ => continue,
                 },
-                None => continue,
             };
             if faced & exists != 0 {
                 for (d, bits) in self.nodes.components(m, node) {

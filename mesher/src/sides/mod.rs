@@ -12,6 +12,7 @@ pub mod nodes;
 pub mod rays;
 pub mod vote;
 
+use crate::brick::Brick;
 use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::lattice::Keep;
@@ -52,18 +53,18 @@ pub fn decide(
     keep: Keep,
     comm: &dyn Comm,
 ) -> Sides {
-    let nodes = nodes::Nodes::new(tree, share);
+    let mut nodes = nodes::Nodes::new(tree, share);
     let mut local = components::join(&nodes, share);
     let faces = std::mem::take(&mut local.faces);
     let classes = local.classes();
     let names = global::names(&nodes, tree, share, faces, &classes, comm);
     let candidates = vote::candidates(&nodes, tree, &classes.of, &names, share);
-    // The largest thing in memory; for the sides, bricks are flooded once more.
-    drop(nodes);
+    // Of the largest thing in memory, the components are left.
+    nodes.forget_links();
 
     let verdict = vote::decide(&candidates, facets, comm);
     let inside: Vec<bool> = names.iter().map(|n| verdict.inside.contains(n)).collect();
-    let mut inside = classes.of.into_iter().map(|c| inside[c as usize]);
+    let is_inside = |c: nodes::Component| inside[classes.of[c as usize] as usize];
     let mut sides = Sides {
         inside: per_level(),
         deleted: per_level(),
@@ -72,20 +73,20 @@ pub fn decide(
         rays: verdict.rays,
     };
     for l in 0..LEVELS as Level {
-        for b in nodes::open_bricks(tree, share, l) {
-            let mut side =
-                |w: u64, part: u64| if inside.next() == Some(true) { w | part } else { w };
-            let within = nodes::parts(b.open).fold(0, &mut side);
+        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
+            let (mut open, mut within) = (0, 0);
+            for (c, part) in nodes.components(l, n) {
+                open |= part;
+                within |= if is_inside(c) { part } else { 0 };
+            }
             let (found, deleted) = match keep {
                 Keep::All => (within, 0),
                 Keep::Outside => (0, within),
-                Keep::Inside => (0, b.open & !within),
+                Keep::Inside => (0, open & !within),
             };
-            sides.inside[l as usize].push(b.key, found);
-            sides.deleted[l as usize].push(b.key, deleted);
+            sides.inside[l as usize].push(key, found);
+            sides.deleted[l as usize].push(key, deleted);
         }
     }
-
-    debug_assert!(inside.next().is_none(), "every component has a side");
     sides
 }

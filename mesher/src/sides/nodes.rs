@@ -140,6 +140,13 @@ impl Nodes {
         out
     }
 
+    /// Forgets how bricks hang together, which is a good part of it all; components stay.
+    pub fn forget_links(&mut self) {
+        for level in &mut self.levels {
+            *level = LevelNodes { components: std::mem::take(&mut level.components), ..LevelNodes::default() };
+        }
+    }
+
     /// Number of components.
     pub fn component_count(&self) -> Component {
         self.masks.len() as Component
