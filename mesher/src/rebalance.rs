@@ -138,15 +138,17 @@ impl Scale {
         if l >= self.level + 2 {
             return self.add(l, brick.key, each * i64::from(brick.bits.count_ones()));
         }
-        // The brick has several bins; an octant that has several counts by its children, which have one or more.
-        for bit in ones(brick.bits) {
-            let code = brick.key << 6 | u64::from(bit);
-            if l >= self.level || each < 0 {
-                self.add_at(start57(l, code), each);
-            } else {
-                self.add_at(start57(l, code), -1);
-                (0..8).for_each(|child| self.add_at(start57(l + 1, code << 3 | child), 1));
+        if l == self.level + 1 {
+            // A bin for each group of eight.
+            for j in ones(u64::from(brick::parents(brick.bits))).map(u64::from) {
+                let octants = brick::byte(brick.bits, j).count_ones();
+                self.add_at(start57(self.level, brick.key << 3 | j), each * i64::from(octants));
             }
+            return;
+        }
+        // An octant may have several bins itself; but there are few so large.
+        for bit in ones(brick.bits) {
+            self.add_at(start57(l, brick.key << 6 | u64::from(bit)), each);
         }
     }
 

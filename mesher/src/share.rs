@@ -273,19 +273,7 @@ impl Ownership {
         let sent = out.sent + out.loose.len() as u64;
         let mut told: Vec<Entry> = Vec::new();
         for (_, words) in comm.exchange(out.parcels()) {
-            let mut left = words.as_slice();
-            while let Some((&number, packed)) = left.split_first() {
-                if number < LOOSE {
-                    let (set, behind) = BrickSet::unpack(packed);
-                    parts[number as usize].push(set);
-                    left = behind;
-                    continue;
-                }
-                let (entries, behind) = packed[1..].split_at(2 * packed[0] as usize);
-                let to = if number == TOP { &mut top } else { &mut told };
-                to.extend_from_slice(entries.as_chunks().0);
-                left = behind;
-            }
+            read_parcel(&words, &mut parts, &mut told, &mut top);
         }
         if any_top {
             told.extend(gather_collected(top, |a, b| a | b, comm));
@@ -386,6 +374,27 @@ impl Parcels {
             self.tell(LOOSE, told.iter().map(|l| l.1), told[0].0);
         }
         self.to.into_iter().collect()
+    }
+}
+
+/// Takes a parcel apart: sets, entries, and entries of top bricks that this rank collects.
+fn read_parcel(
+    mut words: &[u64],
+    sets: &mut [Vec<BrickSet>],
+    told: &mut Vec<Entry>,
+    top: &mut Vec<Entry>,
+) {
+    while let Some((&kind, packed)) = words.split_first() {
+        if kind < LOOSE {
+            let (set, behind) = BrickSet::unpack(packed);
+            sets[kind as usize].push(set);
+            words = behind;
+            continue;
+        }
+        let (entries, behind) = packed[1..].split_at(2 * packed[0] as usize);
+        let to = if kind == TOP { &mut *top } else { &mut *told };
+        to.extend_from_slice(entries.as_chunks().0);
+        words = behind;
     }
 }
 

@@ -64,7 +64,9 @@ pub fn decide(
 
     let verdict = vote::decide(&candidates, facets, comm);
     let inside: Vec<bool> = names.iter().map(|n| verdict.inside.contains(n)).collect();
-    let is_inside = |c: nodes::Component| inside[classes.of[c as usize] as usize];
+    let mut is_inside = Vec::with_capacity(classes.of.len());
+    is_inside.extend(classes.of.iter().map(|&c| inside[c as usize]));
+    drop(classes);
     let mut sides = Sides {
         inside: per_level(),
         deleted: per_level(),
@@ -77,7 +79,7 @@ pub fn decide(
             let (mut open, mut within) = (0, 0);
             for (c, part) in nodes.components(l, n) {
                 open |= part;
-                within |= if is_inside(c) { part } else { 0 };
+                within |= if is_inside[c as usize] { part } else { 0 };
             }
             let (found, deleted) = match keep {
                 Keep::All => (within, 0),

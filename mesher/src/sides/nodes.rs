@@ -143,7 +143,10 @@ impl Nodes {
     /// Forgets how bricks hang together, which is a good part of it all; components stay.
     pub fn forget_links(&mut self) {
         for level in &mut self.levels {
-            *level = LevelNodes { components: std::mem::take(&mut level.components), ..LevelNodes::default() };
+            *level = LevelNodes {
+                components: std::mem::take(&mut level.components),
+                ..LevelNodes::default()
+            };
         }
     }
 
