@@ -13,6 +13,8 @@ mod union;
 pub use read::{Bricks, ChildBricks, Cursor};
 
 use crate::brick::{self, Brick};
+use crate::wide::widest;
+use std::ops::Range;
 
 /// Bits of a key that are kept per brick.
 const LOW_BITS: u32 = 32;
@@ -106,7 +108,12 @@ impl BrickSet {
 
     /// Number of octants.
     pub fn count(&self) -> u64 {
-        self.bits.iter().map(|b| u64::from(b.count_ones())).sum()
+        count_ones(&self.bits)
+    }
+
+    /// Number of octants in the bricks of a range of positions.
+    pub fn count_in(&self, range: Range<usize>) -> u64 {
+        count_ones(&self.bits[range])
     }
 
     /// The bits of a brick, 0 where the set has none of it.
@@ -185,6 +192,16 @@ impl BrickSet {
         assert_eq!(self.low.len(), self.bits.len(), "every key has bits");
         assert!(self.runs.is_sorted_by(|a, b| a.high < b.high && a.start < b.start));
     }
+}
+
+widest! {
+    /// Number of bits that are set in some words.
+    fn count_ones(words: &[u64]) -> u64 = count_ones_lanes;
+}
+
+#[inline(always)]
+fn count_ones_lanes(words: &[u64]) -> u64 {
+    words.iter().map(|w| u64::from(w.count_ones())).sum()
 }
 
 /// Positions of the set bits of `bits`, ascending.
@@ -275,7 +292,11 @@ mod tests {
             let key = b.keys().nth(b.len() / 2).copied().unwrap_or(3);
             let (i, j) = (x.position(key), x.position(2 * key));
             prop_assert_eq!((i, j), (a.range(..key).count(), a.range(..2 * key).count()));
-            prop_assert!((0..x.len()).map(|i| x.key_at(i)).eq(a.keys().copied()));
+            prop_assert!((0..x.len()).map(|i| x.brick(i)).eq(x.bricks()));
+            let octants: u32 = a.values().take(j).skip(i).map(|bits| bits.count_ones()).sum();
+            for (_, counted) in crate::wide::tests::widths(|| x.count_in(i..j)) {
+                prop_assert_eq!(counted, u64::from(octants));
+            }
             let ranges = [0..i, i..j, j..x.len()];
             let stretches = ranges.clone().map(|range| {
                 let mut stretch = x.clone();

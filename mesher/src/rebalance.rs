@@ -6,7 +6,7 @@
 //! The paper asks for this in its conclusions.
 
 use crate::brick::{self, Brick};
-use crate::brickset::ones;
+use crate::brickset::{BrickSet, ones};
 use crate::comm::Comm;
 use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::curve::{self, Bin};
@@ -19,7 +19,7 @@ use std::ops::Range;
 /// together, in units of some 70 ns: fitted to what the ranks of several meshes took. Surfaces that lie obliquely to the axes
 /// leave more components; uneven ones leave small ones, and steps that a processor does not foresee.
 const COSTS: [u64; 4] = [2, 2, 2, 13];
-/// Groups of bricks that are looked at to find what a level takes, about.
+/// Groups of bricks that are looked at to find what a level takes, at least where there are so many.
 const SAMPLE: usize = 1024;
 
 /// The ownership that divides the work on T0, once it is refined, into equal parts; `tree` need not be settled.
@@ -35,12 +35,11 @@ pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Com
 /// Weighs the bricks of a level, of which it looks at some.
 fn weigh_level(tree: &Tree, l: Level, scale: &mut Scale) {
     let above = &tree.split[l as usize - 1];
-    let every = (above.len() / SAMPLE).clamp(1, 16) as u64;
+    // Odd, as bricks come in groups of powers of two.
+    let every = (above.len() / SAMPLE) | 1;
     let (mut split, mut crossing) =
         (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
-    // Spread by a product: neighbours in space have keys alike.
-    let seen = |key: u64| (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32).is_multiple_of(every);
-    for b in above.bricks().filter(|b| seen(b.key)) {
+    for b in (0..above.len()).step_by(every).map(|at| above.brick(at)) {
         for j in ones(u64::from(brick::parents(b.bits))).map(u64::from) {
             let key = b.key << 3 | j;
             let leaves = brick::children(brick::byte(b.bits, j)) & !split.get(key);
@@ -80,10 +79,7 @@ impl Weighed {
     pub fn new(parts: &Parts, share: &Ownership, level: Level, with_crossing: bool) -> Self {
         let mut scale = Scale::new(share, level);
         let mut add = |l: Level, sets: &PerLevel, each: i64| {
-            let bricks = sets[l as usize].bricks();
-            bricks
-                .filter(|b| share.answers_for(l, b.key))
-                .for_each(|b| scale.add_octants(l, b, each));
+            scale.add_set(l, &sets[l as usize], each, |key| share.answers_for(l, key));
         };
         for l in 0..LEVELS as Level {
             // A leaf that splits makes eight of one.
@@ -132,12 +128,26 @@ impl Scale {
         Self { own, level, shift: 3 * (LEVEL_MAX - level), bins: Vec::new() }
     }
 
-    /// Adds so much for each octant of a brick.
-    #[inline]
-    fn add_octants(&mut self, l: Level, brick: Brick, each: i64) {
-        if l >= self.level + 2 {
-            return self.add(l, brick.key, each * i64::from(brick.bits.count_ones()));
+    /// Adds so much for each octant of a set, in bricks that this rank answers for.
+    fn add_set(&mut self, l: Level, set: &BrickSet, each: i64, answers_for: impl Fn(u64) -> bool) {
+        let Some(up) = l.checked_sub(self.level + 2) else {
+            let mine = set.bricks().filter(|b| answers_for(b.key));
+            return mine.for_each(|b| self.add_octants(l, b, each));
+        };
+        // Bricks of one bin are beside each other, and have one owner.
+        let mut at = 0;
+        while at < set.len() {
+            let key = set.key_at(at);
+            let end = set.position(((key >> (3 * up)) + 1) << (3 * up));
+            if answers_for(key) {
+                self.add(l, key, each * set.count_in(at..end) as i64);
+            }
+            at = end;
         }
+    }
+
+    /// Adds so much for each octant of a brick, which has several bins.
+    fn add_octants(&mut self, l: Level, brick: Brick, each: i64) {
         if l == self.level + 1 {
             // A bin for each group of eight.
             for j in ones(u64::from(brick::parents(brick.bits))).map(u64::from) {

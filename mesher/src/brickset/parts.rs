@@ -1,6 +1,7 @@
 //! Stretches of a set: by key, taken off its ends, put on, and sent.
 
 use super::{BrickSet, LOW_BITS, Run, high_of};
+use crate::brick::Brick;
 use std::ops::Range;
 
 impl BrickSet {
@@ -21,6 +22,11 @@ impl BrickSet {
     pub fn key_at(&self, position: usize) -> u64 {
         let run = self.runs.partition_point(|r| r.start <= position) - 1;
         self.runs[run].high | u64::from(self.low[position])
+    }
+
+    /// The brick that so many are before.
+    pub fn brick(&self, position: usize) -> Brick {
+        Brick { key: self.key_at(position), bits: self.bits[position] }
     }
 
     /// The first brick's key and the last one's; none if the set is empty.
