@@ -1,6 +1,6 @@
 //! The partition of T0 (the paper's sections II.A and III), and the facets' journey to the ranks.
 //!
-//! By default the Morton curve is cut into equal shares of the leaves to expect, wherever that is ([`shares`]): each rank
+//! By default the Morton curve is cut into equal shares of the leaves to expect, wherever that is (`shares`): each rank
 //! needs to know the owners along the curve, and no more.
 //!
 //! The paper's way, which METIS, weights of 1 and a chosen `level_base` ask for, cuts T0 itself into *base leaves* and
