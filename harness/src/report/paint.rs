@@ -213,13 +213,14 @@ const LINE: i32 = SIZE + 4;
 /// The lines below every bar. Names too long for their bars are broken at spaces; where that does not suffice, they
 /// are left out evenly.
 fn labels(names: &[String], step: f64) -> Vec<Vec<String>> {
-    let widest =
-        |all: &[Vec<String>]| all.iter().flatten().map(|w| width(w)).max().unwrap_or(0) + 16;
+    let widest = |all: &[Vec<String>]| all.iter().flatten().map(|w| width(w)).max().unwrap_or(0);
+    // Between names in one line there is a gap; words of their own lines need hardly any.
+    let [gap, narrow] = [16, 4];
     let whole: Vec<Vec<String>> = names.iter().map(|n| vec![n.clone()]).collect();
     let broken: Vec<Vec<String>> =
         names.iter().map(|n| n.split(' ').map(str::to_owned).collect()).collect();
-    let mut chosen = if f64::from(widest(&whole)) <= step { whole } else { broken };
-    let every = (f64::from(widest(&chosen)) / step).ceil().max(1.0) as usize;
+    let mut chosen = if f64::from(widest(&whole) + gap) <= step { whole } else { broken };
+    let every = (f64::from(widest(&chosen) + narrow) / step).ceil().max(1.0) as usize;
     chosen.iter_mut().enumerate().filter(|(i, _)| i % every != 0).for_each(|(_, l)| l.clear());
     chosen
 }
