@@ -1,0 +1,176 @@
+//! Bringing bricks to the ranks that hold them.
+
+use super::{KEY_BITS, Ownership, Place, brick_start};
+use crate::brickset::BrickSet;
+use crate::comm::{Comm, Entry, collector, for_collectors, gather_collected};
+use crate::octant::{LEVEL_MAX, Level};
+use crate::tree::PerLevel;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+impl Ownership {
+    /// Brings octants to the ranks that hold their bricks: returns those for this rank, from all
+    /// ranks together, and the number of bricks sent. Collective, unless there is one rank.
+    pub fn scatter<const N: usize>(
+        &self,
+        l: Level,
+        sets: [BrickSet; N],
+        comm: &dyn Comm,
+    ) -> ([BrickSet; N], u64) {
+        let sets = sets.into_iter().map(|set| (l, set)).collect();
+        let (sets, sent) = self.scatter_all(sets, comm);
+        (sets.try_into().expect("as many sets as were scattered"), sent)
+    }
+
+    /// Brings all levels of some sets to the ranks that hold their bricks, as if each level of each were
+    /// [scattered](Self::scatter). Collective, unless there is one rank.
+    pub fn settle(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
+        let levels = |set: &mut &mut PerLevel| (0..).zip(std::mem::take(*set)).collect::<Vec<_>>();
+        let (told, _) = self.scatter_all(sets.iter_mut().flat_map(levels).collect(), comm);
+        let mut told = told.into_iter();
+        for set in sets {
+            **set = told.by_ref().take(crate::tree::LEVELS).collect();
+        }
+    }
+
+    /// Brings octants of several sets to the ranks that hold their bricks. Collective, unless there is one rank.
+    fn scatter_all(&self, sets: Vec<(Level, BrickSet)>, comm: &dyn Comm) -> (Vec<BrickSet>, u64) {
+        if self.ranks == 1 {
+            return (sets.into_iter().map(|(_, set)| set).collect(), 0);
+        }
+        let any_top = sets.iter().any(|(l, _)| *l <= self.level_top);
+        let mut out = Parcels::default();
+        let pick = |(number, (l, set))| vec![self.pick(number, l, set, &mut out)];
+        // What this rank holds of each set, in parts.
+        let mut parts: Vec<Vec<BrickSet>> = (0..).zip(sets).map(pick).collect();
+        let mut top = std::mem::take(&mut out.top);
+        if any_top && let Some(collected) = for_collectors(&mut top, |a, b| a | b, comm) {
+            top.clear();
+            for (i, entries) in collected.iter().enumerate() {
+                out.tell(TOP, entries.as_chunks().0.iter().copied(), collector(i, comm));
+            }
+        }
+        let sent = out.sent + out.loose.len() as u64;
+        let mut told: Vec<Entry> = Vec::new();
+        for (_, words) in comm.exchange(out.parcels()) {
+            read_parcel(&words, &mut parts, &mut told, &mut top);
+        }
+        if any_top {
+            told.extend(gather_collected(top, |a, b| a | b, comm));
+        }
+        told.sort_by_key(|e| e[0]);
+        for told in told.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
+            let mut set = BrickSet::default();
+            told.iter().for_each(|e| set.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
+            parts[(told[0][0] >> KEY_BITS) as usize].push(set);
+        }
+        (parts.into_iter().map(BrickSet::union_of).collect(), sent)
+    }
+
+    /// Takes out of set `number` what others hold; returns what this rank does. Of top bricks it holds what
+    /// everybody is told.
+    fn pick(&self, number: u64, l: Level, mut set: BrickSet, out: &mut Parcels) -> BrickSet {
+        let mut stretches = self.stretches();
+        if let (Some(stretch), None) = (stretches.next(), stretches.next())
+            && l > self.level_shared
+        {
+            // Where no brick has several owners, each one's are beside each other.
+            let position = |set: &BrickSet, at: u64| set.position(at >> (3 * (LEVEL_MAX + 2 - l)));
+            let mine = position(&set, stretch.start)..position(&set, stretch.end);
+            for others in [0..mine.start, mine.end..set.len()] {
+                let mut at = others.start;
+                while at < others.end {
+                    let run = self.runs.at(brick_start(l, set.key_at(at)));
+                    let theirs = at..position(&set, self.runs.end(run));
+                    at = theirs.end;
+                    out.send(number, &set, theirs, self.runs.owners[run]);
+                }
+            }
+            set.keep(mine);
+            return set;
+        }
+        set.retain(|b| {
+            let owners = self.owners_of(l, b.key);
+            let place = self.place_among(l, owners);
+            let entry = [number << KEY_BITS | b.key, b.bits];
+            if place == Place::Top {
+                out.top.push(entry);
+                return 0;
+            }
+            if place != Place::Mine {
+                // Few, and for many owners: told brick by brick.
+                let others = owners.iter().filter(|&&owner| owner != self.rank);
+                out.loose.extend(others.map(|&owner| (owner, entry)));
+            }
+            if matches!(place, Place::Mine | Place::Shared) { b.bits } else { 0 }
+        });
+        set
+    }
+}
+
+/// In place of a set's number, before the number of some bricks and those, each with its set's number.
+const LOOSE: u64 = 1 << 32;
+/// The same for top bricks that a rank collects.
+const TOP: u64 = LOOSE + 1;
+
+/// What is to be sent. Entries have their set's number above the key.
+#[derive(Default)]
+struct Parcels {
+    /// By receiver: sets, each behind its number, and entries.
+    to: BTreeMap<usize, Vec<u64>>,
+    /// Entries with their receivers.
+    loose: Vec<(usize, Entry)>,
+    /// Entries for everybody.
+    top: Vec<Entry>,
+    /// Bricks in sets.
+    sent: u64,
+}
+
+impl Parcels {
+    fn send(&mut self, number: u64, set: &BrickSet, bricks: Range<usize>, to: usize) {
+        self.sent += bricks.len() as u64;
+        let parcel = self.to.entry(to).or_default();
+        parcel.push(number);
+        set.pack(bricks, parcel);
+    }
+
+    fn tell(&mut self, kind: u64, entries: impl ExactSizeIterator<Item = Entry>, to: usize) {
+        if entries.len() > 0 {
+            let parcel = self.to.entry(to).or_default();
+            parcel.extend([kind, entries.len() as u64]);
+            parcel.extend(entries.flatten());
+        }
+    }
+
+    fn parcels(mut self) -> Vec<(usize, Vec<u64>)> {
+        let mut loose = std::mem::take(&mut self.loose);
+        loose.sort_by_key(|l| l.0);
+        // With METIS an owner may have several runs of an octant.
+        loose.dedup();
+        for told in loose.chunk_by(|a, b| a.0 == b.0) {
+            self.tell(LOOSE, told.iter().map(|l| l.1), told[0].0);
+        }
+        self.to.into_iter().collect()
+    }
+}
+
+/// Takes a parcel apart: sets, entries, and entries of top bricks that this rank collects.
+fn read_parcel(
+    mut words: &[u64],
+    sets: &mut [Vec<BrickSet>],
+    told: &mut Vec<Entry>,
+    top: &mut Vec<Entry>,
+) {
+    while let Some((&kind, packed)) = words.split_first() {
+        if kind < LOOSE {
+            let (set, behind) = BrickSet::unpack(packed);
+            sets[kind as usize].push(set);
+            words = behind;
+            continue;
+        }
+        let (entries, behind) = packed[1..].split_at(2 * packed[0] as usize);
+        let to = if kind == TOP { &mut *top } else { &mut *told };
+        to.extend_from_slice(entries.as_chunks().0);
+        words = behind;
+    }
+}
