@@ -10,7 +10,7 @@ mod parts;
 mod read;
 mod union;
 
-pub use read::{Bricks, ChildBricks, Cursor};
+pub use read::{Bricks, ChildBricks, Cursor, Groups};
 
 use crate::brick::{self, Brick};
 use crate::wide::widest;
@@ -94,6 +94,13 @@ impl BrickSet {
     #[inline]
     pub fn bricks(&self) -> Bricks<'_> {
         Bricks::new(self)
+    }
+
+    /// The bricks in order, those together whose keys agree but for so many low bits (and whose upper halves do): the first
+    /// one's key, and the positions of all.
+    #[inline]
+    pub fn groups(&self, low_bits: u32) -> Groups<'_> {
+        Groups::new(self, low_bits)
     }
 
     /// Number of bricks.
@@ -296,6 +303,19 @@ mod tests {
             let octants: u32 = a.values().take(j).skip(i).map(|bits| bits.count_ones()).sum();
             for (_, counted) in crate::wide::tests::widths(|| x.count_in(i..j)) {
                 prop_assert_eq!(counted, u64::from(octants));
+            }
+            for low_bits in [0, 1, 2, 31, 32, 40] {
+                let low = |key: u64| (key as u32).checked_shr(low_bits).unwrap_or(0);
+                let group = |b: &Brick| (high_of(b.key), low(b.key));
+                let (mut behind, mut last) = (0, None);
+                for (key, range) in x.groups(low_bits) {
+                    prop_assert_eq!((range.start, key), (behind, x.key_at(behind)));
+                    let all = group(&x.brick(behind));
+                    prop_assert!(last < Some(all));
+                    prop_assert!(range.clone().all(|at| group(&x.brick(at)) == all));
+                    (behind, last) = (range.end, Some(all));
+                }
+                prop_assert_eq!(behind, x.len());
             }
             let ranges = [0..i, i..j, j..x.len()];
             let stretches = ranges.clone().map(|range| {

@@ -3,6 +3,8 @@
 #![deny(missing_docs)]
 
 mod cli;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod heap;
 
 use cli::{Args, CommChoice, case, parse};
 use mesher::base::Division;
@@ -20,6 +22,8 @@ use std::sync::atomic::Ordering;
 const BUG: i32 = 70;
 
 fn main() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    heap::fix_thresholds();
     let args = parse();
     // Failing to install the handler only means that interrupts end the process the default way.
     let _ = ctrlc::set_handler(|| {

@@ -8,7 +8,7 @@
 use crate::brick::{self, Brick};
 use crate::brickset::{BrickSet, ones};
 use crate::comm::Comm;
-use crate::octant::{LEVEL_MAX, Level, start57};
+use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::curve::{self, Bin};
 use crate::share::{Ownership, brick_start};
 use crate::sides::nodes::parts;
@@ -19,24 +19,29 @@ use std::ops::Range;
 /// together, in units of some 70 ns: fitted to what the ranks of several meshes took. Surfaces that lie obliquely to the axes
 /// leave more components; uneven ones leave small ones, and steps that a processor does not foresee.
 const COSTS: [u64; 4] = [2, 2, 2, 13];
-/// Groups of bricks that are looked at to find what a level takes, at least where there are so many.
-const SAMPLE: usize = 1024;
+/// Groups of bricks that are looked at to find what the level takes that has most of them, at least where there are so many;
+/// of the other levels the same part.
+const SAMPLE: usize = 512;
+/// How much heavier than others a share may be: by work on T0, as that is guessed anyway; by leaves, which
+/// cost little time each. To move bricks costs more than such differences.
+const SLACK: [f64; 2] = [0.03, 0.05];
 
 /// The ownership that divides the work on T0, once it is refined, into equal parts; `tree` need not be settled.
 /// Cuts fall between octants of a level. Collective.
 pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Comm) -> Ownership {
     let mut scale = Scale::new(share, level);
+    let groups = tree.split.iter().map(BrickSet::len).max().unwrap_or(0);
+    // Odd, as bricks come in groups of powers of two.
+    let every = (groups / SAMPLE) | 1;
     for l in 1..tree.split.len() as Level {
-        weigh_level(tree, l, &mut scale);
+        weigh_level(tree, l, every, &mut scale);
     }
     scale.cut(comm).unwrap_or_else(|| share.clone())
 }
 
-/// Weighs the bricks of a level, of which it looks at some.
-fn weigh_level(tree: &Tree, l: Level, scale: &mut Scale) {
+/// Weighs the bricks of a level, of which it looks at one group out of so many.
+fn weigh_level(tree: &Tree, l: Level, every: usize, scale: &mut Scale) {
     let above = &tree.split[l as usize - 1];
-    // Odd, as bricks come in groups of powers of two.
-    let every = (above.len() / SAMPLE) | 1;
     let (mut split, mut crossing) =
         (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
     for b in (0..above.len()).step_by(every).map(|at| above.brick(at)) {
@@ -99,7 +104,10 @@ impl Weighed {
 
     /// Deals the leaves out anew, in equal shares. Collective.
     pub fn deal(self, parts: Parts, share: &Ownership, comm: &dyn Comm) -> Ownership {
-        let Some(changes) = curve::cut(&self.0, comm) else { return share.clone() };
+        let own = share.stretches().next().map_or(0, |own| own.start);
+        let Some(changes) = curve::cut_anew(&self.0, own, SLACK[1], comm) else {
+            return share.clone();
+        };
         let fresh = Ownership::along(comm.rank(), comm.size(), changes);
         let mut sets = [parts.split, parts.crossing, parts.inside, parts.deleted];
         for set in &mut sets {
@@ -134,31 +142,19 @@ impl Scale {
             let mine = set.bricks().filter(|b| answers_for(b.key));
             return mine.for_each(|b| self.add_octants(l, b, each));
         };
-        // Bricks of one bin are beside each other, and have one owner.
-        let mut at = 0;
-        while at < set.len() {
-            let key = set.key_at(at);
-            let end = set.position(((key >> (3 * up)) + 1) << (3 * up));
+        // Bricks of one bin have one owner.
+        for (key, bricks) in set.groups(3 * up) {
             if answers_for(key) {
-                self.add(l, key, each * set.count_in(at..end) as i64);
+                self.add(l, key, each * set.count_in(bricks) as i64);
             }
-            at = end;
         }
     }
 
-    /// Adds so much for each octant of a brick, which has several bins.
+    /// Adds so much for each octant of a brick that has several bins, in groups of eight.
     fn add_octants(&mut self, l: Level, brick: Brick, each: i64) {
-        if l == self.level + 1 {
-            // A bin for each group of eight.
-            for j in ones(u64::from(brick::parents(brick.bits))).map(u64::from) {
-                let octants = brick::byte(brick.bits, j).count_ones();
-                self.add_at(start57(self.level, brick.key << 3 | j), each * i64::from(octants));
-            }
-            return;
-        }
-        // An octant may have several bins itself; but there are few so large.
-        for bit in ones(brick.bits) {
-            self.add_at(start57(l, brick.key << 6 | u64::from(bit)), each);
+        for j in ones(u64::from(brick::parents(brick.bits))).map(u64::from) {
+            let octants = brick::byte(brick.bits, j).count_ones();
+            self.add_at(brick_start(l + 1, brick.key << 3 | j), each * i64::from(octants));
         }
     }
 
@@ -177,16 +173,22 @@ impl Scale {
         }
     }
 
-    /// The bins in order. What is negative, as leaves may be deleted in one and their parents split in another, is
-    /// nothing.
+    /// The bins in order. Where leaves that are deleted lie in other bins than the octants that were split for them, a bin
+    /// may be negative: it is nothing, and takes the rest from those behind.
     fn bins(mut self) -> Vec<Bin> {
         self.bins.sort_by_key(|b| b.0);
-        let sums = self.bins.chunk_by(|a, b| a.0 == b.0);
-        sums.map(|all| (all[0].0, all.iter().map(|b| b.1).sum::<i64>().max(0) as u64)).collect()
+        let mut owed = 0;
+        let mut weigh = |all: &[(u64, i64)]| {
+            let sum: i64 = owed + all.iter().map(|b| b.1).sum::<i64>();
+            owed = sum.min(0);
+            (all[0].0, sum.max(0) as u64)
+        };
+        self.bins.chunk_by(|a, b| a.0 == b.0).map(&mut weigh).collect()
     }
 
     fn cut(self, comm: &dyn Comm) -> Option<Ownership> {
-        let changes = curve::cut(&self.bins(), comm)?;
+        let own = self.own.start;
+        let changes = curve::cut_anew(&self.bins(), own, SLACK[0], comm)?;
         Some(Ownership::along(comm.rank(), comm.size(), changes))
     }
 }

@@ -57,6 +57,8 @@ pub struct Ownership {
     rank: usize,
     ranks: usize,
     runs: Arc<Runs>,
+    /// This rank's longest stretch: most questions are about what lies in it.
+    own: Range<u64>,
     /// Deepest level that has a brick of several owners.
     level_shared: Level,
     /// Deepest level that has a top brick.
@@ -115,12 +117,13 @@ impl Ownership {
         }
         assert!(!runs.starts.is_empty(), "all is somebody's");
         let (level_shared, level_top) = (runs.deepest_brick_of(2), runs.deepest_brick_of(MANY));
-        Self { rank, ranks, runs: Arc::new(runs), level_shared, level_top }
+        let own = runs.of(rank).max_by_key(|own| own.end - own.start).unwrap_or(0..0);
+        Self { rank, ranks, runs: Arc::new(runs), own, level_shared, level_top }
     }
 
     /// The same as seen by someone who owns nothing: every brick is a top brick or remote.
     pub fn bystander(&self) -> Self {
-        Self { rank: NOBODY, ..self.clone() }
+        Self { rank: NOBODY, own: 0..0, ..self.clone() }
     }
 
     /// What of a tree lies in top bricks: the same on all ranks.
@@ -152,8 +155,7 @@ impl Ownership {
 
     /// The level-19 codes that this rank owns, in order.
     pub fn stretches(&self) -> impl Iterator<Item = Range<u64>> + '_ {
-        let owners = self.runs.owners.iter().enumerate();
-        owners.filter(|o| *o.1 == self.rank).map(|(run, _)| self.runs.span(run))
+        self.runs.of(self.rank)
     }
 
     /// The owner at a level-19 code.
@@ -180,13 +182,19 @@ impl Ownership {
         if l < 2 {
             return Place::Top;
         }
-        if self.ranks == 1 {
+        if self.ranks == 1 || self.is_within(l, key) {
             return Place::Mine;
         }
         if l > self.level_shared {
             return self.place_of(self.answerer(l, key));
         }
         self.place_among(l, self.owners_of(l, key))
+    }
+
+    /// Whether brick `key` of level `l`, which is 2 or more, lies in this rank's longest stretch, all of it.
+    #[inline]
+    fn is_within(&self, l: Level, key: u64) -> bool {
+        self.own.start <= brick_start(l, key) && brick_start(l, key + 1) <= self.own.end
     }
 
     /// The owners, run by run, of what a brick fills; of many, some.
@@ -220,7 +228,10 @@ impl Ownership {
     #[inline]
     pub fn answers_for(&self, l: Level, key: u64) -> bool {
         // Deeper than a child of a shared brick, whatever a rank holds is its own.
-        self.ranks == 1 || l > self.level_shared + 1 || self.answerer(l, key) == self.rank
+        self.ranks == 1
+            || l > self.level_shared + 1
+            || self.own.contains(&brick_start(l, key))
+            || self.answerer(l, key) == self.rank
     }
 
     /// Whether any brick of level `l` is held by several ranks.
@@ -243,6 +254,12 @@ impl Runs {
     #[inline]
     fn end(&self, run: usize) -> u64 {
         self.starts.get(run + 1).copied().unwrap_or(1 << (3 * LEVEL_MAX))
+    }
+
+    /// The stretches that a rank owns, in order.
+    fn of(&self, rank: usize) -> impl Iterator<Item = Range<u64>> + '_ {
+        let owners = self.owners.iter().enumerate();
+        owners.filter(move |o| *o.1 == rank).map(|(run, _)| self.span(run))
     }
 
     /// From where to where a run goes.

@@ -48,15 +48,17 @@ fn leaves_dealt_out_anew_are_balanced() {
             let leaves = counter(&anew, "leaves");
             let heaviest = *counter(&anew, "base_leaf_cells_max").iter().max().unwrap();
             let share = leaves.iter().sum::<u64>() / ranks;
-            // The curve is cut between octants, each of which may be on the wrong side by its half, on both sides; leaves of
-            // crossing ones that are left out are counted by what they were before gradation.
-            let bound = share + heaviest + share / 50;
+            // Shares may differ by a twentieth; the curve is cut between octants, each of which may be on the wrong side by its
+            // half, on both sides; leaves of crossing ones that are left out are counted by what they were before gradation.
+            let bound = share + share / 20 + heaviest + share / 50;
             assert!(leaves.iter().all(|&l| l <= bound), "{ranks} ranks: {leaves:?}, {heaviest}");
             assert!(heaviest < share / 2, "{ranks} ranks: octants of {heaviest} in {share}");
             let kept = told(&place, &["--comm", &comm, "--weights", "area"]);
             assert_eq!(kept["digest"], solo["digest"]);
             let (new, old) = (lambda(&leaves), lambda(&counter(&kept, "leaves")));
-            assert!(new < old, "{ranks} ranks: lambda {new} is not below {old}");
+            // What is balanced well enough stays where it is.
+            assert!(new < old || old < 1.05, "{ranks} ranks: lambda {new} is not below {old}");
+            assert!(ranks == 2 || old > 1.1, "{ranks} ranks: lambda {old} leaves nothing to gain");
         }
     }
 }

@@ -8,7 +8,7 @@ use super::cut::Cut;
 use crate::comm::{Comm, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::Rules;
-use crate::octant::{Level, start57};
+use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::area::{self, PARTS};
 use crate::partition::curve::{self, Bin};
 use crate::partition::thickness;
@@ -17,15 +17,17 @@ use crate::share::Ownership;
 /// Shares by the facets' area, roughly in octants of the first level, finally in those of the second. Collective.
 pub fn by_area(facets: &[Facet], rules: &Rules, levels: [Level; 2], comm: &dyn Comm) -> Ownership {
     let [coarse, fine] = levels;
-    let mine = expected(facets, rules, coarse).into_iter().map(|b| [b.0, b.1]).collect();
-    let told = gather_merged(mine, |a, b| a + b, comm);
+    let mine = expected(facets, rules, fine);
+    let shift = 3 * (LEVEL_MAX - coarse);
+    let roughly = mine.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
+    let told = gather_merged(roughly, |a, b| a + b, comm);
     let mut bins: Vec<Bin> = told.into_iter().map(|e| (e[0], e[1])).collect();
     let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / PARTS).sum::<u64>();
     let light = leaves(&bins) / comm.size() as u64;
     curve::add_boxes(&mut bins, rules, coarse, light, PARTS, &curve::ALL);
     curve::merge(&mut bins);
     let bins = Bins { light: leaves(&bins) / (comm.size() as u64 * super::CUT_PARTS), bins };
-    finely(&bins, expected(facets, rules, fine), rules, fine, |_, _| {}, comm)
+    finely(&bins, mine, rules, fine, |_, _| {}, comm)
 }
 
 /// Shares by what a rehearsal told of the pieces of a cut; within a piece by the facets' area, in octants of level

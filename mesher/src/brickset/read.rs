@@ -1,7 +1,8 @@
-//! Readers of a set: its bricks, those of the level below, and bits by ascending keys.
+//! Readers of a set: its bricks, groups of them, those of the level below, and bits by ascending keys.
 
 use super::{BrickSet, Run, high_of};
 use crate::brick::{self, Brick};
+use std::ops::Range;
 
 /// The bricks of a set in order.
 #[derive(Clone)]
@@ -37,6 +38,44 @@ impl Iterator for Bricks<'_> {
         self.at += 1;
         Some(Brick { key: self.high | u64::from(self.set.low[at]), bits: self.set.bits[at] })
     }
+}
+
+/// See [`BrickSet::groups`].
+pub struct Groups<'a> {
+    bricks: Bricks<'a>,
+    shift: u32,
+}
+
+impl<'a> Groups<'a> {
+    pub(super) fn new(set: &'a BrickSet, shift: u32) -> Self {
+        Self { bricks: set.bricks(), shift }
+    }
+}
+
+impl Iterator for Groups<'_> {
+    /// The first brick's key, and the positions of all.
+    type Item = (u64, Range<usize>);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        let first = self.bricks.next()?;
+        let Bricks { set, at, run_end, .. } = self.bricks;
+        let group = |low: u32| low.checked_shr(self.shift).unwrap_or(0);
+        let more = leading(&set.low[at..run_end], |low| group(low) == group(first.key as u32));
+        self.bricks.at += more;
+        Some((first.key, at - 1..at + more))
+    }
+}
+
+/// How many elements are before the first of which `leads` is not true. A gallop: quick where that is near.
+#[inline]
+fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
+    let mut step = 1;
+    while low.get(step).is_some_and(|&low| leads(low)) {
+        step *= 2;
+    }
+    let near = &low[step / 2..low.len().min(step + 1)];
+    step / 2 + near.partition_point(|&low| leads(low))
 }
 
 /// See [`BrickSet::child_bricks`].
@@ -118,14 +157,8 @@ impl<'a> Cursor<'a> {
             return 0;
         }
         let want = key as u32;
-        // A gallop: what the reader skips (another rank's share, deleted parts) may be long.
-        let mut step = 1;
-        while self.low.get(step).is_some_and(|low| *low < want) {
-            step *= 2;
-        }
-        let near = &self.low[step / 2..self.low.len().min(step + 1)];
-        let skip = step / 2 + near.partition_point(|low| *low < want);
-        self.low = &self.low[skip..];
+        // What the reader skips (another rank's share, deleted parts) may be long.
+        self.low = &self.low[leading(self.low, |low| low < want)..];
         match self.low {
             [low, ..] if *low == want => self.set.bits[self.end - self.low.len()],
             _ => 0,

@@ -90,6 +90,9 @@ impl Ownership {
             return set;
         }
         set.retain(|b| {
+            if l >= 2 && self.is_within(l, b.key) {
+                return b.bits;
+            }
             let owners = self.owners_of(l, b.key);
             let place = self.place_among(l, owners);
             let entry = [number << KEY_BITS | b.key, b.bits];
