@@ -2,7 +2,8 @@
 //!
 //! What work a place will make is guessed before refinement, known better when T0 is there, and exactly when the mesh
 //! is. So the curve is cut again, twice: after refinement by what sides and gradation take, after gradation by
-//! leaves. Each rank weighs what it has; cuts follow from the ranks' sums; and bricks go to their new holders.
+//! leaves. Each rank weighs what it has; cuts follow from the ranks' sums, and move no further than shares that are
+//! nearly equal ask for; and bricks go to their new holders.
 //! The paper asks for this in its conclusions.
 
 use crate::brick::{self, Brick};
@@ -26,7 +27,7 @@ const SAMPLE: usize = 512;
 /// cost little time each. To move bricks costs more than such differences.
 const SLACK: [f64; 2] = [0.03, 0.05];
 
-/// The ownership that divides the work on T0, once it is refined, into equal parts; `tree` need not be settled.
+/// The ownership that divides the work on T0, once it is refined, into nearly equal parts; `tree` need not be settled.
 /// Cuts fall between octants of a level. Collective.
 pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Comm) -> Ownership {
     let mut scale = Scale::new(share, level);
@@ -102,7 +103,7 @@ impl Weighed {
         self.0.iter().map(|b| b.1).max().unwrap_or(0)
     }
 
-    /// Deals the leaves out anew, in equal shares. Collective.
+    /// Deals the leaves out anew, in nearly equal shares. Collective.
     pub fn deal(self, parts: Parts, share: &Ownership, comm: &dyn Comm) -> Ownership {
         let own = share.stretches().next().map_or(0, |own| own.start);
         let Some(changes) = curve::cut_anew(&self.0, own, SLACK[1], comm) else {
