@@ -36,8 +36,9 @@ const SPLIT_LEAVES_PER_RANK: u64 = 32;
 const SHARE_PARTS: u64 = 16;
 /// Parts of a share that a cut of the Morton curve keeps or gives away as one.
 const CUT_PARTS: u64 = 64;
-/// Parts of a share, about, by which all ranks know where the weight lies before the curve is cut.
-const COARSE_PARTS: u64 = 1;
+/// Parts of a share, about, by which all ranks know where the weight lies before the curve is cut. Coarser than
+/// shares, as what is told to everybody grows with the ranks; so one rank may cut the curve in detail for a few.
+const COARSE_PARTS: f64 = 0.25;
 /// Deepest automatic `level_base` of all base leaves alike.
 const LEVEL_BASE_AUTO_MAX: Level = 12;
 
@@ -90,7 +91,8 @@ pub fn build(
     }
     let rehearsed = division.weights == Weights::Rehearsal;
     // A rehearsal tells more of smaller leaves; but as much shallower as it is coarser.
-    let parts = [if rehearsed { SHARE_PARTS } else { COARSE_PARTS }, CUT_PARTS];
+    let coarse = if rehearsed { SHARE_PARTS as f64 } else { COARSE_PARTS };
+    let parts = [coarse, CUT_PARTS as f64];
     let [coarse, fine] = levels_auto(facets, rules, parts, comm);
     let (share, work) = if rehearsed {
         let coarse = coarse.min(rehearse::deepest(rules));
@@ -113,7 +115,7 @@ fn of_leaves(
 ) -> Result<Base, Error> {
     let level = match division.level_base {
         Some(level) => level.min(level_last(rules)),
-        None => levels_auto(facets, rules, [SHARE_PARTS], comm)[0].min(LEVEL_BASE_AUTO_MAX),
+        None => levels_auto(facets, rules, [SHARE_PARTS as f64], comm)[0].min(LEVEL_BASE_AUTO_MAX),
     };
     let survey = Survey::new(facets, rules, level, division.weights != Weights::Unit, comm);
     let cut = match (division.level_base, division.weights) {
@@ -151,7 +153,7 @@ fn level_last(rules: &Rules) -> Level {
 fn levels_auto<const N: usize>(
     facets: &[Facet],
     rules: &Rules,
-    parts: [u64; N],
+    parts: [f64; N],
     comm: &dyn Comm,
 ) -> [Level; N] {
     // Whole finest faces: a sum of integers is the same on all ranks.
@@ -162,7 +164,7 @@ fn levels_auto<const N: usize>(
     let volume = volumes.fold(0.0, f64::max);
     parts.map(|parts| {
         // Four sheets of facets in one octant are not unusual: wings, fins.
-        let parts = (comm.size() as u64 * parts * 4) as f64;
+        let parts = comm.size() as f64 * parts * 4.0;
         let small = |l: &Level| {
             let h = edge(*l) as f64;
             h * h <= area / parts && (volume == 0.0 || h.powi(3) <= volume / parts)

@@ -219,7 +219,7 @@ fn full() -> Vec<Study> {
     ];
     for case in ["uav-large", "fighter-large"] {
         for cells in [100 * MILLION, 1000 * MILLION] {
-            all.push(study(Experiment::Weights, case, cells, &layouts(&[64], &[]), 1));
+            all.push(study(Experiment::Weights, case, cells, &layouts(&[64], &[]), 3));
         }
     }
     all
