@@ -36,9 +36,13 @@ impl Scale {
             let all = decades.iter().flat_map(|d| factors.iter().map(move |f| f * 10f64.powi(*d)));
             all.filter(|v| inside(v)).collect()
         };
-        let minor = times(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
+        let whole = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+        let minor = times(&whole[1..]);
         let of_range = if (high / low) < 30.0 {
-            times(&[1.0, 2.0, 5.0])
+            // As few as tell the scale.
+            let fine: Vec<f64> = (10..100).map(|tenths| f64::from(tenths) / 10.0).collect();
+            let choices = [&[1.0, 2.0, 5.0], &whole[..], &fine].map(times);
+            choices.into_iter().find(|c| c.len() > 2).unwrap_or_default()
         } else if high / low < 1e7 {
             times(&[1.0])
         } else {
@@ -94,6 +98,9 @@ mod tests {
         assert!((s.at(10.0) - s.at(1.0) - (s.at(100.0) - s.at(10.0))).abs() < 1e-12);
         let short = Scale::of(&Axis::log(""), &[10.0, 60.0]);
         assert_eq!(short.ticks, [10.0, 20.0, 50.0]);
+        let shorter = Scale::of(&Axis::log(""), &[0.15, 0.42]);
+        assert_eq!(shorter.ticks.len(), 3, "0.2, 0.3, 0.4: {:?}", shorter.ticks);
+        assert!(Scale::of(&Axis::log(""), &[9.0, 10.0]).ticks.len() > 2);
     }
 
     #[test]
