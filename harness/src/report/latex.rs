@@ -10,6 +10,7 @@ pub fn fragment(figures: &[Figure]) -> String {
     let mut out = String::from(
         "% Made by `harness report`. Wants \\usepackage{pgfplots} and \\pgfplotsset{compat=1.16}.\n\
          % \\figures is the directory of the .tex files; the same figures are there as PDF.\n\
+         % Message matrices are large: a document with all of them wants LuaLaTeX.\n\
          \\providecommand{\\figures}{figures}\n",
     );
     for f in figures {

@@ -2,6 +2,7 @@
 
 use super::figure::{Axis, Bars, Body, Figure, Heat, How, Layer, Series};
 use super::heat;
+use super::scale::Scale;
 use std::fmt::Write;
 
 const COLOURS: [&str; 7] =
@@ -34,8 +35,9 @@ pub fn tikz(figure: &Figure) -> String {
     ];
     match &figure.body {
         Body::Points(series) => {
-            options.extend(axis_options("x", &figure.x));
-            options.extend(axis_options("y", &figure.y));
+            let all = || series.iter().flat_map(|s| &s.points);
+            options.extend(axis_options("x", &figure.x, all().map(|p| p.x)));
+            options.extend(axis_options("y", &figure.y, all().flat_map(|p| [p.y, p.low, p.high])));
             open(&mut out, &options);
             series.iter().for_each(|s| plot(&mut out, s));
         }
@@ -50,7 +52,7 @@ fn open(out: &mut String, options: &[String]) {
     let _ = writeln!(out, "\\begin{{axis}}[\n  {}\n]", options.join(",\n  "));
 }
 
-fn axis_options(name: &str, axis: &Axis) -> Vec<String> {
+fn axis_options(name: &str, axis: &Axis, values: impl Iterator<Item = f64>) -> Vec<String> {
     let mut options = Vec::new();
     if axis.log {
         options.push(format!("{name}mode=log"));
@@ -64,8 +66,26 @@ fn axis_options(name: &str, axis: &Axis) -> Vec<String> {
         let ticks: Vec<String> = axis.ticks.iter().map(f64::to_string).collect();
         options.push(format!("{name}tick={{{}}}", ticks.join(",")));
         options.push(format!("{name}ticklabels={{{}}}", ticks.join(",")));
+    } else if axis.log {
+        // Left to itself, a short axis has powers of ten between the whole ones.
+        let ticks = Scale::of(axis, &values.collect::<Vec<_>>()).ticks;
+        let labels: Vec<String> = ticks.iter().map(|t| number(*t)).collect();
+        let ticks: Vec<String> = ticks.iter().map(f64::to_string).collect();
+        options.push(format!("{name}tick={{{}}}", ticks.join(",")));
+        options.push(format!("{name}ticklabels={{{}}}", labels.join(",")));
     }
     options
+}
+
+/// A number for an axis: plain where that is short, else with a power of ten.
+fn number(v: f64) -> String {
+    let power = v.log10().floor();
+    let digits = (v / 10f64.powf(power) * 10.0).round() / 10.0;
+    match (power, digits) {
+        (-2.0..=3.0, _) => ((v * 1e4).round() / 1e4).to_string(),
+        (_, 1.0) => format!("$10^{{{power}}}$"),
+        _ => format!("${digits}\\cdot10^{{{power}}}$"),
+    }
 }
 
 fn plot(out: &mut String, s: &Series) {
@@ -235,6 +255,21 @@ mod tests {
         let count = |c| text.chars().filter(|x| *x == c).count();
         assert_eq!(count('{'), count('}'));
         assert_eq!(text.matches("\\begin").count(), text.matches("\\end").count());
+    }
+
+    #[test]
+    fn numbers_of_an_axis() {
+        let all = [0.3, 200.0, 0.01, 1e-3, 5e6, 1e9, 2.5e-4].map(number);
+        let want = [
+            "0.3",
+            "200",
+            "0.01",
+            "$10^{-3}$",
+            "$5\\cdot10^{6}$",
+            "$10^{9}$",
+            "$2.5\\cdot10^{-4}$",
+        ];
+        assert_eq!(all, want);
     }
 
     #[test]
