@@ -23,9 +23,10 @@ const COSTS: [u64; 4] = [2, 2, 2, 13];
 /// Groups of bricks that are looked at to find what the level takes that has most of them, at least where there are so many;
 /// of the other levels the same part.
 const SAMPLE: usize = 512;
-/// How much heavier than others a share may be: by work on T0, as that is guessed anyway; by leaves, which
-/// cost little time each. To move bricks costs more than such differences.
-const SLACK: [f64; 2] = [0.03, 0.05];
+/// How much heavier than an equal share one may be by work on T0, which is guessed anyway; to move bricks costs more.
+const SLACK_WORK: f64 = 0.03;
+/// The same by leaves, which cost little time each.
+const SLACK_LEAVES: f64 = 0.05;
 
 /// The ownership that divides the work on T0, once it is refined, into nearly equal parts; `tree` need not be settled.
 /// Cuts fall between octants of a level. Collective.
@@ -106,7 +107,7 @@ impl Weighed {
     /// Deals the leaves out anew, in nearly equal shares. Collective.
     pub fn deal(self, parts: Parts, share: &Ownership, comm: &dyn Comm) -> Ownership {
         let own = share.stretches().next().map_or(0, |own| own.start);
-        let Some(changes) = curve::cut_anew(&self.0, own, SLACK[1], comm) else {
+        let Some(changes) = curve::cut_anew(&self.0, own, SLACK_LEAVES, comm) else {
             return share.clone();
         };
         let fresh = Ownership::along(comm.rank(), comm.size(), changes);
@@ -189,7 +190,7 @@ impl Scale {
 
     fn cut(self, comm: &dyn Comm) -> Option<Ownership> {
         let own = self.own.start;
-        let changes = curve::cut_anew(&self.bins(), own, SLACK[0], comm)?;
+        let changes = curve::cut_anew(&self.bins(), own, SLACK_WORK, comm)?;
         Some(Ownership::along(comm.rank(), comm.size(), changes))
     }
 }
