@@ -3,7 +3,7 @@
 //! A binary STL is told by its length, 84 + 50 per facet, whatever its header says; each rank reads
 //! its own records. Text is read by rank 0, which deals the facets out; so are generated shapes.
 
-use crate::comm::{Comm, agree};
+use crate::comm::{Comm, Mail, agree};
 use crate::error::Error;
 use crate::stl;
 use geometries::{Facet, Generator};
@@ -73,24 +73,24 @@ fn deal(comm: &dyn Comm, make: impl FnOnce() -> Result<Vec<Facet>, Error>) -> Re
         let at = |r: usize| (u128::from(total) * r as u128 / comm.size() as u128) as usize;
         (1..comm.size()).map(|r| (r, pack(&facets[at(r)..at(r + 1)]))).collect()
     } else {
-        Vec::new()
+        Mail::default()
     };
     let heard = comm.exchange(out);
     let facets = if comm.rank() == 0 {
         facets[..end as usize].to_vec()
     } else {
-        heard.iter().flat_map(|m| unpack(&m.1)).take((end - first) as usize).collect()
+        unpack(heard.words()).into_iter().take((end - first) as usize).collect()
     };
     Ok(Share { facets, first, total })
 }
 
 /// Coordinates, two to the word.
-fn pack(facets: &[Facet]) -> Vec<u64> {
+fn pack(facets: &[Facet]) -> impl Iterator<Item = u64> {
     let flat: &[f32] = facets.as_flattened().as_flattened();
-    let word = |c: &[f32]| {
+    let word = |c: &[f32]| -> u64 {
         u64::from(c[0].to_bits()) | u64::from(c.get(1).map_or(0, |v| v.to_bits())) << 32
     };
-    flat.chunks(2).map(word).collect()
+    flat.chunks(2).map(word)
 }
 
 /// Inverse of [`pack`], with the padding's facet cut off by the caller's count.

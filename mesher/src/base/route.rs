@@ -1,6 +1,6 @@
 //! The facets' journey to the ranks that need them.
 
-use crate::comm::Comm;
+use crate::comm::{Comm, Mail};
 use crate::facet::Facet;
 use crate::octant::{LEVEL_MAX, Level, corner, edge};
 use crate::share::Ownership;
@@ -21,10 +21,11 @@ pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet>
         });
     }
     let mut mine = std::mem::take(&mut packed[comm.rank()]);
-    let out = packed.iter().map(|facets| facets.iter().flat_map(pack).collect());
-    for (_, words) in comm.exchange(out.enumerate().collect()) {
-        mine.extend(words.chunks_exact(5).map(unpack));
+    let mut out = Mail::with_capacity(5 * packed.iter().map(Vec::len).sum::<usize>());
+    for (owner, facets) in packed.into_iter().enumerate() {
+        out.write(owner, facets.iter().flat_map(pack));
     }
+    mine.extend(comm.exchange(out).words().as_chunks().0.iter().map(unpack));
     mine
 }
 
@@ -58,7 +59,7 @@ fn pack(f: &Facet) -> [u64; 5] {
     })
 }
 
-fn unpack(words: &[u64]) -> Facet {
+fn unpack(words: &[u64; 5]) -> Facet {
     let at = |i: usize| (words[i / 2] >> (32 * (i % 2))) as u32 as i32;
     Facet { v: std::array::from_fn(|v| std::array::from_fn(|a| at(3 * v + a))) }
 }

@@ -5,7 +5,7 @@
 //! stretch of the curve exactly, and the true cuts follow from the sums of the stretches.
 
 use super::cut::Cut;
-use crate::comm::{Comm, gather_merged};
+use crate::comm::{Comm, Mail, gather_merged};
 use crate::facet::Facet;
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level, start57};
@@ -88,13 +88,9 @@ fn finely(
     let everything = || vec![(0, 0)];
     let changes = curve::cut_known(&known.bins, comm.size()).unwrap_or_else(everything);
     let roughly = Ownership::along(comm.rank(), comm.size(), changes);
-    let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size()];
-    for (start, weight) in mine {
-        out[roughly.owner_at(start)].extend([start, weight]);
-    }
-    let heard = comm.exchange(out.into_iter().enumerate().collect());
-    let pairs = heard.iter().flat_map(|(_, words)| words.chunks_exact(2));
-    let mut bins: Vec<Bin> = pairs.map(|w| (w[0], w[1])).collect();
+    let told = |(start, weight)| (roughly.owner_at(start), [start, weight]);
+    let heard = comm.exchange(Mail::of_entries(mine.into_iter().map(told).collect()));
+    let mut bins: Vec<Bin> = heard.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
     more(&mut bins, &roughly);
     for stretch in roughly.stretches() {
         curve::add_boxes(&mut bins, rules, fine, known.light, PARTS, &stretch);

@@ -3,7 +3,7 @@
 //! Only exchanges are between pairs of ranks; what collective calls move depends on the library's
 //! algorithm, and is in [`Traffic`](super::Traffic) alone. What a rank keeps for itself is no message.
 
-use super::Comm;
+use super::{Comm, Mail};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
@@ -32,12 +32,8 @@ impl Row {
 /// The matrix up to now, on rank 0, by sender and receiver; nothing on the others, as it may have as
 /// many entries as there are pairs. Gathering it is not in it. Collective.
 pub fn gather(comm: &dyn Comm) -> Vec<Entry> {
-    let mine: Vec<u64> = comm.sent().into_flattened();
-    let mut rows: Vec<Entry> = comm
-        .exchange(vec![(0, mine)])
-        .iter()
-        .flat_map(|(_, words)| words.as_chunks::<4>().0.iter().copied())
-        .collect();
+    let mine = comm.sent().into_iter().map(|entry| (0, entry)).collect();
+    let mut rows: Vec<Entry> = comm.exchange(Mail::of_entries(mine)).words().as_chunks().0.to_vec();
     rows.sort_unstable();
     rows
 }
@@ -50,21 +46,20 @@ mod tests {
     /// Rank r sends r + 1 words to each of the ranks above it, twice to the next one, and some to itself.
     fn talk(c: &dyn Comm) {
         let words = || vec![7; c.rank() + 1];
-        let to: Vec<(usize, Vec<u64>)> = (c.rank()..c.size()).map(|r| (r, words())).collect();
-        c.exchange(to);
+        c.exchange((c.rank()..c.size()).map(|r| (r, words())).collect());
         let next = c.rank() + 1;
-        c.exchange(if next < c.size() { vec![(next, words()), (0, vec![])] } else { vec![] });
+        c.exchange((next..c.size().min(next + 1)).map(|r| (r, words())).collect());
     }
 
     #[test]
     fn entries_are_what_was_sent_and_sum_to_the_meters_totals() {
         let told = sim::run(5, 1, |c| {
-            // A call without messages tells what announcing them costs.
-            c.exchange(vec![]);
-            let announced = c.traffic();
+            // A call without letters tells what agreeing on their arrival takes.
+            c.exchange(Mail::default());
+            let agreed = c.traffic();
             talk(c);
             let t = c.traffic();
-            let own = [t.messages - 3 * announced.messages, t.bytes - 3 * announced.bytes];
+            let own = [t.messages - 3 * agreed.messages, t.bytes - 3 * agreed.bytes];
             (own, gather(c))
         });
         let matrix = &told[0].1;

@@ -4,7 +4,7 @@
 //! places, dozens with each. If all told everybody, everybody would do the same sums over dozens of
 //! times the result; so some *collectors* do them first, each for its part of the keys.
 
-use super::Comm;
+use super::{Comm, Mail};
 
 /// A key and a value.
 pub type Entry = [u64; 2];
@@ -19,39 +19,32 @@ pub fn gather_merged(
     merge: impl Fn(u64, u64) -> u64 + Copy,
     comm: &dyn Comm,
 ) -> Vec<Entry> {
-    if let Some(parcels) = for_collectors(&mut mine, merge, comm) {
-        let parcels = parcels.into_iter().enumerate().map(|(i, w)| (collector(i, comm), w));
-        let heard = comm.exchange(parcels.collect());
-        mine = heard.iter().flat_map(|(_, words)| words.as_chunks().0).copied().collect();
+    if let Some(entries) = for_collectors(&mut mine, merge, comm) {
+        mine = comm.exchange(Mail::of_entries(entries)).words().as_chunks().0.to_vec();
     }
     gather_collected(mine, merge, comm)
 }
 
-/// The first step, as far as it needs no others: what is to be sent to each collector, in the order of their
-/// numbers; none where no step is to be taken before [`gather_collected`].
+/// The first step, as far as it needs no others: entries with the ranks that collect them; none where no step is
+/// to be taken before [`gather_collected`].
 pub fn for_collectors(
     mine: &mut Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64,
     comm: &dyn Comm,
-) -> Option<Vec<Vec<u64>>> {
+) -> Option<Vec<(usize, Entry)>> {
     combine(mine, merge);
     if comm.size() <= SMALL {
         return None;
     }
     // As many collectors as make the two steps alike.
-    let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size().isqrt()];
-    let collectors = out.len();
-    for entry in mine {
+    let collectors = comm.size().isqrt();
+    let apart = comm.size() / collectors;
+    let collected = |entry: &Entry| {
         // The upper bits of a product depend on all bits of the key.
         let spread = entry[0].wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-        out[spread as usize % collectors].extend(&*entry);
-    }
-    Some(out)
-}
-
-/// The rank that is collector number `i`.
-pub fn collector(i: usize, comm: &dyn Comm) -> usize {
-    i * (comm.size() / comm.size().isqrt())
+        (spread as usize % collectors * apart, *entry)
+    };
+    Some(mine.iter().map(collected).collect())
 }
 
 /// The second step: tells all ranks what each has collected. Collective; the same on all ranks.

@@ -7,13 +7,15 @@
 //! Every call is collective: all ranks make the same calls in the same order. Payloads are `u64`
 //! words.
 
+mod mail;
 pub mod matrix;
 mod merged;
 #[cfg(feature = "mpi")]
 pub mod mpi;
 pub mod sim;
 
-pub use merged::{Entry, collector, for_collectors, gather_collected, gather_merged};
+pub use mail::Mail;
+pub use merged::{Entry, for_collectors, gather_collected, gather_merged};
 
 use crate::error::Error;
 use cpu_time::ThreadTime;
@@ -49,9 +51,9 @@ pub trait Comm {
     /// Everyone's words, by rank. Collective.
     fn all_gather(&self, mine: &[u64]) -> ByRank;
 
-    /// Sends words to some ranks and returns what others sent here, with the sender, in no
-    /// particular order. At most one entry per receiver; empty ones are not sent. Collective.
-    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)>;
+    /// Sends letters, one at most to a receiver, and returns those that were sent here, by sender, in no
+    /// particular order. Collective.
+    fn exchange(&self, to: Mail) -> Mail;
 
     /// Ranks that share this rank's process, itself included.
     fn ranks_in_process(&self) -> usize {
@@ -137,24 +139,24 @@ impl Meter {
         self.total.set(Traffic { messages, bytes, ..t });
     }
 
-    /// Counts a message of an exchange to another rank; one without words is not sent.
+    /// Counts a message of an exchange to another rank.
     pub(crate) fn send(&self, to: usize, words: usize) {
-        if words > 0 {
-            self.count(1, words as u64);
-            self.row.count(to, 8 * words as u64);
-        }
+        self.count(1, words as u64);
+        self.row.count(to, 8 * words as u64);
     }
 
-    /// Counts a gathering of `words` by all, all ranks' together: a message for every doubling of the number
-    /// of ranks that have them (recursive doubling, Bruck), in which all words but a rank's share pass on.
+    /// Counts a gathering of `words` by all, all ranks' together, and before it one of how many each has: a message for
+    /// every doubling of the number of ranks that have them (recursive doubling, Bruck), in which all words but
+    /// a rank's share pass on.
     pub(crate) fn gather(&self, ranks: usize, words: u64) {
-        self.count(doublings(ranks), words - words / ranks as u64);
+        let all = words + ranks as u64;
+        self.count(2 * doublings(ranks), all - all / ranks as u64);
     }
 
-    /// Counts what ranks tell each other before an exchange, how many words are to come: one word for
-    /// everybody, by Bruck's algorithm half of them in each message.
-    pub(crate) fn announce(&self, ranks: usize) {
-        self.count(doublings(ranks), doublings(ranks) * (ranks as u64 / 2));
+    /// Counts how ranks agree that all that was sent has arrived: the acknowledgement that each waits for, and a
+    /// barrier by doublings.
+    pub(crate) fn arrived(&self, ranks: usize) {
+        self.count(1 + doublings(ranks), 0);
     }
 
     /// Runs and times a call.
@@ -202,8 +204,8 @@ impl Comm for Solo {
         Arc::new([mine.to_vec()])
     }
 
-    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
-        to.into_iter().filter(|(_, words)| !words.is_empty()).collect()
+    fn exchange(&self, to: Mail) -> Mail {
+        to
     }
 
     fn traffic(&self) -> Traffic {
@@ -225,7 +227,7 @@ mod tests {
             c.all_gather(&[1, 2]);
             let gathered = c.traffic();
             let next = (c.rank() + 1) % 5;
-            c.exchange(vec![(next, vec![0; 10]), (c.rank(), vec![0; 99])]);
+            c.exchange([(next, vec![0; 10]), (c.rank(), vec![0; 99])].into_iter().collect());
             let t = c.traffic();
             [
                 gathered.messages,
@@ -234,8 +236,9 @@ mod tests {
                 t.bytes - gathered.bytes,
             ]
         });
-        // Three doublings to reach five ranks; an exchange announces two words in each, and sends one message.
-        assert!(told.iter().all(|t| *t == [3, 8 * 2 * 4, 3 + 1, 8 * (3 * 2 + 10)]), "{told:?}");
+        // Three doublings to reach five ranks, twice, with a number and two words of each of four others; an exchange sends
+        // one message, and has one acknowledged.
+        assert!(told.iter().all(|t| *t == [6, 8 * 3 * 4, 3 + 2, 8 * 10]), "{told:?}");
     }
 
     #[test]

@@ -1,20 +1,24 @@
 //! Ranks of a real MPI job, through `rsmpi`.
 //!
-//! Counts are exchanged densely (one word per pair), data point to point: measured, a dense all-to-all
-//! of mostly empty messages costs a hundred times a sparse one when ranks share cores. Messages are cut
-//! into chunks, as MPI counts in i32.
+//! Letters go point to point, and nobody tells anybody beforehand what will come: of a thousand ranks each has something
+//! to say to dozens. Measured, a dense all-to-all of mostly empty messages costs a hundred times a sparse
+//! one when ranks share cores. Messages are cut into chunks, as MPI counts in i32.
 
-use super::{ByRank, Comm, Meter, Traffic, matrix};
+use super::{ByRank, Comm, Mail, Meter, Traffic, matrix};
 use mpi::environment::Universe;
-use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
+use mpi::point_to_point::{Message, Status};
+use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
+use std::cell::Cell;
 
-/// Words per message at most: 1 GiB.
-const CHUNK: usize = 1 << 27;
+/// Words per message at most: 1 GiB, and few where the checks of debug builds are made.
+const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
 
 /// One rank of an MPI job.
 pub struct Mpi {
     world: mpi::topology::SimpleCommunicator,
     meter: Meter,
+    /// Whether an odd number of exchanges has been made.
+    odd: Cell<bool>,
     /// Finalises MPI when dropped; must outlive `world`, so it comes last.
     _universe: Universe,
 }
@@ -26,7 +30,12 @@ impl Mpi {
     /// If MPI was initialised before.
     pub fn start() -> Self {
         let universe = mpi::initialize().expect("MPI is initialised once");
-        Self { world: universe.world(), meter: Meter::default(), _universe: universe }
+        Self {
+            world: universe.world(),
+            meter: Meter::default(),
+            odd: Cell::new(false),
+            _universe: universe,
+        }
     }
 }
 
@@ -58,8 +67,8 @@ impl Comm for Mpi {
         self.meter.call(|| self.all_gather_untimed(mine).into())
     }
 
-    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
-        self.meter.call(|| self.exchange_untimed(to))
+    fn exchange(&self, to: Mail) -> Mail {
+        self.meter.call(|| self.exchange_untimed(&to))
     }
 
     fn traffic(&self) -> Traffic {
@@ -98,35 +107,69 @@ impl Mpi {
         all
     }
 
-    fn exchange_untimed(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
+    /// Sends to whom there is something to say, and takes what comes until all ranks know that theirs has arrived: a
+    /// synchronous send completes when it is being received, and who has sent all enters a barrier (Hoefler,
+    /// Siebert, Lumsdaine 2010, "Scalable communication protocols for dynamic sparse data exchange", NBX).
+    fn exchange_untimed(&self, to: &Mail) -> Mail {
         let me = self.rank();
-        let mut counts = vec![0u64; self.size()];
-        to.iter().for_each(|m| counts[m.0] = m.1.len() as u64);
-        let mut coming = vec![0u64; self.size()];
-        self.world.all_to_all_into(&counts[..], &mut coming[..]);
-        self.meter.announce(self.size());
-        let mut received: Vec<(usize, Vec<u64>)> = (0..self.size())
-            .filter(|&r| r != me && coming[r] > 0)
-            .map(|r| (r, vec![0; coming[r] as usize]))
-            .collect();
+        // Who is through the barrier may be in the next exchange while others still take letters of this one; none
+        // can be two ahead.
+        let tag = i32::from(self.odd.replace(!self.odd.get()));
+        let mut received = Mail::default();
         mpi::request::scope(|scope| {
-            let mut requests = Vec::new();
-            for (from, words) in &mut received {
-                let process = self.world.process_at_rank(*from as i32);
-                requests.extend(
-                    words.chunks_mut(CHUNK).map(|c| process.immediate_receive_into(scope, c)),
-                );
-            }
             let mut sends = Vec::new();
-            for (to, words) in to.iter().filter(|m| m.0 != me) {
-                let process = self.world.process_at_rank(*to as i32);
-                sends.extend(words.chunks(CHUNK).map(|c| process.immediate_send(scope, c)));
-                self.meter.send(*to, words.len());
+            for (to, words) in to.letters() {
+                if to == me {
+                    received.write(me, words.iter().copied());
+                    continue;
+                }
+                let process = self.world.process_at_rank(to as i32);
+                sends.extend(
+                    chunks(words).map(|chunk| {
+                        process.immediate_synchronous_send_with_tag(scope, chunk, tag)
+                    }),
+                );
+                self.meter.send(to, words.len());
             }
-            requests.into_iter().for_each(|r| _ = r.wait());
-            sends.into_iter().for_each(|r| _ = r.wait());
+            let mut barrier = None;
+            loop {
+                while let Some(first) =
+                    self.world.any_process().immediate_matched_probe_with_tag(tag)
+                {
+                    self.receive(first, tag, &mut received);
+                }
+                sends = sends.into_iter().filter_map(|send| send.test().err()).collect();
+                barrier = match barrier {
+                    None if sends.is_empty() => Some(self.world.immediate_barrier()),
+                    None => None,
+                    Some(barrier) => match barrier.test() {
+                        Ok(_) => break,
+                        Err(barrier) => Some(barrier),
+                    },
+                };
+            }
         });
-        received.extend(to.into_iter().filter(|m| m.0 == me && !m.1.is_empty()));
+        self.meter.arrived(self.size());
         received
     }
+
+    /// Receives a letter of which the first chunk is there.
+    fn receive(&self, first: (Message, Status), tag: i32, received: &mut Mail) {
+        let from = first.1.source_rank();
+        let mut chunk = first;
+        loop {
+            let words = chunk.1.count(u64::equivalent_datatype()) as usize;
+            chunk.0.matched_receive_into(received.room(from as usize, words));
+            if words < CHUNK {
+                return;
+            }
+            chunk = self.world.process_at_rank(from).matched_probe_with_tag(tag);
+        }
+    }
+}
+
+/// A letter in full chunks and one that is not full, and may be empty: it tells that the letter ends.
+fn chunks(words: &[u64]) -> impl Iterator<Item = &[u64]> {
+    let (full, last) = words.as_chunks::<CHUNK>();
+    full.iter().map(|chunk| &chunk[..]).chain([last])
 }

@@ -4,13 +4,10 @@
 //! has to wait for others. Who gets it next, and in which order messages arrive, is drawn from a seed: a
 //! failure is replayed by its seed, and a rank's CPU time is not disturbed by the others.
 
-use super::{ByRank, Comm, Meter, Traffic, matrix};
+use super::{ByRank, Comm, Mail, Meter, Traffic, matrix};
 use std::any::Any;
 use std::cell::Cell;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
-
-/// Words with the rank that they are for or from.
-type Messages = Vec<(usize, Vec<u64>)>;
 
 /// One rank of a simulated group.
 pub struct Sim {
@@ -57,13 +54,13 @@ enum Words {
     /// For everybody.
     Gather(Vec<u64>),
     /// By receiver.
-    Exchange(Messages),
+    Exchange(Mail),
 }
 
 /// What it takes out.
 enum Delivery {
     Gathered(ByRank),
-    Exchanged(Messages),
+    Exchanged(Mail),
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -152,7 +149,7 @@ impl State {
             assert!(post.call == call, "{UNEQUAL}");
             match post.words {
                 Words::Gather(words) => gathered.push(words),
-                Words::Exchange(messages) => exchanged.push(messages),
+                Words::Exchange(mail) => exchanged.push(mail),
             }
         }
         assert!(gathered.is_empty() || exchanged.is_empty(), "{UNEQUAL}");
@@ -160,24 +157,32 @@ impl State {
             let all: ByRank = gathered.into();
             (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
         } else {
-            self.sorted(exchanged).into_iter().map(|m| Some(Delivery::Exchanged(m))).collect()
+            self.sorted(&exchanged).into_iter().map(|m| Some(Delivery::Exchanged(m))).collect()
         };
         self.doing.iter_mut().for_each(|d| *d = Doing::Ready);
     }
 
-    /// Messages by receiver, in an order that is drawn, from those by sender.
-    fn sorted(&mut self, sent: Vec<Messages>) -> Vec<Messages> {
-        let mut inbox: Vec<Messages> = vec![Vec::new(); sent.len()];
-        for (from, messages) in sent.into_iter().enumerate() {
-            messages.into_iter().for_each(|(to, words)| inbox[to].push((from, words)));
-        }
-        for messages in &mut inbox {
-            for i in (1..messages.len()).rev() {
-                let j = self.draw(i + 1);
-                messages.swap(i, j);
+    /// Letters by receiver, in an order that is drawn, from those by sender.
+    fn sorted(&mut self, sent: &[Mail]) -> Vec<Mail> {
+        let mut inbox: Vec<Vec<(usize, &[u64])>> = vec![Vec::new(); sent.len()];
+        for (from, mail) in sent.iter().enumerate() {
+            for (to, words) in mail.letters() {
+                assert!(inbox[to].last().is_none_or(|l| l.0 != from), "one letter to a receiver");
+                inbox[to].push((from, words));
             }
         }
-        inbox
+        for letters in &mut inbox {
+            for i in (1..letters.len()).rev() {
+                let j = self.draw(i + 1);
+                letters.swap(i, j);
+            }
+        }
+        let copied = |letters: Vec<(usize, &[u64])>| {
+            let mut mail = Mail::with_capacity(letters.iter().map(|l| l.1.len()).sum());
+            letters.iter().for_each(|(from, words)| mail.write(*from, words.iter().copied()));
+            mail
+        };
+        inbox.into_iter().map(copied).collect()
     }
 }
 
@@ -248,13 +253,15 @@ impl Comm for Sim {
         }
     }
 
-    fn exchange(&self, to: Vec<(usize, Vec<u64>)>) -> Vec<(usize, Vec<u64>)> {
-        self.meter.announce(self.size());
-        let to: Messages = to.into_iter().filter(|m| !m.1.is_empty()).collect();
-        let sent = to.iter().filter(|m| m.0 != self.rank);
-        sent.for_each(|m| self.meter.send(m.0, m.1.len()));
-        match self.meter.call(|| self.call(Words::Exchange(to))) {
-            Delivery::Exchanged(messages) => messages,
+    fn exchange(&self, to: Mail) -> Mail {
+        let counted = || {
+            let sent = to.letters().filter(|l| l.0 != self.rank);
+            sent.for_each(|l| self.meter.send(l.0, l.1.len()));
+            self.meter.arrived(self.size());
+            self.call(Words::Exchange(to))
+        };
+        match self.meter.call(counted) {
+            Delivery::Exchanged(mail) => mail,
             Delivery::Gathered(_) => unreachable!("{UNEQUAL}"),
         }
     }
@@ -284,7 +291,7 @@ mod tests {
                     .filter(|r| r % 2 == 0)
                     .map(|r| (r, vec![c.rank() as u64; 2]))
                     .collect();
-                let heard: u64 = c.exchange(to).iter().map(|m| m.1[0]).sum();
+                let heard: u64 = c.exchange(to).letters().map(|l| l.1[0]).sum();
                 (c.sum(c.rank() as u64), heard)
             });
             for (rank, (sum, heard)) in sums.into_iter().enumerate() {
@@ -297,8 +304,8 @@ mod tests {
     #[test]
     fn orders_differ_by_seed_and_repeat_by_seed() {
         let order = |seed| {
-            run(6, seed, |c| c.exchange(vec![(0, vec![1])]).iter().map(|m| m.0).collect::<Vec<_>>())
-                .swap_remove(0)
+            let senders = |mail: Mail| mail.letters().map(|l| l.0).collect::<Vec<_>>();
+            run(6, seed, |c| senders(c.exchange(Mail::of_entries(vec![(0, [1])])))).swap_remove(0)
         };
         assert_eq!(order(3), order(3));
         assert!((0..10).any(|s| order(s) != order(3)));

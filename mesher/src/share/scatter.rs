@@ -1,11 +1,11 @@
 //! Bringing bricks to the ranks that hold them.
 
 use super::{KEY_BITS, Ownership, Place, brick_start};
+use crate::brick::Brick;
 use crate::brickset::BrickSet;
-use crate::comm::{Comm, Entry, collector, for_collectors, gather_collected};
+use crate::comm::{Comm, Entry, Mail, for_collectors, gather_collected};
 use crate::octant::{LEVEL_MAX, Level};
 use crate::tree::PerLevel;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 impl Ownership {
@@ -46,14 +46,12 @@ impl Ownership {
         let mut top = std::mem::take(&mut out.top);
         if any_top && let Some(collected) = for_collectors(&mut top, |a, b| a | b, comm) {
             top.clear();
-            for (i, entries) in collected.iter().enumerate() {
-                out.tell(TOP, entries.as_chunks().0.iter().copied(), collector(i, comm));
-            }
+            out.tell(TOP, collected);
         }
         let sent = out.sent + out.loose.len() as u64;
         let mut told: Vec<Entry> = Vec::new();
-        for (_, words) in comm.exchange(out.parcels()) {
-            read_parcel(&words, &mut parts, &mut told, &mut top);
+        for (_, words) in comm.exchange(out.mail()).letters() {
+            read_letter(words, &mut parts, &mut told, &mut top);
         }
         if any_top {
             told.extend(gather_collected(top, |a, b| a | b, comm));
@@ -111,6 +109,9 @@ impl Ownership {
     }
 }
 
+/// So many bricks of a set are as short to send one by one; they are simpler to send and to receive.
+const FEW: usize = 10;
+
 /// In place of a set's number, before the number of some bricks and those, each with its set's number.
 const LOOSE: u64 = 1 << 32;
 /// The same for top bricks that a rank collects.
@@ -119,8 +120,10 @@ const TOP: u64 = LOOSE + 1;
 /// What is to be sent. Entries have their set's number above the key.
 #[derive(Default)]
 struct Parcels {
-    /// By receiver: sets, each behind its number, and entries.
-    to: BTreeMap<usize, Vec<u64>>,
+    /// Sets, each behind its number, and entries, behind their kind and how many they are.
+    words: Vec<u64>,
+    /// Receivers, with their part of the words.
+    parcels: Vec<(usize, Range<usize>)>,
     /// Entries with their receivers.
     loose: Vec<(usize, Entry)>,
     /// Entries for everybody.
@@ -131,34 +134,44 @@ struct Parcels {
 
 impl Parcels {
     fn send(&mut self, number: u64, set: &BrickSet, bricks: Range<usize>, to: usize) {
+        if bricks.len() <= FEW {
+            let entry = |b: Brick| (to, [number << KEY_BITS | b.key, b.bits]);
+            return self.loose.extend(bricks.map(|at| entry(set.brick(at))));
+        }
         self.sent += bricks.len() as u64;
-        let parcel = self.to.entry(to).or_default();
-        parcel.push(number);
-        set.pack(bricks, parcel);
+        let start = self.words.len();
+        self.words.push(number);
+        set.pack(bricks, &mut self.words);
+        self.parcels.push((to, start..self.words.len()));
     }
 
-    fn tell(&mut self, kind: u64, entries: impl ExactSizeIterator<Item = Entry>, to: usize) {
-        if entries.len() > 0 {
-            let parcel = self.to.entry(to).or_default();
-            parcel.extend([kind, entries.len() as u64]);
-            parcel.extend(entries.flatten());
-        }
-    }
-
-    fn parcels(mut self) -> Vec<(usize, Vec<u64>)> {
-        let mut loose = std::mem::take(&mut self.loose);
-        loose.sort_by_key(|l| l.0);
+    fn tell(&mut self, kind: u64, mut entries: Vec<(usize, Entry)>) {
+        entries.sort_by_key(|e| e.0);
         // With METIS an owner may have several runs of an octant.
-        loose.dedup();
-        for told in loose.chunk_by(|a, b| a.0 == b.0) {
-            self.tell(LOOSE, told.iter().map(|l| l.1), told[0].0);
+        entries.dedup();
+        for told in entries.chunk_by(|a, b| a.0 == b.0) {
+            let start = self.words.len();
+            self.words.extend([kind, told.len() as u64]);
+            self.words.extend(told.iter().flat_map(|e| e.1));
+            self.parcels.push((told[0].0, start..self.words.len()));
         }
-        self.to.into_iter().collect()
+    }
+
+    /// Everything, by receiver.
+    fn mail(mut self) -> Mail {
+        let loose = std::mem::take(&mut self.loose);
+        self.tell(LOOSE, loose);
+        self.parcels.sort_by_key(|p| p.0);
+        let mut mail = Mail::with_capacity(self.words.len());
+        for (to, range) in self.parcels {
+            mail.write(to, self.words[range].iter().copied());
+        }
+        mail
     }
 }
 
-/// Takes a parcel apart: sets, entries, and entries of top bricks that this rank collects.
-fn read_parcel(
+/// Takes a letter apart: sets, entries, and entries of top bricks that this rank collects.
+fn read_letter(
     mut words: &[u64],
     sets: &mut [Vec<BrickSet>],
     told: &mut Vec<Entry>,

@@ -6,7 +6,7 @@
 
 use super::components::{self, Classes, Face};
 use super::nodes::{Component, Nodes};
-use crate::comm::Comm;
+use crate::comm::{Comm, Mail};
 use crate::octant::Level;
 use crate::share::{Ownership, Place};
 use crate::tree::{LEVELS, Tree};
@@ -41,12 +41,11 @@ pub fn names(
 /// Pairs of names, few, that join what all ranks' pairs join. Neighbours see the same from both sides, and ranks that
 /// follow each other are neighbours: so one for each group of ranks does their joining first. Collective.
 fn summed_up(pairs: Vec<[Name; 2]>, comm: &dyn Comm) -> Vec<u64> {
-    let mine = Joined::of(&pairs).pairs();
+    let mine: Vec<u64> = Joined::of(&pairs).pairs();
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
-    let heard = comm.exchange(vec![(first, mine)]);
-    let heard = heard.iter().flat_map(|(_, words)| words.as_chunks().0);
-    Joined::of(heard).pairs()
+    let heard = comm.exchange([(first, mine)].into_iter().collect());
+    Joined::of(heard.words().as_chunks().0).pairs()
 }
 
 /// Gives the classes that a top brick has part of the name that they have for all ranks: the number of
@@ -90,24 +89,22 @@ fn across_ranks(
     let name = |c: Component| names[classes.of[c as usize] as usize];
     let place = |f: &Face| (f.rank, f.level, f.key, name(f.component));
     faces.sort_unstable_by_key(place);
-    let mut out: Vec<Vec<u64>> = vec![Vec::new(); comm.size()];
+    let mut out = Mail::default();
     for run in faces.chunk_by(|a, b| place(a) == place(b)) {
         let bits = run.iter().fold(0, |all, f| all | f.bits);
         let (rank, level, key, name) = place(&run[0]);
-        out[rank].extend([u64::from(level), key, name, bits]);
+        out.write(rank, [u64::from(level), key, name, bits]);
     }
     drop(faces);
     let mut pairs = Vec::new();
-    for (_, words) in comm.exchange(out.into_iter().enumerate().collect()) {
-        for w in words.chunks_exact(4) {
-            nodes.meet(w[0] as Level, w[1], w[3], |c| {
-                let (theirs, mine) = (w[2], name(c));
-                // Most of what faces another rank is named by the top already.
-                if theirs != mine && pairs.last() != Some(&[theirs, mine]) {
-                    pairs.push([theirs, mine]);
-                }
-            });
-        }
+    for &[level, key, theirs, bits] in comm.exchange(out).words().as_chunks().0 {
+        nodes.meet(level as Level, key, bits, |c| {
+            let mine = name(c);
+            // Most of what faces another rank is named by the top already.
+            if theirs != mine && pairs.last() != Some(&[theirs, mine]) {
+                pairs.push([theirs, mine]);
+            }
+        });
     }
     pairs
 }

@@ -1,0 +1,117 @@
+//! Letters to ranks or from them, behind each other.
+//!
+//! One rank of a thousand writes to dozens of others, and a few words to most of them. Memory of its own for each letter
+//! would take longer to get and to give back than the letter to write and to read.
+
+use std::ops::Range;
+
+/// Words by rank: one letter at most to a receiver, or from a sender. None is empty.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Mail {
+    words: Vec<u64>,
+    letters: Vec<Letter>,
+}
+
+/// One letter; it starts where the one before it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Letter {
+    rank: usize,
+    end: usize,
+}
+
+impl Mail {
+    /// No letters, and room for so many words.
+    pub fn with_capacity(words: usize) -> Self {
+        Self { words: Vec::with_capacity(words), letters: Vec::new() }
+    }
+
+    /// One letter to each rank that entries are for, with those in the order in which they are given.
+    pub fn of_entries<const N: usize>(mut entries: Vec<(usize, [u64; N])>) -> Self {
+        entries.sort_by_key(|e| e.0);
+        let mut mail = Self::with_capacity(N * entries.len());
+        entries.into_iter().for_each(|(rank, words)| mail.write(rank, words));
+        mail
+    }
+
+    /// Writes words into a rank's letter, a new one unless the last one is that rank's.
+    pub fn write(&mut self, rank: usize, words: impl IntoIterator<Item = u64>) {
+        let start = self.words.len();
+        self.words.extend(words);
+        self.lengthen(rank, start);
+    }
+
+    /// The same for so many words that are to be written in place; they are zero before.
+    pub fn room(&mut self, rank: usize, words: usize) -> &mut [u64] {
+        let start = self.words.len();
+        self.words.resize(start + words, 0);
+        self.lengthen(rank, start);
+        &mut self.words[start..]
+    }
+
+    /// Makes the words from `start` part of a rank's letter.
+    fn lengthen(&mut self, rank: usize, start: usize) {
+        let end = self.words.len();
+        match self.letters.last_mut() {
+            Some(last) if last.rank == rank => last.end = end,
+            _ if end > start => self.letters.push(Letter { rank, end }),
+            _ => {}
+        }
+    }
+
+    /// The letters, each with its rank, in the order in which they were written.
+    pub fn letters(&self) -> impl Iterator<Item = (usize, &[u64])> {
+        let range = |at: usize| -> Range<usize> {
+            let start = at.checked_sub(1).map_or(0, |before| self.letters[before].end);
+            start..self.letters[at].end
+        };
+        (0..self.letters.len()).map(move |at| (self.letters[at].rank, &self.words[range(at)]))
+    }
+
+    /// The words of all letters, behind each other.
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+}
+
+/// Letters with their ranks; those that follow each other and are one rank's become one, empty ones none.
+impl<W: IntoIterator<Item = u64>> FromIterator<(usize, W)> for Mail {
+    fn from_iter<I: IntoIterator<Item = (usize, W)>>(letters: I) -> Self {
+        let mut mail = Self::default();
+        letters.into_iter().for_each(|(rank, words)| mail.write(rank, words));
+        mail
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    fn told(mail: &Mail) -> Vec<(usize, Vec<u64>)> {
+        mail.letters().map(|(rank, words)| (rank, words.to_vec())).collect()
+    }
+
+    #[test]
+    fn what_is_written_for_the_last_letters_rank_lengthens_it() {
+        let mut mail = Mail::default();
+        mail.write(3, []);
+        mail.write(7, [1, 2]);
+        mail.write(7, []);
+        mail.room(7, 2)[1] = 5;
+        assert!(mail.room(0, 0).is_empty());
+        mail.room(4, 1)[0] = 9;
+        assert_eq!(told(&mail), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
+        assert_eq!(mail.words(), [1, 2, 0, 5, 9]);
+        assert_eq!(mail, told(&mail).into_iter().collect());
+    }
+
+    proptest! {
+        #[test]
+        fn entries_are_sorted_by_rank_and_keep_their_order(entries in prop::collection::vec((0usize..6, any::<[u64; 2]>()), 0..40)) {
+            let mut want: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
+            entries.iter().for_each(|(rank, words)| want.entry(*rank).or_default().extend(words));
+            prop_assert_eq!(told(&Mail::of_entries(entries)), want.into_iter().collect::<Vec<_>>());
+        }
+    }
+}
