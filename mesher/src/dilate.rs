@@ -18,7 +18,7 @@ use crate::brick::Brick;
 use crate::brickset::BrickSet;
 use crate::octant::Level;
 use gathered::Gathered;
-use tile::Tile;
+pub use tile::Tile;
 
 /// Octants along a tile's edge.
 const TILE: usize = 32;
@@ -27,20 +27,21 @@ const MARGIN: usize = 16;
 /// Bricks along a tile's edge, as a power of two; three of these per key.
 const TILE_BRICKS_LOG2: u32 = 3;
 
-/// Words that were dilated, counting every row of every tile.
+/// Words that were dilated: rows of tiles that results can be in.
 pub type Words = u64;
 
 /// What several dilations reach together: octants of one level, those outside the root left out.
-pub struct Reach {
+pub struct Reach<'t> {
     level: Level,
+    tile: &'t mut Tile,
     out: Gathered,
     words: Words,
 }
 
-impl Reach {
-    /// Nothing yet, of level `level`.
-    pub fn new(level: Level) -> Self {
-        Self { level, out: Gathered::new(level), words: 0 }
+impl<'t> Reach<'t> {
+    /// Nothing yet, of level `level`; an empty tile is for scratch, and left empty.
+    pub fn new(level: Level, tile: &'t mut Tile) -> Self {
+        Self { level, tile, out: Gathered::new(level), words: 0 }
     }
 
     /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
@@ -48,29 +49,36 @@ impl Reach {
         // Further than the root is wide, nothing more is reached.
         let mut left = radius.min(1 << self.level) as usize;
         if left <= MARGIN {
-            return dilate_tiles(sources, left, false, &mut self.out, &mut self.words);
+            return dilate_tiles(sources, left, false, self.tile, &mut self.out, &mut self.words);
         }
         let mut near = Gathered::new(self.level);
-        dilate_tiles(sources, MARGIN, false, &mut near, &mut self.words);
+        dilate_tiles(sources, MARGIN, false, self.tile, &mut near, &mut self.words);
         let mut set = near.into_set();
         left -= MARGIN;
         while left > MARGIN {
             let mut near = Gathered::new(self.level);
-            dilate_tiles(set.bricks(), MARGIN, false, &mut near, &mut self.words);
+            dilate_tiles(set.bricks(), MARGIN, false, self.tile, &mut near, &mut self.words);
             set = near.into_set();
             left -= MARGIN;
         }
-        dilate_tiles(set.bricks(), left, false, &mut self.out, &mut self.words);
+        dilate_tiles(set.bricks(), left, false, self.tile, &mut self.out, &mut self.words);
     }
 
     /// Adds the parents of all octants within `radius` of a source, which is one level deeper. Sources
     /// come in Morton order.
     pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
         if radius < 2 {
-            return dilate_tiles(sources, radius as usize, true, &mut self.out, &mut self.words);
+            return dilate_tiles(
+                sources,
+                radius as usize,
+                true,
+                self.tile,
+                &mut self.out,
+                &mut self.words,
+            );
         }
         let mut odd = Gathered::new(self.level);
-        dilate_tiles(sources, (radius & 1) as usize, true, &mut odd, &mut self.words);
+        dilate_tiles(sources, (radius & 1) as usize, true, self.tile, &mut odd, &mut self.words);
         self.dilate(odd.into_set().bricks(), radius / 2);
     }
 
@@ -85,10 +93,11 @@ fn dilate_tiles(
     sources: impl Iterator<Item = Brick>,
     radius: usize,
     to_parents: bool,
+    tile: &mut Tile,
     out: &mut Gathered,
     words: &mut Words,
 ) {
-    let mut tile = Tile::new(radius);
+    tile.set_radius(radius);
     let mut now = None;
     for b in sources {
         let key = b.key >> (3 * TILE_BRICKS_LOG2);
@@ -141,11 +150,13 @@ mod tests {
             let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
             let grown = naive(l, &codes, i64::from(r));
             let all = widths(|| {
-                let mut got = Reach::new(l);
-                got.dilate(set(&codes).bricks(), r);
-                let mut parents = Reach::new(l - 1);
+                let mut tile = Tile::default();
+                let mut same = Reach::new(l, &mut tile);
+                same.dilate(set(&codes).bricks(), r);
+                let same = same.finish().0;
+                let mut parents = Reach::new(l - 1, &mut tile);
                 parents.dilate_children(set(&codes).bricks(), r);
-                [got, parents].map(|reach| reach.finish().0)
+                [same, parents.finish().0]
             });
             let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
             for (width, [same, above]) in all {

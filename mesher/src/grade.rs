@@ -26,7 +26,7 @@
 use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::comm::Comm;
-use crate::dilate::{Reach, Words};
+use crate::dilate::{Reach, Tile, Words};
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::octant::Level;
@@ -64,6 +64,7 @@ pub fn grade(
         surface,
         share,
         comm,
+        tile: Tile::default(),
         work: Work::default(),
     };
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
@@ -91,6 +92,8 @@ struct Gradation<'a> {
     surface: Level,
     share: &'a Ownership,
     comm: &'a dyn Comm,
+    /// Empty; scratch.
+    tile: Tile,
     work: Work,
 }
 
@@ -122,7 +125,8 @@ impl Gradation<'_> {
     /// The parents, of level `l - 1`, that the kept leaves of level `l` in bricks that this rank answers
     /// for reach within `radius` cells.
     fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
-        let mut reach = Reach::new(l - 1);
+        let mut tile = std::mem::take(&mut self.tile);
+        let mut reach = Reach::new(l - 1, &mut tile);
         if l > self.surface {
             reach.dilate_children(self.leaves(l, |_| u64::MAX), radius);
         } else {
@@ -136,13 +140,9 @@ impl Gradation<'_> {
             let within = |key| brick::children(brick::byte(impure.get(key >> 3), key & 7));
             reach.dilate_children(self.leaves(l, within), radius);
         }
-        self.reached(reach)
-    }
-
-    /// Takes what was reached, and counts the work.
-    fn reached(&mut self, reach: Reach) -> BrickSet {
         let (reached, words) = reach.finish();
         self.work.words_dilated += words;
+        self.tile = tile;
         reached
     }
 
@@ -193,10 +193,13 @@ impl Gradation<'_> {
             return;
         }
         for m in (surface..self.crossing.len() as Level).rev() {
-            let mut reach = Reach::new(m - 1);
+            let mut tile = std::mem::take(&mut self.tile);
+            let mut reach = Reach::new(m - 1, &mut tile);
             let leaves = self.crossing[m as usize].bricks();
             reach.dilate_children(leaves.filter(|b| self.share.answers_for(m, b.key)), 1);
-            let mut touched = self.reached(reach);
+            let (mut touched, words) = reach.finish();
+            self.work.words_dilated += words;
+            self.tile = tile;
             for _ in surface..m {
                 touched = touched.coarsen();
             }

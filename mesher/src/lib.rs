@@ -210,7 +210,7 @@ fn quantise(
     let ingest::Share { facets, first, total } = geometry;
     let mine = Bounds::of(&facets);
     let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
-    let bounds = comm.all_gather(&words).iter().fold(Bounds::EMPTY, |b, w| {
+    let bounds = comm.all_gather(&words).letters().fold(Bounds::EMPTY, |b, (_, w)| {
         let at = |i: usize| f64::from_bits(w[i]);
         b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
     });

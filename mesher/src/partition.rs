@@ -71,7 +71,7 @@ pub fn assign(
                 Ok(Vec::new())
             };
             let mine: Vec<u64> = agree(comm, made)?.into_iter().map(|o| o as u64).collect();
-            Ok(comm.all_gather(&mine).concat().into_iter().map(|o| o as usize).collect())
+            Ok(comm.all_gather(&mine).words().iter().map(|&o| o as usize).collect())
         }
     }
 }

@@ -20,6 +20,9 @@ use std::ops::Range;
 /// together, in units of some 70 ns: fitted to what the ranks of several meshes took. Surfaces that lie obliquely to the axes
 /// leave more components; uneven ones leave small ones, and steps that a processor does not foresee.
 const COSTS: [u64; 4] = [2, 2, 2, 13];
+/// What another rank takes that owns something beside, in the same units: two dozen messages to it and from it, and what is in
+/// them. Who owns a corner of the root that is mostly empty has a hundred such, and others two dozen.
+const COST_NEIGHBOUR: i64 = 230;
 /// Groups of bricks that are looked at to find what the level takes that has most of them, at least where there are so many;
 /// of the other levels the same part.
 const SAMPLE: usize = 512;
@@ -37,6 +40,9 @@ pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Com
     let every = (groups / SAMPLE) | 1;
     for l in 1..tree.split.len() as Level {
         weigh_level(tree, l, every, &mut scale);
+    }
+    for (_, at) in share.neighbours() {
+        scale.add_at(at, COST_NEIGHBOUR);
     }
     scale.cut(comm).unwrap_or_else(|| share.clone())
 }

@@ -160,8 +160,8 @@ impl Report {
             [times[0], times[1], times[2], times[3], t.messages, t.bytes] as [u64; PHASE_WORDS]
         }));
         let all = comm.all_gather(&words);
-        let column = |i: usize| all.iter().map(|w| w[i]).collect::<Vec<u64>>();
-        let seconds = |i: usize| all.iter().map(|w| f64::from_bits(w[i])).collect::<Vec<f64>>();
+        let column = |i: usize| all.letters().map(|(_, w)| w[i]).collect::<Vec<u64>>();
+        let seconds = |i: usize| column(i).into_iter().map(f64::from_bits).collect::<Vec<f64>>();
         let first = 1 + COUNTERS.len();
         let entry = |(i, p): (usize, &Phase)| {
             let at = first + PHASE_WORDS * i;

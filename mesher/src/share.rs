@@ -11,6 +11,7 @@
 //!
 //! Invariants: runs follow each other from the curve's start, and neighbours have different owners.
 
+mod neighbours;
 mod scatter;
 
 use crate::octant::{LEVEL_MAX, Level, start57};
@@ -303,11 +304,11 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// Level of the octants that are dealt out here; bricks are looked at down to one level below those that fill them.
-    const FINE: Level = 3;
-    const RANKS: usize = 12;
+    pub const FINE: Level = 3;
+    pub const RANKS: usize = 12;
 
     /// Owners of all octants of level [`FINE`]: runs as a curve cut in shares has them, or as METIS leaves them.
-    fn owners() -> impl Strategy<Value = Vec<usize>> {
+    pub fn owners() -> impl Strategy<Value = Vec<usize>> {
         let octants = 1usize << (3 * FINE);
         let ascending = prop::collection::vec(0..octants, RANKS - 1).prop_map(move |mut cuts| {
             cuts.sort_unstable();
@@ -320,7 +321,7 @@ mod tests {
         prop_oneof![ascending, any]
     }
 
-    fn ownership(rank: usize, owners: &[usize]) -> Ownership {
+    pub fn ownership(rank: usize, owners: &[usize]) -> Ownership {
         let leaf = |(code, &owner)| BaseLeaf { level: FINE, code, owner };
         let leaves: Vec<BaseLeaf> = (0..).zip(owners).map(leaf).collect();
         Ownership::new(rank, RANKS, &leaves)

@@ -25,9 +25,8 @@ impl Counts {
     /// The sum over the ranks. Collective.
     pub fn gather(&self, comm: &dyn crate::comm::Comm) -> Self {
         let mut sum = Self::default();
-        for words in comm.all_gather(self.by_level.as_flattened()).iter() {
-            sum.by_level.as_flattened_mut().iter_mut().zip(words).for_each(|(s, w)| *s += w);
-        }
+        let sums = comm.sums(self.by_level.as_flattened());
+        sum.by_level.as_flattened_mut().copy_from_slice(&sums);
         sum
     }
 

@@ -6,7 +6,7 @@ use mesher::brick::{flood, valid};
 use mesher::brickset::BrickSet;
 use mesher::case::{Case, RootSpec};
 use mesher::comm::Solo;
-use mesher::dilate::Reach;
+use mesher::dilate::{Reach, Tile};
 use mesher::facet::{Facet, crossed};
 use mesher::ingest::{Share, Source, read};
 use mesher::kept::Kept;
@@ -210,7 +210,8 @@ fn floods(set: &BrickSet, l: u32) -> u64 {
 }
 
 fn dilated(set: &BrickSet, l: u32, radius: u32) -> u64 {
-    let mut reach = Reach::new(l - 1);
+    let mut tile = Tile::default();
+    let mut reach = Reach::new(l - 1, &mut tile);
     reach.dilate_children(set.bricks(), radius);
     reach.finish().0.len() as u64
 }

@@ -40,8 +40,9 @@ pub fn weights(facets: &[Facet], rules: &Rules, cut: &Cut, comm: &dyn Comm) -> V
     }
     let coarse = coarsen(rules, coarser, cut.level_base());
     let mut counts = vec![0u64; expected.len()];
-    for theirs in comm.all_gather(&rehearse(facets, &coarse, cut, &expected, comm)).iter() {
-        theirs.chunks_exact(2).for_each(|pair| counts[pair[0] as usize] += pair[1]);
+    let all = comm.all_gather(&rehearse(facets, &coarse, cut, &expected, comm));
+    for &[leaf, count] in all.words().as_chunks().0 {
+        counts[leaf as usize] += count;
     }
     extrapolate(&expected, &counts, 1 << coarser)
 }

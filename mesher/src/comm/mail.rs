@@ -33,6 +33,18 @@ impl Mail {
         mail
     }
 
+    /// A letter from each rank, of so many words that are to be written in place.
+    pub fn with_lengths(lengths: impl Iterator<Item = usize>) -> Self {
+        let mut mail = Self::default();
+        let mut end = 0;
+        for (rank, words) in lengths.enumerate().filter(|l| l.1 > 0) {
+            end += words;
+            mail.letters.push(Letter { rank, end });
+        }
+        mail.words = vec![0; end];
+        mail
+    }
+
     /// Writes words into a rank's letter, a new one unless the last one is that rank's.
     pub fn write(&mut self, rank: usize, words: impl IntoIterator<Item = u64>) {
         let start = self.words.len();
@@ -60,16 +72,29 @@ impl Mail {
 
     /// The letters, each with its rank, in the order in which they were written.
     pub fn letters(&self) -> impl Iterator<Item = (usize, &[u64])> {
-        let range = |at: usize| -> Range<usize> {
-            let start = at.checked_sub(1).map_or(0, |before| self.letters[before].end);
-            start..self.letters[at].end
-        };
-        (0..self.letters.len()).map(move |at| (self.letters[at].rank, &self.words[range(at)]))
+        (0..self.letters.len()).map(|at| (self.letters[at].rank, &self.words[self.range(at)]))
+    }
+
+    /// Where the words of a letter are.
+    fn range(&self, letter: usize) -> Range<usize> {
+        let start = letter.checked_sub(1).map_or(0, |before| self.letters[before].end);
+        start..self.letters[letter].end
     }
 
     /// The words of all letters, behind each other.
     pub fn words(&self) -> &[u64] {
         &self.words
+    }
+
+    /// The same, to be written in place.
+    pub fn words_mut(&mut self) -> &mut [u64] {
+        &mut self.words
+    }
+
+    /// A rank's letter, of letters in the order of the ranks; nothing if there is none.
+    pub fn of(&self, rank: usize) -> &[u64] {
+        let at = self.letters.binary_search_by_key(&rank, |l| l.rank);
+        at.map_or(&[], |at| &self.words[self.range(at)])
     }
 }
 

@@ -54,10 +54,7 @@ pub fn gather_collected(
     comm: &dyn Comm,
 ) -> Vec<Entry> {
     combine(&mut mine, merge);
-    let mut all: Vec<Entry> = Vec::new();
-    for theirs in comm.all_gather(mine.as_flattened()).iter() {
-        all.extend_from_slice(theirs.as_chunks().0);
-    }
+    let mut all: Vec<Entry> = comm.all_gather(mine.as_flattened()).words().as_chunks().0.to_vec();
     combine(&mut all, merge);
     all
 }

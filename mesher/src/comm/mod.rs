@@ -36,9 +36,9 @@ pub struct Traffic {
     pub time_cpu_s: f64,
 }
 
-/// Words by rank. Ranks of one process share them: a copy for each would take memory, and time, that no
-/// real rank takes.
-pub type ByRank = Arc<[Vec<u64>]>;
+/// Letters from all ranks to all, in the order of the ranks. Ranks of one process share them: a copy for each would take
+/// memory, and time, that no real rank takes.
+pub type ByRank = Arc<Mail>;
 
 /// A group of ranks.
 pub trait Comm {
@@ -50,6 +50,9 @@ pub trait Comm {
 
     /// Everyone's words, by rank. Collective.
     fn all_gather(&self, mine: &[u64]) -> ByRank;
+
+    /// The sums over the ranks, modulo 2^64, of as many values on each. Collective.
+    fn sums(&self, mine: &[u64]) -> Vec<u64>;
 
     /// Sends letters, one at most to a receiver, and returns those that were sent here, by sender, in no
     /// particular order. Collective.
@@ -68,12 +71,12 @@ pub trait Comm {
 
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
-        self.all_gather(&[v]).iter().fold(0, |s, w| s.wrapping_add(w[0]))
+        self.sums(&[v])[0]
     }
 
     /// The greatest value of any rank. Collective.
     fn max(&self, v: u64) -> u64 {
-        self.all_gather(&[v]).iter().map(|w| w[0]).max().unwrap_or(v)
+        self.all_gather(&[v]).words().iter().copied().max().unwrap_or(v)
     }
 
     /// Makes one rank's error every rank's: all return the error of the lowest rank that has one.
@@ -83,9 +86,9 @@ pub trait Comm {
             Ok(()) => Vec::new(),
             Err(e) => pack(e),
         };
-        match self.all_gather(&packed).iter().find(|w| !w.is_empty()) {
+        match self.all_gather(&packed).letters().next() {
             None => Ok(()),
-            Some(words) => Err(unpack(words)),
+            Some((_, words)) => Err(unpack(words)),
         }
     }
 }
@@ -153,6 +156,11 @@ impl Meter {
         self.count(2 * doublings(ranks), all - all / ranks as u64);
     }
 
+    /// Counts a sum of so many words over all: by recursive doubling, all words in each message.
+    pub(crate) fn sum(&self, ranks: usize, words: u64) {
+        self.count(doublings(ranks), doublings(ranks) * words);
+    }
+
     /// Counts how ranks agree that all that was sent has arrived: the acknowledgement that each waits for, and a
     /// barrier by doublings.
     pub(crate) fn arrived(&self, ranks: usize) {
@@ -201,7 +209,11 @@ impl Comm for Solo {
     }
 
     fn all_gather(&self, mine: &[u64]) -> ByRank {
-        Arc::new([mine.to_vec()])
+        Arc::new([(0, mine.iter().copied())].into_iter().collect())
+    }
+
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        mine.to_vec()
     }
 
     fn exchange(&self, to: Mail) -> Mail {
@@ -224,21 +236,25 @@ mod tests {
     #[test]
     fn collective_calls_count_as_libraries_make_them() {
         let told = sim::run(5, 1, |c| {
+            c.sums(&[1, 2, 3]);
+            let summed = c.traffic();
             c.all_gather(&[1, 2]);
             let gathered = c.traffic();
             let next = (c.rank() + 1) % 5;
             c.exchange([(next, vec![0; 10]), (c.rank(), vec![0; 99])].into_iter().collect());
             let t = c.traffic();
             [
-                gathered.messages,
-                gathered.bytes,
+                summed.messages,
+                summed.bytes,
+                gathered.messages - summed.messages,
+                gathered.bytes - summed.bytes,
                 t.messages - gathered.messages,
                 t.bytes - gathered.bytes,
             ]
         });
-        // Three doublings to reach five ranks, twice, with a number and two words of each of four others; an exchange sends
-        // one message, and has one acknowledged.
-        assert!(told.iter().all(|t| *t == [6, 8 * 3 * 4, 3 + 2, 8 * 10]), "{told:?}");
+        // Three doublings to reach five ranks, with three sums in each; the same twice, with a number and two words of each of
+        // four others; an exchange sends one message, and has one acknowledged.
+        assert!(told.iter().all(|t| *t == [3, 8 * 9, 6, 8 * 3 * 4, 3 + 2, 8 * 10]), "{told:?}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! one when ranks share cores. Messages are cut into chunks, as MPI counts in i32.
 
 use super::{ByRank, Comm, Mail, Meter, Traffic, matrix};
+use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
 use mpi::point_to_point::{Message, Status};
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
@@ -12,6 +13,8 @@ use std::cell::Cell;
 
 /// Words per message at most: 1 GiB, and few where the checks of debug builds are made.
 const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
+/// Words gathered at once at most, over all ranks.
+const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
 
 /// One rank of an MPI job.
 pub struct Mpi {
@@ -67,6 +70,15 @@ impl Comm for Mpi {
         self.meter.call(|| self.all_gather_untimed(mine).into())
     }
 
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        self.meter.sum(self.size(), mine.len() as u64);
+        self.meter.call(|| {
+            let mut sums = vec![0; mine.len()];
+            self.world.all_reduce_into(mine, &mut sums[..], SystemOperation::sum());
+            sums
+        })
+    }
+
     fn exchange(&self, to: Mail) -> Mail {
         self.meter.call(|| self.exchange_untimed(&to))
     }
@@ -81,29 +93,38 @@ impl Comm for Mpi {
 }
 
 impl Mpi {
-    fn all_gather_untimed(&self, mine: &[u64]) -> Vec<Vec<u64>> {
+    fn all_gather_untimed(&self, mine: &[u64]) -> Mail {
         let mut counts = vec![0u64; self.size()];
         self.world.all_gather_into(&(mine.len() as u64), &mut counts[..]);
         let longest = counts.iter().copied().max().unwrap_or(0) as usize;
-        let mut all: Vec<Vec<u64>> =
-            counts.iter().map(|&c| Vec::with_capacity(c as usize)).collect();
         // The sum over ranks is what is counted in i32.
-        let step = (CHUNK / self.size()).max(1);
-        for at in (0..longest).step_by(step) {
-            let part = |len: usize| len.saturating_sub(at).min(step);
-            let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
-            let starts: Vec<i32> =
-                lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
-            let mut buffer = vec![0u64; lengths.iter().map(|&n| n as usize).sum()];
-            let mine = &mine[at.min(mine.len())..][..part(mine.len())];
-            let mut target =
-                mpi::datatype::PartitionMut::new(&mut buffer[..], &lengths[..], &starts[..]);
-            self.world.all_gather_varcount_into(mine, &mut target);
-            for ((words, &start), &n) in all.iter_mut().zip(&starts).zip(&lengths) {
-                words.extend_from_slice(&buffer[start as usize..(start + n) as usize]);
+        let step = (GATHERED / self.size()).max(1);
+        let parts: Vec<Mail> = (0..longest)
+            .step_by(step)
+            .map(|at| {
+                let part = |len: usize| len.saturating_sub(at).min(step);
+                let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
+                self.all_gather_part(&mine[at.min(mine.len())..][..part(mine.len())], &lengths)
+            })
+            .collect();
+        self.meter.gather(self.size(), counts.iter().sum());
+        match <[Mail; 1]>::try_from(parts) {
+            Ok([all]) => all,
+            Err(parts) => {
+                let words = |rank: usize| parts.iter().flat_map(move |p| p.of(rank));
+                (0..self.size()).map(|rank| (rank, words(rank).copied())).collect()
             }
         }
-        self.meter.gather(self.size(), counts.iter().sum());
+    }
+
+    /// Gathers so many words of each rank.
+    fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> Mail {
+        let starts: Vec<i32> =
+            lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
+        let lengths_all = lengths.iter().map(|&n| n as usize);
+        let mut all = Mail::with_lengths(lengths_all);
+        let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
+        self.world.all_gather_varcount_into(mine, &mut target);
         all
     }
 

@@ -53,6 +53,8 @@ struct Post {
 enum Words {
     /// For everybody.
     Gather(Vec<u64>),
+    /// To be summed up.
+    Sum(Vec<u64>),
     /// By receiver.
     Exchange(Mail),
 }
@@ -60,6 +62,7 @@ enum Words {
 /// What it takes out.
 enum Delivery {
     Gathered(ByRank),
+    Summed(Vec<u64>),
     Exchanged(Mail),
 }
 
@@ -144,20 +147,28 @@ impl State {
         }
         let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
         let (ranks, call) = (posts.len(), posts[0].call);
-        let (mut gathered, mut exchanged) = (Vec::new(), Vec::new());
+        let (mut gathered, mut summed, mut exchanged) = (Vec::new(), Vec::new(), Vec::new());
         for post in posts {
             assert!(post.call == call, "{UNEQUAL}");
             match post.words {
                 Words::Gather(words) => gathered.push(words),
+                Words::Sum(words) => summed.push(words),
                 Words::Exchange(mail) => exchanged.push(mail),
             }
         }
-        assert!(gathered.is_empty() || exchanged.is_empty(), "{UNEQUAL}");
-        self.inbox = if exchanged.is_empty() {
-            let all: ByRank = gathered.into();
-            (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
-        } else {
-            self.sorted(&exchanged).into_iter().map(|m| Some(Delivery::Exchanged(m))).collect()
+        self.inbox = match [gathered.len(), summed.len(), exchanged.len()].map(|n| n == ranks) {
+            [true, false, false] => {
+                let all: ByRank = gathered.into_iter().enumerate().collect::<Mail>().into();
+                (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
+            }
+            [false, true, false] => {
+                let sums = summed_up(&summed);
+                (0..ranks).map(|_| Some(Delivery::Summed(sums.clone()))).collect()
+            }
+            [false, false, true] => {
+                self.sorted(&exchanged).into_iter().map(|m| Some(Delivery::Exchanged(m))).collect()
+            }
+            _ => panic!("{UNEQUAL}"),
         };
         self.doing.iter_mut().for_each(|d| *d = Doing::Ready);
     }
@@ -184,6 +195,16 @@ impl State {
         };
         inbox.into_iter().map(copied).collect()
     }
+}
+
+/// The sums of as many words on each rank.
+fn summed_up(ranks: &[Vec<u64>]) -> Vec<u64> {
+    let mut sums = vec![0u64; ranks[0].len()];
+    for words in ranks {
+        assert!(words.len() == sums.len(), "{UNEQUAL}");
+        sums.iter_mut().zip(words).for_each(|(sum, w)| *sum = sum.wrapping_add(*w));
+    }
+    sums
 }
 
 impl Sim {
@@ -246,10 +267,18 @@ impl Comm for Sim {
     fn all_gather(&self, mine: &[u64]) -> ByRank {
         match self.meter.call(|| self.call(Words::Gather(mine.to_vec()))) {
             Delivery::Gathered(all) => {
-                self.meter.gather(self.size(), all.iter().map(|w| w.len() as u64).sum());
+                self.meter.gather(self.size(), all.words().len() as u64);
                 all
             }
-            Delivery::Exchanged(_) => unreachable!("{UNEQUAL}"),
+            _ => unreachable!("{UNEQUAL}"),
+        }
+    }
+
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        self.meter.sum(self.size(), mine.len() as u64);
+        match self.meter.call(|| self.call(Words::Sum(mine.to_vec()))) {
+            Delivery::Summed(sums) => sums,
+            _ => unreachable!("{UNEQUAL}"),
         }
     }
 
@@ -262,7 +291,7 @@ impl Comm for Sim {
         };
         match self.meter.call(counted) {
             Delivery::Exchanged(mail) => mail,
-            Delivery::Gathered(_) => unreachable!("{UNEQUAL}"),
+            _ => unreachable!("{UNEQUAL}"),
         }
     }
 

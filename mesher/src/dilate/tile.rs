@@ -6,34 +6,48 @@ use crate::brick::{self, Brick};
 use crate::brickset::ones;
 use crate::octant::position;
 use crate::wide::widest;
+use std::ops::Range;
 
-/// A tile and its margin, one word per row.
+/// A tile and its margin, one word per row. Most of a tile may be empty, above all of coarse levels; so only those rows
+/// are touched that a result can be in. What is used again and again need not be zeroed.
+#[derive(Debug, Default)]
 pub struct Tile {
     radius: usize,
     /// Rows before and behind the tile's own along y and z: the radius, up to whole parent bricks.
     margin: usize,
     /// Rows along y and along z.
     side: usize,
+    /// All zero in an empty tile.
     rows: Vec<u64>,
-    /// Which of the tile's own positions along z have a source.
+    /// Which of the tile's own positions along y and along z may have a source.
+    columns: u32,
     layers: u32,
     /// The rows after the passes along x and y; scratch.
     spread: Vec<u64>,
 }
 
+/// From the first set bit to behind the last one.
+fn span(bits: u32) -> Range<usize> {
+    bits.trailing_zeros() as usize..(u32::BITS - bits.leading_zeros()) as usize
+}
+
 impl Tile {
-    pub fn new(radius: usize) -> Self {
+    /// Makes an empty tile one that dilates by `radius`.
+    pub fn set_radius(&mut self, radius: usize) {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
-        let margin = radius.next_multiple_of(8);
-        let side = TILE + 2 * margin;
-        Self {
-            radius,
-            margin,
-            side,
-            layers: 0,
-            rows: vec![0; side * side],
-            spread: vec![0; side * side],
-        }
+        self.radius = radius;
+        self.margin = radius.next_multiple_of(8);
+        self.side = TILE + 2 * self.margin;
+        self.rows.resize(self.side * self.side, 0);
+        self.spread.resize(self.side * self.side, 0);
+    }
+
+    /// The rows along y, and those along z, that results are in; no octant of the tile is none's.
+    fn reached(&self) -> [Range<usize>; 2] {
+        [self.columns, self.layers].map(|sources| {
+            let Range { start, end } = span(sources);
+            self.margin + start - self.radius..self.margin + end + self.radius
+        })
     }
 
     /// Adds a source brick.
@@ -47,6 +61,7 @@ impl Tile {
                 continue;
             }
             self.layers |= 1 << (z + dz);
+            self.columns |= 15 << y;
             let base = (self.margin + z + dz) * self.side + self.margin + y;
             let four = rows >> (16 * dz);
             for (dy, row) in self.rows[base..base + 4].iter_mut().enumerate() {
@@ -57,35 +72,36 @@ impl Tile {
 
     /// Dilates what was put in, along x, then y, then z.
     pub fn dilate(&mut self, words: &mut Words) {
-        *words += self.rows.len() as u64;
+        let [y, z] = self.reached();
+        *words += (y.len() * z.len()) as u64;
         if self.radius > 0 {
             dilate_rows(self);
         }
     }
 
-    /// Sources are in the middle, so only the rows that results can be in are touched.
     #[inline(always)]
     fn dilate_lanes(&mut self) {
         let (r, m, side) = (self.radius, self.margin, self.side);
+        let [reached, along_z] = self.reached();
+        let n = reached.len() - 2 * r;
         let spread = &mut self.spread;
         for z in ones(u64::from(self.layers)).map(|z| z as usize + m) {
-            let rows = &mut self.rows[z * side..(z + 1) * side];
-            for row in &mut rows[m..m + TILE] {
+            let rows = &mut self.rows[z * side..(z + 1) * side][reached.clone()];
+            for row in &mut rows[r..r + n] {
                 *row = dilate_row(*row, r);
             }
-            let out = &mut spread[z * side..(z + 1) * side];
+            let out = &mut spread[z * side..(z + 1) * side][reached.clone()];
             out.copy_from_slice(rows);
-            for s in 1..=r {
-                or_into(&mut out[m - s..m - s + TILE], &rows[m..m + TILE]);
-                or_into(&mut out[m + s..m + s + TILE], &rows[m..m + TILE]);
+            for s in (0..=2 * r).filter(|s| *s != r) {
+                or_into(&mut out[s..s + n], &rows[r..r + n]);
             }
         }
-        for z in m - r..m + TILE + r {
+        for z in along_z {
             let (first, last) = ((z - r.min(z)).max(m) - m, (z + r).min(m + TILE - 1) - m);
             let near = u64::from(self.layers) & ((2 << last) - (1 << first));
-            let rows = &mut self.rows[z * side..(z + 1) * side];
+            let rows = &mut self.rows[z * side..(z + 1) * side][reached.clone()];
             for from in ones(near).map(|z| z as usize + m) {
-                or_into(rows, &spread[from * side..(from + 1) * side]);
+                or_into(rows, &spread[from * side..(from + 1) * side][reached.clone()]);
             }
         }
     }
@@ -94,10 +110,11 @@ impl Tile {
     pub fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
         let side = self.side / scale;
+        let reached = self.reached();
         let halved;
         let rows = if to_parents {
             let mut half = vec![0; side * side];
-            halve(&self.rows, &mut half, side);
+            halve(&self.rows, &mut half, side, &reached);
             halved = half;
             &halved
         } else {
@@ -108,9 +125,13 @@ impl Tile {
         let margins = [MARGIN, self.margin, self.margin].map(|m| (m / scale / 4) as i64);
         let first: [i64; 3] = std::array::from_fn(|a| origin[a] - margins[a]);
         // Blocks of 2 x 2 x 2 bricks start at even ones.
-        let end = |a: usize| (first[a] + (side / 4) as i64 + 1).div_euclid(2);
-        for z in first[2].div_euclid(2)..end(2) {
-            for y in first[1].div_euclid(2)..end(1) {
+        let [along_y, along_z] = [1, 2].map(|a| {
+            let bricks = |row: usize| first[a] + (row / scale / 4) as i64;
+            let Range { start, end } = reached[a - 1];
+            bricks(start).div_euclid(2)..bricks(end - 1).div_euclid(2) + 1
+        });
+        for z in along_z {
+            for y in along_y.clone() {
                 let at = |a: usize, block: i64, odd: usize| 2 * block + odd as i64 - first[a];
                 let bricks: [[u64; 16]; 4] = std::array::from_fn(|k| {
                     bricks_along(rows, side, at(1, y, k & 1), at(2, z, k >> 1))
@@ -124,8 +145,11 @@ impl Tile {
                 }
             }
         }
-        self.rows.fill(0);
-        self.layers = 0;
+        let [along_y, along_z] = reached;
+        for z in along_z {
+            self.rows[z * self.side..(z + 1) * self.side][along_y.clone()].fill(0);
+        }
+        (self.columns, self.layers) = (0, 0);
     }
 }
 
@@ -155,14 +179,18 @@ widest! {
 }
 
 widest! {
-    fn halve(rows: &[u64], half: &mut [u64], side: usize) = halve_lanes;
+    fn halve(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2]) = halve_lanes;
 }
 
-/// Rows of the parents, `side` by `side` of them: pairs along all three axes ored together.
+/// Rows of the parents, `side` by `side` of them, of those rows along y and along z that were reached: pairs along all
+/// three axes ored together.
 #[inline(always)]
-fn halve_lanes(rows: &[u64], half: &mut [u64], side: usize) {
-    for (z, out) in half.chunks_exact_mut(side).enumerate() {
+fn halve_lanes(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2]) {
+    let [along_y, along_z] = [0, 1].map(|a| reached[a].start / 2..reached[a].end.div_ceil(2));
+    for z in along_z {
         let (low, high) = rows[4 * z * side..][..4 * side].split_at(2 * side);
+        let [low, high] = [low, high].map(|rows| &rows[2 * along_y.start..2 * along_y.end]);
+        let out = &mut half[z * side..(z + 1) * side][along_y.clone()];
         for (y, row) in out.iter_mut().enumerate() {
             *row = pairs(low[2 * y] | low[2 * y + 1] | high[2 * y] | high[2 * y + 1]);
         }

@@ -54,7 +54,7 @@ fn cut_where(
 ) -> Option<Vec<(u64, usize)>> {
     let sums: Vec<u128> = {
         let mine = bins.iter().map(|b| b.1).sum();
-        comm.all_gather(&[mine]).iter().map(|w| u128::from(w[0])).collect()
+        comm.all_gather(&[mine]).words().iter().map(|&w| u128::from(w)).collect()
     };
     if sums.iter().all(|&s| s == 0) {
         return None;
@@ -65,8 +65,8 @@ fn cut_where(
         .flat_map(|(start, owner)| [start, owner as u64])
         .collect();
     let all = comm.all_gather(&mine);
-    let pairs = all.iter().flat_map(|words| words.chunks_exact(2));
-    Some(joined(pairs.map(|w| (w[0], w[1] as usize))))
+    let pairs = all.words().as_chunks().0.iter();
+    Some(joined(pairs.map(|&[start, owner]| (start, owner as usize))))
 }
 
 /// The same as [`cut`] for bins that all ranks have all of.

@@ -32,8 +32,8 @@ pub fn names(
     let mut pairs = name_by_top(&mut names, nodes, tree, share, classes);
     pairs.extend(across_ranks(nodes, faces, classes, &names, comm));
     let mut joined = Joined::default();
-    for theirs in comm.all_gather(&summed_up(pairs, comm)).iter() {
-        theirs.as_chunks().0.iter().for_each(|&[a, b]| joined.join(a, b));
+    for &[a, b] in comm.all_gather(&summed_up(pairs, comm)).words().as_chunks().0 {
+        joined.join(a, b);
     }
     names.iter().map(|&n| joined.find(n)).collect()
 }

@@ -161,8 +161,8 @@ fn all_of(mine: &Firsts, open: &[Open], comm: &dyn Comm) -> Firsts {
     let flat: Vec<u64> =
         told.flat_map(|(name, list)| list.iter().flat_map(move |c| [name, c.0])).collect();
     let all = comm.all_gather(&flat);
-    let pairs = all.iter().flat_map(|words| words.chunks_exact(2));
-    merged(pairs.map(|w| (w[0], vec![Candidate(w[1])])))
+    let pairs = all.words().as_chunks().0.iter();
+    merged(pairs.map(|&[name, candidate]| (name, vec![Candidate(candidate)])))
 }
 
 /// Parities over all facets from those over each rank's. Collective.
@@ -170,7 +170,7 @@ fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     let pack = |bytes: &[u8]| bytes.iter().rev().fold(0u64, |w, &b| w << 8 | u64::from(b));
     let words: Vec<u64> = mine.chunks(8).map(pack).collect();
     let mut total = vec![0u64; words.len()];
-    for theirs in comm.all_gather(&words).iter() {
+    for (_, theirs) in comm.all_gather(&words).letters() {
         total.iter_mut().zip(theirs).for_each(|(t, w)| *t ^= w);
     }
     (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()
