@@ -42,7 +42,7 @@ impl Tile {
         self.spread.resize(self.side * self.side, 0);
     }
 
-    /// The rows along y, and those along z, that results are in; no octant of the tile is none's.
+    /// The rows along y, and those along z, that results are in. The tile is not empty.
     fn reached(&self) -> [Range<usize>; 2] {
         [self.columns, self.layers].map(|sources| {
             let Range { start, end } = span(sources);
@@ -50,7 +50,7 @@ impl Tile {
         })
     }
 
-    /// Adds a source brick.
+    /// Adds a source brick, which is not empty.
     pub fn put(&mut self, b: Brick) {
         let [x, y, z] =
             position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
