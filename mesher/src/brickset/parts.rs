@@ -36,6 +36,9 @@ impl BrickSet {
 
     /// Forgets all bricks but those of a range of positions.
     pub fn keep(&mut self, range: Range<usize>) {
+        if range == (0..self.len()) {
+            return;
+        }
         self.runs = self.runs_of(&range);
         self.low.truncate(range.end);
         self.bits.truncate(range.end);

@@ -47,8 +47,13 @@ impl Mail {
 
     /// Writes words into a rank's letter, a new one unless the last one is that rank's.
     pub fn write(&mut self, rank: usize, words: impl IntoIterator<Item = u64>) {
+        self.append(rank, |all| all.extend(words));
+    }
+
+    /// The same for what `write` puts behind the words of all letters.
+    pub fn append(&mut self, rank: usize, write: impl FnOnce(&mut Vec<u64>)) {
         let start = self.words.len();
-        self.words.extend(words);
+        write(&mut self.words);
         self.lengthen(rank, start);
     }
 

@@ -34,23 +34,35 @@ impl Ownership {
     }
 
     /// Brings octants of several sets to the ranks that hold their bricks. Collective, unless there is one rank.
-    fn scatter_all(&self, sets: Vec<(Level, BrickSet)>, comm: &dyn Comm) -> (Vec<BrickSet>, u64) {
+    fn scatter_all(
+        &self,
+        mut sets: Vec<(Level, BrickSet)>,
+        comm: &dyn Comm,
+    ) -> (Vec<BrickSet>, u64) {
         if self.ranks == 1 {
             return (sets.into_iter().map(|(_, set)| set).collect(), 0);
         }
         let any_top = sets.iter().any(|(l, _)| *l <= self.level_top);
         let mut out = Parcels::default();
-        let pick = |(number, (l, set))| vec![self.pick(number, l, set, &mut out)];
-        // What this rank holds of each set, in parts.
-        let mut parts: Vec<Vec<BrickSet>> = (0..).zip(sets).map(pick).collect();
+        let pick = |(number, (l, set)): (usize, &mut (Level, BrickSet))| {
+            self.pick(number, *l, set, &mut out)
+        };
+        let stay: Vec<Range<usize>> = sets.iter_mut().enumerate().map(pick).collect();
         let mut top = std::mem::take(&mut out.top);
         if any_top && let Some(collected) = for_collectors(&mut top, |a, b| a | b, comm) {
             top.clear();
             out.tell(TOP, collected);
         }
         let sent = out.sent + out.loose.len() as u64;
+        let mail = out.mail(&sets);
+        let held = |((_, mut set), stay): ((Level, BrickSet), Range<usize>)| {
+            set.keep(stay);
+            vec![set]
+        };
+        // What this rank holds of each set, in parts.
+        let mut parts: Vec<Vec<BrickSet>> = sets.into_iter().zip(stay).map(held).collect();
         let mut told: Vec<Entry> = Vec::new();
-        for (_, words) in comm.exchange(out.mail()).letters() {
+        for (_, words) in comm.exchange(mail).letters() {
             read_letter(words, &mut parts, &mut told, &mut top);
         }
         if any_top {
@@ -65,27 +77,26 @@ impl Ownership {
         (parts.into_iter().map(BrickSet::union_of).collect(), sent)
     }
 
-    /// Takes out of set `number` what others hold; returns what this rank does. Of top bricks it holds what
+    /// Lists what others hold of set `number`; returns where what this rank does is in it then. Of top bricks it holds what
     /// everybody is told.
-    fn pick(&self, number: u64, l: Level, mut set: BrickSet, out: &mut Parcels) -> BrickSet {
+    fn pick(&self, number: usize, l: Level, set: &mut BrickSet, out: &mut Parcels) -> Range<usize> {
         let mut stretches = self.stretches();
         if let (Some(stretch), None) = (stretches.next(), stretches.next())
             && l > self.level_shared
         {
             // Where no brick has several owners, each one's are beside each other.
             let position = |set: &BrickSet, at: u64| set.position(at >> (3 * (LEVEL_MAX + 2 - l)));
-            let mine = position(&set, stretch.start)..position(&set, stretch.end);
+            let mine = position(set, stretch.start)..position(set, stretch.end);
             for others in [0..mine.start, mine.end..set.len()] {
                 let mut at = others.start;
                 while at < others.end {
                     let run = self.runs.at(brick_start(l, set.key_at(at)));
-                    let theirs = at..position(&set, self.runs.end(run));
+                    let theirs = at..position(set, self.runs.end(run));
                     at = theirs.end;
-                    out.send(number, &set, theirs, self.runs.owners[run]);
+                    out.send(number, set, theirs, self.runs.owners[run]);
                 }
             }
-            set.keep(mine);
-            return set;
+            return mine;
         }
         set.retain(|b| {
             if l >= 2 && self.is_within(l, b.key) {
@@ -93,7 +104,7 @@ impl Ownership {
             }
             let owners = self.owners_of(l, b.key);
             let place = self.place_among(l, owners);
-            let entry = [number << KEY_BITS | b.key, b.bits];
+            let entry = [(number as u64) << KEY_BITS | b.key, b.bits];
             if place == Place::Top {
                 out.top.push(entry);
                 return 0;
@@ -105,7 +116,7 @@ impl Ownership {
             }
             if matches!(place, Place::Mine | Place::Shared) { b.bits } else { 0 }
         });
-        set
+        0..set.len()
     }
 }
 
@@ -120,10 +131,10 @@ const TOP: u64 = LOOSE + 1;
 /// What is to be sent. Entries have their set's number above the key.
 #[derive(Default)]
 struct Parcels {
-    /// Sets, each behind its number, and entries, behind their kind and how many they are.
-    words: Vec<u64>,
-    /// Receivers, with their part of the words.
-    parcels: Vec<(usize, Range<usize>)>,
+    /// With their receivers.
+    parcels: Vec<(usize, Parcel)>,
+    /// Those of parcels.
+    entries: Vec<Entry>,
     /// Entries with their receivers.
     loose: Vec<(usize, Entry)>,
     /// Entries for everybody.
@@ -132,17 +143,21 @@ struct Parcels {
     sent: u64,
 }
 
+enum Parcel {
+    /// Bricks of a set by its number, behind which they are sent.
+    Bricks(usize, Range<usize>),
+    /// Entries, sent behind their kind and how many they are.
+    Entries(u64, Range<usize>),
+}
+
 impl Parcels {
-    fn send(&mut self, number: u64, set: &BrickSet, bricks: Range<usize>, to: usize) {
+    fn send(&mut self, number: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
         if bricks.len() <= FEW {
-            let entry = |b: Brick| (to, [number << KEY_BITS | b.key, b.bits]);
+            let entry = |b: Brick| (to, [(number as u64) << KEY_BITS | b.key, b.bits]);
             return self.loose.extend(bricks.map(|at| entry(set.brick(at))));
         }
         self.sent += bricks.len() as u64;
-        let start = self.words.len();
-        self.words.push(number);
-        set.pack(bricks, &mut self.words);
-        self.parcels.push((to, start..self.words.len()));
+        self.parcels.push((to, Parcel::Bricks(number, bricks)));
     }
 
     fn tell(&mut self, kind: u64, mut entries: Vec<(usize, Entry)>) {
@@ -150,21 +165,31 @@ impl Parcels {
         // With METIS an owner may have several runs of an octant.
         entries.dedup();
         for told in entries.chunk_by(|a, b| a.0 == b.0) {
-            let start = self.words.len();
-            self.words.extend([kind, told.len() as u64]);
-            self.words.extend(told.iter().flat_map(|e| e.1));
-            self.parcels.push((told[0].0, start..self.words.len()));
+            let start = self.entries.len();
+            self.entries.extend(told.iter().map(|e| e.1));
+            self.parcels.push((told[0].0, Parcel::Entries(kind, start..self.entries.len())));
         }
     }
 
-    /// Everything, by receiver.
-    fn mail(mut self) -> Mail {
+    /// Everything, by receiver; the bricks are those of some sets.
+    fn mail(mut self, sets: &[(Level, BrickSet)]) -> Mail {
         let loose = std::mem::take(&mut self.loose);
         self.tell(LOOSE, loose);
         self.parcels.sort_by_key(|p| p.0);
-        let mut mail = Mail::with_capacity(self.words.len());
-        for (to, range) in self.parcels {
-            mail.write(to, self.words[range].iter().copied());
+        // A brick takes one word and a half.
+        let words = 2 * (self.entries.len() + 4 * self.parcels.len()) as u64 + self.sent * 3 / 2;
+        let mut mail = Mail::with_capacity(words as usize);
+        for (to, parcel) in self.parcels {
+            mail.append(to, |words| match parcel {
+                Parcel::Bricks(number, bricks) => {
+                    words.push(number as u64);
+                    sets[number].1.pack(bricks, words);
+                }
+                Parcel::Entries(kind, entries) => {
+                    words.extend([kind, entries.len() as u64]);
+                    words.extend(self.entries[entries].as_flattened());
+                }
+            });
         }
         mail
     }
