@@ -301,7 +301,7 @@ mod tests {
     use super::*;
     use crate::comm::{Comm, sim};
     use proptest::prelude::*;
-    use std::collections::BTreeSet;
+    use std::collections::{BTreeMap, BTreeSet};
 
     /// Level of the octants that are dealt out here; bricks are looked at down to one level below those that fill them.
     pub const FINE: Level = 3;
@@ -393,13 +393,19 @@ mod tests {
         #[test]
         fn what_is_scattered_reaches_all_holders(
             owners in owners(),
-            told in prop::collection::vec((0..RANKS, 0usize..2, 0..FINE + 3, any::<u64>(), 1u64..8), 0..80),
+            few in prop::collection::vec((0..RANKS, 0usize..2, 0..FINE + 3, any::<u64>(), 1u64..8), 0..80),
+            // Two ranks have more than a few bricks for some others.
+            many in prop::collection::vec((0usize..2, 0usize..2, Just(FINE + 2), any::<u64>(), 1u64..8), 0..800),
         ) {
+            let told = [few, many].concat();
             let all = bricks(&owners);
-            let key = |l: Level, draw: u64| {
-                let keys = all.iter().filter(|b| b.0 == l).count() as u64;
-                draw % keys
-            };
+            let mut keys = [0; FINE as usize + 3];
+            all.iter().for_each(|b| keys[b.0 as usize] += 1);
+            let key = |l: Level, draw: u64| draw % keys[l as usize];
+            let mut sums: BTreeMap<(usize, Level, u64), u64> = BTreeMap::new();
+            for &(_, set, l, draw, bits) in &told {
+                *sums.entry((set, l, key(l, draw))).or_default() |= bits;
+            }
             let got = sim::run(RANKS, 7, |comm| {
                 let mut sets = [crate::tree::per_level(), crate::tree::per_level()];
                 let mut mine: Vec<_> = told.iter().filter(|t| t.0 == comm.rank()).collect();
@@ -415,10 +421,7 @@ mod tests {
                 let share = ownership(rank, &owners);
                 for (number, set) in sets.iter().enumerate() {
                     for &(l, brick, _) in &all {
-                        let of = |t: &&(usize, usize, Level, u64, u64)| {
-                            (t.1, t.2, key(t.2, t.3)) == (number, l, brick)
-                        };
-                        let sum = told.iter().filter(of).fold(0, |bits, t| bits | t.4);
+                        let sum = sums.get(&(number, l, brick)).copied().unwrap_or(0);
                         let holds = !matches!(share.place(l, brick), Place::Remote(_));
                         prop_assert_eq!(set[l as usize].get(brick), if holds { sum } else { 0 });
                     }
