@@ -125,21 +125,27 @@ impl Gradation<'_> {
     /// The parents, of level `l - 1`, that the kept leaves of level `l` in bricks that this rank answers
     /// for reach within `radius` cells.
     fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
-        let mut tile = std::mem::take(&mut self.tile);
-        let mut reach = Reach::new(l - 1, &mut tile);
-        if l > self.surface {
-            reach.dilate_children(self.leaves(l, |_| u64::MAX), radius);
-        } else {
-            let mut impure = self.impure.cursor();
-            let pure = (self.split[l as usize - 1].bricks())
-                .filter(|b| self.share.answers_for(l - 1, b.key))
+        self.reached(l - 1, |g, reach| {
+            if l > g.surface {
+                return reach.dilate_children(g.leaves(l, |_| u64::MAX), radius);
+            }
+            let mut impure = g.impure.cursor();
+            let pure = (g.split[l as usize - 1].bricks())
+                .filter(|b| g.share.answers_for(l - 1, b.key))
                 .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
                 .filter(|b| b.bits != 0);
             reach.dilate(pure, radius.div_ceil(2));
-            let mut impure = self.impure.cursor();
+            let mut impure = g.impure.cursor();
             let within = |key| brick::children(brick::byte(impure.get(key >> 3), key & 7));
-            reach.dilate_children(self.leaves(l, within), radius);
-        }
+            reach.dilate_children(g.leaves(l, within), radius);
+        })
+    }
+
+    /// What `dilate` reaches of a level; counts the work.
+    fn reached(&mut self, l: Level, dilate: impl FnOnce(&Self, &mut Reach)) -> BrickSet {
+        let mut tile = std::mem::take(&mut self.tile);
+        let mut reach = Reach::new(l, &mut tile);
+        dilate(self, &mut reach);
         let (reached, words) = reach.finish();
         self.work.words_dilated += words;
         self.tile = tile;
@@ -193,13 +199,10 @@ impl Gradation<'_> {
             return;
         }
         for m in (surface..self.crossing.len() as Level).rev() {
-            let mut tile = std::mem::take(&mut self.tile);
-            let mut reach = Reach::new(m - 1, &mut tile);
-            let leaves = self.crossing[m as usize].bricks();
-            reach.dilate_children(leaves.filter(|b| self.share.answers_for(m, b.key)), 1);
-            let (mut touched, words) = reach.finish();
-            self.work.words_dilated += words;
-            self.tile = tile;
+            let mut touched = self.reached(m - 1, |g, reach| {
+                let leaves = g.crossing[m as usize].bricks();
+                reach.dilate_children(leaves.filter(|b| g.share.answers_for(m, b.key)), 1);
+            });
             for _ in surface..m {
                 touched = touched.coarsen();
             }
