@@ -13,24 +13,24 @@ use mesher::error::Error;
 use mesher::record::{INTERRUPTED, Recorder};
 use mesher::report::Report;
 use mesher::{Options, mesh};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::exit;
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
 
 /// Exit code of a bug.
 const BUG: i32 = 70;
+/// Exit code of a run that was interrupted twice.
+const STOPPED: i32 = 130;
 
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     heap::fix_thresholds();
     let args = parse();
-    // Failing to install the handler only means that interrupts end the process the default way.
-    let _ = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            exit(130);
-        }
-    });
+    // Failing to install the handlers only means that interrupts end the process the default way.
+    let _ = remember_interrupts();
     match choose(args.as_ref().map_or(CommChoice::Auto, |a| a.comm)) {
         Ok(CommChoice::Mpi) => run_mpi(&args),
         Ok(CommChoice::Sim { ranks, seed }) => {
@@ -44,6 +44,17 @@ fn main() {
         }
         Err(e) => exit(fail(&e)),
     }
+}
+
+/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop; a second one ends the process at once. No thread waits for
+/// them: starting one allocates at some moment or other, and who compares meshers counts allocations.
+fn remember_interrupts() -> std::io::Result<()> {
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        // They run in this order, so that the first signal finds the flag down.
+        flag::register_conditional_shutdown(signal, STOPPED, Arc::clone(&INTERRUPTED))?;
+        flag::register(signal, Arc::clone(&INTERRUPTED))?;
+    }
+    Ok(())
 }
 
 /// Number of ranks that an MPI launcher has started, if one has.

@@ -5,10 +5,11 @@ use crate::error::Error;
 use cpu_time::ThreadTime;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 use std::time::Instant;
 
 /// Set when the user asks the run to stop; looked at between phases and while writing.
-pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// An error if the user asked the run to stop.
 pub fn check_interrupt() -> Result<(), Error> {

@@ -3,19 +3,21 @@
 //! Invariant: a signal ends the harness the ordinary way, by returning, so that children are ended and
 //! temporary directories removed by their owners.
 
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// Makes Ctrl-C, SIGTERM and SIGHUP a request to end. A second one, from an impatient user, ends at once.
 pub fn install() {
-    let handler = || {
-        if REQUESTED.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
-        }
-    };
-    // Without a handler a signal ends the harness without cleaning up: worse, but no reason not to run.
-    let _ = ctrlc::set_handler(handler);
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        // Without a handler a signal ends the harness without cleaning up: worse, but no reason not to run.
+        // The two run in this order, so that the first signal finds the flag down.
+        let _ = flag::register_conditional_shutdown(signal, 130, Arc::clone(&REQUESTED));
+        let _ = flag::register(signal, Arc::clone(&REQUESTED));
+    }
 }
 
 /// Whether the user has asked to end.
