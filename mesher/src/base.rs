@@ -35,7 +35,7 @@ const SPLIT_LEAVES_PER_RANK: u64 = 32;
 /// misses an equal share by a few percent.
 const SHARE_PARTS: u64 = 16;
 /// Parts of a share that a cut of the Morton curve keeps or gives away as one.
-const CUT_PARTS: u64 = 64;
+const CUT_PARTS: u64 = 16;
 /// Parts of a share, about, by which all ranks know where the weight lies before the curve is cut. Coarser than
 /// shares, as what is told to everybody grows with the ranks; so one rank may cut the curve in detail for a few.
 const COARSE_PARTS: f64 = 0.25;

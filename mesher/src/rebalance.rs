@@ -25,9 +25,11 @@ const COSTS: [u64; 4] = [2, 2, 2, 13];
 const COST_NEIGHBOUR: i64 = 230;
 /// Groups of bricks that are looked at to find what the level takes that has most of them, at least where there are so many;
 /// of the other levels the same part.
-const SAMPLE: usize = 512;
+const SAMPLE: usize = 256;
+/// Bricks of which it does not matter where in one of them its octants are.
+const BRICKS_MANY: usize = 4096;
 /// How much heavier than an equal share one may be by work on T0, which is guessed anyway; to move bricks costs more.
-const SLACK_WORK: f64 = 0.03;
+const SLACK_WORK: f64 = 0.02;
 /// The same by leaves, which cost little time each.
 const SLACK_LEAVES: f64 = 0.05;
 
@@ -52,11 +54,12 @@ fn weigh_level(tree: &Tree, l: Level, every: usize, scale: &mut Scale) {
     let above = &tree.split[l as usize - 1];
     let (mut split, mut crossing) =
         (tree.split[l as usize].cursor(), tree.crossing[l as usize].cursor());
-    for b in (0..above.len()).step_by(every).map(|at| above.brick(at)) {
-        for j in ones(u64::from(brick::parents(b.bits))).map(u64::from) {
+    for (n, b) in (0..above.len()).step_by(every).map(|at| above.brick(at)).enumerate() {
+        // Every other brick of a group, in turns the first or the second: they are much alike.
+        for j in ones(u64::from(brick::parents(b.bits))).map(u64::from).skip(n & 1).step_by(2) {
             let key = b.key << 3 | j;
             let leaves = brick::children(brick::byte(b.bits, j)) & !split.get(key);
-            scale.add(l, key, cost(leaves & !crossing.get(key)) * every as i64);
+            scale.add(l, key, 2 * cost(leaves & !crossing.get(key)) * every as i64);
         }
     }
 }
@@ -91,6 +94,7 @@ impl Weighed {
     /// Weighs the leaves of a mesh in octants of a level; crossing leaves are in it if `with_crossing`.
     pub fn new(parts: &Parts, share: &Ownership, level: Level, with_crossing: bool) -> Self {
         let mut scale = Scale::new(share, level);
+        scale.coarse = parts.split.iter().map(BrickSet::len).sum::<usize>() >= BRICKS_MANY;
         let mut add = |l: Level, sets: &PerLevel, each: i64| {
             scale.add_set(l, &sets[l as usize], each, |key| share.answers_for(l, key));
         };
@@ -135,20 +139,25 @@ struct Scale {
     own: Range<u64>,
     level: Level,
     shift: u32,
+    /// Whether bricks that have several bins count as if all of them lay in the first.
+    coarse: bool,
     bins: Vec<(u64, i64)>,
 }
 
 impl Scale {
     fn new(share: &Ownership, level: Level) -> Self {
         let own = share.stretches().next().unwrap_or(0..1);
-        Self { own, level, shift: 3 * (LEVEL_MAX - level), bins: Vec::new() }
+        Self { own, level, shift: 3 * (LEVEL_MAX - level), coarse: false, bins: Vec::new() }
     }
 
     /// Adds so much for each octant of a set, in bricks that this rank answers for.
     fn add_set(&mut self, l: Level, set: &BrickSet, each: i64, answers_for: impl Fn(u64) -> bool) {
         let Some(up) = l.checked_sub(self.level + 2) else {
             let mine = set.bricks().filter(|b| answers_for(b.key));
-            return mine.for_each(|b| self.add_octants(l, b, each));
+            return mine.for_each(|b| match self.coarse {
+                true => self.add(l, b.key, each * i64::from(b.bits.count_ones())),
+                false => self.add_octants(l, b, each),
+            });
         };
         // Bricks of one bin have one owner.
         for (key, bricks) in set.groups(3 * up) {

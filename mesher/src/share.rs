@@ -60,6 +60,8 @@ pub struct Ownership {
     runs: Arc<Runs>,
     /// This rank's longest stretch: most questions are about what lies in it.
     own: Range<u64>,
+    /// Whether it has no other.
+    is_single: bool,
     /// Deepest level that has a brick of several owners.
     level_shared: Level,
     /// Deepest level that has a top brick.
@@ -118,13 +120,14 @@ impl Ownership {
         }
         assert!(!runs.starts.is_empty(), "all is somebody's");
         let (level_shared, level_top) = (runs.deepest_brick_of(2), runs.deepest_brick_of(MANY));
+        let is_single = runs.of(rank).count() == 1;
         let own = runs.of(rank).max_by_key(|own| own.end - own.start).unwrap_or(0..0);
-        Self { rank, ranks, runs: Arc::new(runs), own, level_shared, level_top }
+        Self { rank, ranks, runs: Arc::new(runs), own, is_single, level_shared, level_top }
     }
 
     /// The same as seen by someone who owns nothing: every brick is a top brick or remote.
     pub fn bystander(&self) -> Self {
-        Self { rank: NOBODY, own: 0..0, ..self.clone() }
+        Self { rank: NOBODY, own: 0..0, is_single: false, ..self.clone() }
     }
 
     /// What of a tree lies in top bricks: the same on all ranks.

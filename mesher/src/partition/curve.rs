@@ -18,7 +18,7 @@ pub const ALL: Range<u64> = 0..1 << (3 * LEVEL_MAX);
 
 /// Sorts bins, and merges those of one place.
 pub fn merge(bins: &mut Vec<Bin>) {
-    bins.sort_by_key(|b| b.0);
+    bins.sort_unstable_by_key(|b| b.0);
     bins.dedup_by(|b, before| {
         let same = b.0 == before.0;
         if same {

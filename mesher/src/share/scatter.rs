@@ -80,13 +80,10 @@ impl Ownership {
     /// Lists what others hold of set `number`; returns where what this rank does is in it then. Of top bricks it holds what
     /// everybody is told.
     fn pick(&self, number: usize, l: Level, set: &mut BrickSet, out: &mut Parcels) -> Range<usize> {
-        let mut stretches = self.stretches();
-        if let (Some(stretch), None) = (stretches.next(), stretches.next())
-            && l > self.level_shared
-        {
+        if self.is_single && l > self.level_shared {
             // Where no brick has several owners, each one's are beside each other.
             let position = |set: &BrickSet, at: u64| set.position(at >> (3 * (LEVEL_MAX + 2 - l)));
-            let mine = position(set, stretch.start)..position(set, stretch.end);
+            let mine = position(set, self.own.start)..position(set, self.own.end);
             for others in [0..mine.start, mine.end..set.len()] {
                 let mut at = others.start;
                 while at < others.end {
