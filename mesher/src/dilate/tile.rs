@@ -19,11 +19,14 @@ pub struct Tile {
     side: usize,
     /// All zero in an empty tile.
     rows: Vec<u64>,
-    /// Which of the tile's own positions along y and along z may have a source.
-    columns: u32,
+    /// Which of the tile's own positions along z have a source; and which along y may have one, at any of them and at each.
     layers: u32,
+    columns: u32,
+    columns_at: [u32; TILE],
     /// The rows after the passes along x and y; scratch.
     spread: Vec<u64>,
+    /// Rows of parents; all zero but while a result is handed over.
+    half: Vec<u64>,
 }
 
 /// From the first set bit to behind the last one.
@@ -40,6 +43,7 @@ impl Tile {
         self.side = TILE + 2 * self.margin;
         self.rows.resize(self.side * self.side, 0);
         self.spread.resize(self.side * self.side, 0);
+        self.half.resize(self.side * self.side / 4, 0);
     }
 
     /// The rows along y, and those along z, that results are in. The tile is not empty.
@@ -47,6 +51,16 @@ impl Tile {
         [self.columns, self.layers].map(|sources| {
             let Range { start, end } = span(sources);
             self.margin + start - self.radius..self.margin + end + self.radius
+        })
+    }
+
+    /// The layers along z that have sources, and the rows in them that sources reach along y.
+    #[inline(always)]
+    fn along_y(&self) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+        let (r, m) = (self.radius, self.margin);
+        ones(u64::from(self.layers)).map(move |z| {
+            let Range { start, end } = span(self.columns_at[z as usize]);
+            (z as usize + m, m + start - r..m + end + r)
         })
     }
 
@@ -62,6 +76,7 @@ impl Tile {
             }
             self.layers |= 1 << (z + dz);
             self.columns |= 15 << y;
+            self.columns_at[z + dz] |= 15 << y;
             let base = (self.margin + z + dz) * self.side + self.margin + y;
             let four = rows >> (16 * dz);
             for (dy, row) in self.rows[base..base + 4].iter_mut().enumerate() {
@@ -72,8 +87,7 @@ impl Tile {
 
     /// Dilates what was put in, along x, then y, then z.
     pub fn dilate(&mut self, words: &mut Words) {
-        let [y, z] = self.reached();
-        *words += (y.len() * z.len()) as u64;
+        *words += self.along_y().map(|(_, y)| y.len() as u64).sum::<u64>();
         if self.radius > 0 {
             dilate_rows(self);
         }
@@ -81,45 +95,47 @@ impl Tile {
 
     #[inline(always)]
     fn dilate_lanes(&mut self) {
-        let (r, m, side) = (self.radius, self.margin, self.side);
-        let [reached, along_z] = self.reached();
-        let n = reached.len() - 2 * r;
-        let spread = &mut self.spread;
-        for z in ones(u64::from(self.layers)).map(|z| z as usize + m) {
-            let rows = &mut self.rows[z * side..(z + 1) * side][reached.clone()];
+        let (r, side) = (self.radius, self.side);
+        let mut rows = std::mem::take(&mut self.rows);
+        let mut spread = std::mem::take(&mut self.spread);
+        for (z, y) in self.along_y() {
+            let (rows, out) = (&mut rows[z * side..][y.clone()], &mut spread[z * side..][y.clone()]);
+            let n = y.len() - 2 * r;
             for row in &mut rows[r..r + n] {
                 *row = dilate_row(*row, r);
             }
-            let out = &mut spread[z * side..(z + 1) * side][reached.clone()];
             out.copy_from_slice(rows);
             for s in (0..=2 * r).filter(|s| *s != r) {
                 or_into(&mut out[s..s + n], &rows[r..r + n]);
             }
         }
-        for z in along_z {
-            let (first, last) = ((z - r.min(z)).max(m) - m, (z + r).min(m + TILE - 1) - m);
-            let near = u64::from(self.layers) & ((2 << last) - (1 << first));
-            let rows = &mut self.rows[z * side..(z + 1) * side][reached.clone()];
-            for from in ones(near).map(|z| z as usize + m) {
-                or_into(rows, &spread[from * side..(from + 1) * side][reached.clone()]);
+        for (z, y) in self.along_y() {
+            for to in z - r..=z + r {
+                or_into(&mut rows[to * side..][y.clone()], &spread[z * side..][y.clone()]);
             }
         }
+        (self.rows, self.spread) = (rows, spread);
     }
 
     /// Hands over the result and empties the tile.
     pub fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
+        give_blocks(self, tile, to_parents, out);
+        let [along_y, along_z] = self.reached();
+        for z in along_z {
+            self.rows[z * self.side..(z + 1) * self.side][along_y.clone()].fill(0);
+        }
+        (self.layers, self.columns, self.columns_at) = (0, 0, [0; TILE]);
+    }
+
+    #[inline(always)]
+    fn give_lanes(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
         let side = self.side / scale;
         let reached = self.reached();
-        let halved;
-        let rows = if to_parents {
-            let mut half = vec![0; side * side];
-            halve(&self.rows, &mut half, side, &reached);
-            halved = half;
-            &halved
-        } else {
-            &self.rows
-        };
+        if to_parents {
+            halve(&self.rows, &mut self.half, side, &reached);
+        }
+        let rows = if to_parents { &self.half } else { &self.rows };
         // The first brick of the padded tile, in bricks of the result's level; even along x.
         let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
         let margins = [MARGIN, self.margin, self.margin].map(|m| (m / scale / 4) as i64);
@@ -145,11 +161,12 @@ impl Tile {
                 }
             }
         }
-        let [along_y, along_z] = reached;
-        for z in along_z {
-            self.rows[z * self.side..(z + 1) * self.side][along_y.clone()].fill(0);
+        if to_parents {
+            let [along_y, along_z] = halves(&reached);
+            for z in along_z {
+                self.half[z * side..(z + 1) * side][along_y.clone()].fill(0);
+            }
         }
-        (self.columns, self.layers) = (0, 0);
     }
 }
 
@@ -160,7 +177,7 @@ fn any(words: &[u64]) -> bool {
 }
 
 /// The 16 bricks along x, with their bits in rows, at a place along y and z, in bricks; none beside the tile.
-#[inline]
+#[inline(always)]
 fn bricks_along(rows: &[u64], side: usize, y: i64, z: i64) -> [u64; 16] {
     let inside = 0..(side / 4) as i64;
     if !(inside.contains(&y) && inside.contains(&z)) {
@@ -179,14 +196,20 @@ widest! {
 }
 
 widest! {
-    fn halve(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2]) = halve_lanes;
+    fn give_blocks(tile: &mut Tile, number: u64, to_parents: bool, out: &mut Gathered) = Tile::give_lanes;
+}
+
+/// Where the parents of some rows along y and along z are.
+#[inline(always)]
+fn halves(rows: &[Range<usize>; 2]) -> [Range<usize>; 2] {
+    [0, 1].map(|a| rows[a].start / 2..rows[a].end.div_ceil(2))
 }
 
 /// Rows of the parents, `side` by `side` of them, of those rows along y and along z that were reached: pairs along all
 /// three axes ored together.
 #[inline(always)]
-fn halve_lanes(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2]) {
-    let [along_y, along_z] = [0, 1].map(|a| reached[a].start / 2..reached[a].end.div_ceil(2));
+fn halve(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2]) {
+    let [along_y, along_z] = halves(reached);
     for z in along_z {
         let (low, high) = rows[4 * z * side..][..4 * side].split_at(2 * side);
         let [low, high] = [low, high].map(|rows| &rows[2 * along_y.start..2 * along_y.end]);
