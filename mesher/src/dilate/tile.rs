@@ -99,7 +99,8 @@ impl Tile {
         let mut rows = std::mem::take(&mut self.rows);
         let mut spread = std::mem::take(&mut self.spread);
         for (z, y) in self.along_y() {
-            let (rows, out) = (&mut rows[z * side..][y.clone()], &mut spread[z * side..][y.clone()]);
+            let (rows, out) =
+                (&mut rows[z * side..][y.clone()], &mut spread[z * side..][y.clone()]);
             let n = y.len() - 2 * r;
             for row in &mut rows[r..r + n] {
                 *row = dilate_row(*row, r);

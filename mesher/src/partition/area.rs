@@ -104,7 +104,9 @@ pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     // Odd, as facets come in pairs.
     let every = (facets.len() / SAMPLE) | 1;
     for some in facets.chunks(every) {
-        some.iter().filter(|f| is_wide(f, edge(level))).for_each(|f| spread(f, edge(level), &mut add));
+        some.iter()
+            .filter(|f| is_wide(f, edge(level)))
+            .for_each(|f| spread(f, edge(level), &mut add));
         if !is_wide(&some[0], edge(level)) {
             spread(&some[0], edge(level), &mut |at, area| add(at, area * every as f64));
         }

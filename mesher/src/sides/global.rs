@@ -96,9 +96,9 @@ fn across_ranks(
         out.write(rank, [u64::from(level), key, name, bits]);
     }
     drop(faces);
-    let mut pairs = Vec::new();
+    let (mut pairs, mut finder) = (Vec::new(), nodes.finder());
     for &[level, key, theirs, bits] in comm.exchange(out).words().as_chunks().0 {
-        nodes.meet(level as Level, key, bits, |c| {
+        finder.meet(level as Level, key, bits, |c| {
             let mine = name(c);
             // Most of what faces another rank is named by the top already.
             if theirs != mine && pairs.last() != Some(&[theirs, mine]) {

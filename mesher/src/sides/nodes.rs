@@ -198,29 +198,126 @@ impl Nodes {
         0..self.levels[l as usize].places.len() as Node
     }
 
+    /// To find components by octants.
+    pub fn finder(&self) -> Finder<'_> {
+        Finder { nodes: self, way: vec![(0, 0)] }
+    }
+}
+
+/// Finds components by octants, quickly where one question is about the neighbourhood of the one before.
+pub struct Finder<'a> {
+    nodes: &'a Nodes,
+    /// The latest bricks on the way down, by level: key and node.
+    way: Vec<(u64, Node)>,
+}
+
+impl Finder<'_> {
     /// Tells `found` the components that the octants `bits` of brick `key` of level `l` touch: of leaves of that
     /// level, or of the coarser leaves that they lie in; octants that are split have none.
-    pub fn meet(&self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
-        let mut node = 0;
-        for m in 0..=l {
+    pub fn meet(&mut self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
+        let nodes = self.nodes;
+        let on_the_way =
+            |(m, way): (Level, &(u64, Node))| m <= l && way.0 == brick_above(l, key, m);
+        let known = (0..).zip(&self.way).take_while(|&way| on_the_way(way)).count();
+        self.way.truncate(known);
+        // That a brick is there means that the octant is split which it fills, two levels above.
+        for m in (known as Level).saturating_sub(2)..=l {
+            let node = self.way[m as usize].1;
             // Down to two levels above, the octants lie in one; then in those of one group; then they are told apart.
             let here = match l - m {
                 0 => bits,
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
                 up => 1 << (key >> (3 * (up - 2)) & 63),
             };
-            let split = self.split(m, node);
+            let split = nodes.split(m, node);
             let leaves = here & !split;
-            self.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
+            nodes.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
             if here & split == 0 || m == l {
                 return;
             }
-            let group = match l - m {
-                1 => key & 7,
-                up => key >> (3 * (up - 2) + 3) & 7,
-            };
-            let Some((below, _)) = self.family(m, node).child(group) else { return };
-            node = below;
+            if self.way.len() == m as usize + 1 {
+                let below = brick_above(l, key, m + 1);
+                let Some((node, _)) = nodes.family(m, node).child(below & 7) else { return };
+                self.way.push((below, node));
+            }
+        }
+    }
+}
+
+/// The key of the brick of level `m` that a brick of level `l` lies in.
+#[inline]
+fn brick_above(l: Level, key: u64, m: Level) -> u64 {
+    key >> (3 * (l - m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brick::Brick;
+    use crate::brickset::BrickSet;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    /// Deepest level of the trees here.
+    const DEEPEST: Level = 6;
+
+    fn of_codes(codes: &BTreeSet<u64>) -> BrickSet {
+        BrickSet::from_unsorted(
+            codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect(),
+        )
+    }
+
+    /// Some octants of the last level with all above them split; of the leaves every third crosses.
+    fn tree(deepest: &[u64]) -> Tree {
+        let mut tree = Tree::default();
+        for l in 0..DEEPEST {
+            let up = |code: &u64| code % (1 << (3 * DEEPEST)) >> (3 * (DEEPEST - l));
+            tree.split[l as usize] = of_codes(&deepest.iter().map(up).collect());
+        }
+        for l in 0..=DEEPEST as usize {
+            let leaf = |code: &u64| !tree.split[l].contains(*code);
+            let leaves = Tree::exists(&tree.split, l as Level)
+                .flat_map(|b| {
+                    crate::brickset::ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit))
+                })
+                .filter(leaf);
+            tree.crossing[l] = of_codes(&leaves.step_by(3).collect());
+        }
+        tree
+    }
+
+    /// The component of the leaf that an octant is or lies in, found without links; none if that crosses, or if it is split.
+    fn component_of(nodes: &Nodes, tree: &Tree, l: Level, code: u64) -> Option<Component> {
+        let exists =
+            |m: Level| m == 0 || tree.split[m as usize - 1].contains(code >> (3 * (l - m) + 3));
+        let m = (0..=l).rev().find(|&m| exists(m))?;
+        let at = code >> (3 * (l - m));
+        let node = Tree::exists(&tree.split, m).position(|b| b.key == at >> 6)?;
+        let mut there = nodes.components(m, node as Node);
+        there.find(|c| c.1 >> (at & 63) & 1 == 1).map(|c| c.0)
+    }
+
+    proptest! {
+        #[test]
+        fn components_are_found_whatever_was_asked_before(
+            deepest in prop::collection::vec(any::<u64>(), 1..20),
+            asked in prop::collection::vec((2..=DEEPEST, any::<prop::sample::Index>(), 0u64..80, any::<u64>()), 1..40),
+        ) {
+            let tree = tree(&deepest);
+            tree.check_invariants();
+            let nodes = Nodes::new(&tree, &Ownership::solo());
+            let mut finder = nodes.finder();
+            for (l, near, beside, bits) in asked {
+                // Near a place where the tree is deep, as neighbours' octants are.
+                let place = near.get(&deepest) % (1 << (3 * DEEPEST)) >> (3 * (DEEPEST - l));
+                let key = (place ^ beside) >> 6;
+                let mut found = BTreeSet::new();
+                finder.meet(l, key, bits, |c| _ = found.insert(c));
+                let codes = crate::brickset::ones(bits).map(|bit| key << 6 | u64::from(bit));
+                let want: BTreeSet<Component> =
+                    codes.filter_map(|code| component_of(&nodes, &tree, l, code)).collect();
+                prop_assert_eq!(found, want, "level {} key {}", l, key);
+            }
         }
     }
 }
