@@ -26,6 +26,8 @@ const COST_NEIGHBOUR: i64 = 230;
 /// Groups of bricks that are looked at to find what the level takes that has most of them, at least where there are so many;
 /// of the other levels the same part.
 const SAMPLE: usize = 256;
+/// Of so many groups one is looked at at least; then it takes half a percent of the time.
+const SPARSE: usize = 15;
 /// Bricks of which it does not matter where in one of them its octants are.
 const BRICKS_MANY: usize = 4096;
 /// How much heavier than an equal share one may be by work on T0, which is guessed anyway; to move bricks costs more.
@@ -39,7 +41,7 @@ pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Com
     let mut scale = Scale::new(share, level);
     let groups = tree.split.iter().map(BrickSet::len).max().unwrap_or(0);
     // Odd, as bricks come in groups of powers of two.
-    let every = (groups / SAMPLE) | 1;
+    let every = (groups / SAMPLE).min(SPARSE) | 1;
     for l in 1..tree.split.len() as Level {
         weigh_level(tree, l, every, &mut scale);
     }
