@@ -70,6 +70,10 @@ impl Local {
     /// Joins two components; the lower number stands for both.
     #[inline]
     pub fn join(&mut self, a: Component, b: Component) {
+        // Mostly they are joined already, and know it.
+        if self.parent[a as usize] == self.parent[b as usize] {
+            return;
+        }
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }
