@@ -26,8 +26,8 @@ const COST_NEIGHBOUR: i64 = 230;
 /// Groups of bricks that are looked at to find what the level takes that has most of them, at least where there are so many;
 /// of the other levels the same part.
 const SAMPLE: usize = 256;
-/// Of so many groups one is looked at at least; then it takes half a percent of the time.
-const SPARSE: usize = 15;
+/// Of so many groups one is looked at at least.
+const SPARSE: usize = 23;
 /// Bricks of which it does not matter where in one of them its octants are.
 const BRICKS_MANY: usize = 4096;
 /// How much heavier than an equal share one may be by work on T0, which is guessed anyway; to move bricks costs more.
