@@ -211,3 +211,93 @@ impl Scale {
         Some(Ownership::along(comm.rank(), comm.size(), changes))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::octant::start57;
+    use crate::tree::per_level;
+
+    const LEVEL: Level = 5;
+
+    /// All bricks of the level below, the same octants in each, and more of some in the middle.
+    fn split() -> PerLevel {
+        let mut split = per_level();
+        let l = LEVEL as usize + 1;
+        for key in 0..1 << (3 * (LEVEL - 1)) {
+            let more = if key >> 9 == 3 { 0xffff << 20 } else { 0 };
+            split[l].push(key, 0x8000_0000_0000_00f1 | more);
+        }
+        assert!(split[l].len() >= BRICKS_MANY);
+        split
+    }
+
+    /// Leaves by bin, told octant by octant.
+    fn exact(split: &PerLevel) -> Vec<u64> {
+        let mut bins = vec![0; 1 << (3 * LEVEL)];
+        split[LEVEL as usize + 1].codes().for_each(|code| bins[code as usize >> 3] += 7);
+        bins
+    }
+
+    #[test]
+    fn many_bricks_weigh_what_they_do_to_within_a_brick() {
+        let mut split = split();
+        let exact = exact(&split);
+        let [mut crossing, mut inside, mut deleted] = [per_level(), per_level(), per_level()];
+        let parts = Parts {
+            split: &mut split,
+            crossing: &mut crossing,
+            inside: &mut inside,
+            deleted: &mut deleted,
+        };
+        let weighed = Weighed::new(&parts, &Ownership::solo(), LEVEL, true);
+        let (mut told, mut want, mut bins) = (0, 0u64, weighed.0.iter().peekable());
+        for (bin, leaves) in (0..).zip(exact) {
+            want += leaves;
+            while let Some(b) = bins.next_if(|b| b.0 <= start57(LEVEL, bin)) {
+                told += b.1;
+            }
+            assert!(told.abs_diff(want) <= 7 * 64, "up to bin {bin}: {told} for {want}");
+        }
+        assert_eq!(told, want);
+        assert!(bins.next().is_none());
+    }
+
+    #[test]
+    fn of_many_bricks_some_stand_for_all() {
+        // Alike in wide stretches: whatever is looked at, the sums are about what all make.
+        let mut tree = Tree { split: split(), ..Tree::default() };
+        for l in 0..=LEVEL as usize {
+            tree.split[l] = tree.split[LEVEL as usize + 1].coarsen();
+            for _ in l..LEVEL as usize {
+                tree.split[l] = tree.split[l].coarsen();
+            }
+        }
+        tree.check_invariants();
+        let mut some = Scale::new(&Ownership::solo(), LEVEL);
+        let mut all = Scale::new(&Ownership::solo(), LEVEL);
+        for l in 1..tree.split.len() as Level {
+            weigh_level(&tree, l, 7, &mut some);
+            for b in Tree::exists(&tree.split, l) {
+                all.add(l, b.key, cost(b.bits & !tree.split[l as usize].get(b.key)));
+            }
+        }
+        let (some, all) = (some.bins(), all.bins());
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        assert!(some.len() < all.len() / 5, "{} of {} bins looked at", some.len(), all.len());
+        assert!(
+            sum(&some).abs_diff(sum(&all)) < sum(&all) / 20,
+            "{} for {}",
+            sum(&some),
+            sum(&all)
+        );
+        // In every eighth of the curve, too.
+        for eighth in 0..8 {
+            let within = |bins: &[Bin]| -> Vec<Bin> {
+                bins.iter().copied().filter(|b| b.0 >> (3 * LEVEL_MAX - 3) == eighth).collect()
+            };
+            let (some, all) = (sum(&within(&some)), sum(&within(&all)));
+            assert!(some.abs_diff(all) < all / 10, "eighth {eighth}: {some} for {all}");
+        }
+    }
+}

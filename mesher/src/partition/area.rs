@@ -143,6 +143,7 @@ mod tests {
     use crate::comm::Solo;
     use crate::lattice::{Keep, Root};
     use crate::octant::{ROOT_EDGE, start57};
+    use crate::partition::curve;
 
     fn rules(level_surface: Level) -> Rules {
         Rules {
@@ -172,6 +173,36 @@ mod tests {
         assert!(total.abs_diff(512) <= 4, "{parts:?}");
         // The octant at the right angle is covered whole, its neighbours half.
         assert!(parts[0].abs_diff(256) <= 32 && parts[1].abs_diff(128) <= 32, "{parts:?}");
+    }
+
+    #[test]
+    fn of_many_small_facets_some_stand_for_all_and_large_ones_are_all_counted() {
+        // A sheet of 140 x 140 squares over the lower half of a face of the root; a large facet over the other half.
+        let (n, level) = (140, 4);
+        let step = (ROOT_EDGE / 2) as i32 / n;
+        let at = |i: i32, j: i32| [i * step, j * step, 1];
+        let square = |i: i32, j: i32| {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+            [Facet { v: [a, b, c] }, Facet { v: [b, d, c] }]
+        };
+        let mut all: Vec<Facet> =
+            (0..n).flat_map(|i| (0..n).flat_map(move |j| square(i, j))).collect();
+        let h = (ROOT_EDGE / 2) as i32;
+        // Not the first of those that one stands for.
+        all.insert(7, Facet { v: [[h, h, 1], [2 * h - 1, h, 1], [h, 2 * h - 1, 1]] });
+        assert!(all.len() / SAMPLE > 10);
+        let mut sampled = of(&all, &rules(9), level);
+        curve::merge(&mut sampled);
+        let mut exact: Vec<Bin> =
+            all.chunks(SAMPLE / 2).flat_map(|f| of(f, &rules(9), level)).collect();
+        curve::merge(&mut exact);
+        assert_eq!(sampled.len(), exact.len());
+        for (s, e) in sampled.iter().zip(&exact) {
+            let tolerated = if s.0 >= start57(1, 3) { 0 } else { e.1 / 5 };
+            assert!(s.0 == e.0 && s.1.abs_diff(e.1) <= tolerated, "{s:?} for {e:?}");
+        }
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        assert!(sum(&sampled).abs_diff(sum(&exact)) < sum(&exact) / 100);
     }
 
     #[test]
