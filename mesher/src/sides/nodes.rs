@@ -271,7 +271,7 @@ mod tests {
     fn tree(deepest: &[u64]) -> Tree {
         let mut tree = Tree::default();
         for l in 0..DEEPEST {
-            let up = |code: &u64| code % (1 << (3 * DEEPEST)) >> (3 * (DEEPEST - l));
+            let up = |code: &u64| (code % (1 << (3 * DEEPEST))) >> (3 * (DEEPEST - l));
             tree.split[l as usize] = of_codes(&deepest.iter().map(up).collect());
         }
         for l in 0..=DEEPEST as usize {
@@ -309,7 +309,7 @@ mod tests {
             let mut finder = nodes.finder();
             for (l, near, beside, bits) in asked {
                 // Near a place where the tree is deep, as neighbours' octants are.
-                let place = near.get(&deepest) % (1 << (3 * DEEPEST)) >> (3 * (DEEPEST - l));
+                let place = (near.get(&deepest) % (1 << (3 * DEEPEST))) >> (3 * (DEEPEST - l));
                 let key = (place ^ beside) >> 6;
                 let mut found = BTreeSet::new();
                 finder.meet(l, key, bits, |c| _ = found.insert(c));
