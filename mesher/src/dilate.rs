@@ -27,7 +27,7 @@ const MARGIN: usize = 16;
 /// Bricks along a tile's edge, as a power of two; three of these per key.
 const TILE_BRICKS_LOG2: u32 = 3;
 
-/// Words that were dilated: rows of tiles that results can be in.
+/// Words that were dilated: rows of tiles that sources can reach along y, in each layer that has any.
 pub type Words = u64;
 
 /// What several dilations reach together: octants of one level, those outside the root left out.

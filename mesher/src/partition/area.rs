@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn of_many_small_facets_some_stand_for_all_and_large_ones_are_all_counted() {
-        // A sheet of 140 x 140 squares over the lower half of a face of the root; a large facet over the other half.
+        // A sheet of 140 x 140 squares over a quarter of a face of the root; a large facet in the quarter opposite.
         let (n, level) = (140, 4);
         let step = (ROOT_EDGE / 2) as i32 / n;
         let at = |i: i32, j: i32| [i * step, j * step, 1];
