@@ -318,22 +318,22 @@ mod tests {
                 prop_assert_eq!(behind, x.len());
             }
             let ranges = [0..i, i..j, j..x.len()];
-            let stretches = ranges.clone().map(|range| {
-                let mut stretch = x.clone();
-                stretch.keep(range);
-                stretch.check_invariants();
-                stretch
+            let intervals = ranges.clone().map(|range| {
+                let mut interval = x.clone();
+                interval.keep(range);
+                interval.check_invariants();
+                interval
             });
             let mut words = vec![7];
             ranges.into_iter().for_each(|range| x.pack(range, &mut words));
             let mut rest = &words[1..];
-            for stretch in &stretches {
+            for interval in &intervals {
                 let (set, behind) = BrickSet::unpack(rest);
-                prop_assert_eq!(&set, stretch);
+                prop_assert_eq!(&set, interval);
                 rest = behind;
             }
             prop_assert!(rest.is_empty());
-            let [before, middle, behind] = stretches;
+            let [before, middle, behind] = intervals;
             let around = before.clone().union(behind.clone());
             prop_assert_eq!(BrickSet::union_of(vec![around, middle.clone()]), x.clone());
             prop_assert_eq!(BrickSet::union_of(vec![behind, middle, before]), x.clone());

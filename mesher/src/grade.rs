@@ -30,7 +30,7 @@ use crate::dilate::{Reach, Tile, Words};
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::octant::Level;
-use crate::share::Ownership;
+use crate::partition::ownership::Ownership;
 use crate::tree::{PerLevel, Tree};
 
 /// What was done; repeats exactly.
@@ -52,7 +52,7 @@ pub fn grade(
     crossing: &PerLevel,
     kept: &Kept,
     rules: &Rules,
-    share: &Ownership,
+    ownership: &Ownership,
     comm: &dyn Comm,
 ) -> (PerLevel, Work) {
     let surface = rules.level_surface;
@@ -62,7 +62,7 @@ pub fn grade(
         crossing,
         kept,
         surface,
-        share,
+        ownership,
         comm,
         tile: Tile::default(),
         work: Work::default(),
@@ -90,7 +90,7 @@ struct Gradation<'a> {
     crossing: &'a PerLevel,
     kept: &'a Kept<'a>,
     surface: Level,
-    share: &'a Ownership,
+    ownership: &'a Ownership,
     comm: &'a dyn Comm,
     /// Empty; scratch.
     tile: Tile,
@@ -105,7 +105,7 @@ impl Gradation<'_> {
         let [above, impure] = [&self.split[l as usize], &impure].map(|set| self.parents(l, set));
         let fresh = above.without(&self.split[l as usize - 1]);
         let ([fresh, impure, touched], sent) =
-            self.share.scatter(l - 1, [fresh, impure, touched], self.comm);
+            self.ownership.redistribute(l - 1, [fresh, impure, touched], self.comm);
         self.work.bricks_sent += sent;
         self.impure = impure;
         self.split_more(l - 1, fresh);
@@ -114,11 +114,11 @@ impl Gradation<'_> {
 
     /// The parents of octants of level `l` in bricks that this rank answers for: of several equal copies one tells.
     fn parents(&self, l: Level, set: &BrickSet) -> BrickSet {
-        if !self.share.is_shared(l) {
+        if !self.ownership.is_replicated(l) {
             return set.coarsen();
         }
         let mut mine = set.clone();
-        mine.retain(|b| if self.share.answers_for(l, b.key) { b.bits } else { 0 });
+        mine.retain(|b| if self.ownership.owns(l, b.key) { b.bits } else { 0 });
         mine.coarsen()
     }
 
@@ -131,7 +131,7 @@ impl Gradation<'_> {
             }
             let mut impure = g.impure.cursor();
             let pure = (g.split[l as usize - 1].bricks())
-                .filter(|b| g.share.answers_for(l - 1, b.key))
+                .filter(|b| g.ownership.owns(l - 1, b.key))
                 .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
                 .filter(|b| b.bits != 0);
             reach.dilate(pure, radius.div_ceil(2));
@@ -157,7 +157,7 @@ impl Gradation<'_> {
         let mut split = self.split[l as usize].cursor();
         let mut deleted = self.kept.deleted(l).cursor();
         Tree::exists(&self.split, l)
-            .filter(move |b| self.share.answers_for(l, b.key))
+            .filter(move |b| self.ownership.owns(l, b.key))
             .map(move |b| Brick { key: b.key, bits: b.bits & within(b.key) })
             .filter(|b| b.bits != 0)
             .map(move |b| Brick {
@@ -170,7 +170,7 @@ impl Gradation<'_> {
     /// The paper's exchange of extent boxes: what was reached goes to whoever holds it, and is split
     /// there where it is kept. Collective.
     fn split_where_kept(&mut self, l: Level, reached: BrickSet) {
-        let ([reached], sent) = self.share.scatter(l, [reached], self.comm);
+        let ([reached], sent) = self.ownership.redistribute(l, [reached], self.comm);
         self.work.bricks_sent += sent;
         self.split_kept(l, reached);
     }
@@ -184,7 +184,7 @@ impl Gradation<'_> {
     /// Splits octants, not split yet, in bricks that this rank holds.
     fn split_more(&mut self, l: Level, fresh: BrickSet) {
         self.work.octants_split += (fresh.bricks())
-            .filter(|b| self.share.answers_for(l, b.key))
+            .filter(|b| self.ownership.owns(l, b.key))
             .map(|b| u64::from(b.bits.count_ones()))
             .sum::<u64>();
         let before = std::mem::take(&mut self.split[l as usize]);
@@ -201,7 +201,7 @@ impl Gradation<'_> {
         for m in (surface..self.crossing.len() as Level).rev() {
             let mut touched = self.reached(m - 1, |g, reach| {
                 let leaves = g.crossing[m as usize].bricks();
-                reach.dilate_children(leaves.filter(|b| g.share.answers_for(m, b.key)), 1);
+                reach.dilate_children(leaves.filter(|b| g.ownership.owns(m, b.key)), 1);
             });
             for _ in surface..m {
                 touched = touched.coarsen();

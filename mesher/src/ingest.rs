@@ -3,7 +3,7 @@
 //! A binary STL is told by its length, 84 + 50 per facet, whatever its header says; each rank reads
 //! its own records. Text is read by rank 0, which deals the facets out; so are generated shapes.
 
-use crate::comm::{Comm, Mail, agree};
+use crate::comm::{Comm, MessageBuffer, agree};
 use crate::error::Error;
 use crate::stl;
 use geometries::{Facet, Generator};
@@ -33,7 +33,7 @@ pub struct Share {
 
 /// Reads this rank's share. Collective.
 pub fn read(source: &Source, comm: &dyn Comm) -> Result<Share, Error> {
-    let share = match source {
+    let ownership = match source {
         Source::Stl(path) => {
             let file = agree(comm, stl::open(path))?;
             match file.binary {
@@ -50,8 +50,8 @@ pub fn read(source: &Source, comm: &dyn Comm) -> Result<Share, Error> {
         }
         Source::Given(facets) => deal(comm, || Ok(facets.clone()))?,
     };
-    comm.agree(stl::check_finite(&share.facets, share.first))?;
-    Ok(share)
+    comm.agree(stl::check_finite(&ownership.facets, ownership.first))?;
+    Ok(ownership)
 }
 
 /// This rank's part of `total` things: from the first to before the last.
@@ -73,9 +73,9 @@ fn deal(comm: &dyn Comm, make: impl FnOnce() -> Result<Vec<Facet>, Error>) -> Re
         let at = |r: usize| (u128::from(total) * r as u128 / comm.size() as u128) as usize;
         (1..comm.size()).map(|r| (r, pack(&facets[at(r)..at(r + 1)]))).collect()
     } else {
-        Mail::default()
+        MessageBuffer::default()
     };
-    let heard = comm.exchange(out);
+    let heard = comm.sparse_all_to_all(out);
     let facets = if comm.rank() == 0 {
         facets[..end as usize].to_vec()
     } else {

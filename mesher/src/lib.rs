@@ -7,7 +7,6 @@
 
 #![deny(missing_docs)]
 
-pub mod base;
 pub mod brick;
 pub mod brickset;
 pub mod case;
@@ -22,10 +21,9 @@ pub mod kept;
 pub mod lattice;
 pub mod octant;
 pub mod partition;
-pub mod rebalance;
 pub mod record;
 pub mod report;
-pub mod share;
+
 pub mod sides;
 pub mod stl;
 pub mod stream;
@@ -34,14 +32,15 @@ pub mod voxelise;
 mod wide;
 pub mod write;
 
-use base::Division;
 use case::Case;
 use comm::{Comm, agree};
 use error::Error;
 use lattice::{Bounds, Rules};
+use partition::initial::{self as base, Division};
+use partition::ownership::{self, Ownership};
+use partition::repartition as rebalance;
 use record::{Recorder, check_interrupt};
 use report::{Counters, Report};
-use share::Ownership;
 use sides::Sides;
 use std::path::PathBuf;
 use stream::{Counts, Leaves};
@@ -148,7 +147,7 @@ impl Meshed {
             split: self.graded.as_ref().unwrap_or(&self.refined.tree.split),
             crossing: &self.refined.tree.crossing,
             sides: &self.sides,
-            share: &self.refined.share,
+            ownership: &self.refined.ownership,
             everything: self.graded.is_none(),
             rules: &self.rules,
         }
@@ -170,7 +169,7 @@ fn build(
     comm.agree(check_interrupt())?;
 
     let mut sides = record.phase("sides", comm, || {
-        sides::decide(&refined.tree, &refined.share, &facets, rules.keep, comm)
+        sides::decide(&refined.tree, &refined.ownership, &facets, rules.keep, comm)
     });
     drop(facets);
     comm.agree(check_interrupt())?;
@@ -180,7 +179,7 @@ fn build(
         // From here on the base tree is known by its crossing and deleted leaves.
         let split = std::mem::take(&mut refined.tree.split);
         let (split, work) = record.phase("grade", comm, || {
-            grade::grade(split, &refined.tree.crossing, &kept, &rules, &refined.share, comm)
+            grade::grade(split, &refined.tree.crossing, &kept, &rules, &refined.ownership, comm)
         });
         counters.grade(&work);
         split
@@ -210,7 +209,7 @@ fn quantise(
     let ingest::Share { facets, first, total } = geometry;
     let mine = Bounds::of(&facets);
     let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
-    let bounds = comm.all_gather(&words).letters().fold(Bounds::EMPTY, |b, (_, w)| {
+    let bounds = comm.all_gather(&words).messages().fold(Bounds::EMPTY, |b, (_, w)| {
         let at = |i: usize| f64::from_bits(w[i]);
         b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
     });
@@ -222,9 +221,9 @@ fn quantise(
 /// The base tree T0 as this rank holds it.
 struct Refined {
     tree: Tree,
-    share: Ownership,
+    ownership: Ownership,
     /// This rank's base leaves as they were dealt out, if there are any.
-    dealt: Vec<share::BaseLeaf>,
+    dealt: Vec<ownership::BaseLeaf>,
     level_base: octant::Level,
     /// Level of the octants between which the Morton curve is cut, if it is.
     level_cut: Option<octant::Level>,
@@ -246,27 +245,27 @@ fn refine(
             voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
         });
         counters.voxelise(&work);
-        let (share, dealt) = (Ownership::solo(), vec![share::BaseLeaf::ROOT]);
-        return Ok(Refined { tree, dealt, share, level_base: 0, level_cut: None });
+        let (ownership, dealt) = (Ownership::solo(), vec![ownership::BaseLeaf::ROOT]);
+        return Ok(Refined { tree, dealt, ownership, level_base: 0, level_cut: None });
     }
     let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
-    let base::Base { mut share, dealt, level_base, .. } = base;
-    let filed =
-        record.phase("route", comm, || voxelise::Filed::new(&base::route(facets, &share, comm)));
-    let (mut tree, work) =
-        record.phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&share)));
+    let base::Base { mut ownership, dealt, level_base, .. } = base;
+    let filed = record
+        .phase("route", comm, || voxelise::Filed::new(&base::route(facets, &ownership, comm)));
+    let (mut tree, work) = record
+        .phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&ownership)));
     counters.voxelise(&work);
     let level_cut = division.is_of_curve().then_some(level_base);
-    let settle = if division.rebalances() { "rebalance" } else { "share top" };
-    record.phase(settle, comm, || {
+    let synchronise_replicas = if division.rebalances() { "rebalance" } else { "share top" };
+    record.phase(synchronise_replicas, comm, || {
         if division.rebalances() {
-            share = rebalance::of_base_tree(&tree, &share, level_base, comm);
+            ownership = rebalance::of_base_tree(&tree, &ownership, level_base, comm);
         }
         // What several ranks hold of T0, each knows as far as its own octants ask for it.
-        share.settle(&mut [&mut tree.split, &mut tree.crossing], comm);
+        ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
     });
-    Ok(Refined { tree, share, dealt, level_base, level_cut })
+    Ok(Refined { tree, ownership, dealt, level_base, level_cut })
 }
 
 /// Weighs the leaves of the finished tree by octants of a level, and deals them out `anew` or not. Returns how many are in
@@ -280,13 +279,13 @@ fn deal_leaves(
     rules: &Rules,
     comm: &dyn Comm,
 ) -> u64 {
-    let Refined { tree, share, .. } = refined;
+    let Refined { tree, ownership, .. } = refined;
     let (crossing, inside, deleted) = (&mut tree.crossing, &mut sides.inside, &mut sides.deleted);
     let parts = rebalance::Parts { split, crossing, inside, deleted };
-    let weighed = rebalance::Weighed::new(&parts, share, level, rules.keep_crossing);
+    let weighed = rebalance::Weighed::new(&parts, ownership, level, rules.keep_crossing);
     let heaviest = weighed.heaviest();
     if anew {
-        *share = weighed.deal(parts, share, comm);
+        *ownership = weighed.deal(parts, ownership, comm);
     }
     heaviest
 }

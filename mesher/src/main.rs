@@ -7,9 +7,9 @@ mod cli;
 mod heap;
 
 use cli::{Args, CommChoice, case, parse};
-use mesher::base::Division;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
+use mesher::partition::initial::Division;
 use mesher::record::{INTERRUPTED, Recorder};
 use mesher::report::Report;
 use mesher::{Options, mesh};
@@ -129,9 +129,9 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);
-    record.tell("start");
+    record.report_status("start");
     let result = work(args, comm, &mut record);
-    record.tell("done");
+    record.report_status("done");
     if progress {
         eprint!("\r\x1b[K");
     }

@@ -2,14 +2,17 @@
 
 pub mod area;
 pub mod curve;
+pub mod initial;
 #[cfg(feature = "metis")]
 mod metis;
+pub mod ownership;
+pub mod repartition;
 
-use crate::base::cut::{Cut, Piece};
 use crate::comm::{Comm, agree};
 use crate::error::Error;
 use crate::lattice::Rules;
 use crate::octant::{Level, corner, edge};
+use crate::partition::initial::cut::{Cut, Piece};
 
 /// Who cuts the base tree into parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

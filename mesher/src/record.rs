@@ -46,7 +46,7 @@ impl Recorder {
 
     /// Runs and times a phase. A phase that runs several times adds up.
     pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
-        self.tell(name);
+        self.report_status(name);
         let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = work();
@@ -72,7 +72,7 @@ impl Recorder {
     }
 
     /// Says what the rank is doing.
-    pub fn tell(&self, what: &str) {
+    pub fn report_status(&self, what: &str) {
         if let Some(path) = &self.status {
             // For whoever investigates a hang; a status that cannot be written must not end the run.
             let _ = std::fs::write(path, format!("{what}\n"));

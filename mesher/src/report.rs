@@ -160,7 +160,7 @@ impl Report {
             [times[0], times[1], times[2], times[3], t.messages, t.bytes] as [u64; PHASE_WORDS]
         }));
         let all = comm.all_gather(&words);
-        let column = |i: usize| all.letters().map(|(_, w)| w[i]).collect::<Vec<u64>>();
+        let column = |i: usize| all.messages().map(|(_, w)| w[i]).collect::<Vec<u64>>();
         let seconds = |i: usize| column(i).into_iter().map(f64::from_bits).collect::<Vec<f64>>();
         let first = 1 + COUNTERS.len();
         let entry = |(i, p): (usize, &Phase)| {
@@ -254,12 +254,12 @@ impl fmt::Display for Report {
             )?,
         }
         writeln!(f, "digest         {}", self.digest)?;
-        let share: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
+        let ownership: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
         writeln!(
             f,
             "ranks          {}, cells max/mean {:.3}, base level {}",
             self.ranks,
-            imbalance(&share),
+            imbalance(&ownership),
             self.level_base
         )?;
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;

@@ -7,7 +7,7 @@ use crate::brick;
 use crate::brickset::{BrickSet, Cursor, ones};
 use crate::lattice::{Keep, Rules};
 use crate::octant::{Level, Side, start57};
-use crate::share::{Ownership, Place};
+use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
 use crate::tree::LEVELS;
 
@@ -45,7 +45,7 @@ pub struct Leaves<'a> {
     /// Sides of the base tree's leaves.
     pub sides: &'a Sides,
     /// Whose bricks are whose.
-    pub share: &'a Ownership,
+    pub ownership: &'a Ownership,
     /// Whether all leaves are emitted, also those that the rules delete.
     pub everything: bool,
     /// The mesh's rules.
@@ -93,7 +93,7 @@ struct Loaded {
     /// Sides of the leaves, and of split ones for their descendants.
     crossing: u64,
     inside: u64,
-    place: Place,
+    placement: Placement,
 }
 
 struct Walk<'a, S> {
@@ -109,7 +109,11 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
         let (of, at) = (self.of, &mut self.levels[l as usize]);
-        let place = if of.share.answers_for(l, key) { Place::Mine } else { of.share.place(l, key) };
+        let placement = if of.ownership.owns(l, key) {
+            Placement::Local
+        } else {
+            of.ownership.placement(l, key)
+        };
         let split = at.split.get(key) & exists;
         let crossing = at.crossing.get(key) | crossing;
         let deleted = at.deleted.get(key);
@@ -125,7 +129,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
                 leaves &= !crossing;
             }
         }
-        if place != Place::Mine {
+        if placement != Placement::Local {
             leaves = 0;
         }
         let inside = inside & !crossing;
@@ -134,7 +138,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         counts[Side::Crossing as usize] += of(crossing);
         counts[Side::Inside as usize] += of(inside);
         counts[Side::Outside as usize] += of(!(crossing | inside));
-        Loaded { key, leaves, split, crossing, inside, place }
+        Loaded { key, leaves, split, crossing, inside, placement }
     }
 
     /// Emits eight siblings and all that is below them.
@@ -153,7 +157,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
             below(brick.crossing),
             below(brick.inside),
         );
-        let remote = matches!(child.place, Place::Remote(_));
+        let remote = matches!(child.placement, Placement::Remote(_));
         for o in 0..8 {
             if split >> o & 1 == 0 {
                 self.put(l, parent, brick, j, 1 << o);

@@ -232,8 +232,9 @@ impl Voxeliser<'_> {
         let at = if l < 2 { [0; 3] } else { corner(l - 2, key) };
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
-        let crossing =
-            (self.test(&load, l, at) | self.settle(&load.residents, l, at, &mut runs)) & allowed;
+        let crossing = (self.test(&load, l, at)
+            | self.bin_residents(&load.residents, l, at, &mut runs))
+            & allowed;
         let near: Vec<ExtentBox> =
             boxes.iter().filter(|b| b.level >= l && box_mask(b, at, l) != 0).copied().collect();
         let asked = |least: Level| {
@@ -291,7 +292,7 @@ impl Voxeliser<'_> {
     }
 
     /// Files the facets at home in the brick under its octants, and tests those at home above them.
-    fn settle(
+    fn bin_residents(
         &mut self,
         residents: &Range<usize>,
         l: Level,

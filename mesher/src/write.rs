@@ -248,7 +248,7 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     words.extend(octants.flat_map(|(i, &d)| [i, split(d)[0], split(d)[1]]));
     let mut digests = Digests::default();
     let mut parts = Vec::new();
-    for (_, theirs) in comm.all_gather(&words).letters() {
+    for (_, theirs) in comm.all_gather(&words).messages() {
         let (whole, octants) = theirs.split_at(3);
         parts.push([whole[0], whole[1], whole[2]]);
         let octants = octants.chunks_exact(3);

@@ -7,7 +7,7 @@ mod support;
 use mesher::comm::Solo;
 use mesher::lattice::Bounds;
 use mesher::octant::{LEVEL_MAX, corner, edge, neighbour};
-use mesher::share::Ownership;
+use mesher::partition::ownership::Ownership;
 use mesher::sides::{components, global, nodes::Nodes, vote};
 use mesher::voxelise::{Depth, Filed, Start, refine};
 use proptest::prelude::*;

@@ -4,8 +4,8 @@
 mod support;
 
 use clap::ValueEnum;
-use mesher::base::Division;
 use mesher::lattice::{Keep, Root};
+use mesher::partition::initial::Division;
 use mesher::partition::{Partitioner, Weights};
 use proptest::prelude::*;
 use support::symmetry::Symmetry;

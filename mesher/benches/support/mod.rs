@@ -1,7 +1,6 @@
 //! Fixed work for the benches: the mesher's kernels, each on what the phases before it made of an aircraft.
 #![allow(dead_code, missing_docs)]
 
-use mesher::base::Division;
 use mesher::brick::{flood, valid};
 use mesher::brickset::BrickSet;
 use mesher::case::{Case, RootSpec};
@@ -12,8 +11,9 @@ use mesher::ingest::{Share, Source, read};
 use mesher::kept::Kept;
 use mesher::lattice::{Bounds, Keep, Rules};
 use mesher::octant::ROOT_BITS;
+use mesher::partition::initial::Division;
+use mesher::partition::ownership::Ownership;
 use mesher::partition::{Partitioner, Weights};
-use mesher::share::Ownership;
 use mesher::sides::{Sides, decide};
 use mesher::stream::Leaves;
 use mesher::tree::{PerLevel, Tree};
@@ -93,7 +93,7 @@ impl Phases {
             split: &self.graded,
             crossing: &self.tree.crossing,
             sides: &self.sides,
-            share: &self.share,
+            ownership: &self.share,
             everything: false,
             rules: &self.rules,
         }

@@ -3,7 +3,7 @@
 //! Only exchanges are between pairs of ranks; what collective calls move depends on the library's
 //! algorithm, and is in [`Traffic`](super::Traffic) alone. What a rank keeps for itself is no message.
 
-use super::{Comm, Mail};
+use super::{Comm, MessageBuffer};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
@@ -33,7 +33,8 @@ impl Row {
 /// many entries as there are pairs. Gathering it is not in it. Collective.
 pub fn gather(comm: &dyn Comm) -> Vec<Entry> {
     let mine = comm.sent().into_iter().map(|entry| (0, entry)).collect();
-    let mut rows: Vec<Entry> = comm.exchange(Mail::of_entries(mine)).words().as_chunks().0.to_vec();
+    let mut rows: Vec<Entry> =
+        comm.sparse_all_to_all(MessageBuffer::of_entries(mine)).words().as_chunks().0.to_vec();
     rows.sort_unstable();
     rows
 }
@@ -46,16 +47,16 @@ mod tests {
     /// Rank r sends r + 1 words to each of the ranks above it, twice to the next one, and some to itself.
     fn talk(c: &dyn Comm) {
         let words = || vec![7; c.rank() + 1];
-        c.exchange((c.rank()..c.size()).map(|r| (r, words())).collect());
+        c.sparse_all_to_all((c.rank()..c.size()).map(|r| (r, words())).collect());
         let next = c.rank() + 1;
-        c.exchange((next..c.size().min(next + 1)).map(|r| (r, words())).collect());
+        c.sparse_all_to_all((next..c.size().min(next + 1)).map(|r| (r, words())).collect());
     }
 
     #[test]
     fn entries_are_what_was_sent_and_sum_to_the_meters_totals() {
         let told = sim::run(5, 1, |c| {
             // A call without letters tells what agreeing on their arrival takes.
-            c.exchange(Mail::default());
+            c.sparse_all_to_all(MessageBuffer::default());
             let agreed = c.traffic();
             talk(c);
             let t = c.traffic();

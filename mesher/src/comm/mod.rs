@@ -7,15 +7,15 @@
 //! Every call is collective: all ranks make the same calls in the same order. Payloads are `u64`
 //! words.
 
-mod mail;
 pub mod matrix;
-mod merged;
+mod message_buffer;
 #[cfg(feature = "mpi")]
 pub mod mpi;
+mod reduced;
 pub mod sim;
 
-pub use mail::Mail;
-pub use merged::{Entry, for_collectors, gather_collected, gather_merged};
+pub use message_buffer::MessageBuffer;
+pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, split_by_reducer};
 
 use crate::error::Error;
 use cpu_time::ThreadTime;
@@ -38,7 +38,7 @@ pub struct Traffic {
 
 /// Letters from all ranks to all, in the order of the ranks. Ranks of one process share them: a copy for each would take
 /// memory, and time, that no real rank takes.
-pub type ByRank = Arc<Mail>;
+pub type Gathered = Arc<MessageBuffer>;
 
 /// A group of ranks.
 pub trait Comm {
@@ -49,14 +49,14 @@ pub trait Comm {
     fn size(&self) -> usize;
 
     /// Everyone's words, by rank. Collective.
-    fn all_gather(&self, mine: &[u64]) -> ByRank;
+    fn all_gather(&self, mine: &[u64]) -> Gathered;
 
     /// The sums over the ranks, modulo 2^64, of as many values on each. Collective.
     fn sums(&self, mine: &[u64]) -> Vec<u64>;
 
     /// Sends letters, one at most to a receiver, and returns those that were sent here, by sender, in no
     /// particular order. Collective.
-    fn exchange(&self, to: Mail) -> Mail;
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer;
 
     /// Ranks that share this rank's process, itself included.
     fn ranks_in_process(&self) -> usize {
@@ -86,7 +86,7 @@ pub trait Comm {
             Ok(()) => Vec::new(),
             Err(e) => pack(e),
         };
-        match self.all_gather(&packed).letters().next() {
+        match self.all_gather(&packed).messages().next() {
             None => Ok(()),
             Some((_, words)) => Err(unpack(words)),
         }
@@ -208,7 +208,7 @@ impl Comm for Solo {
         1
     }
 
-    fn all_gather(&self, mine: &[u64]) -> ByRank {
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
         Arc::new([(0, mine.iter().copied())].into_iter().collect())
     }
 
@@ -216,7 +216,7 @@ impl Comm for Solo {
         mine.to_vec()
     }
 
-    fn exchange(&self, to: Mail) -> Mail {
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
         to
     }
 
@@ -241,7 +241,9 @@ mod tests {
             c.all_gather(&[1, 2]);
             let gathered = c.traffic();
             let next = (c.rank() + 1) % 5;
-            c.exchange([(next, vec![0; 10]), (c.rank(), vec![0; 99])].into_iter().collect());
+            c.sparse_all_to_all(
+                [(next, vec![0; 10]), (c.rank(), vec![0; 99])].into_iter().collect(),
+            );
             let t = c.traffic();
             [
                 summed.messages,

@@ -4,7 +4,7 @@
 //! to say to dozens. Measured, a dense all-to-all of mostly empty messages costs a hundred times a sparse
 //! one when ranks share cores. Messages are cut into chunks, as MPI counts in i32.
 
-use super::{ByRank, Comm, Mail, Meter, Traffic, matrix};
+use super::{Comm, Gathered, MessageBuffer, Meter, Traffic, matrix};
 use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
 use mpi::point_to_point::{Message, Status};
@@ -66,7 +66,7 @@ impl Comm for Mpi {
         self.world.size() as usize
     }
 
-    fn all_gather(&self, mine: &[u64]) -> ByRank {
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
         self.meter.call(|| self.all_gather_untimed(mine).into())
     }
 
@@ -79,7 +79,7 @@ impl Comm for Mpi {
         })
     }
 
-    fn exchange(&self, to: Mail) -> Mail {
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
         self.meter.call(|| self.exchange_untimed(&to))
     }
 
@@ -93,13 +93,13 @@ impl Comm for Mpi {
 }
 
 impl Mpi {
-    fn all_gather_untimed(&self, mine: &[u64]) -> Mail {
+    fn all_gather_untimed(&self, mine: &[u64]) -> MessageBuffer {
         let mut counts = vec![0u64; self.size()];
         self.world.all_gather_into(&(mine.len() as u64), &mut counts[..]);
         let longest = counts.iter().copied().max().unwrap_or(0) as usize;
         // The sum over ranks is what is counted in i32.
         let step = (GATHERED / self.size()).max(1);
-        let parts: Vec<Mail> = (0..longest)
+        let parts: Vec<MessageBuffer> = (0..longest)
             .step_by(step)
             .map(|at| {
                 let part = |len: usize| len.saturating_sub(at).min(step);
@@ -108,7 +108,7 @@ impl Mpi {
             })
             .collect();
         self.meter.gather(self.size(), counts.iter().sum());
-        match <[Mail; 1]>::try_from(parts) {
+        match <[MessageBuffer; 1]>::try_from(parts) {
             Ok([all]) => all,
             Err(parts) => {
                 let words = |rank: usize| parts.iter().flat_map(move |p| p.of(rank));
@@ -118,11 +118,11 @@ impl Mpi {
     }
 
     /// Gathers so many words of each rank.
-    fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> Mail {
+    fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> MessageBuffer {
         let starts: Vec<i32> =
             lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
         let lengths_all = lengths.iter().map(|&n| n as usize);
-        let mut all = Mail::with_lengths(lengths_all);
+        let mut all = MessageBuffer::with_lengths(lengths_all);
         let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
         self.world.all_gather_varcount_into(mine, &mut target);
         all
@@ -131,15 +131,15 @@ impl Mpi {
     /// Sends to whom there is something to say, and takes what comes until all ranks know that theirs has arrived: a
     /// synchronous send completes when it is being received, and who has sent all enters a barrier (Hoefler,
     /// Siebert, Lumsdaine 2010, "Scalable communication protocols for dynamic sparse data exchange", NBX).
-    fn exchange_untimed(&self, to: &Mail) -> Mail {
+    fn exchange_untimed(&self, to: &MessageBuffer) -> MessageBuffer {
         let me = self.rank();
         // Who is through the barrier may be in the next exchange while others still take letters of this one; none
         // can be two ahead.
         let tag = i32::from(self.odd.replace(!self.odd.get()));
-        let mut received = Mail::default();
+        let mut received = MessageBuffer::default();
         mpi::request::scope(|scope| {
             let mut sends = Vec::new();
-            for (to, words) in to.letters() {
+            for (to, words) in to.messages() {
                 if to == me {
                     received.write(me, words.iter().copied());
                     continue;
@@ -175,7 +175,7 @@ impl Mpi {
     }
 
     /// Receives a letter of which the first chunk is there.
-    fn receive(&self, first: (Message, Status), tag: i32, received: &mut Mail) {
+    fn receive(&self, first: (Message, Status), tag: i32, received: &mut MessageBuffer) {
         let from = first.1.source_rank();
         let mut chunk = first;
         loop {

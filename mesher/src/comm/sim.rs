@@ -4,7 +4,7 @@
 //! has to wait for others. Who gets it next, and in which order messages arrive, is drawn from a seed: a
 //! failure is replayed by its seed, and a rank's CPU time is not disturbed by the others.
 
-use super::{ByRank, Comm, Mail, Meter, Traffic, matrix};
+use super::{Comm, Gathered, MessageBuffer, Meter, Traffic, matrix};
 use std::any::Any;
 use std::cell::Cell;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -56,14 +56,14 @@ enum Words {
     /// To be summed up.
     Sum(Vec<u64>),
     /// By receiver.
-    Exchange(Mail),
+    Exchange(MessageBuffer),
 }
 
 /// What it takes out.
 enum Delivery {
-    Gathered(ByRank),
+    Gathered(Gathered),
     Summed(Vec<u64>),
-    Exchanged(Mail),
+    Exchanged(MessageBuffer),
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -153,12 +153,13 @@ impl State {
             match post.words {
                 Words::Gather(words) => gathered.push(words),
                 Words::Sum(words) => summed.push(words),
-                Words::Exchange(mail) => exchanged.push(mail),
+                Words::Exchange(message_buffer) => exchanged.push(message_buffer),
             }
         }
         self.inbox = match [gathered.len(), summed.len(), exchanged.len()].map(|n| n == ranks) {
             [true, false, false] => {
-                let all: ByRank = gathered.into_iter().enumerate().collect::<Mail>().into();
+                let all: Gathered =
+                    gathered.into_iter().enumerate().collect::<MessageBuffer>().into();
                 (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
             }
             [false, true, false] => {
@@ -174,24 +175,27 @@ impl State {
     }
 
     /// Letters by receiver, in an order that is drawn, from those by sender.
-    fn sorted(&mut self, sent: &[Mail]) -> Vec<Mail> {
+    fn sorted(&mut self, sent: &[MessageBuffer]) -> Vec<MessageBuffer> {
         let mut inbox: Vec<Vec<(usize, &[u64])>> = vec![Vec::new(); sent.len()];
-        for (from, mail) in sent.iter().enumerate() {
-            for (to, words) in mail.letters() {
+        for (from, message_buffer) in sent.iter().enumerate() {
+            for (to, words) in message_buffer.messages() {
                 assert!(inbox[to].last().is_none_or(|l| l.0 != from), "one letter to a receiver");
                 inbox[to].push((from, words));
             }
         }
-        for letters in &mut inbox {
-            for i in (1..letters.len()).rev() {
+        for messages in &mut inbox {
+            for i in (1..messages.len()).rev() {
                 let j = self.draw(i + 1);
-                letters.swap(i, j);
+                messages.swap(i, j);
             }
         }
-        let copied = |letters: Vec<(usize, &[u64])>| {
-            let mut mail = Mail::with_capacity(letters.iter().map(|l| l.1.len()).sum());
-            letters.iter().for_each(|(from, words)| mail.write(*from, words.iter().copied()));
-            mail
+        let copied = |messages: Vec<(usize, &[u64])>| {
+            let mut message_buffer =
+                MessageBuffer::with_capacity(messages.iter().map(|l| l.1.len()).sum());
+            messages
+                .iter()
+                .for_each(|(from, words)| message_buffer.write(*from, words.iter().copied()));
+            message_buffer
         };
         inbox.into_iter().map(copied).collect()
     }
@@ -264,7 +268,7 @@ impl Comm for Sim {
         self.world.size
     }
 
-    fn all_gather(&self, mine: &[u64]) -> ByRank {
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
         match self.meter.call(|| self.call(Words::Gather(mine.to_vec()))) {
             Delivery::Gathered(all) => {
                 self.meter.gather(self.size(), all.words().len() as u64);
@@ -282,15 +286,15 @@ impl Comm for Sim {
         }
     }
 
-    fn exchange(&self, to: Mail) -> Mail {
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
         let counted = || {
-            let sent = to.letters().filter(|l| l.0 != self.rank);
+            let sent = to.messages().filter(|l| l.0 != self.rank);
             sent.for_each(|l| self.meter.send(l.0, l.1.len()));
             self.meter.arrived(self.size());
             self.call(Words::Exchange(to))
         };
         match self.meter.call(counted) {
-            Delivery::Exchanged(mail) => mail,
+            Delivery::Exchanged(message_buffer) => message_buffer,
             _ => unreachable!("{UNEQUAL}"),
         }
     }
@@ -320,7 +324,7 @@ mod tests {
                     .filter(|r| r % 2 == 0)
                     .map(|r| (r, vec![c.rank() as u64; 2]))
                     .collect();
-                let heard: u64 = c.exchange(to).letters().map(|l| l.1[0]).sum();
+                let heard: u64 = c.sparse_all_to_all(to).messages().map(|l| l.1[0]).sum();
                 (c.sum(c.rank() as u64), heard)
             });
             for (rank, (sum, heard)) in sums.into_iter().enumerate() {
@@ -333,8 +337,13 @@ mod tests {
     #[test]
     fn orders_differ_by_seed_and_repeat_by_seed() {
         let order = |seed| {
-            let senders = |mail: Mail| mail.letters().map(|l| l.0).collect::<Vec<_>>();
-            run(6, seed, |c| senders(c.exchange(Mail::of_entries(vec![(0, [1])])))).swap_remove(0)
+            let senders = |message_buffer: MessageBuffer| {
+                message_buffer.messages().map(|l| l.0).collect::<Vec<_>>()
+            };
+            run(6, seed, |c| {
+                senders(c.sparse_all_to_all(MessageBuffer::of_entries(vec![(0, [1])])))
+            })
+            .swap_remove(0)
         };
         assert_eq!(order(3), order(3));
         assert!((0..10).any(|s| order(s) != order(3)));

@@ -5,12 +5,12 @@
 //! units of a finest cell's face; a facet larger than the octants asked for is split in four until it is
 //! not.
 
-use crate::base::middle;
-use crate::comm::{Comm, Entry, gather_merged};
+use crate::comm::{Comm, Entry, all_gather_reduced};
 use crate::facet::Facet;
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level, edge};
 use crate::partition::curve::Bin;
+use crate::partition::initial::middle;
 use std::ops::Range;
 
 /// Parts of a finest cell's face: sums of integers do not depend on their order.
@@ -39,7 +39,7 @@ impl Areas {
     pub fn gather(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> Self {
         let mut areas = Self::default();
         let mine = of(facets, rules, level).into_iter().map(Entry::from).collect();
-        areas.set(&gather_merged(mine, |a, b| a + b, comm));
+        areas.set(&all_gather_reduced(mine, |a, b| a + b, comm));
         areas
     }
 

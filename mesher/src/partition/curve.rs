@@ -194,8 +194,8 @@ mod tests {
             let heaviest = bins.iter().map(|b| b.1).max().unwrap_or(0) as f64;
             for rank in 0..ranks {
                 let owner = |start: u64| cuts[cuts.partition_point(|c| c.0 <= start) - 1].1;
-                let share: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
-                prop_assert!((share as f64 - total as f64 / ranks as f64).abs() <= heaviest);
+                let ownership: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
+                prop_assert!((ownership as f64 - total as f64 / ranks as f64).abs() <= heaviest);
             }
         }
 
@@ -248,7 +248,7 @@ mod tests {
                 let mut begins = nearly_equal(&sums, slack);
                 begins.push(total);
                 let shares = begins.windows(2).map(|w| w[1].checked_sub(w[0]));
-                let fits = |share: Option<u128>| share.is_some_and(|w| w <= most);
+                let fits = |ownership: Option<u128>| ownership.is_some_and(|w| w <= most);
                 assert!(begins[0] == 0 && shares.into_iter().all(fits), "{sums:?}: {begins:?}");
                 let before = sums.iter().scan(0, |s, &w| Some(std::mem::replace(s, *s + w)));
                 let moved: u128 = before.zip(&begins).map(|(a, b)| a.abs_diff(*b)).sum();
@@ -289,8 +289,8 @@ mod tests {
             let heaviest = bins.iter().map(|b| b.1).max().unwrap_or(0) as f64;
             let most = (1.0 + slack) * total as f64 / ranks as f64;
             for rank in 0..ranks {
-                let share: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
-                prop_assert!(share as f64 <= most + heaviest + 1.0);
+                let ownership: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
+                prop_assert!(ownership as f64 <= most + heaviest + 1.0);
                 // With so much slack nothing moves, and neither does what no bin tells of behind a cut.
                 let mut mine = bins.iter().filter(|b| own(rank).contains(&b.0));
                 if slack >= ranks as f64 - 1.0 && let Some(first) = mine.next() && first.1 > 0 {

@@ -4,10 +4,10 @@
 //! hardly more leaves than ranks, the curve's cuts serve as well.
 
 use super::morton_cuts;
-use crate::base::cut::Piece;
-use crate::base::face_neighbours;
 use crate::error::Error;
 use crate::octant::start57;
+use crate::partition::initial::cut::Piece;
+use crate::partition::initial::face_neighbours;
 
 /// Fewest base leaves per rank that METIS is asked to cut, of as many equal ones as they amount to.
 const LEAVES_PER_RANK_METIS: usize = 8;

@@ -9,7 +9,7 @@ use super::nodes::{Component, Family, Node, Nodes};
 use crate::brick;
 use crate::brickset::ones;
 use crate::octant::{Level, neighbour};
-use crate::share::{Ownership, Place};
+use crate::partition::ownership::{Ownership, Placement};
 
 /// The joined components, and the faces that another rank must look at.
 pub struct Local {
@@ -112,10 +112,10 @@ enum Beyond {
 }
 
 /// Joins all components that share part of a face, as far as this rank's nodes tell.
-pub fn join(nodes: &Nodes, share: &Ownership) -> Local {
+pub fn join(nodes: &Nodes, ownership: &Ownership) -> Local {
     let mut w = Walk {
         nodes,
-        share,
+        ownership,
         local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
         way: Vec::new(),
     };
@@ -126,7 +126,7 @@ pub fn join(nodes: &Nodes, share: &Ownership) -> Local {
 
 struct Walk<'a> {
     nodes: &'a Nodes,
-    share: &'a Ownership,
+    ownership: &'a Ownership,
     local: Local,
     /// The bricks on the way down, by level.
     way: Vec<Frame>,
@@ -159,12 +159,12 @@ impl Walk<'_> {
     /// Joins the components of one brick with what they face.
     fn join_brick(&mut self, l: Level, frame: &Frame) {
         let nodes = self.nodes;
-        let elsewhere =
-            nodes.place(l, frame.node) == Place::Shared && !self.share.answers_for(l, frame.key);
+        let elsewhere = nodes.place(l, frame.node) == Placement::PartiallyReplicated
+            && !self.ownership.owns(l, frame.key);
         for (c, bits) in nodes.components(l, frame.node) {
             if elsewhere {
                 // Whoever answers for the brick joins it with what it faces, and this rank's copy with its own.
-                self.tell(l, frame.key, c, bits);
+                self.report_status(l, frame.key, c, bits);
             }
             let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
             self.join_coarser(l, c, frame.key, inner, None);
@@ -195,14 +195,19 @@ impl Walk<'_> {
             Across::Coarser => self.join_coarser(l, c, frame.key, faced, Some((axis, up))),
             Across::Remote => {
                 let asks = match nodes.place(l, frame.node) {
-                    Place::Mine => true,
-                    Place::Shared => self.share.answers_for(l, frame.key),
+                    Placement::Local => true,
+                    Placement::PartiallyReplicated => self.ownership.owns(l, frame.key),
                     // What a top brick faces, the other rank sees itself.
-                    Place::Top | Place::Remote(_) => false,
+                    Placement::FullyReplicated | Placement::Remote(_) => false,
                 };
                 if asks {
                     let there = neighbour(l - 2, frame.key, axis, up == 1);
-                    self.tell(l, there.expect("a brick faces one inside the root"), c, faced);
+                    self.report_status(
+                        l,
+                        there.expect("a brick faces one inside the root"),
+                        c,
+                        faced,
+                    );
                 }
             }
             Across::Here(n, exists) => {
@@ -221,8 +226,8 @@ impl Walk<'_> {
     }
 
     /// Has the rank that answers for a brick told which of its octants a component meets.
-    fn tell(&mut self, level: Level, key: u64, component: Component, bits: u64) {
-        let rank = self.share.answerer(level, key);
+    fn report_status(&mut self, level: Level, key: u64, component: Component, bits: u64) {
+        let rank = self.ownership.owner(level, key);
         self.local.faces.push(Face { rank, level, key, component, bits });
     }
 
@@ -281,7 +286,7 @@ fn step_down(
     j: u64,
 ) -> Option<Frame> {
     let (node, exists) = family.child(j)?;
-    if let Place::Remote(_) = nodes.place(l + 1, node) {
+    if let Placement::Remote(_) = nodes.place(l + 1, node) {
         return None;
     }
     let mut across = [[Across::Nothing; 2]; 3];
@@ -307,7 +312,7 @@ fn step_across(nodes: &Nodes, l: Level, beyond: &Beyond, j: u64) -> Across {
     match family.child(j) {
         None => Across::Coarser,
         Some((n, exists)) => match nodes.place(l + 1, n) {
-            Place::Remote(_) => Across::Remote,
+            Placement::Remote(_) => Across::Remote,
             _ => Across::Here(n, exists),
         },
     }

@@ -6,9 +6,9 @@
 
 use super::components::{self, Classes, Face};
 use super::nodes::{Component, Nodes};
-use crate::comm::{Comm, Mail};
+use crate::comm::{Comm, MessageBuffer};
 use crate::octant::Level;
-use crate::share::{Ownership, Place};
+use crate::partition::ownership::{Ownership, Placement};
 use crate::tree::{LEVELS, Tree};
 use std::collections::HashMap;
 
@@ -19,7 +19,7 @@ pub type Name = u64;
 pub fn names(
     nodes: &Nodes,
     tree: &Tree,
-    share: &Ownership,
+    ownership: &Ownership,
     faces: Vec<Face>,
     classes: &Classes,
     comm: &dyn Comm,
@@ -29,7 +29,7 @@ pub fn names(
     if comm.size() == 1 {
         return names;
     }
-    let mut pairs = name_by_top(&mut names, nodes, tree, share, classes);
+    let mut pairs = name_by_top(&mut names, nodes, tree, ownership, classes);
     pairs.extend(across_ranks(nodes, faces, classes, &names, comm));
     let mut joined = Joined::default();
     for &[a, b] in comm.all_gather(&summed_up(pairs, comm)).words().as_chunks().0 {
@@ -44,7 +44,7 @@ fn summed_up(pairs: Vec<[Name; 2]>, comm: &dyn Comm) -> Vec<u64> {
     let mine: Vec<u64> = Joined::of(&pairs).pairs();
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
-    let heard = comm.exchange([(first, mine)].into_iter().collect());
+    let heard = comm.sparse_all_to_all([(first, mine)].into_iter().collect());
     Joined::of(heard.words().as_chunks().0).pairs()
 }
 
@@ -56,12 +56,12 @@ fn name_by_top(
     names: &mut [Name],
     nodes: &Nodes,
     tree: &Tree,
-    share: &Ownership,
+    ownership: &Ownership,
     classes: &Classes,
 ) -> Vec<[Name; 2]> {
-    let bystander = share.bystander();
-    let top = Nodes::new(&share.top_of(tree), &bystander);
-    let of_top = components::join(&top, &bystander).classes().of;
+    let non_owning_view = ownership.non_owning_view();
+    let top = Nodes::new(&ownership.top_of(tree), &non_owning_view);
+    let of_top = components::join(&top, &non_owning_view).classes().of;
     let here = top_components(nodes);
     assert_eq!(here.len(), of_top.len(), "all ranks hold the same top bricks");
     let mut pairs = Vec::new();
@@ -89,7 +89,7 @@ fn across_ranks(
     let name = |c: Component| names[classes.of[c as usize] as usize];
     let place = |f: &Face| (f.rank, f.level, f.key, name(f.component));
     faces.sort_unstable_by_key(place);
-    let mut out = Mail::default();
+    let mut out = MessageBuffer::default();
     for run in faces.chunk_by(|a, b| place(a) == place(b)) {
         let bits = run.iter().fold(0, |all, f| all | f.bits);
         let (rank, level, key, name) = place(&run[0]);
@@ -97,7 +97,7 @@ fn across_ranks(
     }
     drop(faces);
     let (mut pairs, mut finder) = (Vec::new(), nodes.finder());
-    for &[level, key, theirs, bits] in comm.exchange(out).words().as_chunks().0 {
+    for &[level, key, theirs, bits] in comm.sparse_all_to_all(out).words().as_chunks().0 {
         finder.meet(level as Level, key, bits, |c| {
             let mine = name(c);
             // Most of what faces another rank is named by the top already.
@@ -113,7 +113,7 @@ fn across_ranks(
 fn top_components(nodes: &Nodes) -> Vec<Component> {
     let mut out = Vec::new();
     for l in 0..LEVELS as Level {
-        for n in nodes.shared(l).filter(|&n| nodes.place(l, n) == Place::Top) {
+        for n in nodes.shared(l).filter(|&n| nodes.place(l, n) == Placement::FullyReplicated) {
             out.extend(nodes.components(l, n).map(|c| c.0));
         }
     }

@@ -17,7 +17,7 @@ use crate::comm::Comm;
 use crate::facet::Facet;
 use crate::lattice::Keep;
 use crate::octant::Level;
-use crate::share::Ownership;
+use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, PerLevel, Tree, per_level};
 
 /// Sides of the base tree's leaves.
@@ -48,17 +48,17 @@ pub struct Ambiguous {
 /// Collective.
 pub fn decide(
     tree: &Tree,
-    share: &Ownership,
+    ownership: &Ownership,
     facets: &[Facet],
     keep: Keep,
     comm: &dyn Comm,
 ) -> Sides {
-    let mut nodes = nodes::Nodes::new(tree, share);
-    let mut local = components::join(&nodes, share);
+    let mut nodes = nodes::Nodes::new(tree, ownership);
+    let mut local = components::join(&nodes, ownership);
     let faces = std::mem::take(&mut local.faces);
     let classes = local.classes();
-    let names = global::names(&nodes, tree, share, faces, &classes, comm);
-    let candidates = vote::candidates(&nodes, tree, &classes.of, &names, share);
+    let names = global::names(&nodes, tree, ownership, faces, &classes, comm);
+    let candidates = vote::candidates(&nodes, tree, &classes.of, &names, ownership);
     // Of the largest thing in memory, the components are left.
     nodes.forget_links();
 

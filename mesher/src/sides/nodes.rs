@@ -5,7 +5,7 @@
 
 use crate::brick;
 use crate::octant::Level;
-use crate::share::{Ownership, Place};
+use crate::partition::ownership::{Ownership, Placement};
 use crate::tree::{LEVELS, Tree};
 use std::ops::Range;
 
@@ -29,7 +29,7 @@ struct LevelNodes {
     /// First component; one more entry than nodes.
     components: Vec<Component>,
     /// Places of the nodes; empty if all are this rank's alone.
-    places: Vec<Place>,
+    places: Vec<Placement>,
 }
 
 /// A brick with its leaves that do not cross.
@@ -47,15 +47,16 @@ pub struct OpenBrick {
 /// The bricks of a level, in Morton order: the nodes.
 pub fn open_bricks<'a>(
     tree: &'a Tree,
-    share: &'a Ownership,
+    ownership: &'a Ownership,
     l: Level,
 ) -> impl Iterator<Item = OpenBrick> + 'a {
     let mut split = tree.split[l as usize].cursor();
     let mut crossing = tree.crossing[l as usize].cursor();
     Tree::exists(&tree.split, l).map(move |b| {
-        let place = if share.answers_for(l, b.key) { Place::Mine } else { share.place(l, b.key) };
+        let place =
+            if ownership.owns(l, b.key) { Placement::Local } else { ownership.placement(l, b.key) };
         match place {
-            Place::Remote(r) => OpenBrick { key: b.key, split: 0, open: 0, remote: Some(r) },
+            Placement::Remote(r) => OpenBrick { key: b.key, split: 0, open: 0, remote: Some(r) },
             _ => {
                 let split = split.get(b.key);
                 OpenBrick {
@@ -109,28 +110,28 @@ impl Family {
 
 impl Nodes {
     /// Links the bricks of a base tree.
-    pub fn new(tree: &Tree, share: &Ownership) -> Self {
+    pub fn new(tree: &Tree, ownership: &Ownership) -> Self {
         let mut nodes = Self { levels: Vec::with_capacity(LEVELS), masks: Vec::new() };
         for l in 0..LEVELS as Level {
-            let level = nodes.build(tree, share, l);
+            let level = nodes.build(tree, ownership, l);
             nodes.levels.push(level);
         }
         nodes
     }
 
-    fn build(&mut self, tree: &Tree, share: &Ownership, l: Level) -> LevelNodes {
+    fn build(&mut self, tree: &Tree, ownership: &Ownership, l: Level) -> LevelNodes {
         let mut out = LevelNodes::default();
         let splits = !tree.split[l as usize].is_empty();
         let mut children = 0;
-        for (n, b) in open_bricks(tree, share, l).enumerate() {
+        for (n, b) in open_bricks(tree, ownership, l).enumerate() {
             if splits {
                 out.split.push(b.split);
                 out.first_child.push(children);
                 children += brick::parents(b.split).count_ones();
             }
-            if l < 2 || share.is_shared(l) || b.remote.is_some() || !out.places.is_empty() {
-                out.places.resize(n, Place::Mine);
-                out.places.push(share.place(l, b.key));
+            if l < 2 || ownership.is_replicated(l) || b.remote.is_some() || !out.places.is_empty() {
+                out.places.resize(n, Placement::Local);
+                out.places.push(ownership.placement(l, b.key));
             }
             out.components.push(self.masks.len() as Component);
             self.masks.extend(parts(b.open));
@@ -181,8 +182,8 @@ impl Nodes {
 
     /// Whose the node's brick is.
     #[inline]
-    pub fn place(&self, l: Level, n: Node) -> Place {
-        self.levels[l as usize].places.get(n as usize).copied().unwrap_or(Place::Mine)
+    pub fn place(&self, l: Level, n: Node) -> Placement {
+        self.levels[l as usize].places.get(n as usize).copied().unwrap_or(Placement::Local)
     }
 
     /// Components of a node with their octants.

@@ -6,10 +6,10 @@ use super::nodes::Nodes;
 use super::rays::parities;
 use crate::brick::Brick;
 use crate::brickset::ones;
-use crate::comm::{Comm, gather_merged};
+use crate::comm::{Comm, all_gather_reduced};
 use crate::facet::Facet;
 use crate::octant::{Level, corner, edge};
-use crate::share::Ownership;
+use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, Tree};
 use std::collections::{BTreeMap, HashSet};
 
@@ -38,13 +38,13 @@ pub fn candidates(
     tree: &Tree,
     class: &[u32],
     names: &[Name],
-    share: &Ownership,
+    ownership: &Ownership,
 ) -> Firsts {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); names.len()];
     let mut here: Vec<(u32, u64)> = Vec::new();
     for l in 0..LEVELS as Level {
         for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
-            if !share.answers_for(l, key) {
+            if !ownership.owns(l, key) {
                 continue;
             }
             // Components that meet elsewhere are one: their leaves come in one order.
@@ -108,7 +108,7 @@ pub fn decide(mine: &Firsts, facets: &[Facet], comm: &dyn Comm) -> Verdict {
     let mut verdict = Verdict::default();
     // Nearly always the very first leaf's rays agree: only that is told of every component.
     let firsts = mine.iter().map(|(&name, list)| [name, list[0].0]).collect();
-    let firsts = gather_merged(firsts, u64::min, comm);
+    let firsts = all_gather_reduced(firsts, u64::min, comm);
     verdict.components = firsts.len() as u64;
     let ask = |asked: Vec<(Open, Candidate)>, verdict: &mut Verdict| -> Vec<Open> {
         let points: Vec<[i64; 3]> = asked.iter().map(|(_, c)| c.centroid()).collect();
@@ -170,7 +170,7 @@ fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     let pack = |bytes: &[u8]| bytes.iter().rev().fold(0u64, |w, &b| w << 8 | u64::from(b));
     let words: Vec<u64> = mine.chunks(8).map(pack).collect();
     let mut total = vec![0u64; words.len()];
-    for (_, theirs) in comm.all_gather(&words).letters() {
+    for (_, theirs) in comm.all_gather(&words).messages() {
         total.iter_mut().zip(theirs).for_each(|(t, w)| *t ^= w);
     }
     (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()

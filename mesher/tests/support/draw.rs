@@ -1,9 +1,9 @@
 //! What is drawn at random: bodies, soups, cases, and ways to run them.
 
 use super::{Facet, Run, Small};
-use mesher::base::Division;
 use mesher::case::BoxSpec;
 use mesher::lattice::{Keep, Root};
+use mesher::partition::initial::Division;
 use mesher::partition::{Partitioner, Weights};
 use proptest::prelude::*;
 

@@ -1,11 +1,11 @@
 //! Test support: small cases, and both programs run on them.
 #![allow(dead_code, missing_docs)]
 
-use mesher::base::Division;
 use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::comm::{Solo, sim};
 use mesher::ingest::Source;
 use mesher::lattice::{Keep, Root};
+use mesher::partition::initial::Division;
 use mesher::partition::{Partitioner, Weights};
 use mesher::sides::Ambiguous;
 use mesher::{Options, words};

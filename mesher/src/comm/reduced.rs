@@ -4,7 +4,7 @@
 //! places, dozens with each. If all told everybody, everybody would do the same sums over dozens of
 //! times the result; so some *collectors* do them first, each for its part of the keys.
 
-use super::{Comm, Mail};
+use super::{Comm, MessageBuffer};
 
 /// A key and a value.
 pub type Entry = [u64; 2];
@@ -14,20 +14,25 @@ const SMALL: usize = 8;
 
 /// All ranks' entries in the order of their keys, each key once, with the values merged by `merge`, which
 /// must not depend on order. Collective; the same on all ranks.
-pub fn gather_merged(
+pub fn all_gather_reduced(
     mut mine: Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64 + Copy,
     comm: &dyn Comm,
 ) -> Vec<Entry> {
-    if let Some(entries) = for_collectors(&mut mine, merge, comm) {
-        mine = comm.exchange(Mail::of_entries(entries)).words().as_chunks().0.to_vec();
+    if let Some(entries) = split_by_reducer(&mut mine, merge, comm) {
+        mine = comm
+            .sparse_all_to_all(MessageBuffer::of_entries(entries))
+            .words()
+            .as_chunks()
+            .0
+            .to_vec();
     }
-    gather_collected(mine, merge, comm)
+    all_gather_from_reducers(mine, merge, comm)
 }
 
 /// The first step, as far as it needs no others: entries with the ranks that collect them; none where no step is
 /// to be taken before [`gather_collected`].
-pub fn for_collectors(
+pub fn split_by_reducer(
     mine: &mut Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64,
     comm: &dyn Comm,
@@ -48,7 +53,7 @@ pub fn for_collectors(
 }
 
 /// The second step: tells all ranks what each has collected. Collective; the same on all ranks.
-pub fn gather_collected(
+pub fn all_gather_from_reducers(
     mut mine: Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64 + Copy,
     comm: &dyn Comm,
@@ -82,7 +87,7 @@ mod tests {
         for ranks in [1, 2, 8, 9, 30] {
             let told = sim::run(ranks, 4, |c| {
                 let mine = (0..200u64).map(|i| [(i * i % 97) << 40, c.rank() as u64 + 1]).collect();
-                gather_merged(mine, |a, b| a + b, c)
+                all_gather_reduced(mine, |a, b| a + b, c)
             });
             let sum: u64 = (1..=ranks as u64).sum();
             for key in 0..97u64 {

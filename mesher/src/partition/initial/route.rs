@@ -1,43 +1,43 @@
 //! The facets' journey to the ranks that need them.
 
-use crate::comm::{Comm, Mail};
+use crate::comm::{Comm, MessageBuffer};
 use crate::facet::Facet;
 use crate::octant::{LEVEL_MAX, Level, corner, edge};
-use crate::share::Ownership;
+use crate::partition::ownership::Ownership;
 use crate::voxelise::Home;
 
 /// Brings every facet to the owners of the base leaves that its extent reaches. Collective.
-pub fn route(facets: &[Facet], share: &Ownership, comm: &dyn Comm) -> Vec<Facet> {
+pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Facet> {
     let mut packed: Vec<Vec<Facet>> = vec![Vec::new(); comm.size()];
     let mut last = vec![u64::MAX; comm.size()];
     for (i, f) in (0u64..).zip(facets) {
         let Some(home) = Home::of(f) else { continue };
         let extent = std::array::from_fn(|a| f.range(a));
         let code = home.start() >> (3 * (LEVEL_MAX - home.level()));
-        visit(share, &extent, home.level(), code, &mut |owner| {
+        visit(ownership, &extent, home.level(), code, &mut |owner| {
             if std::mem::replace(&mut last[owner], i) != i {
                 packed[owner].push(*f);
             }
         });
     }
     let mut mine = std::mem::take(&mut packed[comm.rank()]);
-    let mut out = Mail::with_capacity(5 * packed.iter().map(Vec::len).sum::<usize>());
+    let mut out = MessageBuffer::with_capacity(5 * packed.iter().map(Vec::len).sum::<usize>());
     for (owner, facets) in packed.into_iter().enumerate() {
         out.write(owner, facets.iter().flat_map(pack));
     }
-    mine.extend(comm.exchange(out).words().as_chunks().0.iter().map(unpack));
+    mine.extend(comm.sparse_all_to_all(out).words().as_chunks().0.iter().map(unpack));
     mine
 }
 
 /// Tells `found` the owners of what an extent, inside an octant's, reaches; some more than once.
 fn visit(
-    share: &Ownership,
+    ownership: &Ownership,
     extent: &[(i64, i64); 3],
     l: Level,
     code: u64,
     found: &mut impl FnMut(usize),
 ) {
-    if let Some(owner) = share.sole_owner(l, code) {
+    if let Some(owner) = ownership.sole_owner(l, code) {
         return found(owner);
     }
     let (at, half) = (corner(l, code), edge(l + 1));
@@ -46,7 +46,7 @@ fn visit(
         std::array::from_fn(|a| [extent[a].0 <= at[a] + half, extent[a].1 >= at[a] + half]);
     for child in 0..8 {
         if (0..3).all(|a| halves[a][child >> a & 1]) {
-            visit(share, extent, l + 1, code << 3 | child as u64, found);
+            visit(ownership, extent, l + 1, code << 3 | child as u64, found);
         }
     }
 }
@@ -67,7 +67,7 @@ fn unpack(words: &[u64; 5]) -> Facet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::share::BaseLeaf;
+    use crate::partition::ownership::BaseLeaf;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -90,7 +90,7 @@ mod tests {
             // Corners on and beside the octants' faces, and beyond the root.
             let v = v.map(|p| p.map(|c| (c / 2) * (1 << 25) + c % 2));
             let (f, leaves) = (Facet { v }, two_levels(split));
-            let share = Ownership::new(0, leaves.len(), &leaves);
+            let ownership = Ownership::new(0, leaves.len(), &leaves);
             let reached = |b: &BaseLeaf| (0..3).all(|a| {
                 let at = corner(b.level, b.code)[a];
                 f.range(a).0 <= at + edge(b.level) && f.range(a).1 >= at
@@ -98,7 +98,7 @@ mod tests {
             // The root itself is taken to be reached; what is outside it has no home.
             prop_assume!(reached(&BaseLeaf { level: 0, code: 0, owner: 0 }));
             let mut found = BTreeSet::new();
-            visit(&share, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));
+            visit(&ownership, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));
             let want = leaves.iter().filter(|b| reached(b)).map(|b| b.owner);
             prop_assert!(found.into_iter().eq(want));
         }

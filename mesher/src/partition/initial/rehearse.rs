@@ -11,7 +11,7 @@ use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
 use crate::octant::{Level, start57};
 use crate::partition::morton_cuts;
-use crate::share::Ownership;
+use crate::partition::ownership::Ownership;
 use crate::stream::Leaves;
 use crate::tree::Tree;
 use crate::voxelise::{Depth, Filed, refine};
@@ -83,20 +83,20 @@ fn rehearse(
     comm: &dyn Comm,
 ) -> Vec<u64> {
     let owners = morton_cuts(expected, comm.size());
-    let share = Ownership::new(comm.rank(), comm.size(), &cut.dealt(&owners));
-    let filed = Filed::new(&route(facets, &share, comm));
+    let ownership = Ownership::new(comm.rank(), comm.size(), &cut.dealt(&owners));
+    let filed = Filed::new(&route(facets, &ownership, comm));
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let (mut tree, _) = refine(&filed, &depth, &starts(&share));
-    share.settle(&mut [&mut tree.split, &mut tree.crossing], comm);
-    let sides = sides::decide(&tree, &share, facets, rules.keep, comm);
+    let (mut tree, _) = refine(&filed, &depth, &starts(&ownership));
+    ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
+    let sides = sides::decide(&tree, &ownership, facets, rules.keep, comm);
     let Tree { split, crossing } = tree;
     let (split, _) =
-        grade::grade(split, &crossing, &kept::Kept::new(&sides.deleted), rules, &share, comm);
+        grade::grade(split, &crossing, &kept::Kept::new(&sides.deleted), rules, &ownership, comm);
     let leaves = Leaves {
         split: &split,
         crossing: &crossing,
         sides: &sides,
-        share: &share,
+        ownership: &ownership,
         everything: false,
         rules,
     };

@@ -11,7 +11,7 @@ use crate::brickset::{BrickSet, ones};
 use crate::comm::Comm;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::curve::{self, Bin};
-use crate::share::{Ownership, brick_start};
+use crate::partition::ownership::{Ownership, brick_start};
 use crate::sides::nodes::parts;
 use crate::tree::{LEVELS, PerLevel, Tree};
 use std::ops::Range;
@@ -37,18 +37,23 @@ const SLACK_LEAVES: f64 = 0.05;
 
 /// The ownership that divides the work on T0, once it is refined, into nearly equal parts; `tree` need not be settled.
 /// Cuts fall between octants of a level. Collective.
-pub fn of_base_tree(tree: &Tree, share: &Ownership, level: Level, comm: &dyn Comm) -> Ownership {
-    let mut scale = Scale::new(share, level);
+pub fn of_base_tree(
+    tree: &Tree,
+    ownership: &Ownership,
+    level: Level,
+    comm: &dyn Comm,
+) -> Ownership {
+    let mut scale = Scale::new(ownership, level);
     let groups = tree.split.iter().map(BrickSet::len).max().unwrap_or(0);
     // Odd, as bricks come in groups of powers of two.
     let every = (groups / SAMPLE).min(SPARSE) | 1;
     for l in 1..tree.split.len() as Level {
         weigh_level(tree, l, every, &mut scale);
     }
-    for (_, at) in share.neighbours() {
+    for (_, at) in ownership.neighbours() {
         scale.add_at(at, COST_NEIGHBOUR);
     }
-    scale.cut(comm).unwrap_or_else(|| share.clone())
+    scale.cut(comm).unwrap_or_else(|| ownership.clone())
 }
 
 /// Weighs the bricks of a level, of which it looks at one group out of so many.
@@ -94,11 +99,11 @@ pub struct Weighed(Vec<Bin>);
 
 impl Weighed {
     /// Weighs the leaves of a mesh in octants of a level; crossing leaves are in it if `with_crossing`.
-    pub fn new(parts: &Parts, share: &Ownership, level: Level, with_crossing: bool) -> Self {
-        let mut scale = Scale::new(share, level);
+    pub fn new(parts: &Parts, ownership: &Ownership, level: Level, with_crossing: bool) -> Self {
+        let mut scale = Scale::new(ownership, level);
         scale.coarse = parts.split.iter().map(BrickSet::len).sum::<usize>() >= BRICKS_MANY;
         let mut add = |l: Level, sets: &PerLevel, each: i64| {
-            scale.add_set(l, &sets[l as usize], each, |key| share.answers_for(l, key));
+            scale.add_set(l, &sets[l as usize], each, |key| ownership.owns(l, key));
         };
         for l in 0..LEVELS as Level {
             // A leaf that splits makes eight of one.
@@ -117,20 +122,22 @@ impl Weighed {
     }
 
     /// Deals the leaves out anew, in nearly equal shares. Collective.
-    pub fn deal(self, parts: Parts, share: &Ownership, comm: &dyn Comm) -> Ownership {
-        let own = share.stretches().next().map_or(0, |own| own.start);
+    pub fn deal(self, parts: Parts, ownership: &Ownership, comm: &dyn Comm) -> Ownership {
+        let own = ownership.intervals().next().map_or(0, |own| own.start);
         let Some(changes) = curve::cut_anew(&self.0, own, SLACK_LEAVES, comm) else {
-            return share.clone();
+            return ownership.clone();
         };
         let fresh = Ownership::along(comm.rank(), comm.size(), changes);
         let mut sets = [parts.split, parts.crossing, parts.inside, parts.deleted];
         for set in &mut sets {
-            for (l, bricks) in (0..).zip(set.iter_mut()).filter(|(l, _)| share.is_shared(*l)) {
+            for (l, bricks) in
+                (0..).zip(set.iter_mut()).filter(|(l, _)| ownership.is_replicated(*l))
+            {
                 // Of several equal copies one moves.
-                bricks.retain(|b| if share.answers_for(l, b.key) { b.bits } else { 0 });
+                bricks.retain(|b| if ownership.owns(l, b.key) { b.bits } else { 0 });
             }
         }
-        fresh.settle(&mut sets, comm);
+        fresh.synchronise_replicas(&mut sets, comm);
         fresh
     }
 }
@@ -147,15 +154,15 @@ struct Scale {
 }
 
 impl Scale {
-    fn new(share: &Ownership, level: Level) -> Self {
-        let own = share.stretches().next().unwrap_or(0..1);
+    fn new(ownership: &Ownership, level: Level) -> Self {
+        let own = ownership.intervals().next().unwrap_or(0..1);
         Self { own, level, shift: 3 * (LEVEL_MAX - level), coarse: false, bins: Vec::new() }
     }
 
     /// Adds so much for each octant of a set, in bricks that this rank answers for.
-    fn add_set(&mut self, l: Level, set: &BrickSet, each: i64, answers_for: impl Fn(u64) -> bool) {
+    fn add_set(&mut self, l: Level, set: &BrickSet, each: i64, owns: impl Fn(u64) -> bool) {
         let Some(up) = l.checked_sub(self.level + 2) else {
-            let mine = set.bricks().filter(|b| answers_for(b.key));
+            let mine = set.bricks().filter(|b| owns(b.key));
             return mine.for_each(|b| match self.coarse {
                 true => self.add(l, b.key, each * i64::from(b.bits.count_ones())),
                 false => self.add_octants(l, b, each),
@@ -163,7 +170,7 @@ impl Scale {
         };
         // Bricks of one bin have one owner.
         for (key, bricks) in set.groups(3 * up) {
-            if answers_for(key) {
+            if owns(key) {
                 self.add(l, key, each * set.count_in(bricks) as i64);
             }
         }

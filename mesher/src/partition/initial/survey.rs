@@ -3,13 +3,13 @@
 
 use super::cut::span;
 use crate::brick::Brick;
-use crate::comm::{Comm, gather_merged};
+use crate::comm::{Comm, all_gather_reduced};
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
 use crate::octant::Level;
 use crate::partition::area::Areas;
+use crate::partition::ownership::KEY_BITS;
 use crate::partition::{boxed, thickness};
-use crate::share::KEY_BITS;
 use crate::tree::{PerLevel, per_level};
 use crate::voxelise::{Depth, Filed, Start, Work, refine};
 use std::ops::Range;
@@ -75,7 +75,7 @@ impl<'a> Survey<'a> {
         let sets = (0..u64::from(level)).zip(&mine.split);
         let place = |l: u64| move |b: Brick| [l << KEY_BITS | b.key, b.bits];
         let entries = sets.flat_map(|(l, set)| set.bricks().map(place(l)));
-        for [place, bits] in gather_merged(entries.collect(), |a, b| a | b, comm) {
+        for [place, bits] in all_gather_reduced(entries.collect(), |a, b| a | b, comm) {
             self.split[(place >> KEY_BITS) as usize].push(place & ((1 << KEY_BITS) - 1), bits);
         }
     }

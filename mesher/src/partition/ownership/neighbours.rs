@@ -69,11 +69,11 @@ mod tests {
                 let mine: Vec<u64> = octants.clone().filter(|&o| of(o) == rank).collect();
                 let touched = octants.clone().filter(|&o| mine.iter().any(|&m| beside(m, o)));
                 let others: BTreeSet<usize> = touched.map(of).filter(|&o| o != rank).collect();
-                let share = ownership(rank, &owners);
-                let told = share.neighbours();
+                let ownership = ownership(rank, &owners);
+                let told = ownership.neighbours();
                 prop_assert_eq!(told.len(), others.len());
                 prop_assert_eq!(told.iter().map(|t| t.0).collect::<BTreeSet<_>>(), others);
-                let octants = share.octants();
+                let octants = ownership.octants();
                 for (neighbour, at) in told {
                     let place = octants.iter().find(|&&(l, code)| start57(l, code) == at);
                     let &(l, code) = place.expect("an octant of the rank");

@@ -3,7 +3,7 @@
 use super::survey::Survey;
 use crate::brick;
 use crate::octant::{Level, start57};
-use crate::share::BaseLeaf;
+use crate::partition::ownership::BaseLeaf;
 use std::ops::Range;
 
 /// A base leaf while the tree is cut.

@@ -1,9 +1,9 @@
 //! Bringing bricks to the ranks that hold them.
 
-use super::{KEY_BITS, Ownership, Place, brick_start};
+use super::{KEY_BITS, Ownership, Placement, brick_start};
 use crate::brick::Brick;
 use crate::brickset::BrickSet;
-use crate::comm::{Comm, Entry, Mail, for_collectors, gather_collected};
+use crate::comm::{Comm, Entry, MessageBuffer, all_gather_from_reducers, split_by_reducer};
 use crate::octant::{LEVEL_MAX, Level};
 use crate::tree::PerLevel;
 use std::ops::Range;
@@ -11,22 +11,22 @@ use std::ops::Range;
 impl Ownership {
     /// Brings octants to the ranks that hold their bricks: returns those for this rank, from all
     /// ranks together, and the number of bricks sent. Collective, unless there is one rank.
-    pub fn scatter<const N: usize>(
+    pub fn redistribute<const N: usize>(
         &self,
         l: Level,
         sets: [BrickSet; N],
         comm: &dyn Comm,
     ) -> ([BrickSet; N], u64) {
         let sets = sets.into_iter().map(|set| (l, set)).collect();
-        let (sets, sent) = self.scatter_all(sets, comm);
+        let (sets, sent) = self.redistribute_all(sets, comm);
         (sets.try_into().expect("as many sets as were scattered"), sent)
     }
 
     /// Brings all levels of some sets to the ranks that hold their bricks, as if each level of each were
     /// [scattered](Self::scatter). Collective, unless there is one rank.
-    pub fn settle(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
+    pub fn synchronise_replicas(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
         let levels = |set: &mut &mut PerLevel| (0..).zip(std::mem::take(*set)).collect::<Vec<_>>();
-        let (told, _) = self.scatter_all(sets.iter_mut().flat_map(levels).collect(), comm);
+        let (told, _) = self.redistribute_all(sets.iter_mut().flat_map(levels).collect(), comm);
         let mut told = told.into_iter();
         for set in sets {
             **set = told.by_ref().take(crate::tree::LEVELS).collect();
@@ -34,7 +34,7 @@ impl Ownership {
     }
 
     /// Brings octants of several sets to the ranks that hold their bricks. Collective, unless there is one rank.
-    fn scatter_all(
+    fn redistribute_all(
         &self,
         mut sets: Vec<(Level, BrickSet)>,
         comm: &dyn Comm,
@@ -42,19 +42,19 @@ impl Ownership {
         if self.ranks == 1 {
             return (sets.into_iter().map(|(_, set)| set).collect(), 0);
         }
-        let any_top = sets.iter().any(|(l, _)| *l <= self.level_top);
+        let any_top = sets.iter().any(|(l, _)| *l <= self.level_fully_replicated);
         let mut out = Parcels::default();
         let pick = |(number, (l, set)): (usize, &mut (Level, BrickSet))| {
             self.pick(number, *l, set, &mut out)
         };
         let stay: Vec<Range<usize>> = sets.iter_mut().enumerate().map(pick).collect();
         let mut top = std::mem::take(&mut out.top);
-        if any_top && let Some(collected) = for_collectors(&mut top, |a, b| a | b, comm) {
+        if any_top && let Some(collected) = split_by_reducer(&mut top, |a, b| a | b, comm) {
             top.clear();
-            out.tell(TOP, collected);
+            out.report_status(TOP, collected);
         }
         let sent = out.sent + out.loose.len() as u64;
-        let mail = out.mail(&sets);
+        let message_buffer = out.message_buffer(&sets);
         let held = |((_, mut set), stay): ((Level, BrickSet), Range<usize>)| {
             set.keep(stay);
             vec![set]
@@ -62,11 +62,11 @@ impl Ownership {
         // What this rank holds of each set, in parts.
         let mut parts: Vec<Vec<BrickSet>> = sets.into_iter().zip(stay).map(held).collect();
         let mut told: Vec<Entry> = Vec::new();
-        for (_, words) in comm.exchange(mail).letters() {
-            read_letter(words, &mut parts, &mut told, &mut top);
+        for (_, words) in comm.sparse_all_to_all(message_buffer).messages() {
+            read_message(words, &mut parts, &mut told, &mut top);
         }
         if any_top {
-            told.extend(gather_collected(top, |a, b| a | b, comm));
+            told.extend(all_gather_from_reducers(top, |a, b| a | b, comm));
         }
         told.sort_by_key(|e| e[0]);
         for told in told.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
@@ -80,7 +80,7 @@ impl Ownership {
     /// Lists what others hold of set `number`; returns where what this rank does is in it then. Of top bricks it holds what
     /// everybody is told.
     fn pick(&self, number: usize, l: Level, set: &mut BrickSet, out: &mut Parcels) -> Range<usize> {
-        if self.is_single && l > self.level_shared {
+        if self.is_single && l > self.level_replicated {
             // Where no brick has several owners, each one's are beside each other.
             let position = |set: &BrickSet, at: u64| set.position(at >> (3 * (LEVEL_MAX + 2 - l)));
             let mine = position(set, self.own.start)..position(set, self.own.end);
@@ -100,18 +100,22 @@ impl Ownership {
                 return b.bits;
             }
             let owners = self.owners_of(l, b.key);
-            let place = self.place_among(l, owners);
+            let place = self.placement_among(l, owners);
             let entry = [(number as u64) << KEY_BITS | b.key, b.bits];
-            if place == Place::Top {
+            if place == Placement::FullyReplicated {
                 out.top.push(entry);
                 return 0;
             }
-            if place != Place::Mine {
+            if place != Placement::Local {
                 // Few, and for many owners: told brick by brick.
                 let others = owners.iter().filter(|&&owner| owner != self.rank);
                 out.loose.extend(others.map(|&owner| (owner, entry)));
             }
-            if matches!(place, Place::Mine | Place::Shared) { b.bits } else { 0 }
+            if matches!(place, Placement::Local | Placement::PartiallyReplicated) {
+                b.bits
+            } else {
+                0
+            }
         });
         0..set.len()
     }
@@ -157,7 +161,7 @@ impl Parcels {
         self.parcels.push((to, Parcel::Bricks(number, bricks)));
     }
 
-    fn tell(&mut self, kind: u64, mut entries: Vec<(usize, Entry)>) {
+    fn report_status(&mut self, kind: u64, mut entries: Vec<(usize, Entry)>) {
         entries.sort_by_key(|e| e.0);
         // With METIS an owner may have several runs of an octant.
         entries.dedup();
@@ -169,15 +173,15 @@ impl Parcels {
     }
 
     /// Everything, by receiver; the bricks are those of some sets.
-    fn mail(mut self, sets: &[(Level, BrickSet)]) -> Mail {
+    fn message_buffer(mut self, sets: &[(Level, BrickSet)]) -> MessageBuffer {
         let loose = std::mem::take(&mut self.loose);
-        self.tell(LOOSE, loose);
+        self.report_status(LOOSE, loose);
         self.parcels.sort_by_key(|p| p.0);
         // A brick takes one word and a half.
         let words = 2 * (self.entries.len() + 4 * self.parcels.len()) as u64 + self.sent * 3 / 2;
-        let mut mail = Mail::with_capacity(words as usize);
+        let mut message_buffer = MessageBuffer::with_capacity(words as usize);
         for (to, parcel) in self.parcels {
-            mail.append(to, |words| match parcel {
+            message_buffer.append(to, |words| match parcel {
                 Parcel::Bricks(number, bricks) => {
                     words.push(number as u64);
                     sets[number].1.pack(bricks, words);
@@ -188,12 +192,12 @@ impl Parcels {
                 }
             });
         }
-        mail
+        message_buffer
     }
 }
 
 /// Takes a letter apart: sets, entries, and entries of top bricks that this rank collects.
-fn read_letter(
+fn read_message(
     mut words: &[u64],
     sets: &mut [Vec<BrickSet>],
     told: &mut Vec<Entry>,

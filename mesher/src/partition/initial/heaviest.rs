@@ -2,7 +2,7 @@
 
 use crate::brickset::{BrickSet, ones};
 use crate::octant::{LEVEL_MAX, Level, start57};
-use crate::share::BaseLeaf;
+use crate::partition::ownership::BaseLeaf;
 
 /// Leaves of the final mesh in the heaviest of a rank's base leaves, `mine`, in order; `split` is the graded
 /// tree.

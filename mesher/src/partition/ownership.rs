@@ -12,7 +12,7 @@
 //! Invariants: runs follow each other from the curve's start, and neighbours have different owners.
 
 mod neighbours;
-mod scatter;
+mod redistribute;
 
 use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::tree::Tree;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 /// Runs that make an octant one of many owners. Up to here each owner is told of a brick by itself, which costs
 /// messages; beyond, everybody is told of it, which costs every rank time.
-const MANY: usize = 9;
+const OWNERS_MANY: usize = 9;
 
 /// A leaf of the base tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,13 +41,13 @@ impl BaseLeaf {
 
 /// Whose a brick is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Placement {
     /// Many ranks': everyone holds a copy.
-    Top,
+    FullyReplicated,
     /// A few ranks', each of which holds a copy; this one is among them.
-    Shared,
+    PartiallyReplicated,
     /// This rank's alone.
-    Mine,
+    Local,
     /// Others'; the one that answers for it.
     Remote(usize),
 }
@@ -63,9 +63,9 @@ pub struct Ownership {
     /// Whether it has no other.
     is_single: bool,
     /// Deepest level that has a brick of several owners.
-    level_shared: Level,
+    level_replicated: Level,
     /// Deepest level that has a top brick.
-    level_top: Level,
+    level_fully_replicated: Level,
 }
 
 /// Owners along the Morton curve.
@@ -77,7 +77,7 @@ struct Runs {
 }
 
 /// The rank of a bystander, who has nothing: see [`Ownership::bystander`].
-const NOBODY: usize = usize::MAX;
+const RANK_NONE: usize = usize::MAX;
 
 impl Ownership {
     /// The ownership of a single rank.
@@ -119,23 +119,33 @@ impl Ownership {
             }
         }
         assert!(!runs.starts.is_empty(), "all is somebody's");
-        let (level_shared, level_top) = (runs.deepest_brick_of(2), runs.deepest_brick_of(MANY));
+        let (level_replicated, level_fully_replicated) =
+            (runs.deepest_brick_of(2), runs.deepest_brick_of(OWNERS_MANY));
         let is_single = runs.of(rank).count() == 1;
         let own = runs.of(rank).max_by_key(|own| own.end - own.start).unwrap_or(0..0);
-        Self { rank, ranks, runs: Arc::new(runs), own, is_single, level_shared, level_top }
+        Self {
+            rank,
+            ranks,
+            runs: Arc::new(runs),
+            own,
+            is_single,
+            level_replicated,
+            level_fully_replicated,
+        }
     }
 
     /// The same as seen by someone who owns nothing: every brick is a top brick or remote.
-    pub fn bystander(&self) -> Self {
-        Self { rank: NOBODY, own: 0..0, is_single: false, ..self.clone() }
+    pub fn non_owning_view(&self) -> Self {
+        Self { rank: RANK_NONE, own: 0..0, is_single: false, ..self.clone() }
     }
 
     /// What of a tree lies in top bricks: the same on all ranks.
     pub fn top_of(&self, tree: &Tree) -> Tree {
         let mut top = Tree::default();
         for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
-            for l in 0..=self.level_top {
-                let bricks = from[l as usize].bricks().filter(|b| self.is_top(l, b.key));
+            for l in 0..=self.level_fully_replicated {
+                let bricks =
+                    from[l as usize].bricks().filter(|b| self.is_fully_replicated(l, b.key));
                 bricks.for_each(|b| to[l as usize].push(b.key, b.bits));
             }
         }
@@ -145,7 +155,7 @@ impl Ownership {
     /// The largest octants that this rank owns all of, in Morton order: level and code.
     pub fn octants(&self) -> Vec<(Level, u64)> {
         let mut octants = Vec::new();
-        for Range { start: mut at, end } in self.stretches() {
+        for Range { start: mut at, end } in self.intervals() {
             while at < end {
                 // As large as its corner allows, and as there is room for.
                 let aligned = (at.trailing_zeros() / 3).min(LEVEL_MAX);
@@ -158,7 +168,7 @@ impl Ownership {
     }
 
     /// The level-19 codes that this rank owns, in order.
-    pub fn stretches(&self) -> impl Iterator<Item = Range<u64>> + '_ {
+    pub fn intervals(&self) -> impl Iterator<Item = Range<u64>> + '_ {
         self.runs.of(self.rank)
     }
 
@@ -176,23 +186,23 @@ impl Ownership {
     }
 
     /// Whether brick `key` of level `l` is a top brick.
-    fn is_top(&self, l: Level, key: u64) -> bool {
-        l < 2 || l <= self.level_top && self.runs.of_brick(l, key).len() >= MANY
+    fn is_fully_replicated(&self, l: Level, key: u64) -> bool {
+        l < 2 || l <= self.level_fully_replicated && self.runs.of_brick(l, key).len() >= OWNERS_MANY
     }
 
     /// Whose brick `key` of level `l` is.
     #[inline]
-    pub fn place(&self, l: Level, key: u64) -> Place {
+    pub fn placement(&self, l: Level, key: u64) -> Placement {
         if l < 2 {
-            return Place::Top;
+            return Placement::FullyReplicated;
         }
         if self.ranks == 1 || self.is_within(l, key) {
-            return Place::Mine;
+            return Placement::Local;
         }
-        if l > self.level_shared {
-            return self.place_of(self.answerer(l, key));
+        if l > self.level_replicated {
+            return self.placement_of(self.owner(l, key));
         }
-        self.place_among(l, self.owners_of(l, key))
+        self.placement_among(l, self.owners_of(l, key))
     }
 
     /// Whether brick `key` of level `l`, which is 2 or more, lies in this rank's longest stretch, all of it.
@@ -208,39 +218,39 @@ impl Ownership {
     }
 
     #[inline]
-    fn place_among(&self, l: Level, owners: &[usize]) -> Place {
+    fn placement_among(&self, l: Level, owners: &[usize]) -> Placement {
         match owners.len() {
-            _ if l < 2 => Place::Top,
-            1 => self.place_of(owners[0]),
-            MANY.. => Place::Top,
-            _ if owners.contains(&self.rank) => Place::Shared,
-            _ => Place::Remote(owners[0]),
+            _ if l < 2 => Placement::FullyReplicated,
+            1 => self.placement_of(owners[0]),
+            OWNERS_MANY.. => Placement::FullyReplicated,
+            _ if owners.contains(&self.rank) => Placement::PartiallyReplicated,
+            _ => Placement::Remote(owners[0]),
         }
     }
 
-    fn place_of(&self, owner: usize) -> Place {
-        if owner == self.rank { Place::Mine } else { Place::Remote(owner) }
+    fn placement_of(&self, owner: usize) -> Placement {
+        if owner == self.rank { Placement::Local } else { Placement::Remote(owner) }
     }
 
     /// The rank that answers for brick `key` of level `l`.
     #[inline]
-    pub fn answerer(&self, l: Level, key: u64) -> usize {
+    pub fn owner(&self, l: Level, key: u64) -> usize {
         self.owner_at(brick_start(l, key))
     }
 
     /// Whether this rank counts and emits the leaves of a brick that it holds.
     #[inline]
-    pub fn answers_for(&self, l: Level, key: u64) -> bool {
+    pub fn owns(&self, l: Level, key: u64) -> bool {
         // Deeper than a child of a shared brick, whatever a rank holds is its own.
         self.ranks == 1
-            || l > self.level_shared + 1
+            || l > self.level_replicated + 1
             || self.own.contains(&brick_start(l, key))
-            || self.answerer(l, key) == self.rank
+            || self.owner(l, key) == self.rank
     }
 
     /// Whether any brick of level `l` is held by several ranks.
-    pub fn is_shared(&self, l: Level) -> bool {
-        self.ranks > 1 && l <= self.level_shared
+    pub fn is_replicated(&self, l: Level) -> bool {
+        self.ranks > 1 && l <= self.level_replicated
     }
 }
 
@@ -276,7 +286,8 @@ impl Runs {
     fn of_brick(&self, l: Level, key: u64) -> Range<usize> {
         let first = self.at(brick_start(l, key));
         let end = if l < 2 { 1 << (3 * LEVEL_MAX) } else { brick_start(l, key + 1) };
-        let more = self.starts[first + 1..].iter().take(MANY).take_while(|&&s| s < end).count();
+        let more =
+            self.starts[first + 1..].iter().take(OWNERS_MANY).take_while(|&&s| s < end).count();
         first..first + 1 + more
     }
 
@@ -353,33 +364,33 @@ mod tests {
             let shares: Vec<Ownership> = (0..RANKS).map(|r| ownership(r, &owners)).collect();
             let (mut shared, mut top) = (1, 1);
             for (l, key, runs) in bricks(&owners) {
-                let many = l < 2 || runs.len() >= MANY;
+                let many = l < 2 || runs.len() >= OWNERS_MANY;
                 if l >= 2 && runs.len() > 1 { shared = shared.max(l); }
                 if many { top = top.max(l); }
-                for (rank, share) in shares.iter().enumerate() {
+                for (rank, ownership) in shares.iter().enumerate() {
                     let want = match () {
-                        () if many => Place::Top,
-                        () if runs == [rank] => Place::Mine,
-                        () if runs.contains(&rank) => Place::Shared,
-                        () => Place::Remote(runs[0]),
+                        () if many => Placement::FullyReplicated,
+                        () if runs == [rank] => Placement::Local,
+                        () if runs.contains(&rank) => Placement::PartiallyReplicated,
+                        () => Placement::Remote(runs[0]),
                     };
-                    prop_assert_eq!(share.place(l, key), want, "level {} key {}", l, key);
-                    prop_assert_eq!(share.answerer(l, key), runs[0]);
-                    prop_assert_eq!(share.is_top(l, key), many);
-                    let holds = !matches!(want, Place::Remote(_));
-                    prop_assert!(!holds || share.answers_for(l, key) == (runs[0] == rank));
+                    prop_assert_eq!(ownership.placement(l, key), want, "level {} key {}", l, key);
+                    prop_assert_eq!(ownership.owner(l, key), runs[0]);
+                    prop_assert_eq!(ownership.is_fully_replicated(l, key), many);
+                    let holds = !matches!(want, Placement::Remote(_));
+                    prop_assert!(!holds || ownership.owns(l, key) == (runs[0] == rank));
                 }
-                let place = shares[0].bystander().place(l, key);
-                prop_assert_eq!(place, if many { Place::Top } else { Place::Remote(runs[0]) });
+                let place = shares[0].non_owning_view().placement(l, key);
+                prop_assert_eq!(place, if many { Placement::FullyReplicated } else { Placement::Remote(runs[0]) });
             }
-            prop_assert_eq!((shares[0].level_shared, shares[0].level_top), (shared, top));
+            prop_assert_eq!((shares[0].level_replicated, shares[0].level_fully_replicated), (shared, top));
         }
 
         #[test]
         fn octants_tile_what_a_rank_owns(owners in owners()) {
             for rank in 0..RANKS {
-                let share = ownership(rank, &owners);
-                let octants = share.octants();
+                let ownership = ownership(rank, &owners);
+                let octants = ownership.octants();
                 let fine: Vec<u64> = octants
                     .iter()
                     .flat_map(|&(l, code)| code << (3 * (FINE - l))..(code + 1) << (3 * (FINE - l)))
@@ -417,15 +428,15 @@ mod tests {
                     sets[set][l as usize].push(key(l, draw), bits);
                 }
                 let [a, b] = &mut sets;
-                ownership(comm.rank(), &owners).settle(&mut [a, b], comm);
+                ownership(comm.rank(), &owners).synchronise_replicas(&mut [a, b], comm);
                 sets
             });
             for (rank, sets) in got.iter().enumerate() {
-                let share = ownership(rank, &owners);
+                let ownership = ownership(rank, &owners);
                 for (number, set) in sets.iter().enumerate() {
                     for &(l, brick, _) in &all {
                         let sum = sums.get(&(number, l, brick)).copied().unwrap_or(0);
-                        let holds = !matches!(share.place(l, brick), Place::Remote(_));
+                        let holds = !matches!(ownership.placement(l, brick), Placement::Remote(_));
                         prop_assert_eq!(set[l as usize].get(brick), if holds { sum } else { 0 });
                     }
                 }
@@ -437,11 +448,11 @@ mod tests {
     fn a_brick_of_many_owners_is_everybodys() {
         // Nine octants beside each other with an owner each, then all others one rank's.
         let owners: Vec<usize> = (0..1 << (3 * FINE)).map(|o: usize| o.min(9)).collect();
-        let share = ownership(11, &owners);
-        assert_eq!(share.place(FINE + 1, 0), Place::Remote(0));
-        assert_eq!(share.place(FINE, 0), Place::Top);
+        let ownership = ownership(11, &owners);
+        assert_eq!(ownership.placement(FINE + 1, 0), Placement::Remote(0));
+        assert_eq!(ownership.placement(FINE, 0), Placement::FullyReplicated);
         let places: BTreeSet<String> =
-            (1..64).map(|key| format!("{:?}", share.place(FINE + 1, key))).collect();
+            (1..64).map(|key| format!("{:?}", ownership.placement(FINE + 1, key))).collect();
         assert_eq!(places.into_iter().collect::<Vec<_>>(), ["Remote(8)", "Remote(9)"]);
     }
 }

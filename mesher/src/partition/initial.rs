@@ -23,8 +23,8 @@ use crate::error::Error;
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
 use crate::octant::{LEVEL_MAX, Level, edge, start57};
+use crate::partition::ownership::{BaseLeaf, Ownership};
 use crate::partition::{self, Partitioner, Weights, area};
-use crate::share::{BaseLeaf, Ownership};
 use crate::voxelise::{Start, Work};
 use cut::{Cut, Piece};
 use survey::Survey;
@@ -70,7 +70,7 @@ impl Division {
 /// The division of T0 as this rank needs to know it.
 pub struct Base {
     /// Who owns what.
-    pub share: Ownership,
+    pub ownership: Ownership,
     /// This rank's base leaves as they were dealt out, in order; none where the Morton curve is cut anywhere.
     pub dealt: Vec<BaseLeaf>,
     /// Level of the deepest base leaves, or of the octants that the curve is cut between.
@@ -94,7 +94,7 @@ pub fn build(
     let coarse = if rehearsed { SHARE_PARTS as f64 } else { COARSE_PARTS };
     let parts = [coarse, CUT_PARTS as f64];
     let [coarse, fine] = levels_auto(facets, rules, parts, comm);
-    let (share, work) = if rehearsed {
+    let (ownership, work) = if rehearsed {
         let coarse = coarse.min(rehearse::deepest(rules));
         let survey = Survey::new(facets, rules, coarse, true, comm);
         let cut = by_weight(&survey, comm.size());
@@ -103,7 +103,7 @@ pub fn build(
     } else {
         (shares::by_area(facets, rules, [coarse, fine], comm), Work::default())
     };
-    Ok(Base { share, dealt: Vec::new(), level_base: fine, work })
+    Ok(Base { ownership, dealt: Vec::new(), level_base: fine, work })
 }
 
 /// Deals out base leaves, as the paper does. Collective.
@@ -131,7 +131,7 @@ fn of_leaves(
     let owners = partition::assign(&cut, &weights, division.partitioner, comm)?;
     let dealt = cut.dealt(&owners);
     Ok(Base {
-        share: Ownership::new(comm.rank(), comm.size(), &dealt),
+        ownership: Ownership::new(comm.rank(), comm.size(), &dealt),
         dealt: dealt.into_iter().filter(|b| b.owner == comm.rank()).collect(),
         level_base: cut.level_base(),
         work: survey.work,
@@ -139,8 +139,8 @@ fn of_leaves(
 }
 
 /// Where a rank begins to refine: the largest octants that it owns all of.
-pub fn starts(share: &Ownership) -> Vec<Start> {
-    share.octants().into_iter().map(|(level, code)| Start { level, code }).collect()
+pub fn starts(ownership: &Ownership) -> Vec<Start> {
+    ownership.octants().into_iter().map(|(level, code)| Start { level, code }).collect()
 }
 
 /// Deepest level that base leaves may have.

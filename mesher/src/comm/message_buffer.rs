@@ -7,42 +7,42 @@ use std::ops::Range;
 
 /// Words by rank: one letter at most to a receiver, or from a sender. None is empty.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Mail {
+pub struct MessageBuffer {
     words: Vec<u64>,
-    letters: Vec<Letter>,
+    messages: Vec<Message>,
 }
 
 /// One letter; it starts where the one before it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Letter {
+struct Message {
     rank: usize,
     end: usize,
 }
 
-impl Mail {
+impl MessageBuffer {
     /// No letters, and room for so many words.
     pub fn with_capacity(words: usize) -> Self {
-        Self { words: Vec::with_capacity(words), letters: Vec::new() }
+        Self { words: Vec::with_capacity(words), messages: Vec::new() }
     }
 
     /// One letter to each rank that entries are for, with those in the order in which they are given.
     pub fn of_entries<const N: usize>(mut entries: Vec<(usize, [u64; N])>) -> Self {
         entries.sort_by_key(|e| e.0);
-        let mut mail = Self::with_capacity(N * entries.len());
-        entries.into_iter().for_each(|(rank, words)| mail.write(rank, words));
-        mail
+        let mut message_buffer = Self::with_capacity(N * entries.len());
+        entries.into_iter().for_each(|(rank, words)| message_buffer.write(rank, words));
+        message_buffer
     }
 
     /// A letter from each rank, of so many words that are to be written in place.
     pub fn with_lengths(lengths: impl Iterator<Item = usize>) -> Self {
-        let mut mail = Self::default();
+        let mut message_buffer = Self::default();
         let mut end = 0;
         for (rank, words) in lengths.enumerate().filter(|l| l.1 > 0) {
             end += words;
-            mail.letters.push(Letter { rank, end });
+            message_buffer.messages.push(Message { rank, end });
         }
-        mail.words = vec![0; end];
-        mail
+        message_buffer.words = vec![0; end];
+        message_buffer
     }
 
     /// Writes words into a rank's letter, a new one unless the last one is that rank's.
@@ -68,22 +68,22 @@ impl Mail {
     /// Makes the words from `start` part of a rank's letter.
     fn lengthen(&mut self, rank: usize, start: usize) {
         let end = self.words.len();
-        match self.letters.last_mut() {
+        match self.messages.last_mut() {
             Some(last) if last.rank == rank => last.end = end,
-            _ if end > start => self.letters.push(Letter { rank, end }),
+            _ if end > start => self.messages.push(Message { rank, end }),
             _ => {}
         }
     }
 
     /// The letters, each with its rank, in the order in which they were written.
-    pub fn letters(&self) -> impl Iterator<Item = (usize, &[u64])> {
-        (0..self.letters.len()).map(|at| (self.letters[at].rank, &self.words[self.range(at)]))
+    pub fn messages(&self) -> impl Iterator<Item = (usize, &[u64])> {
+        (0..self.messages.len()).map(|at| (self.messages[at].rank, &self.words[self.range(at)]))
     }
 
     /// Where the words of a letter are.
-    fn range(&self, letter: usize) -> Range<usize> {
-        let start = letter.checked_sub(1).map_or(0, |before| self.letters[before].end);
-        start..self.letters[letter].end
+    fn range(&self, message: usize) -> Range<usize> {
+        let start = message.checked_sub(1).map_or(0, |before| self.messages[before].end);
+        start..self.messages[message].end
     }
 
     /// The words of all letters, behind each other.
@@ -98,17 +98,17 @@ impl Mail {
 
     /// A rank's letter, of letters in the order of the ranks; nothing if there is none.
     pub fn of(&self, rank: usize) -> &[u64] {
-        let at = self.letters.binary_search_by_key(&rank, |l| l.rank);
+        let at = self.messages.binary_search_by_key(&rank, |l| l.rank);
         at.map_or(&[], |at| &self.words[self.range(at)])
     }
 }
 
 /// Letters with their ranks; those that follow each other and are one rank's become one, empty ones none.
-impl<W: IntoIterator<Item = u64>> FromIterator<(usize, W)> for Mail {
-    fn from_iter<I: IntoIterator<Item = (usize, W)>>(letters: I) -> Self {
-        let mut mail = Self::default();
-        letters.into_iter().for_each(|(rank, words)| mail.write(rank, words));
-        mail
+impl<W: IntoIterator<Item = u64>> FromIterator<(usize, W)> for MessageBuffer {
+    fn from_iter<I: IntoIterator<Item = (usize, W)>>(messages: I) -> Self {
+        let mut message_buffer = Self::default();
+        messages.into_iter().for_each(|(rank, words)| message_buffer.write(rank, words));
+        message_buffer
     }
 }
 
@@ -118,22 +118,22 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn told(mail: &Mail) -> Vec<(usize, Vec<u64>)> {
-        mail.letters().map(|(rank, words)| (rank, words.to_vec())).collect()
+    fn told(message_buffer: &MessageBuffer) -> Vec<(usize, Vec<u64>)> {
+        message_buffer.messages().map(|(rank, words)| (rank, words.to_vec())).collect()
     }
 
     #[test]
     fn what_is_written_for_the_last_letters_rank_lengthens_it() {
-        let mut mail = Mail::default();
-        mail.write(3, []);
-        mail.write(7, [1, 2]);
-        mail.write(7, []);
-        mail.room(7, 2)[1] = 5;
-        assert!(mail.room(0, 0).is_empty());
-        mail.room(4, 1)[0] = 9;
-        assert_eq!(told(&mail), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
-        assert_eq!(mail.words(), [1, 2, 0, 5, 9]);
-        assert_eq!(mail, told(&mail).into_iter().collect());
+        let mut message_buffer = MessageBuffer::default();
+        message_buffer.write(3, []);
+        message_buffer.write(7, [1, 2]);
+        message_buffer.write(7, []);
+        message_buffer.room(7, 2)[1] = 5;
+        assert!(message_buffer.room(0, 0).is_empty());
+        message_buffer.room(4, 1)[0] = 9;
+        assert_eq!(told(&message_buffer), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
+        assert_eq!(message_buffer.words(), [1, 2, 0, 5, 9]);
+        assert_eq!(message_buffer, told(&message_buffer).into_iter().collect());
     }
 
     proptest! {
@@ -141,7 +141,7 @@ mod tests {
         fn entries_are_sorted_by_rank_and_keep_their_order(entries in prop::collection::vec((0usize..6, any::<[u64; 2]>()), 0..40)) {
             let mut want: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
             entries.iter().for_each(|(rank, words)| want.entry(*rank).or_default().extend(words));
-            prop_assert_eq!(told(&Mail::of_entries(entries)), want.into_iter().collect::<Vec<_>>());
+            prop_assert_eq!(told(&MessageBuffer::of_entries(entries)), want.into_iter().collect::<Vec<_>>());
         }
     }
 }

@@ -5,14 +5,14 @@
 //! stretch of the curve exactly, and the true cuts follow from the sums of the stretches.
 
 use super::cut::Cut;
-use crate::comm::{Comm, Mail, gather_merged};
+use crate::comm::{Comm, MessageBuffer, all_gather_reduced};
 use crate::facet::Facet;
 use crate::lattice::Rules;
 use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::area::{self, PARTS};
 use crate::partition::curve::{self, Bin};
+use crate::partition::ownership::Ownership;
 use crate::partition::thickness;
-use crate::share::Ownership;
 
 /// Shares by the facets' area, roughly in octants of the first level, finally in those of the second. Collective.
 pub fn by_area(facets: &[Facet], rules: &Rules, levels: [Level; 2], comm: &dyn Comm) -> Ownership {
@@ -20,7 +20,7 @@ pub fn by_area(facets: &[Facet], rules: &Rules, levels: [Level; 2], comm: &dyn C
     let mine = expected(facets, rules, fine);
     let shift = 3 * (LEVEL_MAX - coarse);
     let roughly = mine.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
-    let told = gather_merged(roughly, |a, b| a + b, comm);
+    let told = all_gather_reduced(roughly, |a, b| a + b, comm);
     let mut bins: Vec<Bin> = told.into_iter().map(|e| (e[0], e[1])).collect();
     let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / PARTS).sum::<u64>();
     let light = leaves(&bins) / comm.size() as u64;
@@ -50,9 +50,9 @@ pub fn by_rehearsal(
         b.1 = (b.1 as f64 * ratio.min(1.0)) as u64;
     }
     // What a piece has more than area lets expect is taken to be at its corner; pieces are small.
-    let more = |bins: &mut Vec<Bin>, share: &Ownership| {
+    let more = |bins: &mut Vec<Bin>, ownership: &Ownership| {
         for (i, (piece, &leaves)) in cut.pieces.iter().zip(told).enumerate() {
-            if share.owner_at(start(i)) == comm.rank() {
+            if ownership.owner_at(start(i)) == comm.rank() {
                 bins.push((start(i), leaves.saturating_sub(piece.weight).saturating_mul(PARTS)));
             }
         }
@@ -89,11 +89,12 @@ fn finely(
     let changes = curve::cut_known(&known.bins, comm.size()).unwrap_or_else(everything);
     let roughly = Ownership::along(comm.rank(), comm.size(), changes);
     let told = |(start, weight)| (roughly.owner_at(start), [start, weight]);
-    let heard = comm.exchange(Mail::of_entries(mine.into_iter().map(told).collect()));
+    let heard =
+        comm.sparse_all_to_all(MessageBuffer::of_entries(mine.into_iter().map(told).collect()));
     let mut bins: Vec<Bin> = heard.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
     more(&mut bins, &roughly);
-    for stretch in roughly.stretches() {
-        curve::add_boxes(&mut bins, rules, fine, known.light, PARTS, &stretch);
+    for interval in roughly.intervals() {
+        curve::add_boxes(&mut bins, rules, fine, known.light, PARTS, &interval);
     }
     curve::merge(&mut bins);
     let changes = curve::cut(&bins, comm).unwrap_or_else(everything);
@@ -140,8 +141,10 @@ mod tests {
         let seen = sim::run(RANKS, 5, |comm| {
             let on_this = |(i, f): (usize, &Facet)| (dealt(i) == comm.rank()).then_some(*f);
             let mine: Vec<Facet> = all.iter().enumerate().filter_map(on_this).collect();
-            let share = by_area(&mine, rules, [4, FINE], comm);
-            (0..1 << (3 * FINE)).map(|code| share.owner_at(start57(FINE, code))).collect::<Vec<_>>()
+            let ownership = by_area(&mine, rules, [4, FINE], comm);
+            (0..1 << (3 * FINE))
+                .map(|code| ownership.owner_at(start57(FINE, code)))
+                .collect::<Vec<_>>()
         });
         assert!(seen.iter().all(|s| *s == seen[0]), "all ranks see the same");
         seen.into_iter().next().unwrap_or_default()
@@ -179,8 +182,8 @@ mod tests {
     #[test]
     fn where_nothing_is_one_rank_has_all() {
         let owners = sim::run(3, 1, |comm| {
-            let share = by_area(&[], &rules(vec![]), [2, 3], comm);
-            share.octants().len()
+            let ownership = by_area(&[], &rules(vec![]), [2, 3], comm);
+            ownership.octants().len()
         });
         assert_eq!(owners, [1, 0, 0]);
     }
