@@ -1,0 +1,169 @@
+//! Why a run is not faster: one sentence that names the largest loss.
+
+use super::entry::{Network, Phase, Run};
+use super::pop::{self, Efficiency, messages_s};
+
+/// Losses below this are not worth a cause.
+const SLIGHT: f64 = 0.03;
+
+/// The sentence for a run against its reference run.
+pub fn sentence(run: &Run, reference: &Run, network: &Network) -> String {
+    let e = pop::efficiency(run, reference, network);
+    let ranks = run.setup.ranks;
+    let head = format!(
+        "{} at {ranks} {}: ",
+        percent(e.global()),
+        if ranks == 1 { "rank" } else { "ranks" }
+    );
+    let losses = [
+        (e.load_balance, imbalance(run)),
+        (e.serialisation, serial(run)),
+        (e.transfer, transfer(run, network, &e)),
+        (e.computation_scaling, more_work(run, reference)),
+    ];
+    let worst = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (factor, why) = worst.expect("there are four");
+    if factor > 1.0 - SLIGHT {
+        return head + "no single cause takes more than 3 %";
+    }
+    head + &why
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{:.0} %", fraction * 100.0)
+}
+
+/// The phase that `weight` finds heaviest.
+fn worst_phase(run: &Run, weight: impl Fn(&Phase) -> f64) -> Option<&Phase> {
+    run.phases.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))
+}
+
+/// Work lies unevenly: on which rank, in which phase, and whether a single base leaf is to blame.
+fn imbalance(run: &Run) -> String {
+    let ranks = run.setup.ranks as f64;
+    let waits = |p: &Phase| p.useful_s.max - p.useful_s.sum / ranks;
+    let Some(phase) = worst_phase(run, waits) else { return "the work is uneven".to_owned() };
+    let share = phase.useful_s.max / phase.useful_s.sum.max(1e-12);
+    if let Some(leaf) = heaviest_base_leaf(run)
+        && leaf * ranks > 0.7 * run.useful_s.lambda(run.setup.ranks)
+        && leaf * ranks > 1.0
+    {
+        return format!(
+            "one base leaf alone holds {:.1} % of the cells, more than a rank's share",
+            leaf * 100.0
+        );
+    }
+    format!(
+        "work is uneven (lambda {:.2}): rank {} does {:.1} % of `{}` where a share is {:.1} %",
+        run.useful_s.lambda(run.setup.ranks),
+        phase.useful_s.at,
+        share * 100.0,
+        phase.name,
+        100.0 / ranks
+    )
+}
+
+/// The fraction of all cells in the heaviest base leaf, where the program tells it.
+pub fn heaviest_base_leaf(run: &Run) -> Option<f64> {
+    let heaviest = run.counters.get("base_leaf_cells_max")?.max;
+    (run.cells > 0).then(|| heaviest / run.cells as f64)
+}
+
+fn serial(run: &Run) -> String {
+    let ranks = run.setup.ranks as f64;
+    let waits = |p: &Phase| p.useful_s.max - p.useful_s.sum / ranks;
+    match worst_phase(run, waits) {
+        Some(p) => format!(
+            "ranks have equal work in total but not within phases; `{}` waits longest, for rank {} (lambda {:.2})",
+            p.name,
+            p.useful_s.at,
+            p.useful_s.lambda(run.setup.ranks)
+        ),
+        None => "ranks wait for each other at the ends of phases".to_owned(),
+    }
+}
+
+fn transfer(run: &Run, network: &Network, e: &Efficiency) -> String {
+    if run.setup.comm != super::entry::Comm::Sim {
+        let lost = |p: &Phase| p.wall_s.max - p.useful_s.max;
+        let Some(p) = worst_phase(run, lost) else {
+            return "ranks do not compute all the time".to_owned();
+        };
+        let crowd = if run.oversubscribed { ", with more ranks than cores" } else { "" };
+        return format!(
+            "{} of the time is no computing of any rank{crowd}, most of it in `{}`",
+            percent(1.0 - e.transfer),
+            p.name
+        );
+    }
+    match worst_phase(run, |p| messages_s(p, network)) {
+        Some(p) => format!(
+            "messages take {} of the time by the model, most of it `{}` with {:.0} messages and {:.1} MB on a rank",
+            percent(1.0 - e.transfer),
+            p.name,
+            p.messages.max,
+            p.message_bytes.max / 1e6
+        ),
+        None => "messages take the time".to_owned(),
+    }
+}
+
+/// More is computed in total than on the reference's ranks: by which phase.
+fn more_work(run: &Run, reference: &Run) -> String {
+    let per_cell = |p: &Phase, r: &Run| p.useful_s.sum / r.cells.max(1) as f64;
+    let before = |p: &Phase| reference.phases.iter().find(|b| b.name == p.name);
+    let grown = |p: &Phase| per_cell(p, run) - before(p).map_or(0.0, |b| per_cell(b, reference));
+    let all = run.useful_s.sum / run.cells.max(1) as f64;
+    match worst_phase(run, grown) {
+        Some(p) => format!(
+            "the ranks together compute {:.2} times as much as {}, `{}` adding most ({} of all)",
+            all * reference.cells.max(1) as f64 / reference.useful_s.sum.max(1e-12),
+            if reference.setup.ranks == 1 {
+                "one".to_owned()
+            } else {
+                reference.setup.ranks.to_string()
+            },
+            p.name,
+            percent(grown(p) / all)
+        ),
+        None => "more is computed in total".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::entry::{Comm, Spread};
+    use super::*;
+    use crate::testing::run;
+
+    const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: false };
+
+    fn why(run_: &Run, one: &Run, network: &Network) -> String {
+        sentence(run_, one, network)
+    }
+
+    #[test]
+    fn the_largest_loss_is_named() {
+        let one = run(Comm::Sim, 100, &[("read", &[0.1]), ("grade", &[4.0])]);
+        let mut two = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[3.0, 1.0])]);
+        let told = why(&two, &one, &FREE);
+        assert!(
+            told.starts_with("67 % at 2 ranks: ") && told.contains("rank 0 does 75.0 % of `grade`"),
+            "{told}"
+        );
+        two.counters.insert("base_leaf_cells_max".into(), Spread::of(&[70.0, 10.0]));
+        assert!(why(&two, &one, &FREE).contains("one base leaf alone holds 70.0 %"));
+
+        let mut fine = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[2.0, 2.0])]);
+        assert!(why(&fine, &one, &FREE).contains("no single cause"));
+        fine.phases[1].messages = Spread::of(&[10.0, 10.0]);
+        let slow = Network { latency_s: 0.1, bandwidth_bytes_per_s: 1e9, measured: false };
+        assert!(why(&fine, &one, &slow).contains("`grade` with 10 messages"));
+
+        let redundant = run(Comm::Sim, 100, &[("read", &[2.05, 2.05]), ("grade", &[2.0, 2.0])]);
+        assert!(why(&redundant, &one, &FREE).contains("`read` adding most"));
+
+        let crossed = run(Comm::Sim, 100, &[("read", &[0.05, 2.0]), ("grade", &[2.0, 0.05])]);
+        assert!(why(&crossed, &one, &FREE).contains("not within phases"));
+    }
+}

@@ -1,0 +1,342 @@
+//! Runs of the same setup together: what is said of a measurement is said of all its repetitions.
+
+use super::entry::{Comm, Line, Network, Phase, Run, Setup, Spread, What};
+use super::network::ASSUMED;
+use super::pop::{self, Efficiency};
+use super::stats::{Median, median};
+
+/// The repetitions of one run.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// What was run.
+    pub setup: Setup,
+    /// The runs, warm-ups left out, in the order in which they were made.
+    pub runs: Vec<Run>,
+    /// Time, measured or projected (see [`pop::time_s`]). Where it is projected and ranks are told one by one, it
+    /// is the typical run's; the interval is that of the repetitions' own projections, reaching to it.
+    pub time_s: Median,
+    /// What is said of single ranks is said of it: the run whose time is nearest to the median, with every
+    /// rank's useful time in every phase replaced by its median over the repetitions where they tell it.
+    pub typical: Run,
+    /// Whether they do, and there are several.
+    pub by_rank: bool,
+}
+
+impl Group {
+    /// Of repetitions of one setup; nothing of none.
+    fn of(setup: Setup, runs: Vec<Run>, network: &Network) -> Option<Self> {
+        let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, network)).collect();
+        let mut time_s = median(&times)?;
+        let off = |run: &&Run| (pop::time_s(run, network) - time_s.value).abs();
+        let mut typical = runs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.clone();
+        let medians = medians_by_rank(&runs);
+        let by_rank = medians.is_some();
+        if let Some(phases) = medians {
+            quiet(&mut typical, &phases);
+            if setup.comm == Comm::Sim {
+                time_s.value = pop::time_s(&typical, network);
+                time_s.low = time_s.low.min(time_s.value);
+                time_s.high = time_s.high.max(time_s.value);
+            }
+        }
+        Some(Self { setup, runs, time_s, typical, by_rank })
+    }
+
+    /// Where times of single ranks are from, for a caption.
+    pub fn ranks_told(&self) -> String {
+        let n = self.runs.len();
+        match self.by_rank {
+            true => format!("Times of a rank in a phase are medians of {n} runs"),
+            false => format!("Run of median time of {n}"),
+        }
+    }
+
+    /// Cells of the mesh.
+    pub fn cells(&self) -> u64 {
+        self.runs[0].cells
+    }
+
+    /// Cells per second and rank.
+    pub fn rate(&self) -> f64 {
+        self.cells() as f64 / self.time_s.value / self.setup.ranks as f64
+    }
+
+    /// Median of peak memory over cells.
+    pub fn bytes_per_cell(&self) -> Median {
+        let values: Vec<f64> =
+            self.runs.iter().map(|r| r.peak_rss_bytes.sum / r.cells.max(1) as f64).collect();
+        median(&values).expect("a group has runs")
+    }
+
+    /// Whether more ranks than cores shared the machine.
+    pub fn oversubscribed(&self) -> bool {
+        self.runs.iter().any(|r| r.oversubscribed)
+    }
+
+    /// How the time was come by, in a word.
+    pub fn how(&self) -> &'static str {
+        match self.setup.comm {
+            Comm::Sim => "projected",
+            _ if self.oversubscribed() => "oversubscribed",
+            _ => "measured",
+        }
+    }
+
+    /// Efficiencies of the typical run against the typical one of `reference`.
+    pub fn efficiency(&self, reference: &Group, network: &Network) -> Efficiency {
+        pop::efficiency(&self.typical, &reference.typical, network)
+    }
+
+    /// The critical path of CPU times alone.
+    fn path_s(&self) -> f64 {
+        if self.by_rank {
+            return pop::path_s(&self.typical);
+        }
+        let paths: Vec<f64> = self.runs.iter().map(pop::path_s).collect();
+        median(&paths).map_or(f64::NAN, |m| m.value)
+    }
+}
+
+/// Useful time by phase and rank, each the median over runs; nothing where there is one run only, or one of them
+/// does not tell them all.
+fn medians_by_rank(runs: &[Run]) -> Option<Vec<Vec<f64>>> {
+    let (first, rest) = runs.split_first()?;
+    if rest.is_empty() || first.phases.is_empty() {
+        return None;
+    }
+    let told = |r: &Run| r.phases.iter().all(|p| p.useful_s.by_rank.len() == r.setup.ranks);
+    let names = |r: &Run| r.phases.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
+    if !runs.iter().all(|r| told(r) && names(r) == names(first)) {
+        return None;
+    }
+    let of = |phase: usize, rank: usize| {
+        let values: Vec<f64> =
+            runs.iter().map(|r| r.phases[phase].useful_s.by_rank[rank]).collect();
+        median(&values).map(|m| m.value)
+    };
+    let ranks = first.setup.ranks;
+    (0..first.phases.len()).map(|p| (0..ranks).map(|r| of(p, r)).collect()).collect()
+}
+
+/// Replaces a run's useful times, by phase and rank.
+fn quiet(run: &mut Run, useful_s: &[Vec<f64>]) {
+    let put = |(phase, values): (&mut Phase, &Vec<f64>)| phase.useful_s = Spread::of(values);
+    run.phases.iter_mut().zip(useful_s).for_each(put);
+    let of_rank = |r: usize| useful_s.iter().map(|phase| phase[r]).sum();
+    run.useful_s = Spread::of(&(0..run.setup.ranks).map(of_rank).collect::<Vec<f64>>());
+}
+
+/// What lines say, in groups.
+#[derive(Clone, Debug)]
+pub struct Groups {
+    /// In the order of their first runs.
+    pub all: Vec<Group>,
+    /// Runs that tell who sent how much to whom, warm-ups among them; the last one of every setup.
+    pub matrices: Vec<Run>,
+    /// The last network that was measured or given.
+    pub network: Network,
+}
+
+impl Groups {
+    /// Groups the runs among lines.
+    pub fn of(lines: &[Line]) -> Self {
+        let mut network = ASSUMED;
+        let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
+        let mut matrices: Vec<Run> = Vec::new();
+        for line in lines {
+            match &line.what {
+                What::Network(n) => network = *n,
+                What::Run(run) if !run.warm_up => {
+                    match by_setup.iter_mut().find(|(setup, _)| *setup == run.setup) {
+                        Some((_, runs)) => runs.push((**run).clone()),
+                        None => by_setup.push((run.setup.clone(), vec![(**run).clone()])),
+                    }
+                }
+                _ => {}
+            }
+        }
+        let told = lines.iter().filter_map(|line| match &line.what {
+            What::Run(run) if !run.message_matrix.is_empty() => Some(&**run),
+            _ => None,
+        });
+        for run in told {
+            matrices.retain(|other| other.setup != run.setup);
+            matrices.push(run.clone());
+        }
+        let group = |(setup, runs): (Setup, Vec<Run>)| Group::of(setup, runs, &network);
+        Self { all: by_setup.into_iter().filter_map(group).collect(), matrices, network }
+    }
+
+    /// The groups of an experiment on one case, in the order of `key`.
+    pub fn series<K: PartialOrd>(
+        &self,
+        wanted: impl Fn(&Setup) -> bool,
+        key: impl Fn(&Group) -> K,
+    ) -> Vec<&Group> {
+        let mut found: Vec<&Group> = self.all.iter().filter(|g| wanted(&g.setup)).collect();
+        found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+        found
+    }
+
+    /// What a group's efficiency is against: the same on fewest ranks; in weak scaling with another spacing.
+    pub fn reference(&self, group: &Group) -> &Group {
+        let (s, weak) = (&group.setup, group.setup.experiment == "weak");
+        let same = |o: &&Group| {
+            let o = &o.setup;
+            let mesh =
+                o.case == s.case && o.layer_cells_min == s.layer_cells_min && o.engine == s.engine;
+            let size = if weak { o.experiment == "weak" } else { o.spacing_min == s.spacing_min };
+            mesh && size
+        };
+        let rank = |o: &&Group| {
+            // The same way of running if there is one on as few ranks, then the same experiment.
+            (o.setup.ranks, o.setup.comm != s.comm, o.setup.experiment != s.experiment)
+        };
+        let candidates = self.all.iter().filter(same).filter(|o| {
+            weak || o.setup.ranks == 1
+                || o.setup.comm == s.comm && o.setup.experiment == s.experiment
+        });
+        candidates.min_by_key(rank).unwrap_or_else(|| {
+            self.all.iter().find(|o| o.setup == *s).expect("a group is among its groups")
+        })
+    }
+
+    /// Projection against measurement: pairs of the same mesh on as many ranks, both on cores of their own.
+    pub fn projections(&self) -> Vec<Projection<'_>> {
+        let pair = |sim: &'_ Group| {
+            let found = self.all.iter().find(|m| {
+                m.setup.comm == Comm::Mpi
+                    && !m.oversubscribed()
+                    && Setup { comm: Comm::Mpi, ..sim.setup.clone() } == m.setup
+            });
+            found.map(|m| m.setup.clone())
+        };
+        let sims = self.all.iter().filter(|g| g.setup.comm == Comm::Sim);
+        sims.filter_map(|sim| {
+            let setup = pair(sim)?;
+            let measured = self.all.iter().find(|m| m.setup == setup)?;
+            Some(Projection { sim, measured })
+        })
+        .collect()
+    }
+}
+
+/// A projected time and the measured one.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection<'a> {
+    /// Simulated ranks.
+    pub sim: &'a Group,
+    /// The same on MPI.
+    pub measured: &'a Group,
+}
+
+impl Projection<'_> {
+    /// How much longer the projection is, as a fraction; negative where it is shorter.
+    pub fn error(&self) -> f64 {
+        self.sim.time_s.value / self.measured.time_s.value - 1.0
+    }
+
+    /// The same for CPU times alone: how much longer the simulated ranks' critical path is than the one of
+    /// the real ranks' CPU times. Medians of both.
+    pub fn path_error(&self) -> f64 {
+        self.sim.path_s() / self.measured.path_s() - 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::line;
+    use crate::testing::run;
+
+    fn line_of(run: Run) -> Line {
+        line(What::Run(Box::new(run)))
+    }
+
+    fn free() -> Line {
+        line(What::Network(Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true }))
+    }
+
+    #[test]
+    fn repetitions_come_together_and_warm_ups_stay_out() {
+        let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
+        cold.warm_up = true;
+        let lines = [
+            free(),
+            line_of(cold),
+            line_of(run(Comm::Sim, 9, &[("a", &[1.0, 1.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[9.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[2.0, 2.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[7.0, 2.0])])),
+        ];
+        let groups = Groups::of(&lines);
+        assert_eq!(groups.all.len(), 2);
+        let two = &groups.all[0];
+        assert_eq!((two.time_s.value, two.time_s.count, two.how()), (2.0, 3, "projected"));
+        assert_eq!(two.typical.useful_s.sum, 4.0);
+        let reference = groups.reference(two);
+        assert_eq!(reference.setup.ranks, 1);
+        let e = two.efficiency(reference, &groups.network);
+        assert!((e.global() - 9.0 / 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn noise_in_one_repetition_changes_nothing() {
+        let quiet: &[(&str, &[f64])] = &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])];
+        let of = |disturbed: [&[(&str, &[f64])]; 3]| {
+            let mut lines = vec![free()];
+            lines.extend(disturbed.map(|useful| line_of(run(Comm::Sim, 9, useful))));
+            Groups::of(&lines).all.remove(0)
+        };
+        let clean = of([quiet; 3]);
+        // Every repetition is disturbed, each on another rank or in another phase.
+        let noisy = of([
+            &[("a", &[9.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])],
+            &[("a", &[1.0, 7.0, 3.0]), ("b", &[8.0, 2.0, 2.5])],
+            &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 6.0, 2.5])],
+        ]);
+        assert!(noisy.by_rank);
+        assert_eq!(noisy.typical.useful_s, clean.typical.useful_s);
+        assert_eq!(noisy.typical.useful_s.lambda(3), 5.5 * 3.0 / 12.5);
+        assert_eq!((noisy.time_s.value, noisy.path_s()), (5.5, 5.5));
+        // The repetitions' own critical paths are all longer; the bar says so, and reaches the point.
+        assert_eq!((noisy.time_s.low, noisy.time_s.high), (5.5, 15.0));
+    }
+
+    #[test]
+    fn records_without_ranks_by_phase_are_told_by_a_run() {
+        let mut brief = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
+        brief.phases[0].useful_s.by_rank.clear();
+        let lines =
+            [free(), line_of(brief.clone()), line_of(run(Comm::Sim, 9, &[("a", &[3.0, 2.0])]))];
+        let group = Groups::of(&lines).all.remove(0);
+        assert!(!group.by_rank && group.runs.contains(&group.typical));
+        assert!(group.ranks_told().starts_with("Run of median time"));
+    }
+
+    #[test]
+    fn message_matrices_are_taken_from_warm_ups() {
+        let mut warm = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
+        (warm.warm_up, warm.message_matrix) = (true, vec![[0, 1, 1, 8]]);
+        let groups = Groups::of(&[line_of(warm.clone()), line_of(warm)]);
+        assert_eq!((groups.all.len(), groups.matrices.len()), (0, 1));
+    }
+
+    #[test]
+    fn projections_are_held_against_the_same_mesh_on_as_many_ranks() {
+        let mut crowd = run(Comm::Mpi, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])]);
+        crowd.oversubscribed = true;
+        let lines = [
+            free(),
+            line_of(run(Comm::Sim, 9, &[("a", &[1.1, 1.0])])),
+            line_of(run(Comm::Mpi, 9, &[("a", &[1.0, 1.0])])),
+            line_of(run(Comm::Sim, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])])),
+            line_of(crowd),
+        ];
+        let groups = Groups::of(&lines);
+        let pairs = groups.projections();
+        assert_eq!(pairs.len(), 1);
+        assert!((pairs[0].error() - 0.1).abs() < 1e-9);
+        assert!((pairs[0].path_error() - 0.1).abs() < 1e-9);
+    }
+}

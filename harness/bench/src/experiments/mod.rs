@@ -1,0 +1,101 @@
+//! Measurements: how long, why, and how it scales.
+//!
+//! [`bench()`] runs the studies of a [`plan`] and appends every result to a [`record`] at once. What is said
+//! of them is computed from the record alone, by [`group`], [`pop`], [`cause`] and [`table`] here and by
+//! the crate `report`, so that it can be said again at any time, on any machine.
+//!
+//! Repetitions are the outer loop: what drifts on a machine drifts through all setups alike.
+
+pub mod cause;
+pub mod entry;
+pub mod execute;
+pub mod foreign;
+pub mod group;
+pub mod launcher;
+pub mod machine;
+pub mod network;
+pub mod plan;
+mod points;
+pub mod pop;
+pub mod record;
+pub mod session;
+pub mod sizing;
+pub mod stats;
+pub mod table;
+pub mod variant;
+
+use contract::catalogue;
+use entry::{Comm, Line, What};
+use plan::Study;
+use points::warmers;
+use run::engine::programs::Programs;
+use session::{Bench, BenchError, Options, Point};
+use std::path::PathBuf;
+use variant::Base;
+
+/// What a session gave.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Its lines in the record.
+    pub lines: Vec<Line>,
+    /// Number of failures among them.
+    pub failures: usize,
+}
+
+/// Measures. `say` is told what is being done.
+///
+/// # Errors
+/// Where the input is at fault, something is missing, or the user interrupts.
+pub fn bench(
+    options: &Options,
+    programs: &Programs,
+    say: &mut dyn FnMut(&str),
+) -> Result<Outcome, BenchError> {
+    let place = session::temporary_directory()?;
+    let mut bench = Bench::open(options, programs, place.path(), say)?;
+    if options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim) {
+        bench.measure_network()?;
+    }
+    for study in &options.studies {
+        bench.study(study)?;
+    }
+    let failures = bench.lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
+    Ok(Outcome { lines: bench.lines, failures })
+}
+
+impl Bench<'_> {
+    /// Runs an experiment.
+    fn study(&mut self, study: &Study) -> Result<(), BenchError> {
+        let base = self.base(&study.case)?;
+        (self.say)(&format!("{} scaling of {}: choosing spacings", study.experiment, base.name));
+        let mut points = self.points(study, &base)?;
+        self.warm_up(&mut points)?;
+        for repeat in 0..study.repeats {
+            for point in points.iter_mut().filter(|p| !p.failed) {
+                self.run(point, repeat, false)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The case by its name in the catalogue or its path, with its geometry written out.
+    fn base(&self, case: &str) -> Result<Base, BenchError> {
+        let path = match case.ends_with(".toml") {
+            true => PathBuf::from(case),
+            false => {
+                catalogue::named(case, &self.runner.programs.paths.catalogue)
+                    .map_err(BenchError::Input)?
+                    .path
+            }
+        };
+        Base::read(&path, self.runner.place).map_err(BenchError::Input)
+    }
+
+    /// Every mesh once, unrecorded in statistics: it brings files into memory.
+    fn warm_up(&mut self, points: &mut [Point]) -> Result<(), BenchError> {
+        for at in warmers(points) {
+            self.run(&mut points[at], 0, true)?;
+        }
+        Ok(())
+    }
+}

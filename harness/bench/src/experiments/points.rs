@@ -1,0 +1,179 @@
+//! What a study's runs are: meshes by spacing and n, divided in all the ways asked for.
+
+use super::execute::{self, Failed};
+use super::foreign;
+use super::plan::{Experiment, Layout, Study};
+use super::session::{Bench, BenchError, Point};
+use super::sizing::Sizes;
+use super::variant::Base;
+use crate::experiments::entry::{Comm, Setup};
+use contract::case::Case;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+impl Bench<'_> {
+    /// The runs of a study.
+    pub(crate) fn points(&mut self, study: &Study, base: &Base) -> Result<Vec<Point>, BenchError> {
+        let mut sizes: BTreeMap<u32, Sizes> = BTreeMap::new();
+        let own = [base.layer_cells_min];
+        let layers = if study.layers.is_empty() { &own[..] } else { &study.layers };
+        let mut points = Vec::new();
+        for &n in layers {
+            for layout in &study.layouts {
+                for spacing in self.spacings(study, base, layout, &mut sizes)? {
+                    let case = base.variant(spacing, n).map_err(BenchError::Input)?;
+                    if let Some(why) = self.declined(&case)? {
+                        (self.say)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
+                        continue;
+                    }
+                    for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
+                        points.push(Point {
+                            setup: self.setup(
+                                study,
+                                base,
+                                layout,
+                                spacing,
+                                n,
+                                [weights, partitioner],
+                            ),
+                            case: case.clone(),
+                            failed: false,
+                        });
+                    }
+                }
+            }
+        }
+        Ok(points)
+    }
+
+    /// Why the engine is not run on a case, by its description.
+    fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
+        let own = foreign::OWN.contains(&self.options.engine.as_str());
+        let Some(engine) = self.runner.programs.engine.as_ref().filter(|_| !own) else {
+            return Ok(None);
+        };
+        let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
+        Ok(engine.description().declines(&case))
+    }
+
+    fn setup(
+        &self,
+        study: &Study,
+        base: &Base,
+        layout: &Layout,
+        spacing_min: f64,
+        layer_cells_min: u32,
+        [weights, partitioner]: [&str; 2],
+    ) -> Setup {
+        Setup {
+            experiment: study.experiment.to_string(),
+            engine: self.options.engine.clone(),
+            case: base.name.clone(),
+            spacing_min,
+            layer_cells_min,
+            ranks: layout.ranks,
+            comm: layout.comm,
+            partitioner: partitioner.to_owned(),
+            weights: weights.to_owned(),
+        }
+    }
+
+    /// The spacings of a study's meshes for a number of ranks.
+    fn spacings(
+        &mut self,
+        study: &Study,
+        base: &Base,
+        layout: &Layout,
+        sizes: &mut BTreeMap<u32, Sizes>,
+    ) -> Result<Vec<f64>, BenchError> {
+        let Some(cells) = study.cells else { return Ok(vec![base.spacing_min]) };
+        let n = base.layer_cells_min;
+        let known = sizes.entry(n).or_default();
+        let wanted = match study.experiment {
+            Experiment::Weak => cells as f64 * layout.ranks as f64,
+            _ => cells as f64,
+        };
+        let coarse = base.coarse();
+        let finest = known.spacing(wanted, coarse, |spacing| self.count(base, spacing, n))?;
+        Ok(match study.experiment {
+            Experiment::Spacing => {
+                // Coarser by factors of two, while there are enough cells to measure.
+                let halvings = (wanted / 1e5).log(4.0).max(0.0) as i32;
+                (0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect()
+            }
+            _ => vec![finest],
+        })
+    }
+
+    /// Cells of a mesh, made on one rank.
+    pub(crate) fn count(&self, base: &Base, spacing: f64, n: u32) -> Result<u64, BenchError> {
+        let case = base.variant(spacing, n).map_err(BenchError::Input)?;
+        let setup = Setup {
+            experiment: String::new(),
+            engine: "mesher".to_owned(),
+            case: base.name.clone(),
+            spacing_min: spacing,
+            layer_cells_min: n,
+            ranks: 1,
+            comm: Comm::Solo,
+            partitioner: String::new(),
+            weights: String::new(),
+        };
+        match self.runner.run(&setup, &case, 0, true) {
+            Ok(run) => Ok(run.cells),
+            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
+            Err(Failed::Because(why)) => Err(BenchError::Input(format!("{}: {why}", base.name))),
+        }
+    }
+}
+
+/// The setup of every mesh that warms it up: the one whose message matrix is wanted, on most ranks where
+/// there are several; else the first.
+pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
+    let worth = |point: &Point| match execute::tells_matrix(&point.setup) {
+        true => point.setup.ranks,
+        false => 0,
+    };
+    let mut best: Vec<usize> = Vec::new();
+    for (at, point) in points.iter().enumerate() {
+        match best.iter_mut().find(|b| points[**b].case == point.case) {
+            Some(before) if worth(point) > worth(&points[*before]) => *before = at,
+            Some(_) => {}
+            None => best.push(at),
+        }
+    }
+    best
+}
+
+/// Each with each, but for rebalancing by METIS, which does not do that: it would be `area` once more.
+fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<(&'a str, &'a str)> {
+    let all =
+        weights.iter().flat_map(|w| partitioners.iter().map(move |p| (w.as_str(), p.as_str())));
+    all.filter(|pair| partitioners.len() == 1 || *pair != ("rebalance", "metis")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(comm: Comm, ranks: usize, case: &str) -> Point {
+        let setup = crate::testing::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
+        Point { setup, case: case.into(), failed: false }
+    }
+
+    #[test]
+    fn meshes_are_warmed_up_once_where_messages_can_be_told() {
+        let points = [
+            point(Comm::Sim, 1, "a"),
+            point(Comm::Sim, 64, "a"),
+            point(Comm::Sim, 16, "a"),
+            point(Comm::Sim, 1024, "a"),
+            point(Comm::Mpi, 2, "b"),
+            point(Comm::Mpi, 4, "b"),
+        ];
+        assert_eq!(warmers(&points), [1, 4]);
+        let mut weak = points;
+        weak.iter_mut().for_each(|p| p.setup.experiment = "weak".into());
+        assert_eq!(warmers(&weak), [0, 4]);
+    }
+}

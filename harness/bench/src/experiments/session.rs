@@ -1,0 +1,192 @@
+//! A session of measurements under way: runs, checks that equal meshes have equal digests, and appends to the record.
+
+use super::entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
+use super::execute::{Failed, Runner};
+use super::launcher::Launcher;
+use super::plan::Study;
+use super::record::Record;
+use super::{machine, network, table};
+use run::engine::programs::Programs;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What is asked for.
+#[derive(Debug)]
+pub struct Options {
+    /// The studies, in order.
+    pub studies: Vec<Study>,
+    /// `mesher`, `reference`, or what the record calls the engine of `Programs`.
+    pub engine: String,
+    /// How ranks are started.
+    pub launcher: Launcher,
+    /// Latency and bandwidth; measured if not given and the launcher is there.
+    pub network: Option<Network>,
+    /// The record.
+    pub record: PathBuf,
+    /// Time limit of a run.
+    pub limit: Duration,
+    /// The harness's command line, for the record.
+    pub command: Vec<String>,
+}
+
+/// Why measuring ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The user's input.
+    #[error("{0}")]
+    Input(String),
+    /// Something is missing that was asked for.
+    #[error("{0}")]
+    Missing(String),
+    /// Ctrl-C; what was measured is in the record.
+    #[error("interrupted: what was measured so far is in the record")]
+    Interrupted,
+}
+
+/// A run to be repeated.
+pub(crate) struct Point {
+    pub setup: Setup,
+    pub case: PathBuf,
+    pub failed: bool,
+}
+
+/// A directory for the files of runs.
+pub(crate) fn temporary_directory() -> Result<tempfile::TempDir, BenchError> {
+    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
+    place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))
+}
+
+/// What a mesh depends on, as text; its digest must depend on nothing else.
+type Mesh = (String, String, u32);
+
+/// A session under way.
+pub(crate) struct Bench<'a> {
+    pub(crate) options: &'a Options,
+    pub(crate) runner: Runner<'a>,
+    pub(crate) record: Record,
+    pub(crate) say: &'a mut dyn FnMut(&str),
+    pub(crate) lines: Vec<Line>,
+    digests: HashMap<Mesh, String>,
+}
+
+impl<'a> Bench<'a> {
+    /// Opens the record and begins a session; runs leave their files in `place`.
+    pub(crate) fn open(
+        options: &'a Options,
+        programs: &'a Programs,
+        place: &'a Path,
+        say: &'a mut dyn FnMut(&str),
+    ) -> Result<Self, BenchError> {
+        let record = Record::open(&options.record)
+            .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
+        let (launcher, limit) = (&options.launcher, options.limit);
+        let runner = Runner { programs, launcher, limit, place };
+        let (lines, digests) = (Vec::new(), HashMap::new());
+        let mut bench = Self { options, runner, record, say, lines, digests };
+        bench.begin()?;
+        Ok(bench)
+    }
+}
+
+impl Bench<'_> {
+    pub(crate) fn append(&mut self, what: What) -> Result<(), BenchError> {
+        let line = self.record.append(what).map_err(|error| {
+            BenchError::Input(format!("{}: {error}", self.record.path().display()))
+        })?;
+        self.lines.push(line);
+        Ok(())
+    }
+
+    fn begin(&mut self) -> Result<(), BenchError> {
+        let catalogue = &self.runner.programs.paths.catalogue;
+        let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        let session = Session {
+            command: self.options.command.clone(),
+            machine: machine::describe(&self.options.launcher.program(), repository),
+            load_average: machine::load_average(),
+        };
+        self.append(What::Session(Box::new(session)))
+    }
+
+    pub(crate) fn measure_network(&mut self) -> Result<(), BenchError> {
+        let network = match self.options.network {
+            Some(given) => given,
+            None => match self.runner.ping_pong().and_then(|text| network::parse(&text)) {
+                Ok(measured) => measured,
+                Err(why) => {
+                    (self.say)(&format!("messages are assumed to cost 2 us and 10 GB/s: {why}"));
+                    network::ASSUMED
+                }
+            },
+        };
+        self.append(What::Network(network))
+    }
+
+    pub(crate) fn run(
+        &mut self,
+        point: &mut Point,
+        repeat: usize,
+        warm_up: bool,
+    ) -> Result<(), BenchError> {
+        let s = &point.setup;
+        (self.say)(&format!(
+            "{} {}: {} {} ranks, spacing {:.3e}, n {}{}",
+            s.experiment,
+            s.case,
+            match s.comm {
+                Comm::Sim => "simulated",
+                Comm::Mpi => "MPI",
+                Comm::Solo => "serial",
+            },
+            s.ranks,
+            s.spacing_min,
+            s.layer_cells_min,
+            if warm_up {
+                ", warm-up".to_owned()
+            } else {
+                format!(", {}, repeat {}", table::division(s), repeat + 1)
+            }
+        ));
+        let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
+            Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
+            Err(Failed::Because(why)) => why,
+            Ok(run) => match self.same_mesh(&run) {
+                Ok(()) => return self.append(What::Run(Box::new(run))),
+                Err(why) => why,
+            },
+        };
+        self.failed(point, why)
+    }
+
+    fn failed(&mut self, point: &mut Point, why: String) -> Result<(), BenchError> {
+        (self.say)(&format!("failed: {why}"));
+        point.failed = true;
+        let command = format!("{} on {} ranks", self.options.engine, point.setup.ranks);
+        self.append(What::Failure(Failure { setup: point.setup.clone(), command, why }))
+    }
+
+    /// Has a mesh written beside the record and audited.
+    pub(crate) fn audit(&mut self, point: &mut Point) -> Result<(), BenchError> {
+        let s = &point.setup;
+        (self.say)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
+        let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
+        let disk = disk.unwrap_or(Path::new("."));
+        match self.runner.audit(s, &point.case, disk) {
+            Ok(audited) => self.append(What::Audit(audited)),
+            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
+            Err(Failed::Because(why)) => self.failed(point, why),
+        }
+    }
+
+    /// The time of a wrong mesh is no result: all runs of a mesh have one digest.
+    fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
+        let s = &run.setup;
+        let mesh = (s.case.clone(), format!("{:e}", s.spacing_min), s.layer_cells_min);
+        let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
+        if *first == run.digest {
+            return Ok(());
+        }
+        Err(format!("its mesh has the digest {}, where another run of it had {first}", run.digest))
+    }
+}

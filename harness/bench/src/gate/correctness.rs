@@ -1,0 +1,58 @@
+//! The candidate's meshes are right: what `harness verify` says of the gate's cases.
+
+use super::report::{Finding, Layer, LayerName, Verdict};
+use super::{Bench, GateError};
+use run::verify::options::Options;
+use run::verify::report::{CaseReport, Outcome};
+use run::verify::{VerifyError, verify};
+
+/// Verifies the candidate serially on the cases of this layer: reference, and every check of the leaves.
+/// Ranks, oracles and p4est are `harness verify`'s own affair.
+///
+/// # Errors
+/// Where verification could not begin.
+pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
+    let mut layer = Layer::new(LayerName::Correctness);
+    let mut cases = Vec::new();
+    for case in bench.cases_of(LayerName::Correctness) {
+        match &case.path {
+            Ok(path) => cases.push(path.to_string_lossy().into_owned()),
+            Err(why) => layer.findings.push(Finding::told(
+                &case.rule.name,
+                "checks",
+                Verdict::Inconclusive,
+                why,
+            )),
+        }
+    }
+    if cases.is_empty() {
+        return Ok(layer);
+    }
+    let mut programs = bench.programs.clone();
+    programs.paths.mesher = bench.candidate.program().to_owned();
+    programs.engine = Some(bench.candidate.clone());
+    let options = Options { limit: bench.options.limit, ..Options::of_leaves_alone(cases) };
+    let report = verify(&options, &programs).map_err(|error| match error {
+        VerifyError::Input(why) => GateError::Input(why),
+        VerifyError::Missing(why) => GateError::Missing(why),
+    })?;
+    layer.findings.extend(report.cases.iter().map(finding));
+    Ok(layer)
+}
+
+fn finding(case: &CaseReport) -> Finding {
+    let tally = case.tally();
+    let failure = case.checks.iter().find_map(|check| match &check.outcome {
+        Outcome::Fail(why) => {
+            let first = why.lines().next().unwrap_or_default();
+            Some(format!("{}: {}: {first}", check.subject, check.name))
+        }
+        _ => None,
+    });
+    let failure = failure.or(case.input_error.clone());
+    let (verdict, note) = match failure {
+        Some(why) => (Verdict::Regression, format!("{} checks fail, the first: {why}", tally.fail)),
+        None => (Verdict::Unchanged, format!("{} checks hold", tally.pass)),
+    };
+    Finding::told(&case.name, "checks", verdict, note)
+}

@@ -1,0 +1,199 @@
+//! Numbers that repeat exactly: what the program counts, and the mesh's digest, serially and on simulated ranks.
+
+use super::measures::{CaseMeasures, Measures};
+use super::report::{Finding, Layer, LayerName, Verdict};
+use super::rules::{Selected, Tolerance};
+use super::subject::Baseline;
+use super::{Bench, left_out};
+use run::engine::interrupt;
+use run::engine::runner::{Engine, NoResult, Ranks};
+
+/// A schedule like any other: counters may not depend on it, and the same one is used for both.
+const SEED: u64 = 1;
+
+/// Counts on both sides and compares.
+pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Layer {
+    let mut layer = Layer::new(LayerName::Counters);
+    for case in bench.cases_of(LayerName::Counters) {
+        if interrupt::requested() {
+            break;
+        }
+        let name = &case.rule.name;
+        if let Err(why) = &case.path {
+            layer.findings.push(Finding::told(name, "runs", Verdict::Inconclusive, why));
+            continue;
+        }
+        let findings = match count(bench, &bench.candidate, case) {
+            Ok(candidate) => {
+                let entry = measures.case(name);
+                entry.digest.clone_from(&candidate.digest);
+                entry.exact.clone_from(&candidate.exact);
+                against(bench, baseline, case, &candidate)
+            }
+            Err(NoResult::Missing(why)) => return left_out(LayerName::Counters, why),
+            Err(why) => vec![Finding::told(name, "runs", Verdict::Regression, why.to_string())],
+        };
+        layer.findings.extend(findings);
+        let engine = bench.candidate.description();
+        if !case.rule.ranks.is_empty() && engine.run.simulated.is_none() {
+            let why = format!("{} does not say how it is run on simulated ranks", engine.name);
+            layer.findings.push(Finding::told(name, "ranks", Verdict::Inconclusive, why));
+        }
+    }
+    layer
+}
+
+fn against(
+    bench: &Bench,
+    baseline: &Baseline,
+    case: &Selected,
+    candidate: &CaseMeasures,
+) -> Vec<Finding> {
+    let name = &case.rule.name;
+    let inconclusive =
+        |why: String| vec![Finding::told(name, "baseline", Verdict::Inconclusive, why)];
+    let counted;
+    let old = match baseline {
+        Baseline::None => return Vec::new(),
+        Baseline::Record(_, record) => match record.cases.get(name) {
+            Some(old) => old,
+            None => return inconclusive("the record does not have this case".into()),
+        },
+        Baseline::Program(subject) => match count(bench, &subject.engine, case) {
+            Ok(old) => {
+                counted = old;
+                &counted
+            }
+            Err(why) => return inconclusive(format!("the baseline has no result: {why}")),
+        },
+    };
+    compare(case, old, candidate, &bench.rules.tolerance)
+}
+
+/// Counts of one program on one case. Digests of all rank counts must be the same.
+fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures, NoResult> {
+    let path = case.path.clone().map_err(NoResult::Failed)?;
+    let place = bench.enter("counters").map_err(NoResult::Failed)?;
+    let path = engine.prepare(&path, &place.join("case")).map_err(NoResult::Failed)?;
+    let simulated = case.rule.ranks.iter().map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
+    let mut measures = CaseMeasures::default();
+    for ranks in std::iter::once(Ranks::Serial).chain(simulated) {
+        let place = bench.enter("counters/run").map_err(NoResult::Failed)?;
+        let told = match engine.run(&path, ranks, &place, false) {
+            Ok((told, _)) => told,
+            // An engine without simulated ranks still has a serial run to be counted.
+            Err(NoResult::Missing(_)) if ranks != Ranks::Serial => continue,
+            Err(why) => return Err(why),
+        };
+        let prefix = match ranks {
+            Ranks::Serial => String::new(),
+            Ranks::Simulated { ranks, .. } | Ranks::Mpi(ranks) => format!("{ranks} ranks/"),
+        };
+        if *measures.digest.get_or_insert(told.digest.clone()) != told.digest {
+            let why = format!("{ranks}: digest {}, serially it is another", told.digest);
+            return Err(NoResult::Failed(why));
+        }
+        if ranks == Ranks::Serial {
+            measures.exact.insert("cells".into(), told.cells);
+        }
+        measures
+            .exact
+            .extend(told.counters.into_iter().map(|(name, n)| (format!("{prefix}{name}"), n)));
+    }
+    Ok(measures)
+}
+
+/// Every counter that either side has. A digest or a number of cells that changes is another mesh: that is
+/// shown, and whether it is right is for the layer of correctness.
+fn compare(
+    case: &Selected,
+    old: &CaseMeasures,
+    new: &CaseMeasures,
+    tolerance: &Tolerance,
+) -> Vec<Finding> {
+    let name = &case.rule.name;
+    let mut findings = Vec::new();
+    let told = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
+    let (verdict, note) = match old.digest == new.digest {
+        true => (Verdict::Unchanged, told(&new.digest)),
+        false => (
+            Verdict::Changed,
+            format!("another mesh: {} was {}", told(&new.digest), told(&old.digest)),
+        ),
+    };
+    findings.push(Finding::told(name, "digest", verdict, note));
+    let mut names: Vec<&String> = old.exact.keys().chain(new.exact.keys()).collect();
+    names.sort();
+    names.dedup();
+    for metric in names {
+        let finding = match (old.exact.get(metric), new.exact.get(metric)) {
+            (Some(&old), Some(&new)) => {
+                let found = Finding::exact(
+                    name,
+                    metric,
+                    old,
+                    new,
+                    tolerance.of_metric(&case.rule, metric, tolerance.counters),
+                );
+                match metric == "cells" || metric.ends_with("leaves") {
+                    true => not_work(found),
+                    false => found,
+                }
+            }
+            (None, Some(new)) => {
+                Finding::told(name, metric, Verdict::Changed, format!("new, {new}"))
+            }
+            (Some(old), _) => {
+                Finding::told(name, metric, Verdict::Changed, format!("gone, was {old}"))
+            }
+            (None, None) => continue,
+        };
+        findings.push(finding);
+    }
+    findings
+}
+
+/// The size of the mesh is a result: more or less of it is neither better nor worse.
+fn not_work(finding: Finding) -> Finding {
+    match finding.verdict {
+        Verdict::Unchanged => finding,
+        _ => Finding { verdict: Verdict::Changed, note: "another mesh".into(), ..finding },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gate::rules::CaseRule;
+
+    fn measures(digest: &str, exact: &[(&str, u64)]) -> CaseMeasures {
+        let exact = exact.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect();
+        CaseMeasures { digest: Some(digest.into()), exact, ..CaseMeasures::default() }
+    }
+
+    #[test]
+    fn every_change_is_shown_and_growth_alone_fails() {
+        let text = "name = 'c'\nlayers = []\ntolerance = { messages = 10.0 }";
+        let rule: CaseRule = toml::from_str(text).unwrap();
+        let case = Selected { rule, path: Ok("c.toml".into()) };
+        let old =
+            measures("aa", &[("cells", 8), ("rays", 6), ("4 ranks/messages", 10), ("words", 5)]);
+        let new =
+            measures("bb", &[("cells", 9), ("rays", 5), ("4 ranks/messages", 11), ("hops", 1)]);
+        let verdicts: Vec<(String, Verdict)> = compare(&case, &old, &new, &Tolerance::default())
+            .into_iter()
+            .map(|finding| (finding.metric, finding.verdict))
+            .collect();
+        let expected = [
+            ("digest", Verdict::Changed),
+            ("4 ranks/messages", Verdict::Changed),
+            ("cells", Verdict::Changed),
+            ("hops", Verdict::Changed),
+            ("rays", Verdict::Improvement),
+            ("words", Verdict::Changed),
+        ];
+        assert_eq!(verdicts, expected.map(|(name, verdict)| (name.to_owned(), verdict)));
+        let grown = compare(&case, &old, &measures("aa", &[("rays", 7)]), &Tolerance::default());
+        assert!(grown.iter().any(|f| f.metric == "rays" && f.verdict == Verdict::Regression));
+    }
+}

@@ -1,0 +1,131 @@
+//! Instructions and allocations of a serial run, counted by valgrind: they do not know what else the machine is
+//! doing, so a few percent of difference are a fact and not a guess.
+
+use super::callgrind::Profile;
+use super::measures::{CaseMeasures, Measures};
+use super::report::{Finding, Layer, LayerName, Verdict};
+use super::rules::Selected;
+use super::subject::Baseline;
+use super::{Bench, left_out};
+use run::engine::interrupt;
+use run::engine::paths::on_path;
+use run::engine::process::{self, End, Watch};
+use run::engine::runner::{Engine, Ranks, Wanted};
+use std::process::Command;
+
+const VALGRIND: &str = "valgrind";
+
+/// Functions named where instructions grew.
+const FUNCTIONS_TOLD: usize = 3;
+
+/// Counts on both sides and compares.
+pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Layer {
+    if on_path(VALGRIND).is_none() {
+        return left_out(LayerName::Instructions, "there is no valgrind on the PATH");
+    }
+    let mut layer = Layer::new(LayerName::Instructions);
+    for case in bench.cases_of(LayerName::Instructions) {
+        if interrupt::requested() {
+            break;
+        }
+        let name = &case.rule.name;
+        let told = |verdict, why: String| vec![Finding::told(name, "instructions", verdict, why)];
+        layer.findings.extend(match count(bench, &bench.candidate, case) {
+            Ok(new) => {
+                measures.case(name).counted = numbers(&new).into();
+                match baseline {
+                    Baseline::None => Vec::new(),
+                    Baseline::Record(_, record) => match record.cases.get(name) {
+                        Some(old) if !old.counted.is_empty() => {
+                            against_record(bench, case, old, &new)
+                        }
+                        _ => told(Verdict::Inconclusive, "the record does not have them".into()),
+                    },
+                    Baseline::Program(subject) => match count(bench, &subject.engine, case) {
+                        Ok(old) => against_program(bench, case, &old, &new),
+                        Err(why) => {
+                            told(Verdict::Inconclusive, format!("the baseline has none: {why}"))
+                        }
+                    },
+                }
+            }
+            Err(why) => told(Verdict::Inconclusive, why),
+        });
+    }
+    layer
+}
+
+fn numbers(profile: &Profile) -> [(String, u64); 2] {
+    [("instructions".into(), profile.instructions), ("allocations".into(), profile.allocations())]
+}
+
+fn against_record(
+    bench: &Bench,
+    case: &Selected,
+    old: &CaseMeasures,
+    new: &Profile,
+) -> Vec<Finding> {
+    let numbers = numbers(new);
+    let both =
+        numbers.iter().filter_map(|(metric, new)| Some((metric, *old.counted.get(metric)?, *new)));
+    both.map(|(metric, old, new)| held(bench, case, metric, old, new)).collect()
+}
+
+fn against_program(bench: &Bench, case: &Selected, old: &Profile, new: &Profile) -> Vec<Finding> {
+    let both = numbers(old).into_iter().zip(numbers(new));
+    let mut findings: Vec<Finding> =
+        both.map(|((metric, old), (_, new))| held(bench, case, &metric, old, new)).collect();
+    if matches!(findings[0].verdict, Verdict::Regression | Verdict::Improvement) {
+        let grown = new.grown_since(old).into_iter().take(FUNCTIONS_TOLD);
+        let told: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
+        let note = &mut findings[0].note;
+        note.push_str(&format!(
+            "{}most: {}",
+            if note.is_empty() { "" } else { "; " },
+            told.join(", ")
+        ));
+    }
+    findings
+}
+
+/// Within the tolerance either way is unchanged: hash seeds and addresses make a few instructions of difference.
+fn held(bench: &Bench, case: &Selected, metric: &str, old: u64, new: u64) -> Finding {
+    let rules = &bench.rules.tolerance;
+    let tolerance = rules.of_metric(&case.rule, metric, rules.instructions);
+    let found = Finding::exact(&case.rule.name, metric, old, new, tolerance);
+    match found.change_percent {
+        Some(change) if change.abs() <= tolerance => {
+            Finding { verdict: Verdict::Unchanged, note: String::new(), ..found }
+        }
+        _ => found,
+    }
+}
+
+fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Profile, String> {
+    let path = case.path.clone()?;
+    let place = bench.enter("instructions")?;
+    let path = engine.prepare(&path, &place.join("case"))?;
+    let mesh = place.join("mesh");
+    // Writing is the system's work; without it the count is the mesher's own.
+    let out = engine.description().run.json.is_none().then_some(mesh.as_path());
+    let wanted = Wanted { out, ..Wanted::default() };
+    let plain = engine.command(&path, Ranks::Serial, &wanted).map_err(|why| why.to_string())?;
+    let file = place.join("callgrind.out");
+    let mut command = Command::new(VALGRIND);
+    command.args(["--tool=callgrind", "--compress-pos=no"]);
+    command.arg(format!("--callgrind-out-file={}", file.display()));
+    command.arg(plain.get_program()).args(plain.get_args());
+    command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    let watch = Watch { limit: bench.options.limit, logs: &place, name: "valgrind", status: None };
+    let done = process::run(&mut command, &watch).map_err(|error| format!("valgrind: {error}"))?;
+    match done.end {
+        End::Exited(0) => {}
+        End::TimedOut => {
+            return Err(format!("valgrind did not end within {} s", watch.limit.as_secs()));
+        }
+        _ => return Err(format!("under valgrind: {}", done.last_error_line())),
+    }
+    let text =
+        std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    Profile::parse(&text)
+}

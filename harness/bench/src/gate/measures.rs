@@ -1,0 +1,92 @@
+//! What is exact about one program: counters, digests, instructions. A record of it is a baseline that
+//! needs no build, and a point in the history that `harness track` keeps.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Version of the JSON form.
+pub const SCHEMA: &str = "octree-measures/1";
+
+/// What was measured of one program.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// The program.
+    pub of: Measured,
+    /// By case.
+    pub cases: BTreeMap<String, CaseMeasures>,
+}
+
+/// A program that was measured or compared.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// As the user named it.
+    pub named: String,
+    /// The revision it was built from.
+    pub revision: Option<String>,
+}
+
+impl fmt::Display for Measured {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match &self.revision {
+            Some(revision) if !revision.starts_with(&self.named) => {
+                write!(f, "{} ({})", self.named, &revision[..12.min(revision.len())])
+            }
+            _ => f.write_str(&self.named),
+        }
+    }
+}
+
+/// What was measured of one case.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CaseMeasures {
+    /// The mesh's digest.
+    pub digest: Option<String>,
+    /// Numbers that repeat exactly, by name.
+    pub exact: BTreeMap<String, u64>,
+    /// Numbers from valgrind; they repeat but for hash seeds and addresses.
+    pub counted: BTreeMap<String, u64>,
+}
+
+impl Measures {
+    /// Nothing measured yet.
+    pub fn of_program(of: Measured) -> Self {
+        Self { schema: SCHEMA.to_owned(), of, cases: BTreeMap::new() }
+    }
+
+    /// The place for a case's numbers.
+    pub fn case(&mut self, name: &str) -> &mut CaseMeasures {
+        self.cases.entry(name.to_owned()).or_default()
+    }
+
+    /// Reads a record, or the record in a gate's report.
+    ///
+    /// # Errors
+    /// In a sentence, where it is neither.
+    pub fn parse(text: &[u8]) -> Result<Self, String> {
+        #[derive(Deserialize)]
+        struct Report {
+            candidate_measures: Measures,
+        }
+        let measures: Self = match serde_json::from_slice::<Report>(text) {
+            Ok(report) => report.candidate_measures,
+            Err(_) => serde_json::from_slice(text)
+                .map_err(|error| format!("not a record of `harness gate`: {error}"))?,
+        };
+        match measures.schema == SCHEMA {
+            true => Ok(measures),
+            false => Err(format!("schema {:?}, not {SCHEMA:?}", measures.schema)),
+        }
+    }
+
+    /// As JSON.
+    pub fn json(&self) -> String {
+        // Strings and whole numbers only.
+        let mut text =
+            serde_json::to_string_pretty(self).expect("measures are representable in JSON");
+        text.push('\n');
+        text
+    }
+}

@@ -1,0 +1,158 @@
+//! `harness gate`: is the candidate as good as the baseline? Four layers, each reported apart, from what
+//! never lies to what always wavers: correctness, counters, instructions, time.
+//!
+//! [`rules`] is what is run and tolerated; [`subject`] the two programs, built if need be; [`measures`]
+//! what is exact about one; [`counters`], [`instructions`] and [`time`] compare; [`stats`] decides about times;
+//! [`report`] is what was found.
+//!
+//! Invariant: no verdict is drawn from seconds of another run.
+
+pub mod callgrind;
+pub mod correctness;
+pub mod counters;
+pub mod instructions;
+pub mod measures;
+pub mod report;
+pub mod rules;
+pub mod stats;
+pub mod subject;
+pub mod time;
+
+use measures::Measures;
+use report::{Layer, LayerName, Report};
+use rules::{Rules, Selected};
+use run::engine::description::Description;
+use run::engine::interrupt;
+use run::engine::programs::Programs;
+use run::engine::runner::Engine;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use subject::{Baseline, Subject};
+
+/// What was asked of a gate.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// A revision, a program or a record; none if the candidate is only to be recorded.
+    pub baseline: Option<String>,
+    /// A revision, a program, or `.` for the working tree.
+    pub candidate: Option<String>,
+    /// Name or path of an engine description.
+    pub engine: String,
+    /// The rules' file.
+    pub rules: Option<PathBuf>,
+    /// Only these cases of the rules.
+    pub cases: Vec<String>,
+    /// Only these layers.
+    pub layers: Vec<LayerName>,
+    /// Chooses the order of runs and the draws of the tests.
+    pub seed: u64,
+    /// Time limit of every single run.
+    pub limit: Duration,
+    /// Seconds for timing one case, instead of the rules'.
+    pub budget_s: Option<f64>,
+    /// Where revisions are built and kept.
+    pub cache: PathBuf,
+}
+
+/// Why a gate could not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum GateError {
+    /// The user's.
+    #[error("{0}")]
+    Input(String),
+    /// Something without which nothing can be compared.
+    #[error("{0}")]
+    Missing(String),
+}
+
+/// Everything that a layer needs.
+#[derive(Debug)]
+pub struct Bench<'a> {
+    /// What was asked.
+    pub options: &'a Options,
+    /// What is run and tolerated.
+    pub rules: &'a Rules,
+    /// The cases, found.
+    pub cases: Vec<Selected>,
+    /// The programs.
+    pub programs: &'a Programs,
+    /// The candidate.
+    pub candidate: Engine,
+    /// A place for runs.
+    pub place: &'a std::path::Path,
+}
+
+/// Compares, and reports.
+///
+/// # Errors
+/// Only where it could not begin; what goes wrong later is in the report.
+pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError> {
+    let start = Instant::now();
+    let description =
+        Description::find(&options.engine, &programs.paths).map_err(GateError::Input)?;
+    let rules =
+        Rules::read(options.rules.as_deref().unwrap_or(&programs.paths.engines.join("gate.toml")))?;
+    let cases = rules.select(&options.cases, programs)?;
+    let engine = Engine::new(description, &programs.paths, options.limit);
+    let baseline = Baseline::find(options, &engine, programs)?;
+    let candidate = Subject::candidate(options, &engine, &baseline, programs)?;
+    let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();
+    let place =
+        place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
+    let bench = Bench {
+        options,
+        rules: &rules,
+        cases,
+        programs,
+        candidate: candidate.engine.clone(),
+        place: place.path(),
+    };
+    let mut report = Report::new(baseline.told(), candidate.told.clone());
+    report.candidate_measures = Measures::of_program(candidate.told);
+    run_layers(&bench, &baseline, &mut report)?;
+    report.interrupted = interrupt::requested();
+    report.time_s = start.elapsed().as_secs_f64();
+    Ok(report)
+}
+
+fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result<(), GateError> {
+    let asked = |name| bench.options.layers.is_empty() || bench.options.layers.contains(&name);
+    for name in LayerName::ALL.into_iter().filter(|&name| asked(name)) {
+        if interrupt::requested() {
+            break;
+        }
+        let start = Instant::now();
+        eprintln!("harness gate: {name}");
+        let mut layer = match name {
+            LayerName::Correctness => correctness::layer(bench)?,
+            LayerName::Counters => counters::layer(bench, baseline, &mut report.candidate_measures),
+            LayerName::Instructions => {
+                instructions::layer(bench, baseline, &mut report.candidate_measures)
+            }
+            LayerName::Time => time::layer(bench, baseline),
+        };
+        layer.time_s = start.elapsed().as_secs_f64();
+        report.layers.push(layer);
+    }
+    Ok(())
+}
+
+impl Bench<'_> {
+    /// The cases of a layer.
+    fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
+        self.cases.iter().filter(move |case| case.rule.layers.contains(&layer))
+    }
+
+    /// A directory for one run, named after what it is for.
+    fn enter(&self, name: &str) -> Result<PathBuf, String> {
+        let place = self.place.join(name);
+        let _ = std::fs::remove_dir_all(&place);
+        std::fs::create_dir_all(&place).map_err(|error| error.to_string())?;
+        Ok(place)
+    }
+}
+
+/// A layer without findings because it could not be run.
+pub(crate) fn left_out(name: LayerName, why: impl Into<String>) -> Layer {
+    Layer { left_out: Some(why.into()), ..Layer::new(name) }
+}

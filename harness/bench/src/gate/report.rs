@@ -1,0 +1,239 @@
+//! What a gate found: the one model that every output form prints.
+
+use super::measures::{Measured, Measures};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Version of the JSON form.
+pub const SCHEMA: &str = "octree-gate/1";
+
+/// The layers, in the order in which they are run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LayerName {
+    /// The candidate's meshes are right.
+    Correctness,
+    /// Numbers that repeat exactly.
+    Counters,
+    /// Instructions and allocations, counted by valgrind.
+    Instructions,
+    /// Seconds, of baseline and candidate in one run.
+    Time,
+}
+
+impl LayerName {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Correctness, Self::Counters, Self::Instructions, Self::Time];
+}
+
+impl fmt::Display for LayerName {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(match self {
+            Self::Correctness => "correctness",
+            Self::Counters => "counters",
+            Self::Instructions => "instructions",
+            Self::Time => "time",
+        })
+    }
+}
+
+/// What is to be thought of a finding, the best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Better than the baseline.
+    Improvement,
+    /// As the baseline.
+    Unchanged,
+    /// Other than the baseline, within what is tolerated.
+    Changed,
+    /// The measurement could not have seen what matters.
+    Inconclusive,
+    /// Worse than is tolerated, or wrong.
+    Regression,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(match self {
+            Self::Improvement => "improvement",
+            Self::Unchanged => "unchanged",
+            Self::Changed => "changed",
+            Self::Inconclusive => "inconclusive",
+            Self::Regression => "regression",
+        })
+    }
+}
+
+/// One metric of one case.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Finding {
+    /// The case.
+    pub case: String,
+    /// What was measured.
+    pub metric: String,
+    /// What is to be thought of it.
+    pub verdict: Verdict,
+    /// Of the baseline.
+    pub baseline: Option<f64>,
+    /// Of the candidate.
+    pub candidate: Option<f64>,
+    /// Candidate against baseline, in percent; positive is more.
+    pub change_percent: Option<f64>,
+    /// In words: why, and how sure.
+    pub note: String,
+}
+
+impl Finding {
+    /// A finding without numbers.
+    pub fn told(case: &str, metric: &str, verdict: Verdict, note: impl Into<String>) -> Self {
+        Self {
+            case: case.to_owned(),
+            metric: metric.to_owned(),
+            verdict,
+            baseline: None,
+            candidate: None,
+            change_percent: None,
+            note: note.into(),
+        }
+    }
+
+    /// A number that repeats exactly, held to a tolerance.
+    pub fn exact(case: &str, metric: &str, baseline: u64, candidate: u64, tolerance: f64) -> Self {
+        let change = match baseline {
+            0 if candidate == 0 => 0.0,
+            0 => f64::INFINITY,
+            _ => (candidate as f64 / baseline as f64 - 1.0) * 100.0,
+        };
+        let verdict = match candidate.cmp(&baseline) {
+            std::cmp::Ordering::Equal => Verdict::Unchanged,
+            std::cmp::Ordering::Less => Verdict::Improvement,
+            // Ten percent more than ten is, in binary, a little more than ten percent.
+            std::cmp::Ordering::Greater if change <= tolerance + 1e-9 => Verdict::Changed,
+            std::cmp::Ordering::Greater => Verdict::Regression,
+        };
+        let note = match verdict {
+            Verdict::Regression => format!("more than the {tolerance} % that are tolerated"),
+            Verdict::Changed => format!("within the {tolerance} % that are tolerated"),
+            _ => String::new(),
+        };
+        Self {
+            baseline: Some(baseline as f64),
+            candidate: Some(candidate as f64),
+            change_percent: Some(change).filter(|change| change.is_finite()),
+            ..Self::told(case, metric, verdict, note)
+        }
+    }
+}
+
+/// One layer.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Layer {
+    /// Which.
+    pub name: LayerName,
+    /// Why it was not run.
+    pub left_out: Option<String>,
+    /// What was found.
+    pub findings: Vec<Finding>,
+    /// Wall time, in seconds.
+    pub time_s: f64,
+}
+
+impl Layer {
+    /// Nothing found yet.
+    pub fn new(name: LayerName) -> Self {
+        Self { name, left_out: None, findings: Vec::new(), time_s: 0.0 }
+    }
+
+    /// The worst of its findings.
+    pub fn verdict(&self) -> Verdict {
+        let worst = self.findings.iter().map(|finding| finding.verdict).max();
+        worst.unwrap_or(Verdict::Unchanged)
+    }
+}
+
+/// The whole comparison.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Name and version of the harness.
+    pub program: String,
+    /// The baseline; none if the candidate was only recorded.
+    pub baseline: Option<Measured>,
+    /// The candidate.
+    pub candidate: Measured,
+    /// The layers that were asked for.
+    pub layers: Vec<Layer>,
+    /// What is exact about the candidate: a baseline for later.
+    pub candidate_measures: Measures,
+    /// The user ended it.
+    pub interrupted: bool,
+    /// Wall time, in seconds.
+    pub time_s: f64,
+}
+
+impl Report {
+    /// Nothing found yet.
+    pub fn new(baseline: Option<Measured>, candidate: Measured) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            program: format!("harness {}", env!("CARGO_PKG_VERSION")),
+            baseline,
+            candidate,
+            layers: Vec::new(),
+            candidate_measures: Measures::default(),
+            interrupted: false,
+            time_s: 0.0,
+        }
+    }
+
+    /// Whether nothing got worse.
+    pub fn holds(&self) -> bool {
+        self.layers.iter().all(|layer| layer.verdict() < Verdict::Regression)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn growth_beyond_the_tolerance_alone_is_a_regression() {
+        let verdict = |baseline, candidate, tolerance| {
+            Finding::exact("c", "m", baseline, candidate, tolerance).verdict
+        };
+        assert_eq!(verdict(100, 100, 0.0), Verdict::Unchanged);
+        assert_eq!(verdict(100, 101, 0.0), Verdict::Regression);
+        assert_eq!(verdict(100, 101, 1.5), Verdict::Changed);
+        assert_eq!(verdict(100, 99, 0.0), Verdict::Improvement);
+        assert_eq!(verdict(0, 0, 0.0), Verdict::Unchanged);
+        assert_eq!(verdict(0, 1, 50.0), Verdict::Regression);
+    }
+
+    #[test]
+    fn a_layer_is_as_bad_as_its_worst() {
+        let mut layer = Layer::new(LayerName::Time);
+        assert_eq!(layer.verdict(), Verdict::Unchanged);
+        for verdict in [Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed] {
+            layer.findings.push(Finding::told("c", "m", verdict, ""));
+        }
+        assert_eq!(layer.verdict(), Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_record_and_a_report_read_back() {
+        let mut measures = Measures::of_program(Measured { named: "m".into(), revision: None });
+        measures.case("cube").exact.insert("rays".into(), u64::MAX);
+        assert_eq!(Measures::parse(measures.json().as_bytes()).unwrap(), measures);
+        let report = Report {
+            candidate_measures: measures.clone(),
+            ..Report::new(None, Measured::default())
+        };
+        let text = serde_json::to_vec(&report).unwrap();
+        assert_eq!(Measures::parse(&text).unwrap(), measures);
+        assert!(Measures::parse(b"{\"cells\": 1}").is_err());
+        let other = measures.json().replace("measures/1", "measures/9");
+        assert!(Measures::parse(other.as_bytes()).unwrap_err().contains("measures/9"));
+    }
+}

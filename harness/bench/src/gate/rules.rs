@@ -1,0 +1,206 @@
+//! What a gate runs and what it tolerates: `engines/gate.toml`, or a user's own file of the same form.
+
+use super::GateError;
+use super::report::LayerName;
+use contract::catalogue;
+use run::engine::programs::Programs;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The file as it stands.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rules {
+    /// For every case.
+    #[serde(default)]
+    pub tolerance: Tolerance,
+    /// How times are compared.
+    #[serde(default)]
+    pub time: TimeRules,
+    /// The cases.
+    #[serde(default, rename = "case")]
+    pub cases: Vec<CaseRule>,
+    #[serde(skip)]
+    directory: PathBuf,
+}
+
+/// Growth that is let pass, in percent.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Tolerance {
+    /// Of any counter that has none of its own.
+    pub counters: f64,
+    /// Of instructions.
+    pub instructions: f64,
+    /// Of single metrics; a case's own come before these.
+    pub of: BTreeMap<String, f64>,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self { counters: 0.0, instructions: 1.0, of: BTreeMap::new() }
+    }
+}
+
+/// How times are compared.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TimeRules {
+    /// Rounds at least, however long a run takes.
+    pub rounds_min: usize,
+    /// Rounds at most.
+    pub rounds_max: usize,
+    /// Time for one case.
+    pub budget_s: f64,
+    /// Chance of a false alarm per case.
+    pub alpha: f64,
+    /// Smaller effects are no verdict; percent.
+    pub effect_min: f64,
+    /// "Unchanged" means that this would have been seen; percent.
+    pub effect_wanted: f64,
+}
+
+impl Default for TimeRules {
+    fn default() -> Self {
+        Self {
+            rounds_min: 15,
+            rounds_max: 60,
+            budget_s: 20.0,
+            alpha: 0.001,
+            effect_min: 3.0,
+            effect_wanted: 10.0,
+        }
+    }
+}
+
+/// One case's rules.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaseRule {
+    /// Name in the catalogue, or path of a case file.
+    pub name: String,
+    /// Layers that it is run for.
+    pub layers: Vec<LayerName>,
+    /// Simulated ranks on which counters are taken too.
+    #[serde(default)]
+    pub ranks: Vec<usize>,
+    /// Growth of single counters that is let pass, in percent; a counter's name as reported, or `instructions`.
+    #[serde(default)]
+    pub tolerance: BTreeMap<String, f64>,
+}
+
+/// A case, found.
+#[derive(Clone, Debug)]
+pub struct Selected {
+    /// Its rules.
+    pub rule: CaseRule,
+    /// Its file; or why there is none.
+    pub path: Result<PathBuf, String>,
+}
+
+impl Rules {
+    /// Reads a file of rules.
+    ///
+    /// # Errors
+    /// Where there is none or it is not what it should be.
+    pub fn read(path: &Path) -> Result<Self, GateError> {
+        let wrong = |why: String| GateError::Input(format!("{}: {why}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let mut rules: Self =
+            toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
+        rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
+        let time = &rules.time;
+        if time.rounds_min < super::stats::ROUNDS_LEAST || time.rounds_max < time.rounds_min {
+            let least = super::stats::ROUNDS_LEAST;
+            return Err(wrong(format!("rounds_min is at least {least}, rounds_max not below it")));
+        }
+        if !(time.alpha > 0.0 && time.alpha < 0.5 && time.effect_min >= 0.0) {
+            return Err(wrong("alpha is between 0 and 0.5, effect_min not below 0".into()));
+        }
+        Ok(rules)
+    }
+
+    /// The cases asked for; all if none is named.
+    ///
+    /// # Errors
+    /// Where a name is not among the rules' or the catalogue's.
+    pub fn select(
+        &self,
+        names: &[String],
+        programs: &Programs,
+    ) -> Result<Vec<Selected>, GateError> {
+        let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
+        if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+            let known = known.join(", ");
+            return Err(GateError::Input(format!(
+                "no case {name} in the gate's rules, which have {known}"
+            )));
+        }
+        let asked = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
+        self.cases.iter().filter(asked).map(|rule| self.find(rule, programs)).collect()
+    }
+
+    fn find(&self, rule: &CaseRule, programs: &Programs) -> Result<Selected, GateError> {
+        let path = match rule.name.ends_with(".toml") {
+            true => {
+                let path = self.directory.join(&rule.name);
+                std::fs::canonicalize(&path).map_err(|error| format!("{}: {error}", path.display()))
+            }
+            false => {
+                let found = catalogue::named(&rule.name, &programs.paths.catalogue)
+                    .map_err(GateError::Input)?;
+                found.absent.map_or(Ok(found.path), Err)
+            }
+        };
+        Ok(Selected { rule: rule.clone(), path })
+    }
+}
+
+impl Tolerance {
+    /// Growth of a case's metric that is let pass, in percent: the case's own, else that of the metric, else that of its kind.
+    pub fn of_metric(&self, case: &CaseRule, metric: &str, kind: f64) -> f64 {
+        // "4 ranks/messages" is also known as "messages".
+        let plain = metric.rsplit('/').next().unwrap_or(metric);
+        let tables = [&case.tolerance, &self.of];
+        let own =
+            tables.into_iter().find_map(|table| table.get(metric).or_else(|| table.get(plain)));
+        own.copied().unwrap_or(kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Rules, String> {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("gate.toml");
+        std::fs::write(&path, text).unwrap();
+        Rules::read(&path).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_rules_of_this_repository_are_rules() {
+        let text = include_str!("../../../engines/gate.toml");
+        let rules = read(text).unwrap();
+        assert!(LayerName::ALL.iter().all(|l| rules.cases.iter().any(|c| c.layers.contains(l))));
+    }
+
+    #[test]
+    fn a_case_s_own_tolerance_comes_first_then_the_metric_s() {
+        let text = "[tolerance.of]\nmessages = 9.0\nhalo = 8.0\n[[case]]\nname = 'a'\nlayers = ['counters']\n\
+                    tolerance = { messages = 5.0, '2 ranks/rays' = 1.0 }";
+        let rules = read(text).unwrap();
+        let of = |metric| rules.tolerance.of_metric(&rules.cases[0], metric, 0.5);
+        assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 0.5]);
+        assert_eq!(of("3 ranks/halo"), 8.0);
+    }
+
+    #[test]
+    fn rules_that_make_no_sense_are_refused() {
+        assert!(read("[time]\nrounds_min = 3").unwrap_err().contains("rounds_min"));
+        assert!(read("[time]\nalpha = 0.0").unwrap_err().contains("alpha"));
+        assert!(read("[[case]]\nname = 'a'\nlayers = ['luck']").unwrap_err().contains("luck"));
+    }
+}

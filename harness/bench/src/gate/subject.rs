@@ -1,0 +1,224 @@
+//! The two programs of a gate: given as files, or built from revisions and kept for the next time.
+//!
+//! A revision's files are unpacked from the repository's history into a directory of their own; the
+//! repository itself, its index and its working tree are not touched.
+
+use super::measures::{Measured, Measures};
+use super::{GateError, Options};
+use run::engine::description::{Build, Values, fill};
+use run::engine::process::{self, End, Watch};
+use run::engine::programs::Programs;
+use run::engine::runner::Engine;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// A build that takes longer hangs.
+const BUILD_LIMIT: Duration = Duration::from_secs(3600);
+
+/// A program under comparison.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// How it is run.
+    pub engine: Engine,
+    /// How it is told of.
+    pub told: Measured,
+}
+
+/// What the candidate is held against.
+#[derive(Clone, Debug)]
+pub enum Baseline {
+    /// A program: it can be run, so times can be compared.
+    Program(Box<Subject>),
+    /// What was recorded of one.
+    Record(Measured, Measures),
+    /// Nothing: the candidate is only recorded.
+    None,
+}
+
+impl Baseline {
+    /// Finds what the options name: a file, or else a revision.
+    ///
+    /// # Errors
+    /// Where it is neither, or does not build.
+    pub fn find(
+        options: &Options,
+        engine: &Engine,
+        programs: &Programs,
+    ) -> Result<Self, GateError> {
+        let Some(named) = &options.baseline else { return Ok(Self::None) };
+        let path = Path::new(named);
+        if path.is_file() {
+            let start =
+                fs::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
+            if start.first() == Some(&b'{') {
+                let measures = Measures::parse(&start)
+                    .map_err(|why| GateError::Input(format!("{named}: {why}")))?;
+                let told =
+                    Measured { named: named.clone(), revision: measures.of.revision.clone() };
+                return Ok(Self::Record(told, measures));
+            }
+        }
+        Ok(Self::Program(Box::new(Subject::find(named, options, engine, programs)?)))
+    }
+
+    /// How it is told of.
+    pub fn told(&self) -> Option<Measured> {
+        match self {
+            Self::Program(subject) => Some(subject.told.clone()),
+            Self::Record(told, _) => Some(told.clone()),
+            Self::None => None,
+        }
+    }
+}
+
+impl Subject {
+    /// The candidate: as named; else, against a revision, the working tree, built in the same way; else
+    /// the engine's own program.
+    ///
+    /// # Errors
+    /// Where it is not there or does not build.
+    pub fn candidate(
+        options: &Options,
+        engine: &Engine,
+        baseline: &Baseline,
+        programs: &Programs,
+    ) -> Result<Self, GateError> {
+        let built =
+            matches!(baseline, Baseline::Program(subject) if subject.told.revision.is_some());
+        let named = options.candidate.clone();
+        match named.or(built.then(|| ".".to_owned())) {
+            Some(named) => Self::find(&named, options, engine, programs),
+            None => {
+                let program = engine.program().to_owned();
+                if !program.is_file() {
+                    let program = program.display();
+                    return Err(GateError::Missing(format!(
+                        "there is no {program}: build it, or say where it is"
+                    )));
+                }
+                let revision = revision_of("HEAD", &programs.paths.root).ok();
+                let told = Measured { named: program.to_string_lossy().into_owned(), revision };
+                Ok(Self { engine: engine.clone(), told })
+            }
+        }
+    }
+
+    fn find(
+        named: &str,
+        options: &Options,
+        engine: &Engine,
+        programs: &Programs,
+    ) -> Result<Self, GateError> {
+        if Path::new(named).is_file() {
+            let program =
+                fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
+            let told = Measured { named: named.to_owned(), revision: None };
+            return Ok(Self { engine: engine.with_program(program), told });
+        }
+        let name = &engine.description().name;
+        let build = engine.description().build.as_ref().ok_or_else(|| {
+            GateError::Input(format!(
+                "{named} is no file, and {name} does not say how a revision is built"
+            ))
+        })?;
+        let head = if named == "." { "HEAD" } else { named };
+        let revision = revision_of(head, &programs.paths.root).map_err(|why| {
+            GateError::Input(format!("{named} is neither a file nor a revision: {why}"))
+        })?;
+        let program = match named {
+            "." => make(build, &programs.paths.root, "working-tree", options, false)?,
+            _ => {
+                let tree = options.cache.join("trees").join(&revision);
+                let kept = options.cache.join("programs").join(&revision).join("program");
+                match kept.is_file() {
+                    true => kept,
+                    false => {
+                        unpack(&revision, &programs.paths.root, &tree)?;
+                        let made = make(build, &tree, &revision, options, true);
+                        let _ = fs::remove_dir_all(&tree);
+                        made?
+                    }
+                }
+            }
+        };
+        let told = Measured { named: named.to_owned(), revision: Some(revision) };
+        Ok(Self { engine: engine.with_program(program), told })
+    }
+}
+
+/// The full name of a revision.
+fn revision_of(named: &str, repository: &Path) -> Result<String, String> {
+    let mut git = Command::new("git");
+    git.arg("-C").arg(repository).args(["rev-parse", "--verify", "--quiet", "--end-of-options"]);
+    let output =
+        git.arg(format!("{named}^{{commit}}")).output().map_err(|error| format!("git: {error}"))?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned()),
+        false => Err(format!("git knows no {named} in {}", repository.display())),
+    }
+}
+
+/// Puts a revision's files into a directory.
+fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateError> {
+    let wrong = |error: std::io::Error| GateError::Input(format!("{}: {error}", tree.display()));
+    fs::create_dir_all(tree).map_err(wrong)?;
+    let archive = tree.with_extension("tar");
+    let mut git = Command::new("git");
+    git.arg("-C")
+        .arg(repository)
+        .args(["archive", "--format=tar", "-o"])
+        .arg(&archive)
+        .arg(revision);
+    let mut tar = Command::new("tar");
+    tar.arg("-xf").arg(&archive).arg("-C").arg(tree);
+    for mut command in [git, tar] {
+        let output = command.output().map_err(wrong)?;
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+            return Err(GateError::Input(format!("{revision} cannot be unpacked: {said}")));
+        }
+    }
+    fs::remove_file(&archive).map_err(wrong)
+}
+
+/// Builds what is in a directory and keeps the program, so that a later build cannot change it.
+fn make(
+    build: &Build,
+    tree: &Path,
+    name: &str,
+    options: &Options,
+    keep: bool,
+) -> Result<PathBuf, GateError> {
+    let wrong =
+        |error: std::io::Error| GateError::Input(format!("{}: {error}", options.cache.display()));
+    let place = options.cache.join("programs").join(name);
+    fs::create_dir_all(&place).map_err(wrong)?;
+    let cache = fs::canonicalize(&options.cache).map_err(wrong)?;
+    // One directory for all builds: what they have in common is compiled once.
+    let target = cache.join("build").to_string_lossy().into_owned();
+    let values = Values::from([("target", target), ("root", tree.to_string_lossy().into_owned())]);
+    let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
+    let told = if keep { &name[..12.min(name.len())] } else { name };
+    eprintln!("harness gate: building {told}");
+    let (program, arguments) =
+        words.split_first().ok_or_else(|| GateError::Input("an empty build command".into()))?;
+    let mut command = Command::new(program);
+    command.args(arguments).current_dir(tree);
+    let watch = Watch { limit: BUILD_LIMIT, logs: &place, name: "build", status: None };
+    let done = process::run(&mut command, &watch)
+        .map_err(|error| GateError::Missing(format!("{program} cannot be started: {error}")))?;
+    if done.end != End::Exited(0) {
+        let said = done.last_error_line();
+        let log = done.stderr.display();
+        return Err(GateError::Input(format!(
+            "{told} does not build: {said} (all of it in {log})"
+        )));
+    }
+    // Copied under another name first, so that a program that is there is whole.
+    let (half, whole) = (place.join("program.new"), place.join("program"));
+    fs::copy(fill(&build.program, &values), &half).map_err(wrong)?;
+    fs::rename(&half, &whole).map_err(wrong)?;
+    Ok(whole)
+}

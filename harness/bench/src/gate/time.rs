@@ -1,0 +1,186 @@
+//! Seconds: baseline and candidate in one run, interleaved, so that whatever the machine does it does to both.
+
+use super::report::{Finding, Layer, LayerName, Verdict};
+use super::rules::{Selected, TimeRules};
+use super::stats::{Comparison, Random, Round, compare};
+use super::subject::Baseline;
+use super::{Bench, left_out};
+use run::engine::interrupt;
+use run::engine::runner::{Engine, NoResult, Ranks, Told};
+use std::path::Path;
+
+/// Times both sides and compares.
+pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
+    let subject = match baseline {
+        Baseline::Program(subject) => subject,
+        Baseline::Record(..) => {
+            return left_out(
+                LayerName::Time,
+                "a record cannot be run: seconds of another run prove nothing",
+            );
+        }
+        Baseline::None => return left_out(LayerName::Time, "there is no baseline"),
+    };
+    let mut layer = Layer::new(LayerName::Time);
+    for case in bench.cases_of(LayerName::Time) {
+        if interrupt::requested() {
+            break;
+        }
+        let found = match rounds(bench, &subject.engine, case) {
+            Ok(timed) => judge(bench, case, &timed),
+            Err(NoResult::Interrupted) => break,
+            Err(why) => {
+                Finding::told(&case.rule.name, "time", Verdict::Inconclusive, why.to_string())
+            }
+        };
+        layer.findings.push(found);
+    }
+    layer
+}
+
+/// All rounds of a case.
+struct Timed {
+    rounds: Vec<Round>,
+    /// What was timed.
+    what: &'static str,
+    /// Phase by phase, logarithms of candidate against baseline.
+    phases: Vec<(String, Vec<f64>)>,
+}
+
+/// The three runs of a round.
+const BASELINE: usize = 0;
+const AGAIN: usize = 1;
+const CANDIDATE: usize = 2;
+
+fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, NoResult> {
+    let path = case.path.clone().map_err(NoResult::Failed)?;
+    let place = bench.enter("time").map_err(NoResult::Failed)?;
+    let path = baseline.prepare(&path, &place.join("case")).map_err(NoResult::Failed)?;
+    let engines = [baseline, baseline, &bench.candidate];
+    // The first run of a program reads it and the geometry from disk.
+    let first = run(bench, baseline, &path)?;
+    let also = run(bench, &bench.candidate, &path)?;
+    let cpu = first.time_cpu_s.is_some() && also.time_cpu_s.is_some();
+    let rules = &bench.rules.time;
+    let budget_s = bench.options.budget_s.unwrap_or(rules.budget_s);
+    let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
+    let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
+    let mut random = Random(bench.options.seed);
+    let mut timed = Timed {
+        rounds: Vec::with_capacity(count),
+        what: if cpu { "CPU seconds" } else { "wall seconds" },
+        phases: first.phases_cpu_s.iter().map(|(name, _)| (name.clone(), Vec::new())).collect(),
+    };
+    for _ in 0..count {
+        let mut order = [BASELINE, AGAIN, CANDIDATE];
+        random.shuffle(&mut order);
+        let mut told = [const { None }; 3];
+        for who in order {
+            told[who] = Some(run(bench, engines[who], &path)?);
+        }
+        let [Some(a), Some(a_again), Some(b)] = told else { unreachable!("each was run") };
+        let time = |told: &Told| {
+            told.time_cpu_s.filter(|_| cpu).unwrap_or(told.time_process_s).max(1e-9).ln()
+        };
+        timed.rounds.push(Round { a: time(&a), a_again: time(&a_again), b: time(&b) });
+        for (name, ratios) in &mut timed.phases {
+            let of = |told: &Told| {
+                told.phases_cpu_s.iter().find(|(other, _)| other == name).map(|(_, t)| *t)
+            };
+            if let (Some(a), Some(a_again), Some(b)) = (of(&a), of(&a_again), of(&b)) {
+                ratios.push((2.0 * b.max(1e-9) / (a + a_again).max(1e-9)).ln());
+            }
+        }
+    }
+    Ok(timed)
+}
+
+fn run(bench: &Bench, engine: &Engine, case: &Path) -> Result<Told, NoResult> {
+    let place = bench.enter("time/run").map_err(NoResult::Failed)?;
+    engine.run(case, Ranks::Serial, &place, false).map(|(told, _)| told)
+}
+
+fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
+    let rules = &bench.rules.time;
+    let found = compare(&timed.rounds, rules.alpha, bench.options.seed);
+    let verdict = verdict(&found, rules);
+    let mean = |of: &dyn Fn(&Round) -> f64| {
+        let times: Vec<f64> = timed.rounds.iter().map(of).collect();
+        super::stats::middle(&times).exp()
+    };
+    let percent = |ratio: f64| ratio * 100.0;
+    let mut note = format!(
+        "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; baseline against itself reaches {:.1} %, smallest effect that would be seen {:.1} %",
+        timed.rounds.len(),
+        timed.what,
+        percent(found.low),
+        percent(found.high),
+        found.p,
+        percent(found.floor),
+        percent(found.visible.max(rules.effect_min / 100.0)),
+    );
+    if matches!(verdict, Verdict::Regression | Verdict::Improvement) {
+        note.push_str(&format!("; by phase: {}", phases(timed)));
+    }
+    Finding {
+        baseline: Some(mean(&|round| (round.a + round.a_again) / 2.0)),
+        candidate: Some(mean(&|round| round.b)),
+        change_percent: Some(percent(found.effect)),
+        ..Finding::told(&case.rule.name, "time", verdict, note)
+    }
+}
+
+/// A change that looks real, but not with the certainty that is asked for, is not called unchanged.
+const SUSPICIOUS: f64 = 0.01;
+
+/// A change needs both: chance does not explain it, and it is larger than the baseline against itself and than
+/// what code costs that lies elsewhere in memory. To be unchanged needs as much: what matters would have
+/// been seen, is not within the interval, and nothing looks like it.
+fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
+    let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
+    // As ratios, a third less time is as much as half as much again.
+    let size = |effect: f64| if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect };
+    if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
+        return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
+    }
+    let suspicious = found.p <= SUSPICIOUS && size(found.effect) > least;
+    let within = size(found.low) <= wanted && size(found.high) <= wanted;
+    match found.visible <= wanted && within && !suspicious {
+        true => Verdict::Unchanged,
+        false => Verdict::Inconclusive,
+    }
+}
+
+fn phases(timed: &Timed) -> String {
+    let told =
+        timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
+            format!("{name} {:+.0} %", super::stats::middle(ratios).exp_m1() * 100.0)
+        });
+    told.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_verdict_needs_significance_and_size() {
+        let rules = TimeRules::default();
+        let found = Comparison {
+            effect: 0.08,
+            p: 0.0005,
+            floor: 0.02,
+            visible: 0.05,
+            low: 0.06,
+            high: 0.1,
+        };
+        let of = |found: Comparison| verdict(&found, &rules);
+        assert_eq!(of(found), Verdict::Regression);
+        assert_eq!(of(Comparison { effect: -0.08, ..found }), Verdict::Improvement);
+        assert_eq!(of(Comparison { p: 0.02, ..found }), Verdict::Unchanged);
+        assert_eq!(of(Comparison { p: 0.005, ..found }), Verdict::Inconclusive);
+        assert_eq!(of(Comparison { p: 0.02, high: 0.11, ..found }), Verdict::Inconclusive);
+        assert_eq!(of(Comparison { effect: 0.02, ..found }), Verdict::Unchanged);
+        assert_eq!(of(Comparison { floor: 0.09, visible: 0.12, ..found }), Verdict::Inconclusive);
+    }
+}

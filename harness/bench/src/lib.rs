@@ -1,0 +1,16 @@
+//! Measurements of meshers, and what is computed from them.
+//!
+//! - [`experiments`]: scaling, spacing, layers, weights; every result goes to a record;
+//! - [`targets`]: a table of targets, met or missed;
+//! - [`gate`](mod@gate): candidate against baseline; [`track`]: numbers by commit;
+//! - [`shrink`](mod@shrink): the smallest case that still fails;
+//! - [`selftest`]: meshes of a wanted size for the self test.
+
+pub mod experiments;
+pub mod gate;
+pub mod selftest;
+pub mod shrink;
+pub mod targets;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+pub mod track;

@@ -1,0 +1,87 @@
+//! A mesh of a wanted size for the self test, and its T0, made by the mesher.
+
+use crate::experiments::entry::{Comm, Setup};
+use crate::experiments::execute::{Failed, Runner};
+use crate::experiments::launcher::Launcher;
+use crate::experiments::sizing::Sizes;
+use crate::experiments::variant::Base;
+use check::selftest::scale::Source;
+use run::engine::mesher::{self, Files};
+use run::engine::process::{self, End, Watch};
+use run::engine::programs::Programs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Meshes a case file, at a spacing for about so many cells if they are given, and its T0 too; both lie in `place`
+/// afterwards.
+///
+/// # Errors
+/// Where the case is at fault or the mesher fails.
+pub fn source(
+    programs: &Programs,
+    case: &Path,
+    cells: Option<u64>,
+    place: &Path,
+    limit: Duration,
+) -> Result<Source, Failed> {
+    let base = Base::read(case, place).map_err(Failed::Because)?;
+    let n = base.layer_cells_min;
+    let path = match cells {
+        None => base.in_own_root(base.spacing_min, n),
+        Some(cells) => base.variant(spacing(programs, &base, cells, place, limit)?, n),
+    };
+    let path = path.map_err(Failed::Because)?;
+    let mut made = Vec::new();
+    for (name, ungraded) in [("mesh", false), ("base", true)] {
+        let out = place.join(format!("{}-{name}", base.name));
+        let files = Files { case: &path, out: Some(&out), json: None, status: None, ungraded };
+        write(programs, &files, place, limit)?;
+        made.push(out);
+    }
+    let [mesh, base_tree] = <[PathBuf; 2]>::try_from(made).expect("two were made");
+    Ok(Source { name: base.name, mesh, base: Some(base_tree) })
+}
+
+/// The spacing that gives about so many cells.
+fn spacing(
+    programs: &Programs,
+    base: &Base,
+    cells: u64,
+    place: &Path,
+    limit: Duration,
+) -> Result<f64, Failed> {
+    let launcher = Launcher::parse("mpirun -n {ranks}").expect("it says where ranks go");
+    let runner = Runner { programs, launcher: &launcher, limit, place };
+    let count = |spacing_min: f64| {
+        let layer_cells_min = base.layer_cells_min;
+        let setup = Setup {
+            experiment: String::new(),
+            engine: "mesher".to_owned(),
+            case: base.name.clone(),
+            spacing_min,
+            layer_cells_min,
+            ranks: 1,
+            comm: Comm::Solo,
+            partitioner: String::new(),
+            weights: String::new(),
+        };
+        let case = base.variant(spacing_min, layer_cells_min).map_err(Failed::Because)?;
+        runner.run(&setup, &case, 0, true).map(|run| run.cells)
+    };
+    Sizes::default().spacing(cells as f64, base.coarse(), count)
+}
+
+fn write(programs: &Programs, files: &Files, place: &Path, limit: Duration) -> Result<(), Failed> {
+    let mut command = mesher::serial(programs, files).map_err(Failed::Because)?;
+    let watch = Watch { limit, logs: place, name: "mesher", status: None };
+    let finished = process::run(&mut command, &watch)
+        .map_err(|error| Failed::Because(format!("the mesher cannot be started: {error}")))?;
+    match finished.end {
+        End::Exited(0) => Ok(()),
+        End::Interrupted => Err(Failed::Interrupted),
+        end => {
+            let why = finished.first_error_line();
+            Err(Failed::Because(format!("the mesher fails: {end:?}, {why}")))
+        }
+    }
+}

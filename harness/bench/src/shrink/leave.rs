@@ -1,0 +1,99 @@
+//! What a shrunk case leaves behind: a directory to attach to a bug report.
+
+use super::Shrunk;
+use super::probe::{Kind, Probe};
+use super::reduce::told;
+use check::diff;
+use contract::case::Case;
+use run::engine::runner::Ranks;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// The options that make `harness shrink` repeat a failure.
+#[derive(Clone, Debug)]
+pub struct Repeat {
+    /// Name or path of the engine's description.
+    pub engine: String,
+    /// Path of the engine's program, where one was given.
+    pub program: Option<String>,
+}
+
+impl Repeat {
+    /// One line that a shell takes: whether the failure is still there.
+    pub fn line(&self, case: &Path, ranks: Ranks) -> String {
+        let mut words =
+            vec!["harness".into(), "shrink".into(), case.display().to_string(), "--check".into()];
+        words.extend(["--engine".into(), self.engine.clone()]);
+        if let Some(program) = &self.program {
+            words.extend(["--mesher".into(), program.clone()]);
+        }
+        match ranks {
+            Ranks::Serial => {}
+            Ranks::Mpi(ranks) => {
+                words.extend(["--ranks".into(), ranks.to_string(), "--mpi".into()])
+            }
+            Ranks::Simulated { ranks, seed } => {
+                words.extend([
+                    "--ranks".into(),
+                    ranks.to_string(),
+                    "--seed".into(),
+                    seed.to_string(),
+                ]);
+            }
+        }
+        let quoted = words.iter().map(|word: &String| {
+            let plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c));
+            if plain { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+        });
+        quoted.collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// Writes `case.toml`, `body.stl` and `README.md` into a directory; what the README says.
+///
+/// # Errors
+/// Where something cannot be written.
+pub fn leave(
+    shrunk: &Shrunk,
+    probe: &Probe,
+    repeat: &Repeat,
+    directory: &Path,
+) -> io::Result<String> {
+    fs::create_dir_all(directory)?;
+    let case = shrunk.trial.case.write(directory)?;
+    let line = repeat.line(&case, shrunk.trial.ranks);
+    let minimal =
+        if shrunk.minimal { "nothing more can be left out" } else { "the budget was spent" };
+    let text = format!(
+        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nWhether it is still there:\n\n    {line}\n{}",
+        shrunk.failure,
+        shrunk.facets_before,
+        shrunk.trials,
+        told(&shrunk.trial),
+        divergence(shrunk, probe, &case)
+    );
+    fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
+    Ok(text)
+}
+
+/// The first differing leaf and the rule that decides it, where there are two meshes.
+fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
+    if shrunk.failure.kind != Kind::Differs {
+        return String::new();
+    }
+    let compared = probe.meshes(&shrunk.trial).and_then(|[engine, truth]| {
+        let case = Case::read(case).ok();
+        diff::diff(&engine, &truth, case.as_ref()).map_err(|error| error.to_string())
+    });
+    match compared {
+        Ok(report) => {
+            let indented = report.to_string().replace('\n', "\n    ");
+            format!(
+                "\nWhere the meshes differ, A being the engine's and B that of {}:\n\n    {indented}\n",
+                probe.truth_name()
+            )
+        }
+        Err(why) => format!("\nThe meshes could not be compared: {why}\n"),
+    }
+}

@@ -1,0 +1,232 @@
+//! Takes away what a failure does not need, until nothing more can be taken.
+//!
+//! Depth first, which makes every later trial cheaper; then facets, by delta debugging: halves, quarters and so on are
+//! left out as long as the rest still fails.
+
+use super::probe::Trial;
+use contract::case::Facet;
+use run::engine::runner::Ranks;
+use toml::Value;
+
+/// Whether a trial still fails.
+pub type Fails<'a> = &'a mut dyn FnMut(&Trial) -> bool;
+
+/// The smallest trial that can be reached from this one by steps that each still fail.
+pub fn reduce(trial: Trial, fails: Fails, tell: &mut dyn FnMut(String)) -> Trial {
+    let mut smallest = trial;
+    loop {
+        let before = smallest.clone();
+        for step in [depth, facets, plainness, layer, boxes, ranks] {
+            smallest = step(smallest, fails);
+        }
+        if smallest == before {
+            return smallest;
+        }
+        tell(told(&smallest));
+    }
+}
+
+/// How small a trial is, in a sentence.
+pub fn told(trial: &Trial) -> String {
+    let number =
+        |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
+    let boxes = trial.case.table.get("box").and_then(Value::as_array).map_or(0, Vec::len);
+    let facets = trial.case.facets.len();
+    let (spacing, n) = (number("spacing_min"), number("layer_cells_min"));
+    format!(
+        "{facets} facets, spacing_min {spacing}, layer_cells_min {n}, {boxes} boxes, {}",
+        trial.ranks
+    )
+}
+
+/// The first of some changes of a trial that still fails, or the trial itself.
+fn first(trial: Trial, fails: Fails, changed: impl IntoIterator<Item = Trial>) -> Trial {
+    changed.into_iter().find(|smaller| *smaller != trial && fails(smaller)).unwrap_or(trial)
+}
+
+fn with(trial: &Trial, key: &str, value: Option<Value>) -> Trial {
+    let mut changed = trial.clone();
+    match value {
+        Some(value) => changed.case.table.insert(key.to_owned(), value),
+        None => changed.case.table.remove(key),
+    };
+    changed
+}
+
+/// Coarser by as many levels as possible, boxes with it; in large steps first.
+fn depth(trial: Trial, fails: Fails) -> Trial {
+    let mut smallest = trial;
+    for levels in [4, 2, 1] {
+        loop {
+            let coarser = coarsened(&smallest, f64::from(1 << levels));
+            if coarser.as_ref().is_none_or(|coarser| !fails(coarser)) {
+                break;
+            }
+            smallest = coarser.unwrap_or(smallest);
+        }
+    }
+    smallest
+}
+
+/// The surface, and every box, coarser by a factor; nothing where the surface is as coarse as the root.
+fn coarsened(trial: &Trial, factor: f64) -> Option<Trial> {
+    let mut coarser = trial.clone();
+    let edge = number(trial.case.table.get("root")?.get("edge")?)?;
+    let spacing = number(trial.case.table.get("spacing_min")?)?;
+    if spacing > edge {
+        return None;
+    }
+    coarser.case.table.insert("spacing_min".into(), Value::Float(spacing * factor));
+    for one in coarser.case.table.get_mut("box").and_then(Value::as_array_mut).into_iter().flatten()
+    {
+        let spacing = number(one.get("spacing")?)?;
+        one.as_table_mut()?.insert("spacing".into(), Value::Float(spacing * factor));
+    }
+    Some(coarser)
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_float().or(value.as_integer().map(|whole| whole as f64))
+}
+
+/// Delta debugging (Zeller's ddmin, complements only) over facets; in the end none can be left out alone.
+fn facets(trial: Trial, fails: Fails) -> Trial {
+    let of = |facets: Vec<Facet>| {
+        let mut smaller = trial.clone();
+        smaller.case.facets = facets;
+        smaller
+    };
+    let mut kept = trial.case.facets.clone();
+    if !kept.is_empty() && fails(&of(Vec::new())) {
+        return of(Vec::new());
+    }
+    let mut chunk = kept.len().div_ceil(2);
+    while chunk > 0 && kept.len() > 1 {
+        let mut from = 0;
+        while from < kept.len() {
+            let until = (from + chunk).min(kept.len());
+            let rest = [&kept[..from], &kept[until..]].concat();
+            match !rest.is_empty() && fails(&of(rest.clone())) {
+                true => kept = rest,
+                false => from = until,
+            }
+        }
+        chunk = if chunk == 1 { 0 } else { chunk.div_ceil(2) };
+    }
+    of(kept)
+}
+
+/// Everything kept, crossing leaves too: what is not deleted cannot matter by its absence.
+fn plainness(trial: Trial, fails: Fails) -> Trial {
+    let all = with(&trial, "keep", Some(Value::String("all".into())));
+    let trial = first(trial, fails, [all]);
+    let crossing = with(&trial, "keep_crossing", None);
+    first(trial, fails, [crossing])
+}
+
+/// The thinnest layer.
+fn layer(trial: Trial, fails: Fails) -> Trial {
+    let now = trial.case.table.get("layer_cells_min").and_then(Value::as_integer).unwrap_or(4);
+    let thinner: Vec<Trial> =
+        (1..now).map(|n| with(&trial, "layer_cells_min", Some(Value::Integer(n)))).collect();
+    first(trial, fails, thinner)
+}
+
+/// No boxes, or as few as possible.
+fn boxes(trial: Trial, fails: Fails) -> Trial {
+    let none = with(&trial, "box", None);
+    let mut smallest = first(trial, fails, [none]);
+    let mut at = 0;
+    while let Some(boxes) =
+        smallest.case.table.get("box").and_then(Value::as_array).filter(|boxes| at < boxes.len())
+    {
+        let mut rest = boxes.clone();
+        rest.remove(at);
+        let fewer = with(&smallest, "box", Some(Value::Array(rest)));
+        match fails(&fewer) {
+            true => smallest = fewer,
+            false => at += 1,
+        }
+    }
+    smallest
+}
+
+/// The fewest ranks.
+fn ranks(trial: Trial, fails: Fails) -> Trial {
+    let on = |ranks| Trial { ranks, ..trial.clone() };
+    let fewer: Vec<Trial> = match trial.ranks {
+        Ranks::Serial => Vec::new(),
+        Ranks::Mpi(now) => (2..now).map(|ranks| on(Ranks::Mpi(ranks))).collect(),
+        Ranks::Simulated { ranks: now, seed } => {
+            (2..now).map(|ranks| on(Ranks::Simulated { ranks, seed })).collect()
+        }
+    };
+    first(trial, fails, fewer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::plain::PlainCase;
+
+    fn facet(x: f32) -> Facet {
+        [[x; 3], [x, 0.0, 0.0], [0.0, x, 0.0]]
+    }
+
+    fn given() -> Trial {
+        let text = "spacing_min = 0.01\nlayer_cells_min = 5\nkeep = 'inside'\nkeep_crossing = false\n\
+                    [root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n\
+                    [[box]]\nmin = [1.0]\nspacing = 1.0\n[[box]]\nmin = [2.0]\nspacing = 1\n";
+        let facets = (0..100).map(|x| facet(x as f32)).collect();
+        let case = PlainCase { table: text.parse().unwrap(), facets };
+        Trial { case, ranks: Ranks::Simulated { ranks: 16, seed: 7 } }
+    }
+
+    fn has(trial: &Trial, x: f32) -> bool {
+        trial.case.facets.contains(&facet(x))
+    }
+
+    fn count(trial: &Trial, key: &str) -> i64 {
+        trial.case.table[key].as_integer().unwrap()
+    }
+
+    #[test]
+    fn all_that_the_failure_needs_is_left_and_nothing_else() {
+        let mut trials = 0;
+        let mut fails = |trial: &Trial| {
+            trials += 1;
+            let ranks = matches!(trial.ranks, Ranks::Simulated { ranks, seed: 7 } if ranks >= 3);
+            let deep = number(&trial.case.table["spacing_min"]).unwrap() < 0.5;
+            let boxed = trial
+                .case
+                .table
+                .get("box")
+                .and_then(Value::as_array)
+                .is_some_and(|boxes| boxes.iter().any(|b| b["min"][0].as_float() == Some(2.0)));
+            has(trial, 17.0)
+                && has(trial, 80.0)
+                && ranks
+                && deep
+                && boxed
+                && count(trial, "layer_cells_min") >= 2
+        };
+        let smallest = reduce(given(), &mut fails, &mut |_| ());
+        assert_eq!(smallest.case.facets, [facet(17.0), facet(80.0)]);
+        assert_eq!(smallest.ranks, Ranks::Simulated { ranks: 3, seed: 7 });
+        let table = &smallest.case.table;
+        assert_eq!(number(&table["spacing_min"]), Some(0.32));
+        assert_eq!(
+            (count(&smallest, "layer_cells_min"), table["box"].as_array().unwrap().len()),
+            (2, 1)
+        );
+        assert_eq!((table["keep"].as_str(), table.get("keep_crossing")), (Some("all"), None));
+        assert!(trials < 200, "{trials}");
+    }
+
+    #[test]
+    fn what_fails_without_anything_ends_without_anything() {
+        let smallest = reduce(given(), &mut |_| true, &mut |_| ());
+        assert!(smallest.case.facets.is_empty() && smallest.case.table.get("box").is_none());
+        assert_eq!(smallest.ranks, Ranks::Simulated { ranks: 2, seed: 7 });
+    }
+}

@@ -1,0 +1,369 @@
+//! The file of targets, read: meshes, runs and rows by name. reports/README.md describes the format.
+//!
+//! Invariants of [`Targets`] as [`Targets::read`] gives them: every name that is used is declared; a row
+//! has the runs, the other run and the phase that its measure needs, and no others.
+
+use super::measure::{Kind, Measure};
+use crate::experiments::entry::{Comm, Setup};
+use serde::Deserialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What [`Setup::experiment`] is of runs for targets.
+pub const EXPERIMENT: &str = "targets";
+/// Cells that a mesh may be asked to have.
+const CELLS: std::ops::RangeInclusive<f64> = 1e3..=1e12;
+/// Ranks that a run may be asked to have.
+const RANKS_MAX: usize = 65_536;
+
+/// A file of targets.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Targets {
+    /// Meshes by name.
+    #[serde(default)]
+    pub mesh: BTreeMap<String, Mesh>,
+    /// Runs by name.
+    #[serde(default)]
+    pub run: BTreeMap<String, WantedRun>,
+    /// The rows, in order.
+    #[serde(default)]
+    pub row: Vec<Row>,
+    /// Directory of the file; paths are relative to it.
+    #[serde(skip)]
+    pub directory: PathBuf,
+}
+
+/// What is meshed.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// A name in geometries/catalogue.toml, or the path of a case file.
+    pub case: Option<String>,
+    /// Instead of a case: an STL file.
+    pub geometry: Option<PathBuf>,
+    /// Instead of a case: a shape, as the table of that name in a case file.
+    pub generator: Option<toml::Table>,
+    /// Root edge in longest edges of the bounding box; with `geometry` and `generator` only.
+    pub root_scale: Option<f64>,
+    /// n, instead of the case's.
+    pub layer_cells_min: Option<u32>,
+    /// The spacing, instead of the case's; the root stays what it is.
+    pub spacing_min: Option<f64>,
+    /// About how many cells, with `case` only: the spacing is found by meshing coarser, and the root fits it.
+    pub cells: Option<f64>,
+}
+
+/// How it is meshed.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WantedRun {
+    /// Name of the mesh.
+    pub mesh: String,
+    /// How many ranks.
+    #[serde(default = "one")]
+    pub ranks: usize,
+    /// How they talk.
+    #[serde(default = "mpi")]
+    pub comm: Comm,
+    /// `metis` or `morton`; the mesher's own choice if empty.
+    #[serde(default)]
+    pub partitioner: String,
+    /// `unit`, `area`, `rehearsal` or `rebalance`; likewise.
+    #[serde(default)]
+    pub weights: String,
+    /// Repetitions, of which medians are taken.
+    #[serde(default = "one")]
+    pub repeats: usize,
+    /// One run more before them, not counted, unless the mesh was made already. By default where there are repetitions.
+    pub warm_up: Option<bool>,
+    /// Write the mesh to the record's disk and have `harness audit` read it, instead of timing the mesher.
+    #[serde(default)]
+    pub audit: bool,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn mpi() -> Comm {
+    Comm::Mpi
+}
+
+/// A target.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// What it is about, for people; `--only` names rows by it.
+    pub name: String,
+    /// The run, or several: each is a row then, but for measures of a series.
+    pub run: OneOrMany,
+    /// The run that it is held against.
+    pub against: Option<String>,
+    /// What is measured.
+    pub measure: Measure,
+    /// The phase, or several together, for measures of those.
+    pub phase: Option<OneOrMany>,
+    /// Least value wanted.
+    pub at_least: Option<f64>,
+    /// Greatest value wanted.
+    pub at_most: Option<f64>,
+}
+
+/// Names of runs or phases.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum OneOrMany {
+    /// One.
+    One(String),
+    /// Several.
+    Many(Vec<String>),
+}
+
+impl OneOrMany {
+    /// All of them.
+    pub fn all(&self) -> &[String] {
+        match self {
+            Self::One(name) => std::slice::from_ref(name),
+            Self::Many(names) => names,
+        }
+    }
+}
+
+impl Targets {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// One sentence: the file, what is wrong, and where.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let wrong = |why: String| format!("{}: {why}", path.display());
+        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let mut targets: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        targets.directory = path.parent().unwrap_or(Path::new(".")).to_owned();
+        targets.check().map_err(wrong)?;
+        targets.row = targets.row.iter().flat_map(each_run).collect();
+        Ok(targets)
+    }
+
+    /// Leaves only the rows of these names; all if there are none.
+    ///
+    /// # Errors
+    /// A name that no row has.
+    pub fn only(&mut self, names: &[String]) -> Result<(), String> {
+        let named = |row: &Row, name: &String| row.name == *name || row.family() == name;
+        if let Some(name) = names.iter().find(|name| !self.row.iter().any(|row| named(row, name))) {
+            return Err(format!("no row is called {name:?}"));
+        }
+        self.row.retain(|row| names.is_empty() || names.iter().any(|name| named(row, name)));
+        Ok(())
+    }
+
+    /// The runs that a row needs: its own, and the one that it is held against.
+    pub fn runs_of<'a>(&self, row: &'a Row) -> Vec<&'a String> {
+        row.run.all().iter().chain(&row.against).collect()
+    }
+
+    /// Whether a setup of a record is the run of this name.
+    pub fn is_run(&self, name: &str, setup: &Setup) -> bool {
+        let Some(run) = self.run.get(name) else { return false };
+        let mesh = &self.mesh[&run.mesh];
+        setup.experiment == EXPERIMENT
+            && setup.case == run.mesh
+            && (setup.ranks, setup.comm) == (run.ranks, run.comm)
+            && (&setup.partitioner, &setup.weights) == (&run.partitioner, &run.weights)
+            && mesh.spacing_min.is_none_or(|s| s == setup.spacing_min)
+            && mesh.layer_cells_min.is_none_or(|n| n == setup.layer_cells_min)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.row.is_empty() {
+            return Err("it has no [[row]]".to_owned());
+        }
+        self.mesh.iter().try_for_each(|(name, mesh)| mesh.check(name))?;
+        self.run.iter().try_for_each(|(name, run)| self.check_run(name, run))?;
+        self.row.iter().try_for_each(|row| self.check_row(row))?;
+        let mut names = BTreeSet::new();
+        match self.row.iter().find(|row| !names.insert(&row.name)) {
+            Some(row) => Err(format!("two rows are called {:?}", row.name)),
+            None => Ok(()),
+        }
+    }
+
+    fn check_run(&self, name: &str, run: &WantedRun) -> Result<(), String> {
+        let wrong = |why: String| Err(format!("run {name}: {why}"));
+        if !self.mesh.contains_key(&run.mesh) {
+            return wrong(format!("no mesh is called {:?}", run.mesh));
+        }
+        if !(1..=RANKS_MAX).contains(&run.ranks) || run.comm == Comm::Solo && run.ranks != 1 {
+            return wrong(format!("it cannot have {} ranks", run.ranks));
+        }
+        if run.repeats == 0 {
+            return wrong("repeats is at least 1".to_owned());
+        }
+        Ok(())
+    }
+
+    fn check_row(&self, row: &Row) -> Result<(), String> {
+        let wrong = |why: String| Err(format!("row {:?}: {why}", row.name));
+        if let Some(name) = self.runs_of(row).into_iter().find(|n| !self.run.contains_key(*n)) {
+            return wrong(format!("no run is called {name:?}"));
+        }
+        let kind = row.measure.kind();
+        let needs_other = kind == Kind::Against;
+        if needs_other != row.against.is_some() {
+            let what = if needs_other { "needs" } else { "has no use for" };
+            return wrong(format!("{} {what} a run in `against`", row.measure));
+        }
+        let phase = row.measure == Measure::PhaseShare;
+        if phase != row.phase.is_some() {
+            let what = if phase { "needs" } else { "has no use for" };
+            return wrong(format!("{} {what} a name in `phase`", row.measure));
+        }
+        let least = if kind == Kind::Series { 2 } else { 1 };
+        if row.run.all().len() < least {
+            return wrong(format!("{} needs {least} or more runs", row.measure));
+        }
+        let audit = kind == Kind::Audit;
+        if let Some(name) = row.run.all().iter().find(|n| self.run[*n].audit != audit) {
+            let what = if audit { "a run with audit = true" } else { "no run with audit = true" };
+            return wrong(format!("{} is measured of {what}, which {name} is not", row.measure));
+        }
+        Ok(())
+    }
+}
+
+impl Mesh {
+    fn check(&self, name: &str) -> Result<(), String> {
+        let wrong = |why: &str| Err(format!("mesh {name}: {why}"));
+        let given = [self.case.is_some(), self.geometry.is_some(), self.generator.is_some()];
+        if given.iter().filter(|&&g| g).count() != 1 {
+            return wrong("give one of case, geometry and [generator]");
+        }
+        if self.case.is_some() && self.root_scale.is_some() {
+            return wrong("root_scale is the case's to say");
+        }
+        if self.case.is_none() && (self.spacing_min.is_none() || self.cells.is_some()) {
+            return wrong("without a case it needs spacing_min, and takes no cells");
+        }
+        if self.spacing_min.is_some() && self.cells.is_some() {
+            return wrong("give spacing_min or cells, not both");
+        }
+        if self.cells.is_some_and(|cells| !CELLS.contains(&cells)) {
+            return wrong("cells is from 1e3 to 1e12");
+        }
+        Ok(())
+    }
+}
+
+impl Row {
+    /// The row's name as the file has it, without the run that was added to it.
+    fn family(&self) -> &str {
+        match self.run.all() {
+            [run] => self.name.strip_suffix(&format!(": {run}")).unwrap_or(&self.name),
+            _ => &self.name,
+        }
+    }
+}
+
+/// A row of several runs becomes a row for each, unless its measure is one of a series.
+fn each_run(row: &Row) -> Vec<Row> {
+    let OneOrMany::Many(names) = &row.run else { return vec![row.clone()] };
+    if row.measure.kind() == Kind::Series {
+        return vec![row.clone()];
+    }
+    let of = |name: &String| Row {
+        name: format!("{}: {name}", row.name),
+        run: OneOrMany::One(name.clone()),
+        ..row.clone()
+    };
+    names.iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::targets as read;
+
+    const FILE: &str = r#"
+        [mesh.cube]
+        case = "cube-small"
+        spacing_min = 0.1
+        [run]
+        one = { mesh = "cube", repeats = 3 }
+        two = { mesh = "cube", ranks = 2, comm = "sim", weights = "area" }
+        disk = { mesh = "cube", audit = true }
+        [[row]]
+        name = "rate"
+        run = ["one", "two"]
+        measure = "cells_per_second_per_core"
+        at_least = 1e6
+        [[row]]
+        name = "speed-up"
+        run = "two"
+        against = "one"
+        measure = "speed_up"
+        [[row]]
+        name = "growth"
+        run = ["one", "two"]
+        measure = "time_per_cell_growth"
+        at_most = 1.05
+        [[row]]
+        name = "audit"
+        run = "disk"
+        measure = "audit_holds"
+    "#;
+
+    #[test]
+    fn several_runs_are_several_rows_but_for_a_series() {
+        let mut targets = read(FILE).unwrap();
+        let names = |t: &Targets| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&targets), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
+        assert!(targets.only(&["rat".to_owned()]).unwrap_err().contains("\"rat\""));
+        targets.only(&["rate".to_owned(), "growth".to_owned()]).unwrap();
+        assert_eq!(names(&targets), ["rate: one", "rate: two", "growth"]);
+    }
+
+    #[test]
+    fn our_own_targets_are_declared_without_contradiction() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/targets.toml");
+        let targets = Targets::read(&path).unwrap();
+        // A run that no row needs is a mistake, as a row without a name of its own is.
+        let used = |name| targets.row.iter().any(|r| targets.runs_of(r).contains(&name));
+        let unused: Vec<&String> = targets.run.keys().filter(|name| !used(name)).collect();
+        assert!(unused.is_empty(), "{unused:?}");
+        let mut names: Vec<&String> = targets.row.iter().map(|r| &r.name).collect();
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), targets.row.len());
+    }
+
+    #[test]
+    fn contradictions_are_named() {
+        for (from, to, why) in [
+            ("mesh = \"cube\", repeats", "mesh = \"ball\", repeats", "run one: no mesh"),
+            ("repeats = 3", "repeats = 0", "run one: repeats"),
+            ("ranks = 2, comm = \"sim\"", "ranks = 2, comm = \"solo\"", "cannot have 2 ranks"),
+            ("against = \"one\"", "", "\"speed-up\": speed_up needs a run in `against`"),
+            ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
+            ("run = \"disk\"", "run = \"one\"", "which one is not"),
+            ("\"speed_up\"", "\"phase_share\"", "has no use for a run"),
+            ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
+            ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
+            ("case = \"cube-small\"", "case = \"cube-small\"\nroot_scale = 3.0", "the case's"),
+            (
+                "case = \"cube-small\"\n        spacing_min = 0.1",
+                "geometry = \"a.stl\"",
+                "needs spacing_min",
+            ),
+            ("case = \"cube-small\"", "", "give one of"),
+            ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),
+            ("at_least", "atleast", "unknown field"),
+            ("name = \"growth\"", "name = \"rate\"", "two rows are called \"rate\""),
+        ] {
+            assert!(FILE.contains(from), "{from}");
+            let found = read(&FILE.replacen(from, to, 1)).unwrap_err();
+            assert!(found.starts_with("FILE: ") && found.contains(why), "{why} is not in: {found}");
+        }
+        assert!(read("").unwrap_err().contains("no [[row]]"));
+    }
+}

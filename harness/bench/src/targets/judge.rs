@@ -1,0 +1,216 @@
+//! Rows judged: a function of the declaration and of a record's lines alone.
+
+use super::declare::{OneOrMany, Row, Targets};
+use super::measure::{Kind, Sample};
+use crate::experiments::entry::{Audited, Judged, Line, Verdict, What};
+use crate::experiments::group::{Group, Groups};
+
+/// Every row, judged by the runs that these lines tell of.
+pub fn judged(targets: &Targets, lines: &[Line]) -> Vec<Judged> {
+    targets.row.iter().map(|row| judge(targets, row, lines)).collect()
+}
+
+/// One row. Where a run that it needs failed or is not there, it says so.
+pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
+    match measured(targets, row, lines) {
+        Ok((value, how)) => Judged {
+            measured: Some(value),
+            how,
+            verdict: verdict(row, value),
+            ..unjudged(row, Verdict::Told, String::new())
+        },
+        Err(why) => {
+            let failed = targets.runs_of(row).into_iter().find_map(|n| failure(targets, n, lines));
+            match failed {
+                Some(why) => unjudged(row, Verdict::Failed, why),
+                None => unjudged(row, Verdict::LeftOut, why),
+            }
+        }
+    }
+}
+
+/// A row of which nothing was measured.
+pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
+    Judged {
+        name: row.name.clone(),
+        runs: row.run.all().to_vec(),
+        against: row.against.clone(),
+        measure: row.measure.to_string(),
+        at_least: row.at_least,
+        at_most: row.at_most,
+        measured: None,
+        how: String::new(),
+        verdict,
+        why,
+    }
+}
+
+fn verdict(row: &Row, value: f64) -> Verdict {
+    if row.at_least.is_none() && row.at_most.is_none() {
+        return Verdict::Told;
+    }
+    // A value that is no number is within no bounds.
+    let above = row.at_least.is_none_or(|least| value >= least);
+    let below = row.at_most.is_none_or(|most| value <= most);
+    if above && below { Verdict::Met } else { Verdict::Missed }
+}
+
+/// The row's value and how it was come by.
+fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String), String> {
+    if row.measure.kind() == Kind::Audit {
+        let name = &row.run.all()[0];
+        let audits: Vec<&Audited> =
+            lines.iter().filter_map(|line| audit_of(targets, name, line)).collect();
+        if audits.is_empty() {
+            return Err(absent(name));
+        }
+        return Ok((row.measure.of_audits(&audits)?, "audited".to_owned()));
+    }
+    let groups = Groups::of(lines);
+    let find = |name: &String| {
+        let found = groups.all.iter().find(|g| targets.is_run(name, &g.setup));
+        found.ok_or_else(|| absent(name))
+    };
+    let runs = row.run.all().iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
+    let against = row.against.as_ref().map(find).transpose()?;
+    let phases = row.phase.as_ref().map(OneOrMany::all).unwrap_or_default();
+    let sample = Sample { runs: &runs, against, phases, network: &groups.network };
+    Ok((row.measure.of(&sample)?, worst_how(&runs).to_owned()))
+}
+
+fn absent(name: &str) -> String {
+    format!("run {name} was not made")
+}
+
+/// How the least trustworthy of the runs was come by.
+fn worst_how(runs: &[&Group]) -> &'static str {
+    let rank =
+        |how: &&str| ["measured", "oversubscribed", "projected"].iter().position(|h| h == how);
+    runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured")
+}
+
+fn audit_of<'a>(targets: &Targets, name: &str, line: &'a Line) -> Option<&'a Audited> {
+    match &line.what {
+        What::Audit(audited) if targets.is_run(name, &audited.setup) => Some(audited),
+        _ => None,
+    }
+}
+
+/// Why a run failed, if it did.
+fn failure(targets: &Targets, name: &str, lines: &[Line]) -> Option<String> {
+    lines.iter().find_map(|line| match &line.what {
+        What::Failure(f) if targets.is_run(name, &f.setup) => {
+            Some(format!("run {name} failed: {}", f.why))
+        }
+        _ => None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::declare::EXPERIMENT;
+    use super::*;
+    use crate::experiments::entry::{Comm, Failure, Setup};
+    use crate::testing::line;
+    use crate::testing::run;
+    use crate::testing::targets as read;
+
+    const FILE: &str = r#"
+        mesh.cube.case = "cube-small"
+        run.one = { mesh = "cube" }
+        run.two = { mesh = "cube", ranks = 2 }
+        run.disk = { mesh = "cube", comm = "solo", audit = true }
+        [[row]]
+        name = "rate"
+        run = "one"
+        measure = "cells_per_second_per_core"
+        at_least = 100.0
+        [[row]]
+        name = "two"
+        run = "two"
+        against = "one"
+        measure = "speed_up"
+        at_least = 1.8
+        at_most = 2.2
+        [[row]]
+        name = "seconds"
+        run = "two"
+        measure = "seconds"
+        [[row]]
+        name = "audit"
+        run = "disk"
+        measure = "audit_holds"
+        at_least = 1
+    "#;
+
+    fn setup(ranks: usize) -> Setup {
+        let of = run(Comm::Mpi, 1, &[("a", &vec![1.0; ranks])]).setup;
+        let (experiment, case) = (EXPERIMENT.to_owned(), "cube".to_owned());
+        Setup { experiment, case, partitioner: String::new(), weights: String::new(), ..of }
+    }
+
+    fn ran(ranks: usize, time_s: f64) -> Line {
+        let mut run = run(Comm::Mpi, 900, &[("a", &vec![time_s; ranks])]);
+        run.setup = setup(ranks);
+        line(What::Run(Box::new(run)))
+    }
+
+    fn failed(ranks: usize) -> Line {
+        let (command, why) = (String::new(), "killed after 9 s".to_owned());
+        line(What::Failure(Failure { setup: setup(ranks), command, why }))
+    }
+
+    fn audited(holds: bool) -> Line {
+        line(What::Audit(Audited {
+            setup: Setup { comm: Comm::Solo, ..setup(1) },
+            command: String::new(),
+            cells: 9,
+            holds,
+            found: Vec::new(),
+            time_cpu_s: 1.0,
+            time_wall_s: 1.0,
+            peak_rss_bytes: 1,
+        }))
+    }
+
+    #[test]
+    fn bounds_are_met_and_missed() {
+        let targets = read(FILE).unwrap();
+        let verdicts = |lines: &[Line]| -> Vec<Verdict> {
+            judged(&targets, lines).iter().map(|j| j.verdict).collect()
+        };
+        use Verdict::{Failed, LeftOut, Met, Missed, Told};
+        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 5.0), audited(true)]), [Met, Met, Told, Met]);
+        // Too slow; then faster than is to be believed.
+        assert_eq!(
+            verdicts(&[ran(1, 9.1), ran(2, 5.1), audited(false)]),
+            [Missed, Missed, Told, Missed]
+        );
+        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, Told, LeftOut]);
+        assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed, LeftOut]);
+    }
+
+    #[test]
+    fn medians_of_repetitions_are_judged() {
+        let targets = read(FILE).unwrap();
+        let lines = [ran(1, 90.0), ran(1, 8.0), ran(1, 9.0)];
+        let rate = judge(&targets, &targets.row[0], &lines);
+        assert_eq!(
+            (rate.measured, rate.verdict, rate.how.as_str()),
+            (Some(100.0), Verdict::Met, "measured")
+        );
+    }
+
+    #[test]
+    fn a_row_says_why_it_has_no_value() {
+        let targets = read(FILE).unwrap();
+        let all = judged(&targets, &[ran(1, 9.0), failed(2)]);
+        assert_eq!(all[1].why, "run two failed: killed after 9 s");
+        assert_eq!(all[3].why, "run disk was not made");
+        // Runs of another experiment are none of its own.
+        let mut other = run(Comm::Mpi, 900, &[("a", &[9.0])]);
+        other.setup = Setup { experiment: "strong".into(), ..setup(1) };
+        let lines = [line(What::Run(Box::new(other)))];
+        assert_eq!(judge(&targets, &targets.row[0], &lines).why, "run one was not made");
+    }
+}

@@ -1,0 +1,288 @@
+//! Makes the runs that rows need, row by row.
+
+use super::declare::{EXPERIMENT, Mesh, Row, Targets, WantedRun};
+use super::judge::{judge, unjudged};
+use super::row;
+use crate::experiments::entry::{Comm, Judged, Line, Setup, Verdict, What};
+use crate::experiments::execute::Failed;
+use crate::experiments::session::{Bench, BenchError, Options, Point, temporary_directory};
+use crate::experiments::sizing::Sizes;
+use crate::experiments::variant::Base;
+use contract::catalogue;
+use run::engine::interrupt;
+use run::engine::programs::Programs;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What measuring gave.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The rows, in the order of the file.
+    pub rows: Vec<Judged>,
+    /// The lines of the session in the record.
+    pub lines: Vec<Line>,
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+    /// What was asked for and is not there.
+    pub missing: Option<String>,
+}
+
+/// Makes the runs and judges the rows. `options.studies` is not looked at.
+///
+/// # Errors
+/// Where the record or a temporary directory cannot be written.
+pub fn measure(
+    options: &Options,
+    targets: &Targets,
+    wishes: &Wishes,
+    programs: &Programs,
+    say: &mut dyn FnMut(&str),
+) -> Result<Outcome, BenchError> {
+    let place = temporary_directory()?;
+    let bench = Bench::open(options, programs, place.path(), say)?;
+    let mut session = Session::new(bench, targets, wishes);
+    let mut rows = Vec::new();
+    let mut interrupted = false;
+    for (i, row) in targets.row.iter().enumerate() {
+        interrupted |= interrupt::requested();
+        let judged = match interrupted {
+            true => Err(BenchError::Interrupted),
+            false => session.row(row),
+        };
+        let judged = match judged {
+            Err(BenchError::Interrupted) => {
+                interrupted = true;
+                unjudged(row, Verdict::LeftOut, "interrupted".to_owned())
+            }
+            judged => judged?,
+        };
+        // What was not measured for want of time is no result.
+        if !interrupted {
+            let of = format!("row {} of {}", i + 1, targets.row.len());
+            (session.bench.say)(&format!("{of}: {}", row::line(targets, &judged)));
+            session.bench.append(What::Target(judged.clone()))?;
+        }
+        rows.push(judged);
+    }
+    let missing = session.missing();
+    Ok(Outcome { rows, lines: session.bench.lines, interrupted, missing })
+}
+
+/// What the command line changes.
+#[derive(Clone, Debug, Default)]
+pub struct Wishes {
+    /// Repetitions of every run, instead of the file's.
+    pub repeats: Option<usize>,
+    /// No runs on MPI, by the user's wish.
+    pub no_mpi: bool,
+    /// There is nothing to start ranks with.
+    pub no_launcher: bool,
+}
+
+/// A session under way.
+struct Session<'a> {
+    bench: Bench<'a>,
+    targets: &'a Targets,
+    wishes: &'a Wishes,
+    /// Geometries that were read, by what they were read from.
+    bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
+    /// Meshes whose case files are written, or why that failed.
+    meshes: BTreeMap<String, Result<Ready, String>>,
+    /// Runs that need not be made again.
+    made: BTreeSet<String>,
+    /// Meshes that were made once.
+    warm: BTreeSet<String>,
+    /// Whether messages were measured.
+    network: bool,
+}
+
+/// A mesh that can be made.
+#[derive(Clone, Debug)]
+struct Ready {
+    case: PathBuf,
+    spacing_min: f64,
+    layer_cells_min: u32,
+}
+
+/// A run to be repeated.
+struct Pending<'a> {
+    wanted: &'a WantedRun,
+    point: Point,
+}
+
+impl<'a> Session<'a> {
+    fn new(bench: Bench<'a>, targets: &'a Targets, wishes: &'a Wishes) -> Self {
+        let (made, warm) = (BTreeSet::new(), BTreeSet::new());
+        let (bases, meshes) = (BTreeMap::new(), BTreeMap::new());
+        Self { bench, targets, wishes, bases, meshes, made, warm, network: false }
+    }
+
+    /// Makes the runs of a row that were not made yet; judges it.
+    fn row(&mut self, row: &Row) -> Result<Judged, BenchError> {
+        let targets = self.targets;
+        let mut pending = Vec::new();
+        for name in targets.runs_of(row) {
+            let wanted = &targets.run[name];
+            if let Some(why) = self.without_mpi().filter(|_| wanted.comm == Comm::Mpi) {
+                return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
+            }
+            if self.made.insert(name.clone()) {
+                match self.ready(&wanted.mesh) {
+                    Ok(ready) => pending.push(Pending { wanted, point: point(wanted, ready) }),
+                    Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
+                    Err(Failed::Because(why)) => {
+                        self.made.remove(name);
+                        return Ok(unjudged(row, Verdict::Failed, why));
+                    }
+                }
+            }
+        }
+        self.make(&mut pending)?;
+        Ok(judge(targets, row, &self.bench.lines))
+    }
+
+    /// Why there are no runs on MPI, if that is so.
+    fn without_mpi(&self) -> Option<&'static str> {
+        match (self.wishes.no_mpi, self.wishes.no_launcher) {
+            (true, _) => Some("runs on MPI were not wanted"),
+            (false, true) => Some("there is nothing to start ranks with"),
+            _ => None,
+        }
+    }
+
+    /// Repetitions are the outer loop here too.
+    fn make(&mut self, pending: &mut [Pending]) -> Result<(), BenchError> {
+        let wishes = self.wishes;
+        let repeats = |wanted: &WantedRun| wishes.repeats.unwrap_or(wanted.repeats);
+        if !self.network && pending.iter().any(|p| p.wanted.comm == Comm::Sim) {
+            self.network = true;
+            self.bench.measure_network()?;
+        }
+        let most = pending.iter().map(|p| repeats(p.wanted)).max().unwrap_or(0);
+        for p in pending.iter_mut().filter(|p| !p.wanted.audit) {
+            let cold = self.warm.insert(p.wanted.mesh.clone());
+            let wished = p.wanted.warm_up.unwrap_or(repeats(p.wanted) > 1);
+            if cold && wished {
+                self.bench.run(&mut p.point, 0, true)?;
+            }
+        }
+        for repeat in 0..most {
+            for p in pending.iter_mut() {
+                let due = repeat < repeats(p.wanted) && !p.point.failed;
+                match p.wanted.audit {
+                    _ if !due => {}
+                    true => self.bench.audit(&mut p.point)?,
+                    false => self.bench.run(&mut p.point, repeat, false)?,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The case file of a mesh; made once.
+    fn ready(&mut self, name: &str) -> Result<Ready, Failed> {
+        if let Some(known) = self.meshes.get(name) {
+            return known.clone().map_err(Failed::Because);
+        }
+        let made = self.prepare(name, &self.targets.mesh[name]);
+        match &made {
+            Err(Failed::Interrupted) => {}
+            Ok(ready) => drop(self.meshes.insert(name.to_owned(), Ok(ready.clone()))),
+            Err(Failed::Because(why)) => {
+                let why = format!("mesh {name}: {why}");
+                self.meshes.insert(name.to_owned(), Err(why.clone()));
+                return Err(Failed::Because(why));
+            }
+        }
+        made
+    }
+
+    fn prepare(&mut self, name: &str, mesh: &Mesh) -> Result<Ready, Failed> {
+        let key = format!(
+            "{:?} {:?} {:?} {:?}",
+            mesh.case, mesh.geometry, mesh.generator, mesh.root_scale
+        );
+        if !self.bases.contains_key(&key) {
+            (self.bench.say)(&format!("{name}: reading the geometry"));
+            let base = self.base(name, mesh).map_err(Failed::Because)?;
+            self.bases.insert(key.clone(), (base, BTreeMap::new()));
+        }
+        let (base, sizes) = self.bases.get_mut(&key).expect("it was inserted");
+        let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
+        let ready = |case: Result<PathBuf, String>, spacing_min| {
+            case.map(|case| Ready { case, spacing_min, layer_cells_min: n })
+                .map_err(Failed::Because)
+        };
+        let Some(cells) = mesh.cells else {
+            let spacing = mesh.spacing_min.unwrap_or(base.spacing_min);
+            return ready(base.in_own_root(spacing, n), spacing);
+        };
+        (self.bench.say)(&format!("{name}: looking for the spacing"));
+        let bench = &mut self.bench;
+        let known = sizes.entry(n).or_default();
+        let spacing = known.spacing(cells, base.coarse(), |spacing| bench.count(base, spacing, n));
+        match spacing {
+            Ok(spacing) => ready(base.variant(spacing, n), spacing),
+            Err(BenchError::Interrupted) => Err(Failed::Interrupted),
+            Err(other) => Err(Failed::Because(other.to_string())),
+        }
+    }
+
+    /// The geometry of a mesh, in a binary STL file.
+    fn base(&self, name: &str, mesh: &Mesh) -> Result<Base, String> {
+        let place = self.bench.runner.place;
+        if let Some(case) = &mesh.case {
+            let path = match case.ends_with(".toml") {
+                true => self.targets.directory.join(case),
+                false => catalogue::named(case, &self.bench.runner.programs.paths.catalogue)?.path,
+            };
+            return Base::read(&path, place);
+        }
+        let path = place.join(format!("{name}-given.toml"));
+        let text = given_case(mesh, &self.targets.directory)?;
+        std::fs::write(&path, text).map_err(|error| format!("{}: {error}", path.display()))?;
+        Base::read(&path, place)
+    }
+
+    /// What rows were left out for want of, unless the user wished it so.
+    fn missing(&self) -> Option<String> {
+        let wants_mpi = |row: &Row| {
+            self.targets.runs_of(row).iter().any(|n| self.targets.run[*n].comm == Comm::Mpi)
+        };
+        let missing = self.wishes.no_launcher && !self.wishes.no_mpi;
+        let missing = missing && self.targets.row.iter().any(wants_mpi);
+        let program = self.bench.options.launcher.program();
+        missing.then(|| format!("{} is not there: runs on MPI were left out", program.display()))
+    }
+}
+
+/// A case file for a geometry that is given without one.
+fn given_case(mesh: &Mesh, directory: &Path) -> Result<String, String> {
+    let mut table = toml::Table::new();
+    if let Some(file) = &mesh.geometry {
+        let path = std::path::absolute(directory.join(file)).map_err(|error| error.to_string())?;
+        table.insert("geometry".into(), path.to_string_lossy().into_owned().into());
+    }
+    if let Some(generator) = &mesh.generator {
+        table.insert("generator".into(), generator.clone().into());
+    }
+    for (key, value) in [("root_scale", mesh.root_scale), ("spacing_min", mesh.spacing_min)] {
+        table.extend(value.map(|v| (key.to_owned(), v.into())));
+    }
+    Ok(table.to_string())
+}
+
+fn point(wanted: &WantedRun, ready: Ready) -> Point {
+    let setup = Setup {
+        experiment: EXPERIMENT.to_owned(),
+        engine: "mesher".to_owned(),
+        case: wanted.mesh.clone(),
+        spacing_min: ready.spacing_min,
+        layer_cells_min: ready.layer_cells_min,
+        ranks: wanted.ranks,
+        comm: wanted.comm,
+        partitioner: wanted.partitioner.clone(),
+        weights: wanted.weights.clone(),
+    };
+    Point { setup, case: ready.case, failed: false }
+}

@@ -1,0 +1,82 @@
+//! Data for tests, here and in the crates that build on this one.
+
+use crate::experiments::entry::{Comm, Line, Phase, Run, SCHEMA, Setup, Spread, What};
+use crate::targets::Targets;
+use crate::track::history::Record;
+use std::collections::BTreeMap;
+
+/// A run with the given useful times, by phase and rank, of so many cells.
+pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
+    let ranks = useful[0].1.len();
+    let total: Vec<f64> = (0..ranks).map(|r| useful.iter().map(|p| p.1[r]).sum()).collect();
+    let phase = |(name, u): &(&str, &[f64])| Phase {
+        name: (*name).to_owned(),
+        useful_s: Spread::of(u),
+        wall_s: Spread::of(u),
+        comm_s: Spread::of(&vec![0.0; ranks]),
+        messages: Spread::of(&vec![0.0; ranks]),
+        message_bytes: Spread::of(&vec![0.0; ranks]),
+    };
+    let phases: Vec<Phase> = useful.iter().map(phase).collect();
+    Run {
+        setup: Setup {
+            experiment: "strong".into(),
+            engine: "mesher".into(),
+            case: "cube".into(),
+            spacing_min: 0.1,
+            layer_cells_min: 4,
+            ranks,
+            comm,
+            partitioner: "metis".into(),
+            weights: "area".into(),
+        },
+        repeat: 0,
+        warm_up: false,
+        oversubscribed: false,
+        command: "mesher".into(),
+        facets: 12,
+        cells,
+        digest: "0".repeat(32),
+        time_wall_s: phases.iter().map(|p| p.useful_s.max).sum(),
+        time_launch_s: 0.0,
+        peak_rss_bytes: Spread::of(&vec![1e6; ranks]),
+        useful_s: Spread::of(&total),
+        phases,
+        counters: Default::default(),
+        message_matrix: Vec::new(),
+    }
+}
+
+/// A line of a record.
+pub fn line(what: What) -> Line {
+    Line { schema: SCHEMA.into(), session: "s".into(), time_utc: "t".into(), what }
+}
+
+/// A history of 30 commits in which `uav/words` grows by a tenth at commit 20, with noise below one percent.
+pub fn history() -> Vec<Record> {
+    let record = |i: usize| {
+        let noise = (i * 7919 % 13) as f64 / 13.0;
+        let words = if i < 20 { 1000.0 } else { 1100.0 } + 8.0 * noise;
+        let metrics =
+            BTreeMap::from([("uav/words".to_owned(), words), ("uav/cells".to_owned(), 8.0)]);
+        let commit = format!("{i:040x}");
+        Record {
+            time: format!("2026-01-{:02}T00:00:00Z", i + 1),
+            subject: "<b>".into(),
+            metrics,
+            ..Record::new(commit)
+        }
+    };
+    (0..30).map(record).collect()
+}
+
+/// The targets that a file with this text declares.
+///
+/// # Errors
+/// As [`Targets::read`], with `FILE` in the place of the path.
+pub fn targets(text: &str) -> Result<Targets, String> {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("targets.toml");
+    std::fs::write(&path, text).unwrap();
+    Targets::read(&path).map_err(|why| why.replace(&path.display().to_string(), "FILE"))
+}

@@ -1,0 +1,179 @@
+//! The history: a file of JSON lines, one record per commit, kept in the repository or on a branch of its own.
+//!
+//! Invariant: lines are only ever appended. Of several records of one commit the numbers of the last count.
+//!
+//! A record: `{"schema": "octree-track/1", "commit": "full name", "time": "2026-01-31T12:00:00Z" (of the commit),
+//! "subject": "first line of its message", "metrics": {"CASE/METRIC": number}}`.
+
+use crate::gate::measures::Measures;
+use crate::gate::report::{LayerName, Report};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::Command;
+
+/// Version of a line.
+pub const SCHEMA: &str = "octree-track/1";
+
+/// One commit's numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Full name of the commit.
+    pub commit: String,
+    /// When it was committed, ISO 8601.
+    #[serde(default)]
+    pub time: String,
+    /// First line of its message.
+    #[serde(default)]
+    pub subject: String,
+    /// Numbers by `CASE/METRIC`.
+    pub metrics: BTreeMap<String, f64>,
+}
+
+impl Record {
+    /// A commit without numbers.
+    pub fn new(commit: String) -> Self {
+        let (time, subject) = (String::new(), String::new());
+        Self { schema: SCHEMA.to_owned(), commit, time, subject, metrics: BTreeMap::new() }
+    }
+
+    /// What git knows of a commit.
+    ///
+    /// # Errors
+    /// One sentence, where it knows none.
+    pub fn of_commit(named: &str, repository: &Path) -> Result<Self, String> {
+        let mut git = Command::new("git");
+        git.arg("-C").arg(repository).args([
+            "log",
+            "-1",
+            "--format=%H%n%cI%n%s",
+            "--end-of-options",
+            named,
+        ]);
+        let output = git.output().map_err(|error| format!("git: {error}"))?;
+        if !output.status.success() {
+            return Err(format!("git knows no commit {named} in {}", repository.display()));
+        }
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let mut lines = text.lines().map(str::to_owned);
+        let mut next = || lines.next().unwrap_or_default();
+        let (commit, time, subject) = (next(), next(), next());
+        Ok(Self { time, subject, ..Self::new(commit) })
+    }
+
+    /// Takes up the numbers of a record or report of `harness gate`. Seconds come from a report alone; they are worth
+    /// tracking on a machine that does nothing else.
+    ///
+    /// # Errors
+    /// In a sentence, where it is neither.
+    pub fn add(&mut self, text: &[u8]) -> Result<(), String> {
+        for (case, measures) in &Measures::parse(text)?.cases {
+            for (metric, value) in measures.exact.iter().chain(&measures.counted) {
+                self.metrics.insert(format!("{case}/{metric}"), *value as f64);
+            }
+        }
+        if let Ok(report) = serde_json::from_slice::<Report>(text) {
+            let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
+            for finding in times.flat_map(|layer| &layer.findings) {
+                if let Some(seconds) = finding.candidate {
+                    self.metrics.insert(format!("{}/seconds", finding.case), seconds);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a history; one that is not there is empty.
+///
+/// # Errors
+/// One sentence, naming the line that is no record.
+pub fn read(path: &Path) -> Result<Vec<Record>, String> {
+    let wrong = |why: String| format!("{}: {why}", path.display());
+    let text = match fs::read_to_string(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+        other => other.map_err(|error| wrong(error.to_string()))?,
+    };
+    parse(&text).map_err(wrong)
+}
+
+fn parse(text: &str) -> Result<Vec<Record>, String> {
+    let mut records: Vec<Record> = Vec::new();
+    for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let wrong = |why: String| format!("line {}: {why}", i + 1);
+        let record: Record =
+            serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
+        if record.schema != SCHEMA {
+            return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
+        }
+        match records.iter_mut().find(|other| other.commit == record.commit) {
+            Some(same) => same.metrics.extend(record.metrics),
+            None => records.push(record),
+        }
+    }
+    Ok(records)
+}
+
+/// Appends a record in one write, so that a line is there as a whole or not at all.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn append(path: &Path, record: &Record) -> io::Result<()> {
+    if let Some(directory) = path.parent() {
+        fs::create_dir_all(directory)?;
+    }
+    // Strings and finite numbers only.
+    let mut line = serde_json::to_string(record).expect("a record is representable in JSON");
+    line.push('\n');
+    OpenOptions::new().create(true).append(true).open(path)?.write_all(line.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gate::measures::Measured;
+
+    fn record(commit: &str, metrics: &[(&str, f64)]) -> Record {
+        let metrics = metrics.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        Record { metrics, ..Record::new(commit.into()) }
+    }
+
+    #[test]
+    fn what_is_appended_is_read_and_the_last_of_a_commit_counts() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("deep/history.jsonl");
+        assert_eq!(read(&path).unwrap(), []);
+        for one in [
+            record("a", &[("x", 1.0)]),
+            record("b", &[("x", 2.5)]),
+            record("a", &[("x", 3.0), ("y", 4.0)]),
+        ] {
+            append(&path, &one).unwrap();
+        }
+        let expected = [record("a", &[("x", 3.0), ("y", 4.0)]), record("b", &[("x", 2.5)])];
+        assert_eq!(read(&path).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_line_that_is_no_record_is_named() {
+        let line = serde_json::to_string(&record("a", &[])).unwrap();
+        assert!(parse(&format!("{line}\n\nx")).unwrap_err().starts_with("line 3"));
+        assert!(parse(&line.replace("track/1", "track/2")).unwrap_err().contains("track/2"));
+    }
+
+    #[test]
+    fn numbers_of_a_gate_become_metrics_by_case() {
+        let mut measures = Measures::of_program(Measured::default());
+        measures.case("cube").exact.insert("rays".into(), 6);
+        measures.case("cube").counted.insert("instructions".into(), 7);
+        let mut one = record("a", &[]);
+        one.add(measures.json().as_bytes()).unwrap();
+        assert_eq!(one, record("a", &[("cube/rays", 6.0), ("cube/instructions", 7.0)]));
+        assert!(one.add(b"{}").is_err());
+    }
+}

@@ -1,0 +1,151 @@
+//! `harness track`: a record per commit in a file, and the commits at which numbers changed.
+//!
+//! [`history`] is the file; [`divisive`] finds change points; [`export`] is for other people's tools, [`page`] for
+//! people.
+//!
+//! Invariant: the same history and options give the same answer on every machine.
+
+pub mod divisive;
+pub mod history;
+
+use divisive::{Rules, change_points};
+use history::Record;
+use serde::Serialize;
+
+/// Numbers that are results and not costs: they change, but neither for the better nor the worse.
+const NEUTRAL: [&str; 2] = ["cells", "leaves"];
+
+/// One metric over the history.
+#[derive(Clone, Debug, Serialize)]
+pub struct Series {
+    /// `CASE/METRIC`.
+    pub name: String,
+    /// Values, each with the index of its record.
+    pub points: Vec<(usize, f64)>,
+    /// Where it changed.
+    pub changes: Vec<Change>,
+}
+
+/// A change point.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// Index among the points of the first new value.
+    pub at: usize,
+    /// The last commit with the old values.
+    pub last_old: String,
+    /// The first commit with the new ones.
+    pub first_new: String,
+    /// Median of the values since the change before.
+    pub before: f64,
+    /// Median of the values up to the next change.
+    pub after: f64,
+    /// From the one to the other, in percent; nothing where it was 0.
+    pub percent: Option<f64>,
+    /// Chance of as clear a change in values without one.
+    pub p: f64,
+}
+
+impl Series {
+    /// Whether more of it is worse.
+    pub fn is_cost(&self) -> bool {
+        let plain = self.name.rsplit('/').next().unwrap_or(&self.name);
+        !NEUTRAL.contains(&plain)
+    }
+
+    /// The last change, if it is for the worse and its first new value is among the last `recent`.
+    pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
+        let last = self.changes.last()?;
+        let new = self.points.len() - last.at <= recent;
+        (self.is_cost() && new && last.after > last.before).then_some(last)
+    }
+}
+
+/// Every metric of the history, with its change points.
+pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
+    let mut names: Vec<&String> = records.iter().flat_map(|record| record.metrics.keys()).collect();
+    names.sort();
+    names.dedup();
+    names.into_iter().map(|name| series(name, records, rules)).collect()
+}
+
+fn series(name: &str, records: &[Record], rules: &Rules) -> Series {
+    let value = |record: &Record| record.metrics.get(name).copied();
+    let points: Vec<(usize, f64)> =
+        records.iter().enumerate().filter_map(|(i, record)| Some((i, value(record)?))).collect();
+    let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
+    let found = change_points(&values, rules);
+    let commit = |at: usize| records[points[at].0].commit.clone();
+    let changes = (0..found.len()).map(|i| {
+        let (at, p) = found[i];
+        let from = if i == 0 { 0 } else { found[i - 1].0 };
+        let until = found.get(i + 1).map_or(values.len(), |next| next.0);
+        let (before, after) = (median(&values[from..at]), median(&values[at..until]));
+        let percent = (before != 0.0).then(|| (after / before - 1.0) * 100.0);
+        Change { at, last_old: commit(at - 1), first_new: commit(at), before, after, percent, p }
+    });
+    Series { name: name.to_owned(), changes: changes.collect(), points }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let half = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[half] } else { (sorted[half - 1] + sorted[half]) / 2.0 }
+}
+
+/// Change points in words, one to a line.
+pub fn told(all: &[Series]) -> String {
+    let short = |commit: &str| commit.chars().take(12).collect::<String>();
+    let mut text = String::new();
+    for series in all {
+        for change in &series.changes {
+            let percent =
+                change.percent.map_or("from nothing".to_owned(), |by| format!("{by:+.2} %"));
+            text.push_str(&format!(
+                "{}: {} -> {} ({percent}) in {}..{}, p = {:.3}\n",
+                series.name,
+                change.before,
+                change.after,
+                short(&change.last_old),
+                short(&change.first_new),
+                change.p
+            ));
+        }
+    }
+    if text.is_empty() {
+        text.push_str("no change points\n");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::history as sample;
+
+    #[test]
+    fn a_change_is_placed_between_its_commits_with_its_size() {
+        let all = analyse(&sample(), &Rules::default());
+        assert!(all[0].changes.is_empty());
+        let [change] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
+        assert_eq!((change.at, &change.first_new), (20, &format!("{:040x}", 20)));
+        assert!((9.0..11.0).contains(&change.percent.unwrap()), "{change:?}");
+        assert!(told(&all).starts_with("uav/words: 100"), "{}", told(&all));
+    }
+
+    #[test]
+    fn only_a_recent_change_for_the_worse_counts() {
+        let all = analyse(&sample(), &Rules::default());
+        assert!(all[1].worse_recently(10).is_some() && all[1].worse_recently(9).is_none());
+        let mut better = all[1].clone();
+        better.changes[0].after = 1.0;
+        assert!(better.worse_recently(10).is_none());
+        let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
+        assert!(neutral.worse_recently(10).is_none());
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
+    }
+}

@@ -1,0 +1,78 @@
+//! Touching leaves differ by at most one level, be it over a face, an edge or a corner, deleted
+//! crossing leaves included.
+//!
+//! Section 7 of reference/DEFINITION.md (the paper's 4:1 rule: at most one hanging node per edge, which
+//! is counted as well). Misses: refinement that nothing asked for, which is balanced too; and in a mesh
+//! without crossing leaves, without T0, whatever touched those.
+
+use std::fmt::Write;
+
+use super::gap::Gap;
+use super::{CheckResult, Subject, hanging};
+use contract::lattice::Root;
+use contract::tree::Tree;
+
+const NAME: &str = "balance";
+
+/// Checks the mesh, and counts hanging nodes.
+pub fn check(subject: &Subject) -> CheckResult {
+    let tree = subject.tree_with_ghosts();
+    let mut result = check_tree(tree, &subject.terms.root);
+    result.examined = subject.mesh.words.len() as u64;
+    let counts = hanging::count(tree);
+    if let Some(edge) = &counts.worst {
+        result.find(format!(
+            "more than one hanging node on an edge of {}",
+            subject.terms.root.describe(&edge)
+        ));
+    }
+    let [none, one, more] = counts.edges;
+    let _ = write!(result.note, "leaf edges with 0, 1, more hanging nodes: {none}, {one}, {more}");
+    result
+}
+
+/// What can be said of the leaves alone.
+pub fn check_tree(tree: &Tree, root: &Root) -> CheckResult {
+    let mut result = CheckResult::new(NAME);
+    // Distances are whole cells: less than one is none.
+    Gap { tree, root, margin: &|_| Some(1), what: "touching leaves differ by two levels or more" }
+        .check(&mut result);
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::octant::Octant;
+    use contract::testing::{distance, graded_words, octants_of, random_words, words_of};
+    use contract::word;
+    use proptest::prelude::*;
+
+    const ROOT: Root = Root { origin: [0.0; 3], edge: 1.0 };
+
+    /// Whether any two leaves touch and differ by two levels, by comparing all pairs.
+    fn unbalanced(words: &[u64]) -> bool {
+        let leaves: Vec<_> = words.iter().map(|&w| word::octant(w)).collect();
+        let touch = |a: &Octant, b: &Octant| distance(a, b) == 0;
+        leaves.iter().any(|a| leaves.iter().any(|b| a.level + 2 <= b.level && touch(a, b)))
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_all_pairs(words in prop_oneof![random_words(4), graded_words(5)]) {
+            let tree = Tree::of_words(&words);
+            prop_assert_eq!(check_tree(&tree, &ROOT).holds(), !unbalanced(&words));
+        }
+    }
+
+    /// Every octant of level 3 in turn is the only one refined that far: its 26 neighbours must be
+    /// told apart.
+    #[test]
+    fn one_fine_octant_disturbs_exactly_the_coarse_leaves_it_touches() {
+        for fine in octants_of(&words_of(|o| o.level < 3)).into_iter().filter(|o| o.level == 3) {
+            let words = words_of(|o| o.contains(&fine));
+            let result = check_tree(&Tree::of_words(&words), &ROOT);
+            assert_eq!(result.holds(), !unbalanced(&words), "{fine}");
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Checks on oct-tree meshes. Nothing here shares an algorithm with the programs it judges, and nothing starts a process.
+//!
+//! - [`checks`]: a file per promise; [`audit`](mod@audit): those that need no more than the leaves, at any size;
+//! - [`diff`](mod@diff): where two meshes differ;
+//! - [`oracle`]: which points other programs are asked about, and how their answers are counted;
+//! - [`selftest`]: corruptions that the checks must catch.
+
+pub mod audit;
+pub mod checks;
+pub mod diff;
+pub mod oracle;
+pub mod selftest;

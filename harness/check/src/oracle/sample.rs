@@ -1,0 +1,111 @@
+//! The points that are put to the oracles: centroids of leaves of the base tree.
+//!
+//! Invariants: no point lies within [`Sample::band`] of the surface as the oracles see it; which points are
+//! chosen depends on the leaves and the seed alone.
+
+use contract::case::Case;
+use contract::lattice::UNITS_PER_EDGE;
+use contract::word::{self, Side};
+
+/// Leaves and their centroids.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// The chosen leaves, ascending.
+    pub words: Vec<u64>,
+    /// Their centroids in the user's units.
+    pub points: Vec<[f64; 3]>,
+    /// Half-width of the band around the surface that is left out, in the user's units.
+    pub band: f64,
+    /// Leaves that the band leaves out.
+    pub in_band: u64,
+    /// Non-crossing leaves in all.
+    pub candidates: u64,
+}
+
+/// Chooses among the leaves of a base tree: all that the band leaves over where they are at most `most`,
+/// otherwise `most` of them.
+pub fn choose(case: &Case, base: &[u64], most: usize, seed: u64) -> Sample {
+    let band = band(case);
+    let candidates = base.iter().copied().filter(|&leaf| word::side(leaf) != Side::Crossing);
+    let count = candidates.clone().count();
+    // No facet touches the closed octant of a non-crossing leaf, so its centroid is at least half an
+    // edge away from all of them.
+    let clear = |leaf: &u64| case.root.edge / f64::from(1u32 << word::level(*leaf)) / 2.0 >= band;
+    let mut words: Vec<u64> = candidates.filter(clear).collect();
+    let in_band = count - words.len();
+    if words.len() > most {
+        words.select_nth_unstable_by_key(most, |&leaf| mixed(leaf ^ seed));
+        words.truncate(most);
+        words.sort_unstable();
+    }
+    let points = words.iter().map(|&leaf| case.root.to_user(word::octant(leaf).centre())).collect();
+    Sample { words, points, band, in_band: in_band as u64, candidates: count as u64 }
+}
+
+/// What single precision and the lattice may move a surface by, with room to spare. The oracles are
+/// given coordinates around the body's centre, but the STL that they read is f32 about the origin.
+fn band(case: &Case) -> f64 {
+    let coordinates = case.facets.iter().flatten().flatten();
+    let largest = coordinates.fold(0.0, |most: f64, &c| most.max(f64::from(c).abs()));
+    let single = 16.0 * f64::from(f32::EPSILON) * largest;
+    let lattice = 4.0 * case.root.edge / UNITS_PER_EDGE as f64;
+    single.max(lattice)
+}
+
+/// The finaliser of splitmix64: a fixed shuffle of all words.
+fn mixed(word: u64) -> u64 {
+    let mut x = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ x >> 31
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::octant::Octant;
+    use contract::word::Leaf;
+
+    const BODY: [[f32; 3]; 3] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    fn case(edge: f64, origin: f64, body: [[f32; 3]; 3]) -> Case {
+        let root =
+            format!("[root]\norigin = [{origin:?}, {origin:?}, {origin:?}]\nedge = {edge:?}");
+        Case::from_parts(&format!("spacing_min = {edge:?}\n{root}"), vec![body]).unwrap()
+    }
+
+    /// The 512 octants of level 3, each side in turn.
+    fn leaves() -> Vec<u64> {
+        let octant = |key: u64| Octant { corner: word::corner_of(key << 48), level: 3 };
+        let leaf = |key: u64| Leaf { octant: octant(key), side: Side::ALL[(key % 3) as usize] };
+        (0..512).map(|key| word::encode(&leaf(key))).collect()
+    }
+
+    #[test]
+    fn all_where_they_are_few_and_never_a_crossing_one() {
+        let sample = choose(&case(8.0, -4.0, BODY), &leaves(), 1000, 0);
+        assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
+        assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));
+        assert_eq!(sample.points[0], [-3.5; 3]);
+    }
+
+    #[test]
+    fn a_sample_depends_on_leaves_and_seed_alone() {
+        let case = case(8.0, -4.0, BODY);
+        let sample = choose(&case, &leaves(), 100, 1);
+        assert_eq!(sample.words.len(), 100);
+        assert!(sample.words.is_sorted());
+        let mut shuffled = leaves();
+        shuffled.reverse();
+        assert_eq!(choose(&case, &shuffled, 100, 1), sample);
+        assert_ne!(choose(&case, &leaves(), 100, 2).words, sample.words);
+    }
+
+    #[test]
+    fn far_from_the_origin_the_band_grows_and_is_counted() {
+        let far = BODY.map(|vertex| vertex.map(|c| c + 4.0e6));
+        let sample = choose(&case(8.0, 4.0e6 - 4.0, far), &leaves(), 1000, 0);
+        assert!(sample.band > 1.0);
+        assert_eq!((sample.words.len(), sample.in_band), (0, 342));
+    }
+}

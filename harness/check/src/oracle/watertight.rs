@@ -1,0 +1,73 @@
+//! Whether parity means anything on a body.
+
+use contract::lattice::FacetLattice;
+
+/// Whether every edge belongs to an even number of facets, on the lattice and whatever their winding.
+///
+/// Where it holds, all rays from a point off the surface have the same parity. Degenerate facets count
+/// here though no ray counts them: they close what would otherwise look like slits of no width.
+pub fn is_watertight(facets: &[FacetLattice]) -> bool {
+    let sides = |facet: &FacetLattice| {
+        let [a, b, c] = *facet;
+        [[a, b], [b, c], [c, a]]
+    };
+    let sorted = |[a, b]: [[i64; 3]; 2]| if a <= b { [a, b] } else { [b, a] };
+    let mut edges: Vec<_> = facets.iter().flat_map(sides).map(sorted).collect();
+    edges.retain(|[a, b]| a != b);
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNERS: [[i64; 3]; 4] = [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]];
+
+    fn tetrahedron() -> Vec<FacetLattice> {
+        let facet = |without: usize| {
+            let mut rest = CORNERS.to_vec();
+            rest.remove(without);
+            [rest[0], rest[1], rest[2]]
+        };
+        (0..4).map(facet).collect()
+    }
+
+    #[test]
+    fn closed_and_open() {
+        let mut body = tetrahedron();
+        assert!(is_watertight(&body));
+        assert!(is_watertight(&[]));
+        body.pop();
+        assert!(!is_watertight(&body));
+    }
+
+    #[test]
+    fn a_facet_twice_is_no_facet() {
+        let mut body = tetrahedron();
+        body.push(body[0]);
+        assert!(!is_watertight(&body));
+        body.push(body[0]);
+        assert!(is_watertight(&body));
+    }
+
+    #[test]
+    fn a_facet_that_is_a_segment_closes_a_slit() {
+        let mut body = tetrahedron();
+        // One edge of facet 0 is halved, on that side only, so that a neighbour's edge has no partner.
+        let [a, b, c] = body[0];
+        let middle = std::array::from_fn(|axis| (a[axis] + b[axis]) / 2);
+        body[0] = [a, middle, c];
+        body.push([middle, b, c]);
+        assert!(!is_watertight(&body));
+        body.push([a, middle, b]);
+        assert!(is_watertight(&body));
+    }
+
+    #[test]
+    fn a_facet_that_is_a_point_is_nothing() {
+        let mut body = tetrahedron();
+        body.push([CORNERS[0]; 3]);
+        assert!(is_watertight(&body));
+    }
+}

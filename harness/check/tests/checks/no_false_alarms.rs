@@ -1,0 +1,84 @@
+//! No false alarms: every check holds on what the reference makes of random bodies, by itself and in
+//! the audit.
+
+use crate::support;
+use check::audit::{self, AuditOptions};
+use check::checks::{self, Subject};
+use geometries::Facet;
+use proptest::prelude::*;
+
+/// Coordinates that often coincide with each other and with planes of the lattice, for a root of
+/// edge 16 around the origin.
+fn coordinate() -> impl Strategy<Value = f32> {
+    prop_oneof![(-12i32..=12).prop_map(|i| i as f32 * 0.5), -6.0f32..6.0]
+}
+
+fn soup() -> impl Strategy<Value = Vec<Facet>> {
+    let vertex = || prop::array::uniform3(coordinate());
+    let facet = prop::array::uniform3(vertex());
+    let degenerate = (vertex(), vertex()).prop_map(|(a, b)| [a, b, a]);
+    prop::collection::vec(prop_oneof![8 => facet, 1 => degenerate], 0..8)
+}
+
+/// A box with its faces on the lattice or anywhere: watertight.
+fn hull() -> impl Strategy<Value = Vec<Facet>> {
+    (prop::array::uniform3(coordinate()), prop::array::uniform3(0.6f32..6.0)).prop_map(
+        |(low, size)| {
+            let corner = |i: usize| -> [f32; 3] {
+                std::array::from_fn(|a| low[a] + if i >> a & 1 == 1 { size[a] } else { 0.0 })
+            };
+            let quads = [
+                [0, 1, 3, 2],
+                [4, 5, 7, 6],
+                [0, 1, 5, 4],
+                [2, 3, 7, 6],
+                [0, 2, 6, 4],
+                [1, 3, 7, 5],
+            ];
+            let halves = |q: [usize; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]];
+            quads.into_iter().flat_map(halves).map(|t| t.map(corner)).collect()
+        },
+    )
+}
+
+fn settings() -> impl Strategy<Value = String> {
+    let extent = (prop::array::uniform3(coordinate()), prop::array::uniform3(0.3f32..4.0), 0i32..6);
+    let boxes = prop::collection::vec(extent, 0..3);
+    let keep = prop::sample::select(vec!["outside", "inside", "all"]);
+    (0i32..6, 1u32..=10, keep, any::<bool>(), boxes).prop_map(|(level, n, keep, crossing, boxes)| {
+        let spacing = |level: i32| 16.0 * 0.5f64.powi(level);
+        let mut text = format!(
+            "spacing_min = {:?}\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = {crossing}\n\
+             [root]\norigin = [-8.0, -8.0, -8.0]\nedge = 16.0\n",
+            spacing(level)
+        );
+        for (min, size, level) in boxes {
+            let max: [f32; 3] = std::array::from_fn(|a| min[a] + size[a]);
+            text += &format!("[[box]]\nmin = {min:?}\nmax = {max:?}\nspacing = {:?}\n", spacing(level));
+        }
+        text
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    #[test]
+    fn all_checks_hold(facets in prop_oneof![soup(), hull()], text in settings()) {
+        let specimen = support::specimen_of_facets(&text, &facets);
+        let subject = Subject::new(&specimen.case, &specimen.mesh);
+        let informed = subject.with_base(&specimen.base).with_reference(&specimen.mesh);
+        for result in checks::all(&informed) {
+            prop_assert!(result.holds(), "{text}{result}");
+        }
+        for result in checks::all(&Subject::new(&specimen.case, &specimen.mesh)) {
+            prop_assert!(result.holds(), "without T0: {text}{result}");
+        }
+        for set in [&specimen.mesh, &specimen.base] {
+            let dir = tempfile::tempdir().unwrap();
+            set.write(dir.path()).unwrap();
+            let report = audit::audit(dir.path(), &AuditOptions::default());
+            prop_assert!(report.holds(), "{text}{report}");
+        }
+    }
+}

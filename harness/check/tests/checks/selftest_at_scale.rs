@@ -1,0 +1,96 @@
+//! The self test at scale, on meshes small enough for every test run: the same corruptions, planted in files.
+
+use crate::support;
+use check::selftest::scale::{self, Options, Source};
+use check::selftest::{self, SelftestReport, Specimen};
+use std::path::Path;
+
+/// Between them every corruption applies that a mesh can hold; the first has some 10^4 leaves.
+const CASES: [(&str, &str); 4] = [
+    // Faces lie in the middle of octants, so that eight siblings cross.
+    (
+        "outside",
+        "spacing_min = 0.05\nlayer_cells_min = 3\n[root]\norigin = [-3.45, -3.45, -3.45]\nedge = 6.4\n\
+         [generator]\nshape = \"cube\"\nfacets = 12\n",
+    ),
+    ("inside", include_str!("../../../selftest-cases/inside.toml")),
+    ("all", include_str!("../../../selftest-cases/all.toml")),
+    ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+];
+
+fn written(name: &str, specimen: &Specimen, place: &Path) -> Source {
+    let write = |what: &str, set: &contract::leafset::LeafSet| {
+        let dir = place.join(format!("{name}-{what}"));
+        std::fs::create_dir(&dir).unwrap();
+        set.write(&dir).unwrap();
+        dir
+    };
+    let (mesh, base) = (write("mesh", &specimen.mesh), write("base", &specimen.base));
+    Source { name: name.to_owned(), mesh, base: Some(base) }
+}
+
+fn run(sources: &[Source], seed: u64, jobs: usize) -> SelftestReport {
+    let scratch = tempfile::tempdir().unwrap();
+    let options = Options { seed, jobs, interrupted: || false };
+    let report = scale::run(sources, &options, scratch.path(), &|_, _| {}).unwrap();
+    let left: Vec<_> = std::fs::read_dir(scratch.path()).unwrap().collect();
+    assert!(left.is_empty(), "scratch files are left behind: {left:?}");
+    report
+}
+
+#[test]
+fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
+    let place = tempfile::tempdir().unwrap();
+    let sources = CASES.map(|(name, text)| {
+        let specimen = support::specimen(name, text);
+        let leaves = specimen.mesh.words.len();
+        assert!(name != "outside" || leaves > 20_000, "{leaves}");
+        written(name, &specimen, place.path())
+    });
+    let report = run(&sources, 1, 2);
+    println!("{report}");
+    assert!(report.holds(), "{report}");
+    for mutant in selftest::catalogue() {
+        let planted = report.kills.iter().any(|kill| kill.mutant == mutant.name);
+        assert!(planted || !mutant.audit, "{} was not planted", mutant.name);
+        let of_base =
+            mutant.name.contains("T0") && report.left_out.iter().any(|l| l.0 == mutant.name);
+        assert!(planted || of_base, "{} was left out", mutant.name);
+    }
+    // Leaves are corrupted behind a manifest that is true to them, so that no digest helps.
+    let of_leaves = |kill: &&selftest::Kill| {
+        !["manifest", "files"].contains(&kill.meant) && !kill.mutant.starts_with("part ")
+    };
+    for kill in report.kills.iter().filter(of_leaves).filter(|k| !k.mutant.starts_with("manifest"))
+    {
+        assert!(!kill.audit_caught_by.contains(&"manifest"), "{}: {:?}", kill.mutant, kill.finding);
+    }
+}
+
+#[test]
+fn the_seed_decides_places_and_the_number_of_jobs_does_not() {
+    let place = tempfile::tempdir().unwrap();
+    let (name, text) = CASES[0];
+    let source = [written(name, &support::specimen(name, text), place.path())];
+    let (one, two, other) = (run(&source, 1, 1), run(&source, 1, 2), run(&source, 2, 2));
+    assert_eq!(one.to_string(), two.to_string());
+    assert_ne!(one.to_string(), other.to_string());
+}
+
+#[test]
+fn a_mesh_that_is_wrong_before_is_a_false_alarm_and_no_success() {
+    let place = tempfile::tempdir().unwrap();
+    let (name, text) = CASES[2];
+    let sound = support::specimen(name, text);
+    let mut lying = sound.clone();
+    lying.mesh.manifest.leaves_by_side.crossing += 1;
+    let mut disordered = sound;
+    disordered.mesh.parts[0].reverse();
+    for (name, specimen, check) in
+        [("lying", lying, "manifest"), ("disordered", disordered, "linear")]
+    {
+        let report = run(&[written(name, &specimen, place.path())], 1, 1);
+        assert!(!report.holds() && report.kills.is_empty());
+        assert!(report.alarms.iter().any(|alarm| alarm.contains(check)), "{:?}", report.alarms);
+    }
+}

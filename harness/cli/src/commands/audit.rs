@@ -1,0 +1,39 @@
+//! `harness audit`: a leaf-set directory in, a verdict out, exit code.
+
+use check::audit::record::AuditRecord;
+use check::audit::{self, AuditOptions};
+use clap::Args;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use std::path::PathBuf;
+
+/// `harness audit`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The leaf-set directory
+    mesh: PathBuf,
+    /// Distinct nodes that may be kept in memory
+    #[arg(long)]
+    nodes_max: Option<usize>,
+    /// Write verdict, times and memory as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Audits, prints, writes; the exit code.
+pub fn run(Arguments { mesh, nodes_max, json }: &Arguments) -> u8 {
+    if !mesh.is_dir() {
+        eprintln!("harness: {} is no directory", mesh.display());
+        return EXIT_INPUT;
+    }
+    let default = AuditOptions::default();
+    let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
+    let report = audit::audit(mesh, &options);
+    println!("{report}");
+    if let Some(path) = json
+        && let Err(error) = AuditRecord::of(&report).write(path)
+    {
+        eprintln!("harness: {}: {error}", path.display());
+        return EXIT_INPUT;
+    }
+    if report.holds() { EXIT_HOLDS } else { EXIT_FAILED }
+}

@@ -1,0 +1,153 @@
+//! `harness bench`: options in, a record and tables out, exit code.
+
+use super::session::{SessionArguments, progress, refuse, require};
+use super::values::cell_count;
+use bench::experiments::entry::What;
+use bench::experiments::foreign::{OWN, label};
+use bench::experiments::group::Groups;
+use bench::experiments::plan::{self, Experiment, Preset, Wishes, studies};
+use bench::experiments::session::Options;
+use bench::experiments::{bench, table};
+use clap::Args;
+use run::engine::description::Templates;
+use run::engine::programs::Programs;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+
+/// `harness bench`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Names in geometries/catalogue.toml or paths of case files [default: those of the preset]
+    pub cases: Vec<String>,
+    /// Sizes and ranks to choose from
+    #[arg(long, value_enum, default_value = "small")]
+    pub preset: Preset,
+    /// Which questions to ask [default: all]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub experiment: Vec<Experiment>,
+    /// Ranks of simulated runs, as in 1,2,7 or 1..64 for powers of two [default: those of the preset]
+    #[arg(long, value_parser = rank_list)]
+    pub ranks: Option<RankList>,
+    /// Ranks of runs on MPI
+    #[arg(long, value_parser = rank_list, conflicts_with = "no_mpi")]
+    pub ranks_mpi: Option<RankList>,
+    /// Cells of the mesh (strong, weights), per rank (weak), of the largest mesh (spacing), at the case's n (layers)
+    #[arg(long, value_delimiter = ',', value_parser = cell_count)]
+    pub cells: Vec<u64>,
+    /// Values of n in the experiment `layers`
+    #[arg(long, value_delimiter = ',')]
+    pub layers: Vec<u32>,
+    /// Weights of base leaves: unit, area, rehearsal, rebalance
+    #[arg(long, value_delimiter = ',')]
+    pub weights: Vec<String>,
+    /// Partitioners: metis, morton
+    #[arg(long, value_delimiter = ',')]
+    pub partitioners: Vec<String>,
+    /// What to measure: mesher, reference, or an engine's description (a name in harness/engines, or a TOML file)
+    #[arg(long, value_name = "NAME|FILE", default_value = "mesher")]
+    pub engine: String,
+    /// Print the tables of an existing record and measure nothing
+    #[arg(long)]
+    pub show: bool,
+    /// How it is measured and where results go.
+    #[command(flatten)]
+    pub session: SessionArguments,
+}
+
+/// A list of rank counts, as one argument.
+#[derive(Clone, Debug)]
+pub struct RankList(pub Vec<usize>);
+
+fn rank_list(text: &str) -> Result<RankList, String> {
+    plan::ranks(text).map(RankList)
+}
+
+/// Measures, prints; the exit code.
+pub fn run(arguments: Arguments) -> u8 {
+    let code = match arguments.show {
+        true => show(&arguments),
+        false => measure(&arguments).unwrap_or_else(|code| code),
+    };
+    arguments.session.write_report(code)
+}
+
+fn measure(arguments: &Arguments) -> Result<u8, u8> {
+    let programs = programs(arguments)?;
+    let options = options(arguments, &programs);
+    let outcome = bench(&options, &programs, &mut progress()).map_err(|error| refuse(&error))?;
+    print!("{}", table::tables(&Groups::of(&outcome.lines)));
+    for line in &outcome.lines {
+        if let What::Failure(f) = &line.what {
+            println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);
+        }
+    }
+    println!("record: {}", options.record.display());
+    let measured = outcome.lines.iter().any(|line| matches!(line.what, What::Run(_)));
+    Ok(match (outcome.failures, measured) {
+        (0, true) => EXIT_HOLDS,
+        (0, false) => {
+            eprintln!(
+                "harness: nothing was measured: ask for fewer cells, or for another experiment"
+            );
+            EXIT_MISSING
+        }
+        _ => EXIT_FAILED,
+    })
+}
+
+/// Where the programs are; an exit code where the one to be measured is not.
+fn programs(arguments: &Arguments) -> Result<Programs, u8> {
+    let mut programs = Programs::find(arguments.session.programs.given());
+    if !OWN.contains(&arguments.engine.as_str()) {
+        if !arguments.weights.is_empty() || !arguments.partitioners.is_empty() {
+            eprintln!(
+                "harness: --weights and --partitioners are the mesher's: leave them out with another --engine"
+            );
+            return Err(EXIT_INPUT);
+        }
+        programs =
+            programs.and_engine(&arguments.engine, arguments.session.limit()).map_err(|why| {
+                eprintln!("harness: {why}");
+                EXIT_INPUT
+            })?;
+    }
+    match arguments.engine.as_str() {
+        "reference" => require(&programs.paths.reference)?,
+        _ => require(&programs.paths.mesher)?,
+    }
+    Ok(programs)
+}
+
+fn show(arguments: &Arguments) -> u8 {
+    match arguments.session.read_record() {
+        Ok(content) => {
+            print!("{}", table::tables(&Groups::of(&content.lines)));
+            EXIT_HOLDS
+        }
+        Err(code) => code,
+    }
+}
+
+/// What is asked for, in the library's words.
+fn options(arguments: &Arguments, programs: &Programs) -> Options {
+    let session = &arguments.session;
+    let does = programs.engine.as_ref().map(|engine| engine.description().run.clone());
+    let can = |has: fn(&Templates) -> bool| does.as_ref().is_none_or(has);
+    let (sim, mpi) = (can(|t| t.simulated.is_some()), can(|t| t.parallel.is_some()));
+    let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
+    let wishes = Wishes {
+        cases: arguments.cases.clone(),
+        experiments: arguments.experiment.clone(),
+        ranks: list(&arguments.ranks),
+        ranks_mpi: list(&arguments.ranks_mpi),
+        cells: arguments.cells.clone(),
+        layers: arguments.layers.clone(),
+        weights: arguments.weights.clone(),
+        partitioners: arguments.partitioners.clone(),
+        repeats: session.repeat.map(usize::from),
+        no_mpi: session.no_mpi || !session.launcher.is_found() || !mpi,
+        no_sim: !sim,
+        serial: arguments.engine == "reference" || !sim && !mpi,
+        no_choice: does.is_some(),
+    };
+    session.options(studies(arguments.preset, &wishes), label(&arguments.engine))
+}

@@ -1,0 +1,36 @@
+//! `harness diff`: two leaf-set directories in, their first difference out, exit code.
+
+use check::diff;
+use clap::Args;
+use contract::case::Case;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use std::path::PathBuf;
+
+/// `harness diff`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// A leaf-set directory
+    a: PathBuf,
+    /// Another
+    b: PathBuf,
+    /// The case that both are meshes of: its facets help to decide
+    #[arg(long)]
+    case: Option<PathBuf>,
+}
+
+/// Compares, prints; the exit code.
+pub fn run(Arguments { a, b, case }: &Arguments) -> u8 {
+    let compared = case.as_deref().map(Case::read).transpose().map_err(|error| error.to_string());
+    match compared
+        .and_then(|case| diff::diff(a, b, case.as_ref()).map_err(|error| error.to_string()))
+    {
+        Ok(report) => {
+            println!("{report}");
+            if report.same_leaves() { EXIT_HOLDS } else { EXIT_FAILED }
+        }
+        Err(error) => {
+            eprintln!("harness: {error}");
+            EXIT_INPUT
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Writing files.
+
+use std::path::Path;
+use std::{fs, io};
+
+/// Writes a file and the directories it lies in, naming it where that fails.
+pub fn put(path: &Path, text: &str) -> io::Result<()> {
+    let make = || {
+        if let Some(directory) = path.parent() {
+            fs::create_dir_all(directory)?;
+        }
+        fs::write(path, text)
+    };
+    make().map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+}

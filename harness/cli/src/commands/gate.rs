@@ -1,0 +1,128 @@
+//! `harness gate`: options in, reports out, exit code.
+
+use super::files::put;
+use super::programs::ProgramArguments;
+use bench::gate::report::{LayerName, Report};
+use bench::gate::{GateError, Options, gate};
+use clap::Args;
+use report::gate::{json, junit, markdown, text};
+use run::engine::programs::Programs;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::path::PathBuf;
+use std::time::Duration;
+use std::{env, fs, io};
+
+/// `harness gate`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// A revision (built and kept), a program, or a record of --record; without it nothing is compared
+    #[arg(long, value_name = "REVISION|FILE")]
+    baseline: Option<String>,
+    /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]
+    #[arg(long, value_name = "REVISION|FILE")]
+    candidate: Option<String>,
+    /// Name in harness/engines or path of an engine description
+    #[arg(long, default_value = "mesher")]
+    engine: String,
+    /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
+    #[arg(long, value_name = "FILE")]
+    rules: Option<PathBuf>,
+    /// Only these cases of the rules
+    #[arg(long, value_delimiter = ',')]
+    case: Vec<String>,
+    /// Only these layers
+    #[arg(long, value_delimiter = ',')]
+    layers: Vec<LayerName>,
+    /// Seconds for timing one case [default: the rules']
+    #[arg(long, value_name = "SECONDS")]
+    budget: Option<f64>,
+    /// Chooses the order of runs and the draws of tests
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    timeout: u64,
+    /// Write what is exact about the candidate: a baseline for later, a point for `harness track`
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Write the report as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Write the report as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the report as Markdown
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Exit code 3 if a layer that was asked for had to be left out
+    #[arg(long)]
+    require_layers: bool,
+    /// Where revisions are built and kept [default: target/gate]
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    #[command(flatten)]
+    programs: ProgramArguments,
+}
+
+/// Compares, prints, writes; the exit code.
+pub fn run(arguments: Arguments) -> u8 {
+    let programs = Programs::find(arguments.programs.given());
+    let options = Options {
+        baseline: arguments.baseline.clone(),
+        candidate: arguments.candidate.clone(),
+        engine: arguments.engine.clone(),
+        rules: arguments.rules.clone(),
+        cases: arguments.case.clone(),
+        layers: arguments.layers.clone(),
+        seed: arguments.seed,
+        limit: Duration::from_secs(arguments.timeout),
+        budget_s: arguments.budget,
+        cache: arguments.cache.clone().unwrap_or_else(|| programs.paths.root.join("target/gate")),
+    };
+    let report = match gate(&options, &programs) {
+        Ok(report) => report,
+        Err(error) => {
+            eprintln!("harness: {error}");
+            return match error {
+                GateError::Input(_) => EXIT_INPUT,
+                GateError::Missing(_) => EXIT_MISSING,
+            };
+        }
+    };
+    print!("{}", text(&report));
+    if let Err(error) = write(&report, &arguments) {
+        eprintln!("harness: a report could not be written: {error}");
+        return exit_code(&report, &arguments).max(EXIT_INPUT);
+    }
+    exit_code(&report, &arguments)
+}
+
+fn exit_code(report: &Report, arguments: &Arguments) -> u8 {
+    match (report.interrupted, report.holds()) {
+        (true, _) => EXIT_INTERRUPTED,
+        (_, false) => EXIT_FAILED,
+        _ if arguments.require_layers && report.layers.iter().any(|l| l.left_out.is_some()) => {
+            EXIT_MISSING
+        }
+        _ => EXIT_HOLDS,
+    }
+}
+
+fn write(report: &Report, arguments: &Arguments) -> io::Result<()> {
+    let forms: [(&Option<PathBuf>, &dyn Fn() -> String); 4] = [
+        (&arguments.record, &|| report.candidate_measures.json()),
+        (&arguments.junit, &|| junit(report)),
+        (&arguments.json, &|| json(report)),
+        (&arguments.markdown, &|| markdown(report)),
+    ];
+    for (file, form) in forms {
+        if let Some(file) = file {
+            put(file, &form())?;
+        }
+    }
+    if let Some(summary) = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty()) {
+        let mut file = fs::OpenOptions::new().create(true).append(true).open(summary)?;
+        io::Write::write_all(&mut file, markdown(report).as_bytes())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,86 @@
+//! `harness report`: records in, figures and a page out.
+
+use bench::experiments::record;
+use bench::track::history::{self, Record};
+use clap::Args;
+use report::benchmark::report;
+use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use std::path::{Path, PathBuf};
+
+/// `harness report`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Directory for the report; its files *.jsonl are the records unless --record names some
+    pub directory: PathBuf,
+    /// A record of `harness bench`; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub record: Vec<PathBuf>,
+    /// A history of `harness track`, whose trend is shown, too
+    #[arg(long, value_name = "FILE")]
+    pub history: Option<PathBuf>,
+}
+
+/// Writes the report; the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    match write(&arguments.directory, &arguments.record, arguments.history.as_deref()) {
+        Ok(()) => EXIT_HOLDS,
+        Err(why) => {
+            eprintln!("harness: {why}");
+            EXIT_INPUT
+        }
+    }
+}
+
+/// Reads records, writes the report into `directory`, and says what it is.
+///
+/// # Errors
+/// One sentence.
+pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Result<(), String> {
+    let mut records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
+    // A history beside the records is none of them.
+    records.retain(|path| Some(path.as_path()) != history);
+    let history = history.map_or(Ok(Vec::new()), history_of)?;
+    let mut lines = Vec::new();
+    for path in &records {
+        let content = record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        for (line, why) in &content.broken {
+            eprintln!("harness: {}, line {line} is passed over: {why}", path.display());
+        }
+        lines.extend(content.lines);
+    }
+    if lines.is_empty() {
+        let shown = directory.display();
+        return Err(format!(
+            "no results to report: {shown} has no record; make one with harness bench"
+        ));
+    }
+    let written = report(directory, &lines, &history).map_err(|error| error.to_string())?;
+    for finding in &written.broken {
+        println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
+    }
+    if !cfg!(feature = "figures") {
+        println!("PNG and PDF are left out: build the harness with --features figures");
+    }
+    println!("{} figures; the page is {}", written.figures, written.page.display());
+    Ok(())
+}
+
+/// The history; to the tracker one that is not there is empty, but here it was asked for.
+fn history_of(path: &Path) -> Result<Vec<Record>, String> {
+    if !path.is_file() {
+        return Err(format!(
+            "{}: there is no such history; harness track makes it",
+            path.display()
+        ));
+    }
+    history::read(path)
+}
+
+fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = std::fs::read_dir(directory)
+        .map_err(|error| format!("{}: {error}", directory.display()))?;
+    let is_record = |path: &PathBuf| path.extension().is_some_and(|e| e == "jsonl");
+    let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_record).collect();
+    found.sort();
+    Ok(found)
+}

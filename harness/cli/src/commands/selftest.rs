@@ -1,0 +1,212 @@
+//! `harness selftest`: correct meshes from the reference, corrupted; the table of kills, exit code.
+
+use super::programs::ProgramArguments;
+use super::values::cell_count;
+use bench::experiments::execute::Failed;
+use bench::selftest::source as made_by_mesher;
+use check::selftest::scale::{self, Options, Source};
+use check::selftest::{self, Specimen};
+use clap::Args;
+use contract::case::Case;
+use contract::leafset;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use run::engine::interrupt;
+use run::engine::mesher::{self, Files};
+use run::engine::process::{self, End, Watch};
+use run::engine::programs::Programs;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// `harness selftest`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Corrupt the meshes of this case file instead of the built-in ones; may be repeated
+    #[arg(long, value_name = "CASE")]
+    pub case: Vec<PathBuf>,
+    /// Corrupt a mesh of any size instead, for the audit to find: a leaf-set directory, or a case file to be
+    /// meshed; may be repeated
+    #[arg(long, value_name = "DIR|CASE", conflicts_with = "case")]
+    pub at_scale: Vec<PathBuf>,
+    /// Cells of the meshes of case files, about; the spacing is chosen so [default: the case's own]
+    #[arg(long, value_name = "N", requires = "at_scale", value_parser = cell_count)]
+    pub cells: Option<u64>,
+    /// Trials at a time, at scale; each takes the memory of an audit
+    #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: u16,
+    /// Chooses the places of corruptions, at scale
+    #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1)]
+    pub seed: u64,
+    /// Where scratch files go, at scale: two to four times the size of a mesh [default: the temporary directory]
+    #[arg(long, value_name = "DIR", requires = "at_scale")]
+    pub scratch: Option<PathBuf>,
+    /// Time limit of every run of reference or mesher
+    #[arg(long, value_name = "SECONDS", default_value_t = 600)]
+    pub timeout: u64,
+    /// Where the programs are.
+    #[command(flatten)]
+    pub programs: ProgramArguments,
+}
+
+/// The built-in cases: between them every corruption applies.
+const SPECIMENS: [(&str, &str); 4] = [
+    ("outside", include_str!("../../../selftest-cases/outside.toml")),
+    ("inside", include_str!("../../../selftest-cases/inside.toml")),
+    ("all", include_str!("../../../selftest-cases/all.toml")),
+    ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+];
+
+/// Makes specimens, corrupts them, prints the table of kills; the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    match try_run(arguments) {
+        Ok(code) => code,
+        Err((code, why)) => {
+            eprintln!("harness: {why}");
+            code
+        }
+    }
+}
+
+/// An exit code and its sentence.
+type Failure = (u8, String);
+
+fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
+    if !arguments.at_scale.is_empty() {
+        return at_scale(arguments);
+    }
+    let programs = Programs::find(arguments.programs.given());
+    if !programs.paths.reference.is_file() {
+        let path = programs.paths.reference.display();
+        return Err((
+            EXIT_MISSING,
+            format!("there is no reference at {path}: build it, or say where it is"),
+        ));
+    }
+    let scratch = tempfile::tempdir().map_err(|error| (EXIT_INPUT, error.to_string()))?;
+    let cases =
+        if arguments.case.is_empty() { built_in(scratch.path())? } else { arguments.case.clone() };
+    let limit = Duration::from_secs(arguments.timeout);
+    let made = cases.iter().enumerate().map(|(index, case)| {
+        let place = scratch.path().join(format!("specimen-{index}"));
+        specimen(&programs, case, &place, limit)
+    });
+    let specimens = made.collect::<Result<Vec<Specimen>, Failure>>()?;
+    let mutants = scratch.path().join("mutants");
+    let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&specimens, &mutants));
+    let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
+    println!("{report}");
+    Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
+}
+
+/// The self test on meshes of any size.
+fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
+    let input = |error: std::io::Error| (EXIT_INPUT, error.to_string());
+    let mut place = tempfile::Builder::new();
+    place.prefix("harness-selftest-");
+    let scratch = match &arguments.scratch {
+        Some(directory) => place.tempdir_in(directory),
+        None => place.tempdir(),
+    };
+    let scratch = scratch.map_err(input)?;
+    let made = scratch.path().join("made");
+    fs::create_dir(&made).map_err(input)?;
+    let sources = arguments.at_scale.iter().map(|path| source(arguments, path, &made));
+    let sources = sources.collect::<Result<Vec<Source>, Failure>>()?;
+    let options = Options {
+        seed: arguments.seed,
+        jobs: usize::from(arguments.jobs),
+        interrupted: interrupt::requested,
+    };
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_style(
+        ProgressStyle::with_template("{pos}/{len} trials [{elapsed}]")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let say = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let report = scale::run(&sources, &options, scratch.path(), &say);
+    bar.finish_and_clear();
+    let report = report.map_err(|error| match error.kind() {
+        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+        _ => input(error),
+    })?;
+    println!("{report}");
+    let (trials, found) = (report.kills.len(), report.found_by_audit());
+    let killed = report.kills.iter().filter(|kill| kill.killed()).count();
+    println!(
+        "the audit found {found} of {trials}; {} show only against the untouched mesh",
+        killed.saturating_sub(found)
+    );
+    Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
+}
+
+/// A directory as it is, or what a case file makes.
+fn source(arguments: &Arguments, path: &Path, made: &Path) -> Result<Source, Failure> {
+    if path.is_dir() {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        return Ok(Source { name, mesh: path.to_owned(), base: None });
+    }
+    let programs = Programs::find(arguments.programs.given());
+    if !programs.paths.mesher.is_file() {
+        let path = programs.paths.mesher.display();
+        return Err((
+            EXIT_MISSING,
+            format!("there is no mesher at {path}: build it, or say where it is"),
+        ));
+    }
+    let limit = Duration::from_secs(arguments.timeout);
+    let place = made.join(format!("{}", fs::read_dir(made).map_or(0, Iterator::count)));
+    fs::create_dir(&place).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+    made_by_mesher(&programs, path, arguments.cells, &place, limit).map_err(|why| match why {
+        Failed::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+        Failed::Because(why) => (EXIT_INPUT, format!("{}: {why}", path.display())),
+    })
+}
+
+fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let write = |(name, text): (&str, &str)| {
+        let path = scratch.join(format!("{name}.toml"));
+        fs::write(&path, text).map(|()| path).map_err(|error| (EXIT_INPUT, error.to_string()))
+    };
+    SPECIMENS.into_iter().map(write).collect()
+}
+
+/// The reference's meshes of a case.
+fn specimen(
+    programs: &Programs,
+    path: &Path,
+    place: &Path,
+    limit: Duration,
+) -> Result<Specimen, Failure> {
+    let case = Case::read(path).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+    let mut meshes = Vec::new();
+    for (name, ungraded) in [("mesh", false), ("base", true)] {
+        let logs = place.join(format!("{name}-logs"));
+        fs::create_dir_all(&logs).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+        let out = place.join(name);
+        let files = Files { case: path, out: Some(&out), json: None, status: None, ungraded };
+        let watch = Watch { limit, logs: &logs, name: "reference", status: None };
+        let done = process::run(&mut mesher::reference(programs, &files), &watch)
+            .map_err(|error| (EXIT_MISSING, format!("the reference cannot be started: {error}")))?;
+        let shown = path.display();
+        match done.end {
+            End::Exited(0) => {}
+            End::Interrupted => return Err((EXIT_INTERRUPTED, "ended by the user".to_owned())),
+            End::Exited(2) => return Err((EXIT_INPUT, done.first_error_line())),
+            end => {
+                return Err((
+                    EXIT_FAILED,
+                    format!("the reference fails on {shown}: {end:?}, {}", done.first_error_line()),
+                ));
+            }
+        }
+        meshes.push(leafset::read(&out).map_err(|error| (EXIT_FAILED, error.to_string()))?);
+    }
+    let base = meshes.pop().expect("two were made");
+    let mesh = meshes.pop().expect("two were made");
+    Ok(Specimen { case, mesh, base })
+}

@@ -1,0 +1,120 @@
+//! A session of measurements: the options that `harness bench` and `harness targets` share, and its end.
+
+use super::programs::ProgramArguments;
+use bench::experiments::entry::Network;
+use bench::experiments::launcher::Launcher;
+use bench::experiments::network;
+use bench::experiments::plan::Study;
+use bench::experiments::record::{self, Content};
+use bench::experiments::session::{BenchError, Options};
+use clap::Args;
+use run::verify::report::{EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How measurements are made, and where results go.
+#[derive(Args, Debug)]
+pub struct SessionArguments {
+    /// No runs on MPI
+    #[arg(long)]
+    pub no_mpi: bool,
+    /// Repetitions of every run; 95 % intervals of a median need six
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    pub repeat: Option<u16>,
+    /// What starts ranks; {ranks} stands for their number
+    #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
+    pub launcher: Launcher,
+    /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
+    #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
+    pub network: Option<Network>,
+    /// File of JSON lines to append to [default: reports/out/bench.jsonl]
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = clap::value_parser!(u64).range(1..))]
+    pub timeout: u64,
+    /// Make a report, too: DIR/record.jsonl is the record then, unless --record names one
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Where the programs are.
+    #[command(flatten)]
+    pub programs: ProgramArguments,
+}
+
+impl SessionArguments {
+    /// The record to append to.
+    pub fn record_path(&self) -> PathBuf {
+        let in_report = self.report.as_ref().map(|directory| directory.join("record.jsonl"));
+        let given = self.record.clone().or(in_report);
+        given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
+    }
+
+    /// Time limit of a run.
+    pub fn limit(&self) -> Duration {
+        Duration::from_secs(self.timeout)
+    }
+
+    /// A session of these studies.
+    pub fn options(&self, studies: Vec<Study>, engine: String) -> Options {
+        Options {
+            studies,
+            engine,
+            launcher: self.launcher.clone(),
+            network: self.network,
+            record: self.record_path(),
+            limit: self.limit(),
+            command: std::env::args().collect(),
+        }
+    }
+
+    /// The existing record; an exit code where it cannot be read.
+    pub fn read_record(&self) -> Result<Content, u8> {
+        let path = self.record_path();
+        let content = record::read(&path).map_err(|error| {
+            eprintln!("harness: {}: {error}", path.display());
+            EXIT_INPUT
+        })?;
+        for (line, why) in &content.broken {
+            eprintln!("harness: line {line} is passed over: {why}");
+        }
+        Ok(content)
+    }
+
+    /// Writes the report if one was asked for; the graver of its exit code and the given one.
+    pub fn write_report(&self, code: u8) -> u8 {
+        let Some(directory) = &self.report else { return code };
+        match super::report::write(directory, &[], None) {
+            Ok(()) => code,
+            // A failed run stays the graver of the two.
+            Err(why) => {
+                eprintln!("harness: {why}");
+                code.max(EXIT_INPUT)
+            }
+        }
+    }
+}
+
+/// An exit code where a program to be measured is not there.
+pub fn require(program: &Path) -> Result<(), u8> {
+    if program.is_file() {
+        return Ok(());
+    }
+    eprintln!("harness: {} is not there; build it or name it", program.display());
+    Err(EXIT_MISSING)
+}
+
+/// Tells on standard error what is being done, with the seconds since now.
+pub fn progress() -> impl FnMut(&str) {
+    let start = Instant::now();
+    move |what| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs())
+}
+
+/// Says why nothing more was measured; the exit code.
+pub fn refuse(error: &BenchError) -> u8 {
+    eprintln!("harness: {error}");
+    match error {
+        BenchError::Input(_) => EXIT_INPUT,
+        BenchError::Missing(_) => EXIT_MISSING,
+        BenchError::Interrupted => EXIT_INTERRUPTED,
+    }
+}

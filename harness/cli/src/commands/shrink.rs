@@ -1,0 +1,98 @@
+//! `harness shrink`: options in, a tiny case directory out, exit code.
+
+use super::programs::ProgramArguments;
+use bench::shrink::leave::{Repeat, leave};
+use bench::shrink::probe::{Probe, Trial};
+use bench::shrink::{Budget, shrink};
+use clap::Args;
+use contract::catalogue;
+use contract::plain::PlainCase;
+use run::engine::description::Description;
+use run::engine::programs::Programs;
+use run::engine::runner::{Engine, Ranks};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Name in geometries/catalogue.toml or path of a case file
+    case: String,
+    /// Name in harness/engines or path of an engine description
+    #[arg(long, default_value = "mesher")]
+    engine: String,
+    /// Compare a run on so many ranks with the serial run [default: the serial run with the reference]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    ranks: Option<u32>,
+    /// Ranks on MPI instead of simulated ones
+    #[arg(long, requires = "ranks")]
+    mpi: bool,
+    /// Chooses the schedule of simulated ranks
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only say whether the case fails
+    #[arg(long)]
+    check: bool,
+    /// Where the tiny case goes [default: shrunk-CASE]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Trials at most
+    #[arg(long, value_name = "N", default_value_t = 5000)]
+    trials: usize,
+    /// Seconds at most
+    #[arg(long, value_name = "SECONDS", default_value_t = 900)]
+    budget: u64,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
+    timeout: u64,
+    #[command(flatten)]
+    programs: ProgramArguments,
+}
+
+/// Shrinks, prints, writes; the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    run_or_why(arguments).unwrap_or_else(|why| {
+        eprintln!("harness: {why}");
+        EXIT_INPUT
+    })
+}
+
+fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
+    let programs = Programs::find(arguments.programs.given());
+    let limit = Duration::from_secs(arguments.timeout);
+    let engine =
+        Engine::new(Description::find(&arguments.engine, &programs.paths)?, &programs.paths, limit);
+    let reference =
+        Engine::new(Description::find("reference", &programs.paths)?, &programs.paths, limit);
+    let reference = reference.with_program(programs.paths.reference.clone());
+    let ranks = match arguments.ranks {
+        None => Ranks::Serial,
+        Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
+        Some(ranks) => Ranks::Simulated { ranks: ranks as usize, seed: arguments.seed },
+    };
+    let case = match arguments.case.ends_with(".toml") {
+        true => PathBuf::from(&arguments.case),
+        false => catalogue::named(&arguments.case, &programs.paths.catalogue)?.path,
+    };
+    let probe = Probe::new(engine, reference, ranks)?;
+    if arguments.check {
+        let failure = probe.failure(&Trial { case: PlainCase::read(&case)?, ranks })?;
+        println!("{}", failure.as_ref().map_or("it does not fail".to_owned(), ToString::to_string));
+        return Ok(if failure.is_some() { EXIT_FAILED } else { EXIT_HOLDS });
+    }
+    let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
+    let Some(shrunk) = shrink(&case, &probe, &budget)? else {
+        println!("it does not fail: there is nothing to shrink");
+        return Ok(EXIT_HOLDS);
+    };
+    let name = case.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
+    let program =
+        programs.paths.mesher_given.as_ref().map(|path| path.to_string_lossy().into_owned());
+    let repeat = Repeat { engine: arguments.engine.clone(), program };
+    let told = leave(&shrunk, &probe, &repeat, &out)
+        .map_err(|error| format!("{}: {error}", out.display()))?;
+    println!("{told}\nThe case is in {}", out.display());
+    Ok(EXIT_FAILED)
+}

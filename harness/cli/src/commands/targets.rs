@@ -1,0 +1,136 @@
+//! `harness targets`: a file of targets in, a table out, exit code.
+
+use super::session::{SessionArguments, progress, refuse, require};
+use bench::experiments::entry::{Judged, Line, Machine, Verdict, What};
+use bench::experiments::foreign::label;
+use bench::experiments::session::BenchError;
+use bench::targets::{self, Targets, Wishes};
+use clap::Args;
+use report::targets as page;
+use run::engine::programs::Programs;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use std::path::{Path, PathBuf};
+
+/// Name of the table in a report's directory.
+const PAGE: &str = "targets.md";
+
+/// `harness targets`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The table of targets, TOML
+    pub file: PathBuf,
+    /// Only these rows of it
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub only: Vec<String>,
+    /// Judge the rows by an existing record and measure nothing
+    #[arg(long)]
+    pub show: bool,
+    /// How it is measured and where results go.
+    #[command(flatten)]
+    pub session: SessionArguments,
+}
+
+/// Measures, or with `--show` reads an existing record; prints the table; the exit code.
+pub fn run(arguments: Arguments) -> u8 {
+    let code = match read(&arguments) {
+        Ok(targets) if arguments.show => show(&targets, &arguments),
+        Ok(targets) => measure(&targets, &arguments),
+        Err(why) => {
+            eprintln!("harness: {why}");
+            Ok(EXIT_INPUT)
+        }
+    };
+    arguments.session.write_report(code.unwrap_or_else(|code| code))
+}
+
+/// The table, or the rows of it that were asked for.
+fn read(arguments: &Arguments) -> Result<Targets, String> {
+    let mut targets = Targets::read(&arguments.file)?;
+    let file = arguments.file.display();
+    targets.only(&arguments.only).map_err(|why| format!("{file}: {why}"))?;
+    Ok(targets)
+}
+
+fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
+    let session = &arguments.session;
+    let programs = Programs::find(session.programs.given());
+    require(&programs.paths.mesher)?;
+    let wishes = Wishes {
+        repeats: session.repeat.map(usize::from),
+        no_mpi: session.no_mpi,
+        no_launcher: !session.launcher.is_found(),
+    };
+    // The runs are those that rows need, not those of an experiment.
+    let options = session.options(Vec::new(), label("mesher"));
+    let outcome = targets::measure(&options, targets, &wishes, &programs, &mut progress())
+        .map_err(|error| refuse(&error))?;
+    let written = tell(targets, &outcome.rows, &outcome.lines, session.report.as_deref());
+    println!("record: {}", options.record.display());
+    if let Some(missing) = &outcome.missing {
+        eprintln!("harness: {missing}");
+    }
+    Ok(match code(&outcome.rows) {
+        _ if outcome.interrupted => refuse(&BenchError::Interrupted),
+        EXIT_HOLDS if written.is_err() => EXIT_INPUT,
+        EXIT_HOLDS if outcome.missing.is_some() => EXIT_MISSING,
+        code => code,
+    })
+}
+
+fn show(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
+    let content = arguments.session.read_record()?;
+    let rows = targets::judged(targets, &content.lines);
+    Ok(match tell(targets, &rows, &content.lines, arguments.session.report.as_deref()) {
+        Ok(()) => code(&rows),
+        Err(()) => EXIT_INPUT.max(code(&rows)),
+    })
+}
+
+/// Prints the table, and writes it into the report's directory if there is one.
+fn tell(
+    targets: &Targets,
+    rows: &[Judged],
+    lines: &[Line],
+    report: Option<&Path>,
+) -> Result<(), ()> {
+    print!("{}", page::text(targets, rows));
+    let Some(directory) = report else { return Ok(()) };
+    let path = directory.join(PAGE);
+    match write(&path, &page::markdown(targets, rows, &machine(lines))) {
+        Ok(()) => println!("table: {}", path.display()),
+        Err(error) => {
+            eprintln!("harness: {}: {error}", path.display());
+            return Err(());
+        }
+    }
+    Ok(())
+}
+
+/// Beside, synced, renamed.
+fn write(path: &PathBuf, text: &str) -> std::io::Result<()> {
+    let directory = path.parent().unwrap_or(Path::new("."));
+    std::fs::create_dir_all(directory)?;
+    let mut beside = tempfile::NamedTempFile::new_in(directory)?;
+    std::io::Write::write_all(&mut beside, text.as_bytes())?;
+    beside.as_file().sync_all()?;
+    beside.persist(path).map(drop).map_err(|error| error.error)
+}
+
+/// Where the last session ran.
+fn machine(lines: &[Line]) -> String {
+    let session = lines.iter().rev().find_map(|line| match &line.what {
+        What::Session(session) => Some(&session.machine),
+        _ => None,
+    });
+    let Some(Machine { cpu, cores, kernel, mpi, compiler, commit, memory_bytes }) = session else {
+        return "a machine that the record does not describe".to_owned();
+    };
+    let gib = memory_bytes >> 30;
+    format!("{cpu}, {cores} cores, {gib} GiB, {kernel}, {mpi}, {compiler}, commit {commit}")
+}
+
+/// 0 where nothing was missed or failed.
+fn code(rows: &[Judged]) -> u8 {
+    let bad = |row: &Judged| matches!(row.verdict, Verdict::Missed | Verdict::Failed);
+    if rows.iter().any(bad) { EXIT_FAILED } else { EXIT_HOLDS }
+}

@@ -1,0 +1,130 @@
+//! `harness track`: numbers into the history, change points out.
+
+use super::files::put;
+use bench::track::divisive::Rules;
+use bench::track::history::{self, Record};
+use bench::track::{Series, analyse, told};
+use clap::Args;
+use report::track::{export, page};
+use run::engine::paths::Paths;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use std::fs;
+use std::path::PathBuf;
+
+/// `harness track`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The history: JSON lines, one record per commit
+    history: PathBuf,
+    /// Append the numbers of this record or JSON report of `harness gate`; may be repeated
+    #[arg(long, value_name = "FILE")]
+    add: Vec<PathBuf>,
+    /// Append this number, too; may be repeated
+    #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number)]
+    value: Vec<(String, f64)>,
+    /// The commit that they belong to
+    #[arg(long, value_name = "REVISION", default_value = "HEAD")]
+    commit: String,
+    /// The repository that the commit is in [default: the one that the harness is in]
+    #[arg(long, value_name = "DIR")]
+    repository: Option<PathBuf>,
+    /// Write the trend page
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    /// Write the last record in Bencher Metric Format
+    #[arg(long, value_name = "FILE")]
+    bencher: Option<PathBuf>,
+    /// Write the last record for github-action-benchmark (customSmallerIsBetter)
+    #[arg(long, value_name = "FILE")]
+    github_benchmark: Option<PathBuf>,
+    /// Write the whole history as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write a test per metric as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Write all series with their change points as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Exit code 1 (and a failed test) where the last change of a metric is for the worse and within its last N values
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    fail_recent: usize,
+    /// Chance of a false change point
+    #[arg(long, default_value_t = 0.01)]
+    alpha: f64,
+    /// Smaller changes are passed over; percent
+    #[arg(long, default_value_t = 0.1)]
+    effect_min: f64,
+    /// Chooses the random orders of the test
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+fn named_number(text: &str) -> Result<(String, f64), String> {
+    let (name, number) = text.split_once('=').ok_or("give CASE/METRIC=NUMBER")?;
+    let number: f64 = number.parse().map_err(|_| format!("{number:?} is no number"))?;
+    if number.is_finite() {
+        Ok((name.to_owned(), number))
+    } else {
+        Err(format!("{number} is not finite"))
+    }
+}
+
+/// Appends, analyses, prints, writes; the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    run_or_why(arguments).unwrap_or_else(|why| {
+        eprintln!("harness: {why}");
+        EXIT_INPUT
+    })
+}
+
+fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
+    if !arguments.add.is_empty() || !arguments.value.is_empty() {
+        append(arguments)?;
+    }
+    let records = history::read(&arguments.history)?;
+    let effect_min = arguments.effect_min / 100.0;
+    let rules =
+        Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
+    let all = analyse(&records, &rules);
+    println!("{} commits, {} metrics", records.len(), all.len());
+    print!("{}", told(&all));
+    write(arguments, &records, &all).map_err(|error| error.to_string())?;
+    let worse = all.iter().any(|series| series.worse_recently(arguments.fail_recent).is_some());
+    Ok(if worse { EXIT_FAILED } else { EXIT_HOLDS })
+}
+
+fn append(arguments: &Arguments) -> Result<(), String> {
+    // A history that cannot be read is not made worse.
+    history::read(&arguments.history)?;
+    let repository = arguments.repository.clone();
+    let repository = repository.unwrap_or_else(|| Paths::find(Default::default()).root);
+    let mut record = Record::of_commit(&arguments.commit, &repository)?;
+    for file in &arguments.add {
+        let wrong = |why: String| format!("{}: {why}", file.display());
+        let text = fs::read(file).map_err(|error| wrong(error.to_string()))?;
+        record.add(&text).map_err(wrong)?;
+    }
+    record.metrics.extend(arguments.value.iter().cloned());
+    history::append(&arguments.history, &record)
+        .map_err(|error| format!("{}: {error}", arguments.history.display()))
+}
+
+fn write(arguments: &Arguments, records: &[Record], all: &[Series]) -> std::io::Result<()> {
+    let none = Record::new(String::new());
+    let last = records.last().unwrap_or(&none);
+    let forms: [(&Option<PathBuf>, &dyn Fn() -> String); 6] = [
+        (&arguments.page, &|| page::page(records, all)),
+        (&arguments.bencher, &|| export::bencher(last)),
+        (&arguments.github_benchmark, &|| export::github(last)),
+        (&arguments.csv, &|| export::csv(records)),
+        (&arguments.junit, &|| export::junit(all, arguments.fail_recent)),
+        (&arguments.json, &|| serde_json::to_string_pretty(all).expect("plain data") + "\n"),
+    ];
+    for (file, form) in forms {
+        if let Some(file) = file {
+            put(file, &form())?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,28 @@
+//! harness: verifies meshes and the programs that make them. `harness --help` says how.
+
+mod cli;
+mod commands;
+
+use clap::Parser;
+use cli::{Arguments, Command};
+use run::engine::interrupt;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    interrupt::install();
+    let code = match arguments.command {
+        Command::Verify(arguments) => commands::verify::run(*arguments),
+        Command::Selftest(arguments) => commands::selftest::run(&arguments),
+        Command::Gate(arguments) => commands::gate::run(*arguments),
+        Command::Bench(arguments) => commands::bench::run(*arguments),
+        Command::Targets(arguments) => commands::targets::run(*arguments),
+        Command::Report(arguments) => commands::report::run(&arguments),
+        Command::Track(arguments) => commands::track::run(&arguments),
+        Command::Shrink(arguments) => commands::shrink::run(&arguments),
+        Command::Audit(arguments) => commands::audit::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Diff(arguments) => commands::diff::run(&arguments),
+    };
+    ExitCode::from(code)
+}

@@ -1,0 +1,164 @@
+//! A directory with a case, and scripts that play the programs.
+
+use contract::leafset::LeafSet;
+use serde_json::json;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// A program that does what it should: copies the tree that was asked for, and says so in its record.
+pub const HOLDS: &str = r#"
+here=$(dirname "$0"); tree=final; shift
+while [ $# -gt 0 ]; do
+    case "$1" in
+    --out) out="$2"; shift ;;
+    --json) json="$2"; shift ;;
+    --ungraded) tree=base ;;
+    esac
+    shift
+done
+from="$here/$tree"
+[ -z "$out" ] || cp -r "$from" "$out"
+ranks="$FAKE_RANKS"
+[ -z "$json" ] || printf '{"cells": 1, "digest": "%s", "ranks": %s, "time_wall_s": 0.5, "peak_rss_bytes": [9]}' \
+    "$(cat "$here/$tree.digest")" "${ranks:-1}" > "$json"
+"#;
+
+/// A mesher that holds the case to be at fault.
+pub const REFUSES: &str = "echo 'spacing_min is negative' >&2; exit 2";
+
+/// A mesher that says what two ranks are doing and then sleeps, in a process of its own.
+pub const HANGS: &str = r#"
+here=$(dirname "$0")
+while [ "$1" != --status ]; do shift; done
+echo 'layer 7' > "$2/rank-00000.txt"; echo 'layer 7' > "$2/rank-00001.txt"
+sleep 600 & echo $! > "$here/sleeper"; wait
+"#;
+
+const CASE: &str = "spacing_min = 100.0\nkeep = \"all\"\n[root]\norigin = [-32.0, -32.0, -32.0]\nedge = 64.0\n\
+                    [generator]\nshape = \"cube\"\nfacets = 12\n";
+
+/// The root as the only leaf, crossing; and as one outside of the body, which it is not.
+const WORDS: [(&str, u64); 3] = [("final", 2), ("base", 2), ("other", 0)];
+
+/// How a run of the harness ended.
+pub struct Done {
+    /// Its exit code.
+    pub code: i32,
+    /// All that it printed.
+    pub told: String,
+}
+
+/// The directory; gone at the end.
+pub struct Fixture(TempDir);
+
+impl Fixture {
+    /// With programs that do what they should, and neither MPI, oracles nor p4est.
+    pub fn new() -> Self {
+        let fixture = Self(tempfile::tempdir().unwrap());
+        fs::create_dir(fixture.path("tmp")).unwrap();
+        fixture.write("case.toml", CASE);
+        for (name, word) in WORDS {
+            fixture.write_tree(name, word);
+        }
+        fixture.play("mesher", HOLDS);
+        fixture.play("reference", HOLDS);
+        fixture
+    }
+
+    /// A path below the directory.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// The text of a file.
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Writes a file, its directories too.
+    pub fn write(&self, name: &str, text: &str) {
+        fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    /// Has a script play a program.
+    pub fn play(&self, program: &str, script: &str) {
+        self.write(program, &format!("#!/bin/sh\n{script}\n"));
+        fs::set_permissions(self.path(program), fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    /// An `mpirun` that starts one process for all ranks.
+    pub fn play_mpirun(&self) {
+        self.play("bin/mpirun", "export FAKE_RANKS=$2; shift 2; exec \"$@\"");
+    }
+
+    /// A catalogue with the one case `jet`, whose geometry is not there.
+    pub fn catalogue_of_one_absent(&self) {
+        let catalogue = "[[case]]\nname = \"jet\"\nfile = \"jet.toml\"\nsize = \"small\"\n";
+        self.write("root/geometries/catalogue.toml", catalogue);
+        let case = "geometry = \"fetched/jet.stl\"\nspacing_min = 1.0\n";
+        self.write("root/geometries/jet.toml", case);
+    }
+
+    fn write_tree(&self, name: &str, word: u64) {
+        let digests = vec!["0".repeat(32); 512];
+        let tree = if name == "base" { "base" } else { "final" };
+        let manifest = json!({
+            "schema": "octree-leaf-set/1", "program": "fixture", "tree": tree,
+            "root": {"origin": [-32.0, -32.0, -32.0], "edge": 64.0},
+            "level_surface": 0, "layer_cells_min": 4, "keep": "all", "keep_crossing": true, "boxes": [],
+            "leaves": 0, "leaves_by_level": vec![0; 20],
+            "leaves_by_side": {"outside": 0, "inside": 0, "crossing": 0},
+            "components_ambiguous": {"count": 0, "example": null},
+            "digest": digests[0], "octant_digests": digests, "parts": [],
+        });
+        let empty = LeafSet::new(serde_json::from_value(manifest).unwrap(), vec![]);
+        let tree = empty.with_parts(vec![vec![word]]);
+        fs::create_dir(self.path(name)).unwrap();
+        tree.write(&self.path(name)).unwrap();
+        self.write(&format!("{name}.digest"), &tree.manifest.digest.to_string());
+    }
+
+    /// Verifies the case on 2 and 3 ranks.
+    pub fn verify(&self, options: &[&str]) -> Done {
+        let case = self.path("case.toml");
+        let ours = ["verify", case.to_str().unwrap(), "--ranks", "2,3", "--partitioners", "morton"];
+        self.harness(&[&ours[..], &["--level-bases", "auto"], options].concat())
+    }
+
+    /// Runs the harness in the directory.
+    pub fn harness(&self, arguments: &[&str]) -> Done {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(arguments).current_dir(self.0.path());
+        if arguments.contains(&"verify") {
+            command
+                .arg("--mesher")
+                .arg(self.path("mesher"))
+                .arg("--reference")
+                .arg(self.path("reference"));
+        }
+        let path = format!("{}:/usr/bin:/bin", self.path("bin").display());
+        command
+            .env("PATH", path)
+            .env("TMPDIR", self.path("tmp"))
+            .env("HARNESS_ROOT", self.path("root"));
+        command.env("HARNESS_PYTHON", "/nowhere/python").env("HARNESS_P4EST", "/nowhere/p4est");
+        command.env("GITHUB_STEP_SUMMARY", self.path("summary.md"));
+        let output = command.output().unwrap();
+        let told =
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+        Done { code: output.status.code().unwrap_or(-1), told }
+    }
+
+    /// What is left in the directory for temporary files.
+    pub fn left_behind(&self) -> Vec<PathBuf> {
+        entries(&self.path("tmp"))
+    }
+}
+
+fn entries(directory: &Path) -> Vec<PathBuf> {
+    fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect()
+}

@@ -1,0 +1,96 @@
+//! The integer lattice on which every geometric decision is made (reference/DEFINITION.md, section 2).
+
+use crate::octant::{LEVEL_MAX, Octant};
+use serde::{Deserialize, Serialize};
+
+/// Lattice units along an edge of the root.
+pub const UNITS_PER_EDGE: i64 = 1 << 27;
+
+/// A facet on the lattice.
+pub type FacetLattice = [[i64; 3]; 3];
+
+/// The root cube, in the user's units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Root {
+    /// Minimum corner.
+    pub origin: [f64; 3],
+    /// Edge length.
+    pub edge: f64,
+}
+
+impl Root {
+    /// A vertex on the lattice, or nothing where it is not finite or more than one root edge away.
+    pub fn quantise(&self, at: [f64; 3]) -> Option<[i64; 3]> {
+        let near = -(UNITS_PER_EDGE as f64)..=2.0 * UNITS_PER_EDGE as f64;
+        let q = self.units(at);
+        q.iter().all(|v| near.contains(v)).then(|| q.map(|v| v as i64))
+    }
+
+    /// A corner of an extent box on the lattice: what lies beyond the root is brought to its faces.
+    pub fn quantise_clamped(&self, at: [f64; 3]) -> [i64; 3] {
+        self.units(at).map(|v| v.clamp(0.0, UNITS_PER_EDGE as f64) as i64)
+    }
+
+    /// Lattice coordinates, still as floating point.
+    fn units(&self, at: [f64; 3]) -> [f64; 3] {
+        let scale = UNITS_PER_EDGE as f64 / self.edge;
+        std::array::from_fn(|a| ((at[a] - self.origin[a]) * scale).round_ties_even())
+    }
+
+    /// A lattice point in the user's units.
+    pub fn to_user(&self, at: [i64; 3]) -> [f64; 3] {
+        let scale = self.edge / UNITS_PER_EDGE as f64;
+        std::array::from_fn(|a| self.origin[a] + at[a] as f64 * scale)
+    }
+
+    /// The least level whose cells are at most `spacing` wide; nothing if that is deeper than 19.
+    pub fn level_for(&self, spacing: f64) -> Option<u8> {
+        let fits = |level: &u8| self.edge / f64::from(1u32 << level) <= spacing;
+        (0..=LEVEL_MAX).find(fits)
+    }
+
+    /// An octant for people: path, level, and where it is on the lattice and in the user's units.
+    pub fn describe(&self, octant: &Octant) -> String {
+        let (low, high) = octant.bounds();
+        let (from, to) = (self.to_user(low), self.to_user(high));
+        format!("{octant}, lattice {low:?} to {high:?}, user {from:?} to {to:?}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROOT: Root = Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 };
+
+    #[test]
+    fn corners_of_the_root_are_corners_of_the_lattice() {
+        assert_eq!(ROOT.quantise([-1.0, 0.0, 2.0]), Some([0; 3]));
+        assert_eq!(ROOT.quantise([3.0, 4.0, 6.0]), Some([UNITS_PER_EDGE; 3]));
+        assert_eq!(ROOT.to_user([UNITS_PER_EDGE / 2; 3]), [1.0, 2.0, 4.0]);
+    }
+
+    #[test]
+    fn one_edge_beyond_is_the_limit() {
+        assert!(ROOT.quantise([-5.0, 0.0, 2.0]).is_some());
+        assert!(ROOT.quantise([-5.001, 0.0, 2.0]).is_none());
+        assert!(ROOT.quantise([7.0, 0.0, 2.0]).is_some());
+        assert!(ROOT.quantise([7.001, 0.0, 2.0]).is_none());
+        assert!(ROOT.quantise([f64::NAN, 0.0, 2.0]).is_none());
+        assert_eq!(ROOT.quantise_clamped([-9.0, 1.0, 99.0]), [0, 1 << 25, UNITS_PER_EDGE]);
+    }
+
+    #[test]
+    fn ties_go_to_even() {
+        let root = Root { origin: [0.0; 3], edge: UNITS_PER_EDGE as f64 };
+        assert_eq!(root.quantise([0.5, 1.5, 2.5]), Some([0, 2, 2]));
+    }
+
+    #[test]
+    fn same_size_or_smaller() {
+        assert_eq!(ROOT.level_for(4.0), Some(0));
+        assert_eq!(ROOT.level_for(3.9), Some(1));
+        assert_eq!(ROOT.level_for(1e-9), None);
+    }
+}

@@ -1,0 +1,23 @@
+//! What programs exchange, in the harness's own few lines for it, and the algebra of octants and trees.
+//!
+//! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`], [`leafset`];
+//! - numbers: [`lattice`], [`octant`], [`word`], [`digest`];
+//! - what checks stand on: [`tree`] (leaves as a tree whose equal subtrees are stored once), [`parity`]
+//!   (rays), [`triangle`] (exact facet-octant test).
+
+pub mod case;
+pub mod catalogue;
+pub mod digest;
+pub mod lattice;
+pub mod leafset;
+pub mod manifest;
+pub mod npy;
+pub mod octant;
+pub mod parity;
+pub mod plain;
+pub mod stl;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+pub mod tree;
+pub mod triangle;
+pub mod word;

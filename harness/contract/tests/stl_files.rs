@@ -1,0 +1,36 @@
+//! STL files that must be read, and those that must be refused.
+
+use std::path::{Path, PathBuf};
+
+use contract::case::{Case, Facet};
+use contract::stl;
+
+fn files(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../geometries").join(folder);
+    let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let stl: Vec<_> = paths.filter(|p| p.extension().is_some_and(|e| e == "stl")).collect();
+    assert!(stl.len() > 10);
+    stl
+}
+
+#[test]
+fn tricky_files_all_hold_the_same_facets() {
+    let files = files("tricky");
+    let plain = files.iter().find(|p| p.ends_with("tricky/binary.stl")).unwrap();
+    let want: Vec<Facet> = stl::read(plain).unwrap();
+    assert_eq!(want.len(), 8);
+    for path in files {
+        let found = stl::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        assert_eq!(found, want, "{}", path.display());
+    }
+}
+
+#[test]
+fn bad_files_are_refused_by_reader_or_case() {
+    let text = "spacing_min = 1.0\n[root]\norigin = [-8.0, -8.0, -8.0]\nedge = 16.0";
+    for path in files("bad") {
+        let case = stl::read(&path).map_err(|e| e.to_string());
+        let case = case.and_then(|facets| Case::from_parts(text, facets));
+        assert!(case.is_err(), "{}", path.display());
+    }
+}

@@ -1,0 +1,88 @@
+//! The test vectors that all programs share.
+
+use contract::digest::{Digest, mix};
+use contract::lattice::Root;
+use contract::manifest::octant_index;
+use contract::octant::Octant;
+use contract::word::{self, Leaf, Side};
+use serde_json::Value;
+
+fn vectors(name: &str) -> Vec<Value> {
+    let text = include_str!("../../../reference/vectors/digest.json");
+    let all: Value = serde_json::from_str(text).unwrap();
+    let list = all[name].as_array().unwrap().clone();
+    assert!(!list.is_empty());
+    list
+}
+
+fn hex(value: &Value) -> u64 {
+    u64::from_str_radix(value.as_str().unwrap(), 16).unwrap()
+}
+
+/// Floating-point numbers are strings there, lest a JSON reader round them.
+fn float(value: &Value) -> f64 {
+    value.as_str().unwrap().parse().unwrap()
+}
+
+fn triple<T>(value: &Value, of: impl Fn(&Value) -> T) -> [T; 3] {
+    std::array::from_fn(|a| of(&value[a]))
+}
+
+#[test]
+fn mixes_and_digests() {
+    for v in vectors("mix") {
+        assert_eq!(Digest(mix(hex(&v["word"]))).to_string(), v["mix"]);
+    }
+    for v in vectors("digests") {
+        let words: Vec<u64> = v["words"].as_array().unwrap().iter().map(hex).collect();
+        assert_eq!(Digest::of(&words).to_string(), v["digest"]);
+    }
+}
+
+#[test]
+fn words() {
+    for v in vectors("words") {
+        let level = v["level"].as_u64().unwrap() as u8;
+        let corner = triple(&v["cell"], |c| c.as_u64().unwrap() as u32);
+        let side: Side = serde_json::from_value(v["side"].clone()).unwrap();
+        let leaf = Leaf { octant: Octant { corner, level }, side };
+        let w = hex(&v["word"]);
+        assert_eq!(word::encode(&leaf), w);
+        assert_eq!(word::decode(w), Ok(leaf));
+        assert_eq!(octant_index(w) as u64, v["octant"].as_u64().unwrap());
+    }
+}
+
+#[test]
+fn the_lattice() {
+    for v in vectors("levels") {
+        let root = Root { origin: [0.0; 3], edge: float(&v["edge"]) };
+        assert_eq!(root.level_for(float(&v["spacing"])).map(u64::from), v["level"].as_u64());
+    }
+    let root = |v: &Value| Root { origin: triple(&v["origin"], float), edge: float(&v["edge"]) };
+    for v in vectors("quantised") {
+        let want =
+            (!v["lattice"].is_null()).then(|| triple(&v["lattice"], |q| q.as_i64().unwrap()));
+        assert_eq!(root(&v).quantise(triple(&v["vertex"], float)), want);
+    }
+    for v in vectors("boxes") {
+        for (given, on_lattice) in [("min", "lattice_min"), ("max", "lattice_max")] {
+            let want = triple(&v[on_lattice], |q| q.as_i64().unwrap());
+            assert_eq!(root(&v).quantise_clamped(triple(&v[given], float)), want);
+        }
+    }
+}
+
+#[test]
+fn roots() {
+    for v in vectors("roots") {
+        let coordinates = |vertex: &Value| triple(vertex, |c| float(c) as f32);
+        let facet: [[f32; 3]; 3] = triple(&v["vertices"], coordinates);
+        let text = format!("spacing_min = 1e6\nroot_scale = {}", v["root_scale"].as_str().unwrap());
+        let case = contract::case::Case::from_parts(&text, vec![facet]).unwrap();
+        assert_eq!(
+            case.root,
+            Root { origin: triple(&v["origin"], float), edge: float(&v["edge"]) }
+        );
+    }
+}

@@ -1,0 +1,218 @@
+//! A gate's report for people (text, Markdown) and for CI (JUnit, JSON).
+
+use crate::verification::junit::to_text;
+use bench::gate::report::{Finding, Layer, Report, Verdict};
+use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
+use std::fmt::Write as _;
+use std::time::Duration;
+
+/// As text: a part for each layer, what is unchanged counted only.
+pub fn text(report: &Report) -> String {
+    let mut text = format!("{}\n", heading(report));
+    for layer in &report.layers {
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "{:<13} {}", layer.name, summary(layer));
+        for finding in layer.findings.iter().filter(|finding| worth_telling(layer, finding)) {
+            let _ = writeln!(text, "  {}", line(finding));
+        }
+    }
+    let _ = writeln!(text, "{}", verdict(report));
+    text
+}
+
+/// As Markdown, for a CI system's summary page.
+pub fn markdown(report: &Report) -> String {
+    let mut text = format!("## harness gate\n\n{}: **{}**\n\n", heading(report), verdict(report));
+    text.push_str("| layer | verdict | case | metric | baseline | candidate | change | |\n");
+    text.push_str("| --- | --- | --- | --- | ---: | ---: | ---: | --- |\n");
+    for layer in &report.layers {
+        let _ = writeln!(text, "| **{}** | {} | | | | | | |", layer.name, escaped(&summary(layer)));
+        for finding in layer.findings.iter().filter(|finding| worth_telling(layer, finding)) {
+            let number = |value: Option<f64>| value.map(number).unwrap_or_default();
+            let change = finding.change_percent.map(|by| format!("{by:+.2} %")).unwrap_or_default();
+            let _ = writeln!(
+                text,
+                "| | {} | {} | {} | {} | {} | {change} | {} |",
+                finding.verdict,
+                escaped(&finding.case),
+                escaped(&finding.metric),
+                number(finding.baseline),
+                number(finding.candidate),
+                escaped(&finding.note)
+            );
+        }
+    }
+    text
+}
+
+/// As JUnit XML: a suite per layer, a test per metric; what is inconclusive is skipped, with the reason.
+pub fn junit(report: &Report) -> String {
+    let mut xml = quick_junit::Report::new("harness gate");
+    xml.set_time(Duration::from_secs_f64(report.time_s));
+    for layer in &report.layers {
+        let mut suite = TestSuite::new(layer.name.to_string());
+        suite.set_time(Duration::from_secs_f64(layer.time_s));
+        if let Some(why) = &layer.left_out {
+            let mut status = TestCaseStatus::skipped();
+            status.set_message(format!("left out: {why}"));
+            suite.add_test_case(TestCase::new("layer", status));
+        }
+        suite.add_test_cases(layer.findings.iter().map(test));
+        xml.add_test_suite(suite);
+    }
+    to_text(&xml)
+}
+
+/// As JSON.
+pub fn json(report: &Report) -> String {
+    let mut text = serde_json::to_string_pretty(report).expect("a report is representable in JSON");
+    text.push('\n');
+    text
+}
+
+fn test(finding: &Finding) -> TestCase {
+    let status = match finding.verdict {
+        Verdict::Regression => {
+            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+            status.set_message(line(finding)).set_description(finding.note.as_str());
+            status
+        }
+        Verdict::Inconclusive => {
+            let mut status = TestCaseStatus::skipped();
+            status.set_message(format!("inconclusive: {}", finding.note));
+            status
+        }
+        _ => TestCaseStatus::success(),
+    };
+    let mut test = TestCase::new(format!("{}: {}", finding.case, finding.metric), status);
+    test.set_system_out(line(finding));
+    test
+}
+
+fn heading(report: &Report) -> String {
+    match &report.baseline {
+        Some(baseline) => format!("candidate {} against baseline {baseline}", report.candidate),
+        None => format!("candidate {}", report.candidate),
+    }
+}
+
+/// One sentence on the whole.
+fn verdict(report: &Report) -> String {
+    let bad: Vec<String> = report
+        .layers
+        .iter()
+        .filter(|layer| layer.verdict() == Verdict::Regression)
+        .map(|layer| layer.name.to_string())
+        .collect();
+    let end = match (report.interrupted, bad.is_empty()) {
+        (true, _) => "interrupted".to_owned(),
+        (_, true) => "nothing got worse".to_owned(),
+        (_, false) => format!("REGRESSION in {}", bad.join(", ")),
+    };
+    format!("{end} ({:.1} s)", report.time_s)
+}
+
+fn summary(layer: &Layer) -> String {
+    if let Some(why) = &layer.left_out {
+        return format!("left out: {why}");
+    }
+    let count =
+        |verdict| layer.findings.iter().filter(|finding| finding.verdict == verdict).count();
+    let all = [
+        Verdict::Regression,
+        Verdict::Inconclusive,
+        Verdict::Changed,
+        Verdict::Improvement,
+        Verdict::Unchanged,
+    ];
+    let counts = all.map(|verdict| (count(verdict), verdict));
+    let told = counts.iter().filter(|(n, _)| *n > 0).map(|(n, verdict)| format!("{n} {verdict}"));
+    let told: Vec<String> = told.collect();
+    format!(
+        "{} ({:.1} s)",
+        if told.is_empty() { "nothing compared".into() } else { told.join(", ") },
+        layer.time_s
+    )
+}
+
+/// What is unchanged is told where it has something to say: how sure a time is.
+fn worth_telling(layer: &Layer, finding: &Finding) -> bool {
+    use bench::gate::report::LayerName::{Correctness, Time};
+    finding.verdict != Verdict::Unchanged || matches!(layer.name, Time | Correctness)
+}
+
+fn line(finding: &Finding) -> String {
+    let Finding { case, metric, verdict, note, .. } = finding;
+    let mut line = format!("{verdict:<12} {case}: {metric}");
+    if let (Some(old), Some(new)) = (finding.baseline, finding.candidate) {
+        let _ = write!(line, " {} -> {}", number(old), number(new));
+    }
+    if let Some(change) = finding.change_percent {
+        let _ = write!(line, " ({change:+.2} %)");
+    }
+    if !note.is_empty() {
+        let _ = write!(line, "; {note}");
+    }
+    line
+}
+
+/// Counts as they are, seconds to four figures.
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.4}") }
+}
+
+/// Text in which a Markdown table sees nothing of its own.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('|', "\\|").replace('\n', "<br>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::gate::measures::Measured;
+    use bench::gate::report::LayerName;
+
+    fn sample() -> Report {
+        let told = |named: &str| Measured { named: named.into(), revision: None };
+        let mut report = Report::new(Some(told("main")), told("."));
+        let mut counters = Layer::new(LayerName::Counters);
+        counters.findings = vec![
+            Finding::exact("cube", "rays", 6, 7, 0.0),
+            Finding::exact("cube", "messages", 6, 6, 0.0),
+            Finding::told("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
+        ];
+        report.layers = vec![
+            counters,
+            Layer { left_out: Some("no valgrind".into()), ..Layer::new(LayerName::Instructions) },
+        ];
+        report
+    }
+
+    #[test]
+    fn text_tells_changes_and_counts_the_rest() {
+        let text = text(&sample());
+        assert!(
+            text.contains("regression   cube: rays 6 -> 7 (+16.67 %); more than the 0 %"),
+            "{text}"
+        );
+        assert!(text.contains("1 unchanged") && !text.contains("messages"), "{text}");
+        assert!(
+            text.contains("REGRESSION in counters") && text.contains("left out: no valgrind"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn markdown_keeps_its_columns() {
+        let text = markdown(&sample());
+        assert!(text.contains("a &lt;busy> machine \\| or so"), "{text}");
+        let rows = text.lines().filter(|line| line.starts_with('|'));
+        assert!(rows.clone().all(|row| row.replace("\\|", "").matches('|').count() == 9), "{text}");
+    }
+
+    #[test]
+    fn junit_survives_a_reader() {
+        let back = quick_junit::Report::deserialize_from_str(&junit(&sample())).unwrap();
+        assert_eq!((back.tests, back.failures), (4, 1));
+    }
+}

@@ -1,0 +1,90 @@
+//! The table of targets, for a terminal and as Markdown.
+
+use crate::verification::markdown::escaped;
+use bench::experiments::entry::{Judged, Verdict};
+use bench::targets::declare::Targets;
+use bench::targets::row::fields;
+use std::fmt::Write;
+
+/// Titles of the columns.
+const TITLES: [&str; 5] = ["row", "target", "measured", "how", ""];
+
+/// The table for a terminal, with a line that counts.
+pub fn text(targets: &Targets, rows: &[Judged]) -> String {
+    let cells: Vec<[String; 5]> = rows.iter().map(|row| fields(targets, row)).collect();
+    let titles = TITLES.map(str::to_owned);
+    let wide = |column: usize| {
+        let of = |row: &[String; 5]| row[column].chars().count();
+        cells.iter().chain([&titles]).map(of).max().unwrap_or(0)
+    };
+    let [a, b, c, d] = [0, 1, 2, 3].map(wide);
+    let mut out = String::new();
+    for [name, target, measured, how, verdict] in [&titles].into_iter().chain(&cells) {
+        // Writing into a string cannot fail.
+        let _ = writeln!(out, "{name:a$}  {target:>b$}  {measured:>c$}  {how:d$}  {verdict}");
+    }
+    let _ = writeln!(out, "{}", count(rows));
+    out
+}
+
+/// The same as Markdown, with the machine that it was measured on in a line above.
+pub fn markdown(targets: &Targets, rows: &[Judged], machine: &str) -> String {
+    let mut out = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
+    let mut row = |fields: &[String; 5]| {
+        let _ = writeln!(out, "| {} |", fields.each_ref().map(|f| escaped(f)).join(" | "));
+    };
+    row(&TITLES.map(str::to_owned));
+    row(&TITLES.map(|_| "---".to_owned()));
+    rows.iter().for_each(|judged| row(&fields(targets, judged)));
+    out
+}
+
+fn count(rows: &[Judged]) -> String {
+    let of = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    format!(
+        "{} met, {} missed, {} failed, {} left out, {} for comparison",
+        of(Verdict::Met),
+        of(Verdict::Missed),
+        of(Verdict::Failed),
+        of(Verdict::LeftOut),
+        of(Verdict::Told)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::targets::judge::unjudged;
+    use bench::testing::targets as read;
+
+    #[test]
+    fn every_verdict_is_told_with_its_reason() {
+        let targets = read(
+            "mesh.a.case = \"a\"\nrun.a.mesh = \"a\"\n[[row]]\nname = \"rate|1\"\nrun = \"a\"\n\
+             measure = \"cells_per_second_per_core\"\nat_least = 100e6\nat_most = 3e8\n",
+        )
+        .unwrap();
+        let row = &targets.row[0];
+        let missed = Judged {
+            measured: Some(99.5e6),
+            how: "measured".into(),
+            ..unjudged(row, Verdict::Missed, String::new())
+        };
+        let failed = unjudged(row, Verdict::Failed, "run a failed: <no memory>".into());
+        let rows = [missed, failed];
+        let text = text(&targets, &rows);
+        for part in [
+            "at least 100.00 M cells/s, at most 300.00 M cells/s",
+            "99.50 M cells/s  measured  MISSED",
+            "FAILED: run a failed: <no memory>",
+            "0 met, 1 missed, 1 failed, 0 left out, 0 for comparison",
+        ] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+        let markdown = markdown(&targets, &rows, "2 cores");
+        let of_table: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
+        assert_eq!(of_table.len(), 4);
+        assert!(of_table[1].starts_with("| --- | --- |"), "{markdown}");
+        assert!(of_table[2].starts_with("| rate\\|1 |") && markdown.contains("&lt;no memory&gt;"));
+    }
+}

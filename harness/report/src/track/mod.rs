@@ -1,0 +1,4 @@
+//! The history of numbers by commit: a page, and forms for other programs.
+
+pub mod export;
+pub mod page;

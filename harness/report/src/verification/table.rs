@@ -1,0 +1,128 @@
+//! The table for people: a line for each case's serial run, one for each rank count, then the remarks.
+
+use super::remarks::remarks;
+use run::verify::report::{CaseReport, Report, Run, Tally};
+use std::fmt::Write;
+
+/// Headings of the table's columns.
+pub const COLUMNS: [&str; 12] = [
+    "case",
+    "facets",
+    "base",
+    "cells",
+    "ranks",
+    "hold",
+    "fail",
+    "left out",
+    "time s",
+    "process s",
+    "M cells/s",
+    "B/cell",
+];
+
+/// The column that compares with the paper's 38 k cells per second on one core.
+pub const COLUMN_PAPER: &str = "x paper";
+
+/// The report as plain text.
+pub fn table(report: &Report) -> String {
+    let mut rows =
+        vec![COLUMNS.iter().chain([&COLUMN_PAPER]).map(|title| (*title).to_owned()).collect()];
+    rows.extend(report.cases.iter().flat_map(rows_of));
+    let mut text = aligned(&rows);
+    for line in remarks(report) {
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "{line}");
+    }
+    let _ = writeln!(text, "{}", report.verdict());
+    text
+}
+
+/// The rows of one case, each with one field per column.
+pub fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
+    let serial = case.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
+    let of_case = case.checks.iter().filter(|check| check.ranks.is_none()).collect();
+    let mut first = vec![case.name.clone(), case.facets.to_string(), case.leaves_base.to_string()];
+    first.extend([case.cells.to_string(), "serial".to_owned()]);
+    first.extend(results(of_case, serial));
+    let mut rows = vec![first];
+    for ranks in rank_counts(case) {
+        let with_ranks =
+            |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks == ranks);
+        let runs = case.runs.iter().filter(with_ranks);
+        // Layouts differ in time and not in result; the table shows what the best of them gives.
+        let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));
+        let checks = case.checks.iter().filter(|check| check.ranks == Some(ranks)).collect();
+        let mut row = vec![String::new(); 4];
+        row.push(ranks.to_string());
+        row.extend(results(checks, fastest));
+        rows.push(row);
+    }
+    rows
+}
+
+fn rank_counts(case: &CaseReport) -> Vec<usize> {
+    let mut counts: Vec<usize> = case.checks.iter().filter_map(|check| check.ranks).collect();
+    counts.sort_unstable();
+    counts.dedup();
+    counts
+}
+
+fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
+    let mut fields =
+        vec![tally.pass.to_string(), tally.fail.to_string(), tally.left_out.to_string()];
+    match run {
+        Some(run) => fields.extend([
+            format!("{:.3}", run.time_wall_s),
+            format!("{:.3}", run.time_process_s),
+            format!("{:.3}", run.cells_per_s() / 1e6),
+            format!("{:.1}", run.bytes_per_cell()),
+            format!("{:.1}", run.speedup_over_paper()),
+        ]),
+        None => fields.extend(vec!["-".to_owned(); 5]),
+    }
+    fields
+}
+
+/// Columns as wide as their widest field; all but the first set to the right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width =
+        |row: &Vec<String>, column: usize| row.get(column).map_or(0, |field| field.chars().count());
+    let widest = |column| rows.iter().map(|row| width(row, column)).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(widest).collect();
+    let mut text = String::new();
+    for row in rows {
+        let fields =
+            row.iter().zip(&widths).enumerate().map(|(column, (field, &width))| match column {
+                0 => format!("{field:<width$}"),
+                _ => format!("{field:>width$}"),
+            });
+        let line = fields.collect::<Vec<_>>().join("  ");
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use run::testing::report as sample;
+
+    #[test]
+    fn a_line_for_the_serial_run_and_one_for_each_rank_count() {
+        let text = table(&sample());
+        let lines: Vec<Vec<&str>> =
+            text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(
+            lines[1][..9],
+            ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100"]
+        );
+        assert_eq!(lines[2], ["4", "0", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
+    }
+
+    #[test]
+    fn the_verdict_comes_last() {
+        let verdict = "1 cases: 1 checks hold, 1 fail, 1 left out, in 2.0 s: FAILED\n";
+        assert!(table(&sample()).ends_with(verdict));
+    }
+}

@@ -1,0 +1,204 @@
+//! A report from a record of every experiment: what is beside what, and that the page needs nothing else.
+
+use bench::experiments::entry::{
+    Comm, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread, What,
+};
+use bench::track::history::Record;
+use report::benchmark::report;
+use std::path::Path;
+
+fn line(what: What) -> Line {
+    Line {
+        schema: SCHEMA.into(),
+        session: "s".into(),
+        time_utc: "2026-01-31T12:00:00Z".into(),
+        what,
+    }
+}
+
+fn session() -> Line {
+    let machine = Machine {
+        cpu: "A <Chip> & more".into(),
+        cores: 2,
+        memory_bytes: 1 << 34,
+        kernel: "Linux 6".into(),
+        mpi: "mpirun (Open MPI) 4.1.4".into(),
+        compiler: "rustc 1.95.0".into(),
+        commit: "0123456789ab".into(),
+    };
+    let command = vec!["harness".into(), "bench".into()];
+    line(What::Session(Box::new(Session { command, machine, load_average: 0.0 })))
+}
+
+/// A run in which every rank has nearly the same to do.
+fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: &str) -> Vec<Line> {
+    let times = |repeat: usize| -> Vec<f64> {
+        let share = cells as f64 / 1e6 / ranks as f64;
+        (0..ranks).map(|r| share * (1.0 + 0.01 * ((r + repeat) % 5) as f64)).collect()
+    };
+    let one = |repeat: usize| {
+        let useful = Spread::of(&times(repeat));
+        let none = Spread::of(&vec![0.0; ranks]);
+        let phase = |name: &str| Phase {
+            name: name.into(),
+            useful_s: useful.clone(),
+            wall_s: useful.clone(),
+            comm_s: none.clone(),
+            messages: Spread::of(&vec![3.0; ranks]),
+            message_bytes: Spread::of(&vec![4096.0; ranks]),
+        };
+        let setup = Setup {
+            experiment: experiment.into(),
+            engine: "mesher".into(),
+            case: "uav".into(),
+            spacing_min: 1.0 / (cells as f64).sqrt()
+                * if experiment == "layers" { 0.0 } else { 1.0 },
+            layer_cells_min: n,
+            ranks,
+            comm,
+            partitioner: if weights.is_empty() { String::new() } else { "morton".into() },
+            weights: weights.into(),
+        };
+        let both: Vec<f64> = times(repeat).iter().map(|t| 2.0 * t).collect();
+        let counters = [
+            ("leaves".to_owned(), Spread::of(&vec![cells as f64 / ranks as f64; ranks])),
+            ("base_leaf_cells_max".to_owned(), Spread::of(&vec![cells as f64 / 500.0; ranks])),
+        ];
+        line(What::Run(Box::new(Run {
+            setup,
+            repeat,
+            warm_up: false,
+            oversubscribed: comm == Comm::Mpi && ranks > 2,
+            command: "mesher uav.toml".into(),
+            facets: 1000,
+            cells,
+            digest: "0".repeat(32),
+            time_wall_s: 2.0 * useful.max,
+            time_launch_s: 3.0 * useful.max,
+            peak_rss_bytes: Spread::of(&vec![1e6; ranks]),
+            useful_s: Spread::of(&both),
+            phases: vec![phase("refine"), phase("grade")],
+            counters: counters.into_iter().collect(),
+            message_matrix: Vec::new(),
+        })))
+    };
+    (0..6).map(one).collect()
+}
+
+/// A warm-up that tells who sent how much to whom.
+fn warm_up() -> Line {
+    let mut line = run("strong", Comm::Sim, 4, 50_000_000, 4, "").remove(0);
+    if let What::Run(run) = &mut line.what {
+        (run.warm_up, run.message_matrix) = (true, vec![[0, 1, 3, 96], [3, 0, 1, 4096]]);
+    }
+    line
+}
+
+fn record() -> Vec<Line> {
+    let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
+    let mut lines = vec![session(), line(What::Network(network)), warm_up()];
+    for ranks in [1, 2, 4, 16, 32, 64] {
+        lines.extend(run("strong", Comm::Sim, ranks, 50_000_000, 4, ""));
+        lines.extend(run("weak", Comm::Sim, ranks, 1_000_000 * ranks as u64, 4, ""));
+    }
+    for ranks in [1, 2, 4] {
+        lines.extend(run("strong", Comm::Mpi, ranks, 50_000_000, 4, ""));
+    }
+    for ranks in [1, 2] {
+        for k in 0..4 {
+            lines.extend(run("spacing", Comm::Mpi, ranks, 100_000 << (2 * k), 4, ""));
+            lines.extend(run("layers", Comm::Mpi, ranks, 400_000 << k, 1 << k, ""));
+        }
+    }
+    for weights in ["unit", "area", "rehearsal"] {
+        lines.extend(run("weights", Comm::Sim, 64, 4_000_000, 4, weights));
+    }
+    lines
+}
+
+fn files(place: &Path, kind: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(place.join("figures")).unwrap();
+    let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+    let mut of_kind: Vec<String> =
+        names.filter_map(|n| n.strip_suffix(&format!(".{kind}")).map(str::to_owned)).collect();
+    of_kind.sort();
+    of_kind
+}
+
+#[test]
+fn numbers_and_tikz_are_beside_every_figure() {
+    let place = tempfile::tempdir().unwrap();
+    let written = report(place.path(), &record(), &[]).unwrap();
+    let drawn = files(place.path(), "svg");
+    assert_eq!(drawn.len(), written.figures);
+    let mut kinds = vec!["csv", "tex"];
+    if cfg!(feature = "figures") {
+        kinds.extend(["png", "pdf"]);
+    }
+    for kind in kinds {
+        assert_eq!(files(place.path(), kind), drawn, "{kind}");
+    }
+    for figure in [
+        "time-over-cells-uav",
+        "time-over-layers-uav",
+        "speedup-uav-50M",
+        "efficiency-strong-uav-50M",
+        "efficiency-weak-uav",
+        "phases-strong-uav-50M",
+        "per-rank-uav-16",
+        "per-rank-uav-32",
+        "per-rank-uav-64",
+        "balance-uav-4M-64",
+        "messages-uav-50M-4",
+        "rate",
+        "memory",
+    ] {
+        assert!(drawn.iter().any(|d| d == figure), "{figure} is missing among {drawn:?}");
+    }
+    let speedup =
+        std::fs::read_to_string(place.path().join("figures/speedup-uav-50M.csv")).unwrap();
+    assert!(speedup.contains("oversubscribed,oversubscribed,4,"), "{speedup}");
+    assert!(speedup.contains("projected,projected,64,") && speedup.contains("cited,32,11.28"));
+    assert!(
+        place.path().join("figures.tex").is_file() && place.path().join("artifact.md").is_file()
+    );
+    assert!(written.broken.is_empty(), "{:?}", written.broken);
+}
+
+#[test]
+fn a_history_adds_its_trend() {
+    let commit = |i: u32| Record {
+        metrics: [("uav/rays".to_owned(), 100.0 + f64::from(i))].into(),
+        ..Record::new(format!("{i:040}"))
+    };
+    let place = tempfile::tempdir().unwrap();
+    let page = |history: &[Record]| {
+        std::fs::read_to_string(report(place.path(), &record(), history).unwrap().page).unwrap()
+    };
+    assert!(!page(&[]).contains("trend"));
+    let with = page(&[commit(0), commit(1), commit(2)]);
+    assert!(with.contains("<a href=\"#trend\">") && with.contains("id=\"trend-uav\""));
+    assert!(with.contains("<h2 id=\"trend\">") && with.contains("no change points"));
+    let numbers = std::fs::read_to_string(place.path().join("figures/trend-uav.csv")).unwrap();
+    assert!(numbers.contains("rays,measured,2,1.02,"), "{numbers}");
+}
+
+#[test]
+fn the_page_needs_nothing_but_itself() {
+    let place = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &record(), &[]).unwrap().page).unwrap();
+    for asks in ["<script", "<link", "<img", "<iframe", "src=", "@import", "url("] {
+        assert!(!page.contains(asks), "{asks}");
+    }
+    // Namespaces are names, not addresses; every other reference stays on the page.
+    let rest = page.replace("http://www.w3.org/2000/svg", "");
+    assert!(!rest.contains("http:") && !rest.contains("https:"));
+    for reference in rest.split("href=\"").skip(1) {
+        assert!(reference.starts_with('#') || reference.starts_with("data:"), "{reference:.40}");
+    }
+    assert_eq!(page.matches("<figure").count(), page.matches("</figure>").count());
+    assert!(
+        page.contains("prefers-color-scheme: dark") && page.contains("A &lt;Chip&gt; &amp; more")
+    );
+    assert!(page.contains("projection against MPI"));
+}

@@ -1,0 +1,77 @@
+//! Data for tests, here and in the crates that build on this one.
+
+use crate::engine::mesher::Layout;
+use crate::verify::options::Options;
+use crate::verify::outcome::{Check, Outcome};
+use crate::verify::report::{CaseReport, Missing, Report, Run, SCHEMA};
+use contract::catalogue::Size;
+use std::time::Duration;
+
+/// A report with one of everything, for the tests of the output formats too.
+pub fn report() -> Report {
+    let layout = Layout { ranks: 4, partitioner: "metis".into(), level_base: "auto".into() };
+    let run = Run {
+        program: "mesher".into(),
+        layout: None,
+        cells: 7600,
+        time_wall_s: 0.1,
+        time_process_s: 0.2,
+        peak_rss_bytes: 76_000,
+    };
+    let on_ranks = Run { layout: Some(layout.clone()), time_wall_s: 0.05, ..run.clone() };
+    let mut sides = Check::new("serial", "oracles", Outcome::Pass);
+    sides.notes.push("open3d was wrong at 1 point".into());
+    let case = CaseReport {
+        name: "cube_small".into(),
+        facets: 12,
+        leaves_base: 5000,
+        cells: 7600,
+        runs: vec![run, on_ranks],
+        checks: vec![
+            sides,
+            Check::of_layout(
+                &layout,
+                "same leaves",
+                Outcome::Fail("first difference <at> root".into()),
+            ),
+            Check::new("p4est", "balance", Outcome::LeftOut("the engine is not built".into())),
+        ],
+        kept: Some("out/cube_small".into()),
+        repeat_with: Some("harness verify cube_small --ranks 4".into()),
+        time_s: 1.5,
+        ..CaseReport::default()
+    };
+    let missing =
+        Missing { what: "p4est".into(), why: "the engine is not built".into(), required: false };
+    Report {
+        schema: SCHEMA.into(),
+        program: "harness 0".into(),
+        cores: 2,
+        missing: vec![missing],
+        cases: vec![case],
+        interrupted: false,
+        time_s: 2.0,
+    }
+}
+
+/// Options of a verification that asks for as little as possible.
+pub fn options() -> Options {
+    Options {
+        cases: vec![],
+        sizes: vec![Size::Small],
+        ranks: vec![2],
+        partitioners: vec!["morton".into()],
+        level_bases: vec!["auto".into()],
+        out: None,
+        keep: false,
+        limit: Duration::from_secs(60),
+        mpi: false,
+        oracles: false,
+        p4est: false,
+        require: vec![],
+        oracle_points: 100,
+        seed: 0,
+        cells_max: 1_000_000,
+        reference_cells_max: 1_000_000,
+    }
+}

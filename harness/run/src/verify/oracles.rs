@@ -1,0 +1,119 @@
+//! The sides of the base tree's leaves, put to the oracles.
+
+use super::case::CaseRun;
+use super::report::{Check, Outcome};
+use super::serial::Meshes;
+use crate::oracle::{NoAnswer, Question};
+use check::oracle::sample::{self, Sample};
+use check::oracle::vote::{self, Answer, Ballot};
+use check::oracle::watertight::is_watertight;
+use contract::case::Case;
+use contract::catalogue::Size;
+use contract::parity::Parity;
+use contract::word::{self, Side};
+use std::collections::BTreeMap;
+use std::fs;
+use std::time::Instant;
+
+const NAME: &str = "oracles";
+const SUBJECT: &str = "sides";
+
+/// On a small case every leaf is asked for; this many are still small.
+const POINTS_OF_SMALL: usize = 400_000;
+
+impl CaseRun<'_> {
+    /// Chooses points, asks, counts votes.
+    pub fn verify_oracles(&mut self, case: &Case, meshes: &Meshes) {
+        if let Some(why) = &self.needs.oracles {
+            let why = why.clone();
+            return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
+        }
+        let start = Instant::now();
+        let most = match self.selected.size {
+            Some(Size::Small) => POINTS_OF_SMALL,
+            _ => self.options.oracle_points,
+        };
+        let sample = sample::choose(case, &meshes.base.words, most, self.options.seed);
+        let (answers, troubles) = match self.ask(case, &sample) {
+            Ok(asked) => asked,
+            Err(NoAnswer::Missing(why) | NoAnswer::Failed(why)) => {
+                return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
+            }
+            Err(NoAnswer::Interrupted) => return,
+        };
+        let mut check = judge(case, &sample, &answers);
+        check.notes.extend(troubles);
+        check.time_s = start.elapsed().as_secs_f64();
+        self.add(check, None);
+    }
+
+    /// The answers, and the sentences of those that gave none.
+    fn ask(&self, case: &Case, sample: &Sample) -> Result<(Vec<Answer>, Vec<String>), NoAnswer> {
+        let place = self.place.join("oracles");
+        let question = fs::create_dir_all(&place)
+            .and_then(|()| Question::write(&sample.points, &case.facets, &place));
+        let question = question.map_err(|error| NoAnswer::Failed(error.to_string()))?;
+        let (mut answers, mut troubles) = (Vec::new(), Vec::new());
+        for oracle in &self.needs.oracles_there {
+            self.progress.step(format!("oracle {oracle}"));
+            match question.ask(oracle, self.programs, self.options.limit) {
+                Ok(answer) => answers.push(answer),
+                Err(NoAnswer::Missing(why) | NoAnswer::Failed(why)) => {
+                    troubles.push(format!("no answer: {why}"))
+                }
+                Err(NoAnswer::Interrupted) => return Err(NoAnswer::Interrupted),
+            }
+        }
+        match (answers.is_empty(), troubles.first()) {
+            (true, Some(why)) => Err(NoAnswer::Failed(why.clone())),
+            _ => Ok((answers, troubles)),
+        }
+    }
+}
+
+fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
+    let parity = Parity::new(&case.facets_lattice);
+    let mesh: Vec<bool> =
+        sample.words.iter().map(|&leaf| word::side(leaf) == Side::Inside).collect();
+    let exact: Vec<Option<bool>> =
+        sample.words.iter().map(|&leaf| unanimous(&parity, leaf)).collect();
+    let ballot = Ballot {
+        mesh: &mesh,
+        exact: &exact,
+        oracles: answers,
+        watertight: is_watertight(&case.facets_lattice),
+    };
+    let count = vote::count(&ballot);
+    let outcome = count.failure(&ballot, &sample.points).map_or(Outcome::Pass, Outcome::Fail);
+    let mut counts = BTreeMap::from([
+        ("leaves".to_owned(), sample.candidates),
+        ("points".to_owned(), sample.words.len() as u64),
+        ("in_band".to_owned(), sample.in_band),
+        ("watertight".to_owned(), u64::from(ballot.watertight)),
+        ("disputed".to_owned(), count.disputed),
+        ("exact_undecided".to_owned(), count.exact_undecided),
+        ("exact_against_mesh".to_owned(), count.exact_against.len() as u64),
+    ]);
+    for dissent in &count.dissents {
+        counts.insert(format!("{}_differs", dissent.name), dissent.points);
+        counts.insert(format!("{}_right", dissent.name), dissent.right);
+        counts.insert(format!("{}_wrong", dissent.name), dissent.wrong);
+    }
+    let mut notes = count.notes(&ballot);
+    if sample.in_band > 0 {
+        notes.insert(
+            0,
+            format!(
+                "{} leaves within {:.3e} of the surface were not asked for",
+                sample.in_band, sample.band
+            ),
+        );
+    }
+    Check { notes, counts, ..Check::new(SUBJECT, NAME, outcome) }
+}
+
+/// What the exact rays from a leaf's centroid say; nothing where they differ.
+fn unanimous(parity: &Parity, leaf: u64) -> Option<bool> {
+    let rays = parity.inside(word::octant(leaf).centre());
+    rays.iter().all(|ray| *ray == rays[0]).then_some(rays[0])
+}
