@@ -1,4 +1,4 @@
-//! `harness bench --targets FILE`: a table of targets, declared as data, and whether they are met.
+//! `harness targets FILE`: a table of targets, declared as data, and whether they are met.
 //!
 //! A file declares meshes, runs of them and rows; [`measure()`] makes the runs that rows need, each once
 //! whatever number of rows asks for it, and judges a row as soon as its runs are there. A judgement is a

@@ -23,7 +23,7 @@ pub fn check(subject: &Subject) -> CheckResult {
     if let Some(edge) = &counts.worst {
         result.find(format!(
             "more than one hanging node on an edge of {}",
-            subject.terms.root.describe(&edge)
+            subject.terms.root.describe(edge)
         ));
     }
     let [none, one, more] = counts.edges;

@@ -103,7 +103,7 @@ fn least(facets: &Facets, words: &[u64], terms: &Terms, result: &mut CheckResult
             }
             Visit::Split if !wanted && !box_asks(octant, terms) => {
                 result.find_with(|| {
-                    let octant = terms.root.describe(&octant);
+                    let octant = terms.root.describe(octant);
                     format!("T0 splits without need the {octant}")
                 });
             }

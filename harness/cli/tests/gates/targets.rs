@@ -1,4 +1,4 @@
-//! `harness bench --targets` as a user runs it, on a mesher that a script plays.
+//! `harness targets` as a user runs it, on a mesher that a script plays.
 
 use crate::play::Play;
 use std::fs;
@@ -54,20 +54,20 @@ fn play() -> Play {
     play
 }
 
-const BENCH: &str = "bench --targets targets.toml --mesher ./mesher --network 1e-6,1e10";
+const TARGETS_COMMAND: &str = "targets targets.toml --mesher ./mesher --network 1e-6,1e10";
 
 #[test]
 fn met_targets_are_a_success_and_the_record_says_so_again() {
     let play = play();
     let only = "--only rate,audit --record out/r.jsonl";
-    let done = play.harness(&format!("{BENCH} {only}"));
+    let done = play.harness(&format!("{TARGETS_COMMAND} {only}"));
     assert_eq!(done.code, 0, "{}", done.told);
     assert!(done.told.contains("2 met, 0 missed"), "{}", done.told);
     // The audited mesh went when it had been read.
     let left: Vec<_> =
         fs::read_dir(play.path("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left, ["r.jsonl"]);
-    let again = play.harness(&format!("{BENCH} {only} --show"));
+    let again = play.harness(&format!("{TARGETS_COMMAND} {only} --show"));
     assert_eq!(again.code, 0, "{}", again.told);
     assert!(done.told.contains(again.told.trim()), "{}", again.told);
     let record = fs::read_to_string(play.path("out/r.jsonl")).unwrap();
@@ -78,7 +78,7 @@ fn met_targets_are_a_success_and_the_record_says_so_again() {
 #[test]
 fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
     let play = play();
-    let done = play.harness(&format!("{BENCH} --no-mpi --report out"));
+    let done = play.harness(&format!("{TARGETS_COMMAND} --no-mpi --report out"));
     assert_eq!(done.code, 1, "{}", done.told);
     assert!(
         done.told.contains("FAILED: run three failed: it ended with code 70: mesher: no three"),
@@ -92,7 +92,7 @@ fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
         "{page}"
     );
     play.write("targets.toml", &TARGETS.replace("at_least = 500", "at_least = 501"));
-    let done = play.harness(&format!("{BENCH} --only rate --record r.jsonl"));
+    let done = play.harness(&format!("{TARGETS_COMMAND} --only rate --record r.jsonl"));
     assert_eq!(done.code, 1, "{}", done.told);
     assert!(done.told.contains("MISSED"), "{}", done.told);
 }
@@ -101,15 +101,16 @@ fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
 fn what_is_missing_and_what_is_wrong_have_codes_of_their_own() {
     let play = play();
     let done = play.harness(&format!(
-        "{BENCH} --only mpi,rate --record r.jsonl --launcher nonesuch/{{ranks}}"
+        "{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --launcher nonesuch/{{ranks}}"
     ));
     assert_eq!(done.code, 3, "{}", done.told);
     assert!(done.told.contains("left out: there is nothing to start ranks with"), "{}", done.told);
-    let wished = play.harness(&format!("{BENCH} --only mpi,rate --record r.jsonl --no-mpi"));
+    let wished =
+        play.harness(&format!("{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --no-mpi"));
     assert_eq!(wished.code, 0, "{}", wished.told);
-    assert_eq!(play.harness(&format!("{BENCH} --only luck")).code, 2);
+    assert_eq!(play.harness(&format!("{TARGETS_COMMAND} --only luck")).code, 2);
     play.write("targets.toml", &TARGETS.replace("seconds", "minutes"));
-    let done = play.harness(BENCH);
+    let done = play.harness(TARGETS_COMMAND);
     assert_eq!(done.code, 2, "{}", done.told);
     assert!(
         done.told.contains("targets.toml") && done.told.contains("unknown variant"),
