@@ -1,7 +1,6 @@
 //! `harness track`: a record per commit in a file, and the commits at which numbers changed.
 //!
-//! [`history`] is the file; [`divisive`] finds change points; [`export`] is for other people's tools, [`page`] for
-//! people.
+//! [`history`] is the file; [`divisive`] finds change points.
 //!
 //! Invariant: the same history and options give the same answer on every machine.
 
