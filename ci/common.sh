@@ -1,20 +1,20 @@
-# Sourced by the programs of ci/: where things are, and how they speak. Defines; does nothing by itself.
+# Sourced by the scripts of ci/: paths, environment and messages. Sourcing it runs no program.
 
 repo="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 target="${CARGO_TARGET_DIR:-$repo/target}"
 
-# A toolchain that rustup put into the home directory is used even if the shell has not been told of it.
+# rustup installs into the home directory, which may not be on the PATH of the current shell.
 [ -d "${CARGO_HOME:-$HOME/.cargo}/bin" ] && PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 export PATH CARGO_TERM_COLOR="${CARGO_TERM_COLOR:-never}"
 
-# OpenMPI refuses root and more ranks than cores unless told otherwise; both are what a container and a
-# 64-rank test on 2 cores are.
+# By default OpenMPI refuses to run as root, as containers do, and to run more ranks than cores, as a test of
+# 64 ranks on 2 cores does.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 
-# say WHAT...: what is being done, with the seconds since the start, so that a log shows where time went.
+# say MESSAGE...: prints the current step and the seconds since the start, so that a log shows the time of each step.
 say() { printf '[%4ds] %s: %s\n' "$SECONDS" "$(basename "$0")" "$*"; }
 
-# fail CODE WHAT...: one sentence, and out. 2 the caller's input, 3 something missing.
+# fail CODE MESSAGE...: prints one sentence and exits with CODE: 2 for invalid input, 3 if something is missing.
 fail() {
     local code="$1"
     shift

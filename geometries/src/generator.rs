@@ -1,6 +1,6 @@
-//! The `[generator]` table of a case file: a shape, a number of facets, and the shape's own sizes.
+//! The `[generator]` table of a case file: a shape, a number of facets, and the dimensions of the shape.
 //!
-//! A size that the shape does not have is an error, exactly as an unknown key is.
+//! A dimension that the shape does not have is an error, as an unknown key is.
 
 use std::fmt;
 
@@ -8,21 +8,21 @@ use serde::Deserialize;
 
 use crate::{Facet, Mesh, shapes};
 
-/// The shapes that can be generated, by the name they have in a case file.
+/// The shapes that can be generated. Case files use their names in snake case.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Hash)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
-    /// An axis-aligned cube: its faces lie in lattice planes wherever the root's planes allow it.
+    /// An axis-aligned cube. With a suitable root its faces lie in lattice planes.
     Cube,
     /// A geodesic sphere.
     Sphere,
     /// A ring around the z axis.
     Torus,
-    /// A spherical shell: a sphere within a sphere, the space between them being inside.
+    /// A spherical shell: the inside is the space between two concentric spheres.
     NestedSpheres,
-    /// A thin axis-aligned plate, its thickness along z.
+    /// A thin axis-aligned plate with its thickness along z.
     Plate,
-    /// A pipe of two straights and a bend, closed by flat caps: internal flow.
+    /// A pipe of two straight sections and a bend, closed by flat caps, for internal flow.
     Pipe,
     /// An unmanned aircraft: fuselage, long wings, boom, inverted V tail, stores.
     Uav,
@@ -31,7 +31,7 @@ pub enum Shape {
 }
 
 impl fmt::Display for Shape {
-    /// The name in a case file.
+    /// Writes the name that case files use.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Cube => "cube",
@@ -46,22 +46,23 @@ impl fmt::Display for Shape {
     }
 }
 
-/// What a case file's `[generator]` table holds. Sizes left out take the shape's defaults.
+/// The contents of a `[generator]` table. Dimensions that are not given take the defaults of the shape. All
+/// lengths are in the user's unit.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Generator {
-    /// Which shape.
+    /// The shape.
     pub shape: Shape,
-    /// How many facets are wanted. Even numbers are met exactly; an odd one gives one facet less.
+    /// Requested number of facets: exact if even, otherwise the shape has one less.
     pub facets: usize,
-    /// Where the shape's own origin goes. Every shape; default `[0, 0, 0]`.
+    /// Every shape: the position of its origin, default `[0, 0, 0]`.
     #[serde(default)]
     pub centre: Option<[f64; 3]>,
     /// `cube`: the edge, default 1.
     #[serde(default)]
     pub edge: Option<f64>,
-    /// `sphere` and `nested_spheres` (outer): default 0.5. `torus` (of the centre line): default 0.5.
-    /// `pipe` (of the bore): default 0.1.
+    /// `sphere`, and the outer sphere of `nested_spheres`: default 0.5. `torus`: of the centre line, default
+    /// 0.5. `pipe`: of the bore, default 0.1.
     #[serde(default)]
     pub radius: Option<f64>,
     /// `nested_spheres`: of the inner sphere, default half of `radius`.
@@ -73,12 +74,11 @@ pub struct Generator {
     /// `pipe`: of the bend's centre line, default 3 times `radius`.
     #[serde(default)]
     pub radius_bend: Option<f64>,
-    /// `pipe`: how far the bend turns, in degrees below 360, default 90.
+    /// `pipe`: angle of the bend in degrees, at most 180, default 90.
     #[serde(default)]
     pub angle: Option<f64>,
-    /// `plate`: along x, default 1. `pipe`: of each straight, default 5 times
-    /// `radius`. `uav` and `fighter`: the
-    /// longest edge of the bounding box, default 1.
+    /// `plate`: along x, default 1. `pipe`: of each straight section, default 5 times `radius`. `uav` and
+    /// `fighter`: the longest edge of the bounding box, default 1.
     #[serde(default)]
     pub length: Option<f64>,
     /// `plate`: along y, default 0.5.
@@ -89,51 +89,52 @@ pub struct Generator {
     pub thickness: Option<f64>,
 }
 
-/// Why a generator cannot be drawn: always the user's input.
+/// An invalid `[generator]` table, which the user can correct.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GeneratorError {
-    /// A size was given that this shape does not have.
-    #[error("the shape {shape} has no size `{key}`; it has {known}")]
+    /// The shape does not have this dimension.
+    #[error("the shape {shape} has no dimension `{key}`; it has {known}")]
     SizeForeign {
-        /// The shape asked for.
+        /// The shape.
         shape: Shape,
-        /// The key that does not belong to it.
+        /// The key of the dimension.
         key: &'static str,
-        /// The keys that do.
+        /// The keys of the dimensions that the shape has.
         known: String,
     },
-    /// A size is zero, negative, not finite, or contradicts another.
+    /// A dimension is zero, negative, not finite, or contradicts another.
     #[error("[generator] {key} = {value}: {want}")]
     SizeWrong {
-        /// Which size.
+        /// The key of the dimension.
         key: &'static str,
         /// Its value.
         value: f64,
-        /// What it has to be.
+        /// The condition that it must satisfy.
         want: String,
     },
-    /// Fewer facets than the shape can be drawn in, or more than indices can number.
+    /// The number of facets is less than the minimum of the shape, or exceeds the range of vertex indices.
     #[error("[generator] facets = {facets}: {shape} needs at least {least} and at most {most}")]
     FacetsWrong {
-        /// The shape asked for.
+        /// The shape.
         shape: Shape,
-        /// The number asked for.
+        /// The requested number.
         facets: usize,
-        /// The least that the shape can be drawn in.
+        /// The minimum for the shape.
         least: usize,
-        /// The most.
+        /// The maximum for every shape.
         most: usize,
     },
-    /// The sizes are so extreme that f32 vertices fall together.
-    #[error("[generator] {0}; ask for fewer facets or a shape nearer the origin")]
+    /// The vertices of a facet coincide or are not finite in f32.
+    #[error("[generator] {0}; request fewer facets or a shape closer to the origin")]
     Unrepresentable(String),
 }
 
-/// Above this, vertex numbers would no longer fit their 32 bits with room to spare.
+/// Maximum number of facets. Vertex indices are 32 bits wide, and a closed surface has about half as many
+/// vertices as facets.
 const FACETS_MOST: usize = 1 << 31;
 
 impl Generator {
-    /// A shape with all its sizes at their defaults.
+    /// A shape with default dimensions.
     pub fn new(shape: Shape, facets: usize) -> Self {
         Self {
             shape,
@@ -151,12 +152,18 @@ impl Generator {
         }
     }
 
-    /// The shape as facet soup, outward wound.
+    /// The shape as facet soup, wound outward.
+    ///
+    /// # Errors
+    /// The table is invalid for the shape.
     pub fn facets(&self) -> Result<Vec<Facet>, GeneratorError> {
         Ok(self.mesh()?.facets())
     }
 
-    /// The shape as an indexed mesh of exactly `facets` facets (one less where that is odd).
+    /// The shape as an indexed mesh of exactly `facets` facets, one less if that number is odd.
+    ///
+    /// # Errors
+    /// The table is invalid for the shape.
     pub fn mesh(&self) -> Result<Mesh, GeneratorError> {
         self.check_keys()?;
         let least = shapes::facets_least(self.shape);
@@ -173,7 +180,7 @@ impl Generator {
         }
     }
 
-    /// A size of the table, or its default; positive and finite either way.
+    /// A dimension of the table or its default, checked to be positive and finite.
     pub(crate) fn size(
         &self,
         key: &'static str,
@@ -187,7 +194,7 @@ impl Generator {
         Err(GeneratorError::SizeWrong { key, value, want: "must be positive and finite".into() })
     }
 
-    /// Sizes that were given, by key.
+    /// The keys of the dimensions that the table gives.
     fn sizes_given(&self) -> impl Iterator<Item = &'static str> {
         [
             ("edge", self.edge),

@@ -1,11 +1,11 @@
-//! Shapes that need no file: closed surfaces as facet soup, in as many facets as asked.
+//! Generated shapes: closed surfaces as facet soup, with a given number of facets.
 //!
-//! Every shape is one closed, outward-wound surface whose facets share their vertices bit for bit, and
-//! is the same on every machine: only `+ - * /`, square roots and `libm` are used, and nothing depends
-//! on the order of a hash table. [`Generator`] is the `[generator]` table of a case file.
+//! Every shape is a closed surface wound outward, whose facets share vertices bit for bit. It is the same on
+//! every machine: only `+ - * /`, square roots and `libm` are used, and nothing depends on the order of a
+//! hash table. [`Generator`] is the `[generator]` table of a case file.
 //!
-//! The number of facets is exact when it is even and the shape can be drawn in that few; a closed
-//! surface of triangles always has an even number of them, so an odd request gives one facet less.
+//! A closed surface of triangles has an even number of facets. If the requested number is odd, the shape has
+//! one facet less; otherwise the number is exact. Each shape has a minimum number.
 
 #![deny(missing_docs)]
 
@@ -18,5 +18,5 @@ pub use generator::{Generator, GeneratorError, Shape};
 pub use mesh::{Mesh, MeshFault};
 pub use stl::write_stl_binary;
 
-/// One facet: three vertices, f32 as in STL.
+/// The three vertices of a facet, in the precision of STL.
 pub type Facet = [[f32; 3]; 3];

@@ -1,12 +1,12 @@
-//! A closed triangulated surface whose facets share numbered vertices.
+//! A closed triangulated surface with indexed vertices.
 //!
 //! Invariants of a finished mesh, executed by [`Mesh::fault`]:
-//! - every edge belongs to exactly two facets, which run along it in opposite directions (watertight
-//!   and consistently wound);
-//! - no facet repeats a vertex or has no area, as f32 sees it.
+//! - every edge belongs to exactly two facets, which traverse it in opposite directions (the surface is
+//!   watertight and consistently wound);
+//! - every facet has a positive area after its vertices are rounded to f32.
 //!
-//! Positions stay f64 until the facets are handed out, so that each vertex is rounded to f32 once and
-//! all its facets get the same bits.
+//! Positions are f64 until [`Mesh::facets`] rounds each vertex to f32, so all facets at a vertex get the same
+//! bits.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -17,24 +17,24 @@ use edges::halves;
 
 mod edges;
 
-/// A surface of triangles over numbered vertices, wound so that its normals point outward.
+/// A surface of triangles over indexed vertices, wound so that its normals point outward.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     pub(crate) vertices: Vec<[f64; 3]>,
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
-/// The first broken invariant of a mesh.
+/// A violated invariant of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MeshFault {
-    /// The facet has no area once its vertices are f32, or is not finite.
+    /// The facet has no area after rounding to f32, or is not finite.
     FacetWithoutArea {
         /// Index of the facet.
         facet: usize,
     },
-    /// The directed edge is not matched by exactly one in the opposite direction.
+    /// The number of directed edges in the opposite direction is not one.
     EdgeUnmatched {
-        /// Vertex numbers, from and to.
+        /// Vertex indices, from and to.
         edge: [u32; 2],
     },
 }
@@ -42,36 +42,36 @@ pub enum MeshFault {
 impl fmt::Display for MeshFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::FacetWithoutArea { facet } => write!(f, "facet {facet} has no area as f32"),
+            Self::FacetWithoutArea { facet } => write!(f, "facet {facet} has no area in f32"),
             Self::EdgeUnmatched { edge: [a, b] } => {
-                write!(f, "the edge from vertex {a} to {b} has no single opposite")
+                write!(f, "the edge from vertex {a} to {b} does not have exactly one opposite edge")
             }
         }
     }
 }
 
 impl Mesh {
-    /// Adds a vertex and gives its number.
+    /// Adds a vertex and returns its index.
     pub(crate) fn add_vertex(&mut self, position: [f64; 3]) -> u32 {
-        let number = u32::try_from(self.vertices.len()).expect("facets are limited to 2^31");
+        let index = u32::try_from(self.vertices.len()).expect("facets are limited to 2^31");
         self.vertices.push(position);
-        number
+        index
     }
 
-    /// Adds the two triangles of a quadrilateral given in the order of its corners.
+    /// Adds the two triangles of a quadrilateral whose corners are given in order.
     pub(crate) fn add_quad(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangles.push([a, b, c]);
         self.triangles.push([a, c, d]);
     }
 
-    /// Adds all of another mesh.
+    /// Adds the vertices and triangles of another mesh.
     pub(crate) fn append(&mut self, other: &Mesh) {
         let first = u32::try_from(self.vertices.len()).expect("facets are limited to 2^31");
         self.vertices.extend(&other.vertices);
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
     }
 
-    /// Turns the surface inside out.
+    /// Reverses the winding of every facet.
     pub(crate) fn flip(&mut self) {
         self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
@@ -91,7 +91,7 @@ impl Mesh {
         triangle.map(|v| self.vertices[v as usize].map(|x| x as f32))
     }
 
-    /// The volume enclosed, negative if the surface is inside out.
+    /// The enclosed volume, negative if the surface is wound inward.
     pub fn volume(&self) -> f64 {
         let six_fold: f64 = self
             .triangles
@@ -106,9 +106,9 @@ impl Mesh {
         six_fold / 6.0
     }
 
-    /// Splits the longest edges at their middles, two facets more each time, until there are `facets`
-    /// of them (one less if that is odd). Passes over the mesh touch a facet once each, so that what is
-    /// longest is judged again before a facet is split a second time.
+    /// Splits the longest edges at their midpoints until the mesh has `facets` facets, one less if that number
+    /// is odd. Each split adds two facets. One pass splits a facet at most once, and each pass selects the
+    /// longest edges of the mesh that the previous pass produced.
     pub(crate) fn split_edges_until(&mut self, facets: usize) {
         while self.triangles.len() + 1 < facets {
             let wanted = (facets - self.triangles.len()) / 2;
@@ -116,10 +116,10 @@ impl Mesh {
         }
     }
 
-    /// Splits at most `wanted` edges, no two of which share a facet; at least one.
+    /// Splits between one and `wanted` edges, no two of which share a facet.
     fn split_longest(&mut self, wanted: usize) {
         let chosen = edges::longest(self, wanted.saturating_mul(3));
-        // An edge is known by its facet that runs upward along it; look up the one that runs downward.
+        // The chosen edges store only the facet that traverses them upward; find the other facet.
         let slots: HashMap<u64, usize, EdgeHasher> =
             chosen.iter().enumerate().map(|(slot, edge)| (edge.key, slot)).collect();
         let mut down = vec![usize::MAX; chosen.len()];
@@ -130,32 +130,32 @@ impl Mesh {
                 down[slot] = facet;
             }
         }
-        let mut touched = vec![false; self.triangles.len()];
+        let mut is_split = vec![false; self.triangles.len()];
         let mut split = 0;
         for (edge, facet_down) in chosen.iter().zip(down) {
-            if split < wanted && !touched[edge.facet_up] && !touched[facet_down] {
-                touched[edge.facet_up] = true;
-                touched[facet_down] = true;
+            if split < wanted && !is_split[edge.facet_up] && !is_split[facet_down] {
+                is_split[edge.facet_up] = true;
+                is_split[facet_down] = true;
                 self.split(edge.ends(), [edge.facet_up, facet_down]);
                 split += 1;
             }
         }
     }
 
-    /// Splits one edge and the two facets on it.
+    /// Splits one edge and its two facets.
     fn split(&mut self, ends: [u32; 2], facets: [usize; 2]) {
         let [p, q] = ends.map(|v| self.vertices[v as usize]);
         let middle = self.add_vertex(std::array::from_fn(|a| (p[a] + q[a]) * 0.5));
         for facet in facets {
             let whole = self.triangles[facet];
-            let part =
-                |keep: u32| whole.map(|v| if v != keep && ends.contains(&v) { middle } else { v });
-            self.triangles[facet] = part(ends[0]);
-            self.triangles.push(part(ends[1]));
+            let half_at =
+                |end: u32| whole.map(|v| if v != end && ends.contains(&v) { middle } else { v });
+            self.triangles[facet] = half_at(ends[0]);
+            self.triangles.push(half_at(ends[1]));
         }
     }
 
-    /// The first facet that has no area once its vertices are f32, or no finite one.
+    /// The first facet that has no area after rounding to f32, or whose edges are not finite.
     pub(crate) fn fault_of_area(&self) -> Option<MeshFault> {
         let has_area = |t: &[u32; 3]| {
             let [p, q, r] = self.facet(*t).map(|p| p.map(f64::from));
@@ -168,7 +168,7 @@ impl Mesh {
         Some(MeshFault::FacetWithoutArea { facet })
     }
 
-    /// The first broken invariant, if any.
+    /// The first violated invariant; `None` if all hold.
     pub fn fault(&self) -> Option<MeshFault> {
         self.fault_of_area().or_else(|| edges::fault(&self.triangles))
     }
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn splitting_edges_keeps_the_surface_and_meets_the_number() {
+    fn splitting_edges_preserves_the_surface_and_reaches_the_number_of_facets() {
         for facets in [4, 5, 6, 8, 50, 51, 1000] {
             let mut mesh = tetrahedron();
             mesh.split_edges_until(facets);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_found() {
+    fn open_flipped_doubled_and_flat_meshes_are_faulty() {
         let mut open = tetrahedron();
         open.triangles.pop();
         assert!(matches!(open.fault(), Some(MeshFault::EdgeUnmatched { .. })));
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn inside_out_has_negative_volume() {
+    fn a_surface_wound_inward_has_negative_volume() {
         let mut mesh = tetrahedron();
         mesh.flip();
         assert!(mesh.volume() < 0.0);

@@ -1,4 +1,4 @@
-//! One module per shape, and the table of what each can be asked.
+//! The shapes, one module each, with their dimensions and minimum numbers of facets.
 
 use crate::{Generator, GeneratorError, Mesh, Shape};
 
@@ -11,7 +11,7 @@ mod sphere;
 mod torus;
 mod uav;
 
-/// The size keys that a shape has.
+/// The keys of the dimensions of a shape.
 pub(crate) fn sizes(shape: Shape) -> &'static [&'static str] {
     match shape {
         Shape::Cube => &["edge"],
@@ -24,7 +24,7 @@ pub(crate) fn sizes(shape: Shape) -> &'static [&'static str] {
     }
 }
 
-/// The fewest facets that still draw the shape.
+/// Minimum number of facets of a shape.
 pub(crate) fn facets_least(shape: Shape) -> usize {
     match shape {
         Shape::Cube | Shape::Plate => 12,
@@ -36,7 +36,7 @@ pub(crate) fn facets_least(shape: Shape) -> usize {
     }
 }
 
-/// Draws the shape about its own origin in at most the facets asked for, and not far below.
+/// Draws the shape about its own origin with at most the requested number of facets, and not many fewer.
 pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
     match of.shape {
         Shape::Cube => slab::cube(of),
@@ -50,8 +50,8 @@ pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
     }
 }
 
-/// The least pitch, at most `longest`, at which `count` does not exceed `facets`. `count` falls with the
-/// pitch, in steps; closing in by halving finds the step.
+/// The least pitch, at most `longest`, for which `count` does not exceed `facets`. `count` is a step function
+/// that does not increase with the pitch, so bisection finds the step.
 fn pitch_finest(longest: f64, facets: usize, count: impl Fn(f64) -> usize) -> f64 {
     let (mut fine, mut coarse) = (longest / (facets as f64 + 1.0), longest);
     for _ in 0..100 {

@@ -1,4 +1,4 @@
-//! The case files, the catalogue, and the table of what is fetched agree with each other.
+//! The case files, the catalogue, `fetch.toml` and SOURCES.md are consistent.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use geometries::Generator;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-/// The keys of a case file: these and no others.
+/// A case file, which may have no other keys.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
@@ -88,7 +88,7 @@ enum Inside {
     Some,
 }
 
-/// How a fetched file is made; only what the catalogue repeats is looked at.
+/// The keys of a `fetch.toml` entry that the catalogue repeats.
 #[derive(Deserialize)]
 struct Fetched {
     package: String,
@@ -108,7 +108,7 @@ fn catalogue() -> Vec<Entry> {
     read::<Catalogue>("catalogue.toml").case
 }
 
-/// Names in a directory that end so.
+/// The names of the files in a directory that end with `end`.
 fn names(directory: &str, end: &str) -> BTreeSet<String> {
     std::fs::read_dir(here(directory))
         .unwrap()
@@ -118,7 +118,7 @@ fn names(directory: &str, end: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_case_file_is_in_the_catalogue_and_the_other_way_round() {
+fn the_catalogue_lists_exactly_the_case_files() {
     let mut files = names(".", ".toml");
     for other in ["Cargo.toml", "catalogue.toml", "fetch.toml"] {
         assert!(files.remove(other), "{other}");
@@ -136,11 +136,14 @@ fn every_case_file_is_in_the_catalogue_and_the_other_way_round() {
 }
 
 #[test]
-fn every_case_file_is_well_formed_and_says_whence_it_is() {
+fn every_case_file_is_valid_and_states_its_origin() {
     for Entry { file, .. } in catalogue() {
         let case: Case = read(&file);
-        assert!(case.geometry.is_some() != case.generator.is_some(), "{file}: one of the two");
-        assert!(case.root.is_none() || case.root_scale.is_none(), "{file}: one of the two at most");
+        assert!(
+            case.geometry.is_some() != case.generator.is_some(),
+            "{file}: exactly one of the two"
+        );
+        assert!(case.root.is_none() || case.root_scale.is_none(), "{file}: at most one of the two");
         let lengths = case.boxes.iter().map(|b| b.spacing).chain([case.spacing_min]);
         for length in lengths.chain(case.root_scale).chain(case.root.iter().map(|r| r.edge)) {
             assert!(length.is_finite() && length > 0.0, "{file}: {length}");
@@ -169,10 +172,10 @@ fn every_generator_can_be_drawn() {
 }
 
 #[test]
-fn every_geometry_is_here_or_fetched_as_the_table_says() {
+fn every_geometry_is_in_the_repository_or_in_the_fetch_table() {
     let table: BTreeMap<String, Fetched> = read("fetch.toml");
     let sources = std::fs::read_to_string(here("SOURCES.md")).unwrap();
-    let mut met = BTreeSet::new();
+    let mut used = BTreeSet::new();
     for entry in catalogue() {
         let case: Case = read(&entry.file);
         let Some(geometry) = case.geometry else {
@@ -190,16 +193,16 @@ fn every_geometry_is_here_or_fetched_as_the_table_says() {
             assert!(here(&geometry).is_file(), "{geometry}");
             assert!(entry.package.is_none() && entry.sha256.is_none(), "{name}");
         }
-        met.insert(name);
+        used.insert(name);
     }
-    let kept = names(".", ".stl").into_iter().map(|name| name.replace(".stl", ""));
-    let all: BTreeSet<String> = table.keys().cloned().chain(kept).collect();
-    assert_eq!(met, all, "a geometry without a case, or the other way round");
+    let shipped = names(".", ".stl").into_iter().map(|name| name.replace(".stl", ""));
+    let all: BTreeSet<String> = table.keys().cloned().chain(shipped).collect();
+    assert_eq!(used, all, "every geometry has a case and every case a geometry");
     assert_eq!(all.len(), 18);
 }
 
 #[test]
-fn sizes_are_what_they_are_called_and_parameters_vary() {
+fn numbers_of_cells_match_the_sizes_and_small_cases_vary_all_parameters() {
     let mut layers = BTreeSet::new();
     let mut keeps = BTreeSet::new();
     for entry in catalogue() {

@@ -1,5 +1,5 @@
-//! What every generated shape promises, judged on the facets as an STL reader would see them: vertices
-//! are one only where their bits are.
+//! Properties of every generated shape, tested on facets as an STL reader sees them: two vertices are the same
+//! only if their bits are equal.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -26,7 +26,7 @@ fn table(text: &str) -> Generator {
     toml::from_str(text).unwrap()
 }
 
-/// Vertices numbered by their bits.
+/// The number of distinct vertices, and the facets by vertex index.
 fn weld(facets: &[Facet]) -> (usize, Vec<[usize; 3]>) {
     let mut numbers = HashMap::new();
     let triangles = facets
@@ -34,7 +34,7 @@ fn weld(facets: &[Facet]) -> (usize, Vec<[usize; 3]>) {
         .map(|facet| {
             facet.map(|vertex| {
                 let next = numbers.len();
-                // Adding zero makes one of the two zeros, which are equal but not the same bits.
+                // Adding zero maps -0 to +0, which is equal but has other bits.
                 *numbers.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert(next)
             })
         })
@@ -42,7 +42,7 @@ fn weld(facets: &[Facet]) -> (usize, Vec<[usize; 3]>) {
     (numbers.len(), triangles)
 }
 
-/// How often each directed edge occurs.
+/// The number of occurrences of each directed edge.
 fn directed_edges(triangles: &[[usize; 3]]) -> HashMap<(usize, usize), usize> {
     let mut edges = HashMap::new();
     for t in triangles {
@@ -54,8 +54,8 @@ fn directed_edges(triangles: &[[usize; 3]]) -> HashMap<(usize, usize), usize> {
 }
 
 fn area_vector([p, q, r]: &Facet) -> [f64; 3] {
-    let at = |v: &[f32; 3], a: usize| f64::from(v[a]) - f64::from(p[a]);
-    [(1, 2), (2, 0), (0, 1)].map(|(b, c)| at(q, b) * at(r, c) - at(q, c) * at(r, b))
+    let edge = |v: &[f32; 3], a: usize| f64::from(v[a]) - f64::from(p[a]);
+    [(1, 2), (2, 0), (0, 1)].map(|(b, c)| edge(q, b) * edge(r, c) - edge(q, c) * edge(r, b))
 }
 
 fn volume(facets: &[Facet]) -> f64 {
@@ -66,7 +66,7 @@ fn volume(facets: &[Facet]) -> f64 {
     facets.iter().map(six_fold).sum::<f64>() / 6.0
 }
 
-/// FNV-1a over the bits of all vertices in their order.
+/// The FNV-1a hash of the bits of all vertices in order.
 fn fingerprint(facets: &[Facet]) -> u64 {
     facets
         .iter()
@@ -78,40 +78,41 @@ fn fingerprint(facets: &[Facet]) -> u64 {
         })
 }
 
-fn assert_closed(facets: &[Facet], what: &str) -> i64 {
+/// Asserts that the surface is closed and wound outward. Returns its Euler characteristic.
+fn assert_closed(facets: &[Facet], name: &str) -> i64 {
     let (vertices, triangles) = weld(facets);
     for (i, facet) in facets.iter().enumerate() {
-        assert!(area_vector(facet) != [0.0; 3], "{what}: facet {i} has no area: {facet:?}");
+        assert!(area_vector(facet) != [0.0; 3], "{name}: facet {i} has no area: {facet:?}");
     }
     let edges = directed_edges(&triangles);
     for (&(a, b), &times) in &edges {
-        assert_eq!(times, 1, "{what}: an edge is run along twice in one direction");
-        assert!(edges.contains_key(&(b, a)), "{what}: an edge has one facet only");
+        assert_eq!(times, 1, "{name}: two facets traverse an edge in the same direction");
+        assert!(edges.contains_key(&(b, a)), "{name}: an edge has only one facet");
     }
-    assert!(volume(facets) > 0.0, "{what}: inside out");
+    assert!(volume(facets) > 0.0, "{name}: wound inward");
     vertices as i64 - edges.len() as i64 / 2 + triangles.len() as i64
 }
 
 #[test]
-fn every_shape_is_closed_outward_and_of_the_right_genus() {
+fn every_shape_is_closed_wound_outward_and_of_the_right_genus() {
     for shape in SHAPES {
         for count in [2_000, 2_500, 3_333, 5_000, 12_345, 20_000, 60_000] {
-            let what = format!("{shape:?} {count}");
+            let name = format!("{shape:?} {count}");
             let facets = facets(shape, count);
-            assert_eq!(facets.len(), count & !1, "{what}");
-            let euler = assert_closed(&facets, &what);
+            assert_eq!(facets.len(), count & !1, "{name}");
+            let euler = assert_closed(&facets, &name);
             let expected = match shape {
                 Shape::Torus => 0,
                 Shape::NestedSpheres => 4,
                 _ => 2,
             };
-            assert_eq!(euler, expected, "{what}: Euler number");
+            assert_eq!(euler, expected, "{name}: Euler characteristic");
         }
     }
 }
 
 #[test]
-fn few_facets_are_enough() {
+fn every_shape_can_be_drawn_with_its_minimum_number_of_facets() {
     let least = [12, 20, 18, 40, 12, 60, 2_000, 2_000];
     for (shape, least) in SHAPES.into_iter().zip(least) {
         let drawn = facets(shape, least);
@@ -128,7 +129,7 @@ fn few_facets_are_enough() {
 }
 
 #[test]
-fn volumes_are_those_of_the_textbook() {
+fn volumes_agree_with_the_analytic_ones() {
     let cases = [
         ("shape = 'cube'\nfacets = 1000\nedge = 2", 8.0, 1e-12),
         ("shape = 'plate'\nfacets = 1000\nlength = 2\nwidth = 1\nthickness = 0.25", 0.5, 1e-12),
@@ -155,7 +156,7 @@ fn volumes_are_those_of_the_textbook() {
     }
 }
 
-/// Lowest and highest coordinate along each axis.
+/// The least and greatest coordinate along each axis.
 fn bounds(facets: &[Facet]) -> [[f32; 2]; 3] {
     std::array::from_fn(|a| {
         let along = facets.iter().flatten().map(|v| v[a]);
@@ -164,34 +165,36 @@ fn bounds(facets: &[Facet]) -> [[f32; 2]; 3] {
 }
 
 #[test]
-fn a_cube_lies_exactly_in_its_planes() {
+fn the_faces_of_a_cube_lie_exactly_in_their_planes() {
     let drawn = table("shape = 'cube'\nfacets = 1234\nedge = 0.5\ncentre = [1.0, -2.0, 0.25]");
     let drawn = drawn.facets().unwrap();
     let planes = [[0.75, 1.25], [-2.25, -1.75], [0.0, 0.5]];
     assert_eq!(bounds(&drawn), planes);
     for facet in &drawn {
-        let lies = |a: usize| planes[a].iter().any(|&x| facet.iter().all(|v| v[a] == x));
-        assert!((0..3).any(lies), "{facet:?}");
+        let lies_in_a_plane = |a: usize| planes[a].iter().any(|&x| facet.iter().all(|v| v[a] == x));
+        assert!((0..3).any(lies_in_a_plane), "{facet:?}");
     }
 }
 
 #[test]
-fn aircraft_are_as_long_as_asked_and_converge_with_the_number_of_facets() {
+fn aircraft_have_the_requested_length_and_converge_with_the_number_of_facets() {
     for (shape, axis) in [(Shape::Uav, 1), (Shape::Fighter, 0)] {
         let mut generator = Generator::new(shape, 40_000);
         generator.length = Some(3.0);
         let [low, high] = bounds(&generator.facets().unwrap())[axis];
         assert!((high - low - 3.0).abs() < 1e-6);
         let [coarse, fine, finer] = [10_000, 100_000, 400_000].map(|n| volume(&facets(shape, n)));
-        assert!(coarse > fine && fine > finer, "coarser is stouter: {coarse} {fine} {finer}");
+        assert!(
+            coarse > fine && fine > finer,
+            "coarse grids thicken parts: {coarse} {fine} {finer}"
+        );
         assert!(fine / finer < 1.25, "{fine} {finer}");
     }
 }
 
-/// The same vertices in the same order on every machine: a change of any of these is a change of every
-/// case that uses the shape.
+/// If a fingerprint changes, so does every case that uses the shape.
 #[test]
-fn vertices_are_the_same_everywhere() {
+fn vertices_are_the_same_on_every_machine() {
     let found =
         SHAPES.map(|shape| format!("{shape:?} {:016x}", fingerprint(&facets(shape, 5_000))));
     let expected = [
@@ -208,14 +211,17 @@ fn vertices_are_the_same_everywhere() {
 }
 
 #[test]
-fn wrong_tables_are_refused_with_the_reason() {
-    let refused = |text: &str| match toml::from_str::<Generator>(text) {
+fn invalid_tables_are_refused_with_the_reason() {
+    let refusal = |text: &str| match toml::from_str::<Generator>(text) {
         Ok(generator) => generator.facets().unwrap_err().to_string(),
         Err(error) => error.to_string(),
     };
     for (text, reason) in [
         ("shape = 'sphere'\nfacets = 100\nradios = 1", "unknown field `radios`"),
-        ("shape = 'sphere'\nfacets = 100\nthickness = 1", "no size `thickness`; it has radius"),
+        (
+            "shape = 'sphere'\nfacets = 100\nthickness = 1",
+            "no dimension `thickness`; it has radius",
+        ),
         ("shape = 'ball'\nfacets = 100", "unknown variant `ball`"),
         ("shape = 'sphere'", "missing field `facets`"),
         ("shape = 'sphere'\nfacets = -1", "invalid value"),
@@ -228,10 +234,10 @@ fn wrong_tables_are_refused_with_the_reason() {
         ("shape = 'pipe'\nfacets = 100\nradius_bend = 0.1", "must exceed radius"),
         ("shape = 'pipe'\nfacets = 100\nangle = 200", "at most 180"),
         ("shape = 'sphere'\nfacets = 99999999999999", "at most 2147483648"),
-        ("shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]", "has no area as f32"),
-        ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "has no area as f32"),
+        ("shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]", "has no area in f32"),
+        ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "has no area in f32"),
     ] {
-        let message = refused(text);
+        let message = refusal(text);
         assert!(message.contains(reason), "{text}\n{message}");
     }
 }

@@ -1,4 +1,4 @@
-//! The STL files of our own making are what their READMEs say.
+//! The STL files in `bad/` and `tricky/` match the descriptions in their READMEs.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ fn bytes(directory: &str, name: &str) -> Vec<u8> {
     std::fs::read(here(directory).join(name)).unwrap()
 }
 
-/// Whether a file is as long as binary STL with its count would be.
+/// Whether a file has the length of a binary STL file with its facet count.
 fn is_binary(data: &[u8]) -> bool {
     let count = data.get(80..84).map(|b| u32::from_le_bytes(b.try_into().unwrap()));
     count.is_some_and(|count| data.len() as u64 == 84 + 50 * u64::from(count))
@@ -31,7 +31,7 @@ fn coordinates_binary(data: &[u8]) -> Vec<f32> {
     numbers.map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
-/// Takes what follows each word "vertex" but on the lines of names: no more than these files need.
+/// The coordinates on the lines that start with "vertex", which suffices for these files.
 fn coordinates_text(data: &[u8]) -> Vec<f32> {
     let text: String = data.iter().map(|&b| char::from(b).to_ascii_lowercase()).collect();
     let lines = text.split(['\r', '\n']).map(|line| line.split_whitespace().collect::<Vec<_>>());
@@ -54,7 +54,7 @@ fn readmes_list_exactly_the_files() {
 }
 
 #[test]
-fn tricky_files_hold_the_same_facets() {
+fn all_tricky_files_contain_the_same_facets() {
     let expected = coordinates_binary(&bytes("tricky", "binary.stl"));
     assert_eq!(expected.len(), 8 * 9);
     for name in files("tricky") {
@@ -67,14 +67,13 @@ fn tricky_files_hold_the_same_facets() {
 }
 
 #[test]
-fn bad_files_are_bad_in_one_way_each() {
+fn bad_files_have_the_wrong_length_for_binary_stl_or_one_number_that_is_not_finite() {
     let good = bytes("tricky", "binary.stl");
     for name in files("bad") {
         let data = bytes("bad", &name);
-        // Those that have the length of binary STL have it so that only a number is wrong.
-        let has_wrong_number =
+        let one_is_not_finite =
             || coordinates_binary(&data).iter().filter(|x| !x.is_finite()).count() == 1;
-        assert!(!is_binary(&data) || has_wrong_number(), "{name}");
+        assert!(!is_binary(&data) || one_is_not_finite(), "{name}");
         assert_ne!(data, good);
     }
     assert!(is_binary(&bytes("bad", "nan.stl")) && is_binary(&bytes("bad", "infinite.stl")));

@@ -1,27 +1,27 @@
-//! What is meshed: the inputs of the definition, in the user's units.
+//! The inputs of the mesh definition (`DEFINITION.md`, section 1), in the user's unit of length.
 use crate::Side;
 use serde::{Deserialize, Serialize};
 
-/// A case: everything that the mesh is a function of.
+/// A case. The mesh is a function of these fields alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// The body: a soup of triangles, three vertices each.
+    /// The body: a soup of triangles, each given by its three vertices.
     pub facets: Vec<[[f64; 3]; 3]>,
-    /// The cube that is meshed.
+    /// The cube that the mesh fills.
     pub root: Root,
-    /// The edge length that no cell at the surface exceeds.
+    /// Upper bound on the edge length of cells at the surface.
     pub spacing_min: f64,
-    /// The least thickness of a layer, in cells; at least 1.
+    /// Minimum thickness of a layer, in cells; at least 1.
     pub layer_cells_min: u32,
-    /// The region that is meshed.
+    /// The region that the final mesh covers.
     pub keep: Keep,
-    /// Whether leaves that hold geometry stay in the final mesh.
+    /// Whether leaves that contain geometry stay in the final mesh.
     pub keep_crossing: bool,
-    /// Regions with a spacing of their own.
+    /// Extent boxes, each with its own spacing.
     pub boxes: Vec<BoxSpec>,
 }
 
-/// The cube that is meshed.
+/// The cube that the mesh fills.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Root {
@@ -32,8 +32,8 @@ pub struct Root {
 }
 
 impl Root {
-    /// The root whose edge is `scale` longest edges of the vertices' bounding box, centred on it.
-    /// `None` when there are no vertices.
+    /// The root centred on the bounding box of all vertices, with an edge of `scale` times the longest
+    /// edge of that box. `None` if there are no facets.
     #[must_use]
     pub fn around(facets: &[[[f64; 3]; 3]], scale: f64) -> Option<Self> {
         let mut lo = facets.first()?[0];
@@ -44,7 +44,7 @@ impl Root {
                 hi[a] = hi[a].max(vertex[a]);
             }
         }
-        // The order of operations is part of the definition: programs must agree to the last bit.
+        // The definition fixes the order of operations, so that all programs agree to the last bit.
         let longest = (0..3).map(|a| hi[a] - lo[a]).fold(0.0, f64::max);
         let edge = scale * longest;
         let origin = std::array::from_fn(|a| (lo[a] + hi[a]) * 0.5 - edge * 0.5);
@@ -52,7 +52,7 @@ impl Root {
     }
 }
 
-/// The region that is meshed.
+/// The region that the final mesh covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
@@ -66,7 +66,7 @@ pub enum Keep {
 }
 
 impl Keep {
-    /// Whether leaves of `side` are kept. Crossing leaves always are, until the mesh is final.
+    /// Whether gradation keeps leaves of `side`. Crossing leaves are always kept at this stage.
     #[must_use]
     pub fn keeps(self, side: Side) -> bool {
         match self {
@@ -77,7 +77,7 @@ impl Keep {
     }
 }
 
-/// An axis-aligned box with a spacing of its own.
+/// An axis-aligned box with its own spacing.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoxSpec {
@@ -85,6 +85,6 @@ pub struct BoxSpec {
     pub min: [f64; 3],
     /// The maximum corner.
     pub max: [f64; 3],
-    /// The edge length that no cell in the box exceeds.
+    /// Upper bound on the edge length of cells that meet the box.
     pub spacing: f64,
 }

@@ -1,119 +1,120 @@
-//! What can be wrong, each in one sentence: what, where, and what to do about it.
+//! Errors of the user's input and output. Each message is one sentence: the problem, its location and a
+//! remedy.
 use crate::case::Root;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// An error that is the user's to mend. Bugs panic instead.
+/// An error that the user can correct. Bugs panic instead.
 #[derive(Debug, Error)]
 pub enum Error {
-    /// A file that cannot be read.
+    /// A file cannot be read.
     #[error("cannot read {}: {source}; check the path and its permissions", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: io::Error,
     },
-    /// A case file that makes no sense.
+    /// A case file is invalid.
     #[error("case file {}: {problem}", path.display())]
     CaseFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         problem: String,
     },
-    /// A geometry that is not STL, or damaged.
+    /// A geometry is damaged or not STL.
     #[error("geometry {}: {problem}", path.display())]
     Stl {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         problem: String,
     },
-    /// A root that is nowhere.
+    /// The origin of the root is not finite.
     #[error("the root's origin {0:?} is not finite: give three finite numbers")]
     RootOrigin([f64; 3]),
-    /// A root without a size.
+    /// The edge of the root is not a length.
     #[error("the root's edge is {0}: it must be finite and greater than 0")]
     RootEdge(f64),
-    /// A layer of no cells.
+    /// A layer has no cells.
     #[error("layer_cells_min is 0: it must be at least 1, which is plain 2:1 balance")]
     LayerCells,
-    /// A spacing that is no length.
+    /// A spacing is not a length.
     #[error("{name} is {spacing}: it must be finite and greater than 0")]
     Spacing {
-        /// Which spacing.
+        /// The name of the spacing.
         name: String,
         /// Its value.
         spacing: f64,
     },
-    /// A spacing beyond the deepest level.
+    /// A spacing requires a level beyond the deepest.
     #[error(
-        "{name} is {spacing}, finer than level 19, whose cells have edge {least}: \
-         make it coarser or the root smaller"
+        "{name} is {spacing}, less than {least}, the cell edge at the deepest level, 19: \
+         choose a larger spacing or a smaller root"
     )]
     SpacingTooFine {
-        /// Which spacing.
+        /// The name of the spacing.
         name: String,
         /// Its value.
         spacing: f64,
-        /// The finest that this root allows.
+        /// The least spacing that this root allows.
         least: f64,
     },
-    /// A box with no interior, or nowhere.
+    /// A box has a corner that is not finite, or min >= max along an axis.
     #[error(
-        "box {index} reaches from {min:?} to {max:?}: \
+        "box {index} extends from {min:?} to {max:?}: \
          its corners must be finite and min less than max along every axis"
     )]
     BoxCorners {
-        /// Which box, from 0.
+        /// Index of the box, from 0.
         index: usize,
         /// Its minimum corner.
         min: [f64; 3],
         /// Its maximum corner.
         max: [f64; 3],
     },
-    /// A vertex that is nowhere.
+    /// A vertex is not finite.
     #[error("facet {facet} has a vertex {vertex:?} that is not finite: repair the geometry")]
     VertexNotFinite {
-        /// Which facet, from 0.
+        /// Index of the facet, from 0.
         facet: usize,
         /// The vertex.
         vertex: [f64; 3],
     },
-    /// A vertex too far from the root.
+    /// A vertex is too far from the root.
     #[error(
         "facet {facet} has a vertex {vertex:?} more than one root edge outside the root \
-         (origin {:?}, edge {}): enlarge or move the root, or mend the vertex",
+         (origin {:?}, edge {}): enlarge or move the root, or correct the vertex",
         root.origin, root.edge
     )]
     VertexOutside {
-        /// Which facet, from 0.
+        /// Index of the facet, from 0.
         facet: usize,
         /// The vertex.
         vertex: [f64; 3],
         /// The root.
         root: Root,
     },
-    /// An output directory that is in use.
-    #[error("output directory {} is not empty: name another or empty it", path.display())]
+    /// The output directory is not empty.
+    #[error("output directory {} is not empty: empty it or choose another", path.display())]
     OutputNotEmpty {
         /// The directory.
         path: PathBuf,
     },
-    /// A file that cannot be written.
+    /// A file cannot be written.
     #[error("cannot write {}: {source}; check the path, its permissions and the free space", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: io::Error,
     },
 }
 
 impl Error {
-    /// What the program exits with: 4 when output could not be written, 2 for any other input.
+    /// The exit code of the program: 4 if output could not be written, otherwise 2.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {

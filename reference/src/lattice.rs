@@ -1,4 +1,4 @@
-//! From the user's units to the lattice, where every decision is exact.
+//! Quantisation of a case to the integer lattice, on which every geometric decision is exact.
 use crate::case::{Case, Root};
 use crate::error::Error;
 use crate::octant::{Extent, LEVEL_MAX, ROOT_EDGE};
@@ -9,41 +9,42 @@ pub type Facet = [[i64; 3]; 3];
 /// An extent box on the lattice, clamped to the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LatticeBox {
-    /// The box.
+    /// The box, in lattice units.
     pub extent: Extent,
-    /// The least level of the leaves that it meets.
+    /// Minimum level of the leaves that meet the box.
     pub level: u32,
 }
 
-/// A case on the lattice: all that the algorithm sees.
+/// A case on the lattice: the complete input of the algorithm.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// The root, needed only to report a location in the user's units.
+    /// The root, used only to report a location in the user's unit.
     pub root: Root,
     /// The facets.
     pub facets: Vec<Facet>,
     /// The extent boxes.
     pub boxes: Vec<LatticeBox>,
-    /// The level D that `spacing_min` asks for.
+    /// The level D of `spacing_min`.
     pub level_surface: u32,
-    /// The least thickness of a layer, in cells.
+    /// Minimum thickness of a layer, in cells.
     pub layer_cells_min: u32,
-    /// Whether crossing leaves stay.
+    /// Whether crossing leaves stay in the final mesh.
     pub keep_crossing: bool,
 }
 
 impl Input {
-    /// Checks a case and puts it on the lattice.
+    /// Validates a case and quantises it to the lattice.
     ///
     /// # Errors
-    /// A size that is not finite and positive, a layer of no cells, a spacing that takes a level
-    /// beyond 19, a box that is inside out, a vertex that is not finite or too far outside.
+    /// An edge or a spacing is not finite and positive; the origin is not finite; a layer has no cells; a
+    /// spacing requires a level beyond 19; a box has a corner that is not finite, or min >= max along an
+    /// axis; a vertex is not finite or more than one root edge outside the root.
     pub fn new(case: &Case) -> Result<Self, Error> {
         let root = case.root;
         if !root.origin.iter().all(|x| x.is_finite()) {
             return Err(Error::RootOrigin(root.origin));
         }
-        if !is_size(root.edge) {
+        if !is_length(root.edge) {
             return Err(Error::RootEdge(root.edge));
         }
         if case.layer_cells_min == 0 {
@@ -65,7 +66,7 @@ impl Input {
         Ok(Self {
             root,
             facets: facets
-                .map(|(index, f)| on_lattice(&root, index, f))
+                .map(|(index, facet)| quantised_facet(&root, index, facet))
                 .collect::<Result<_, _>>()?,
             boxes,
             level_surface,
@@ -75,20 +76,20 @@ impl Input {
     }
 }
 
-/// Where a lattice point is, in the user's units.
+/// The location of a lattice point in the user's unit.
 #[must_use]
 pub fn location(root: &Root, point: [i64; 3]) -> [f64; 3] {
     let unit = root.edge / ROOT_EDGE as f64;
     std::array::from_fn(|a| root.origin[a] + point[a] as f64 * unit)
 }
 
-fn is_size(x: f64) -> bool {
+fn is_length(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
 
-/// The least level whose cells are of edge `spacing` or smaller.
+/// The coarsest level whose cells have an edge of at most `spacing`.
 fn level(root: &Root, name: &str, spacing: f64) -> Result<u32, Error> {
-    if !is_size(spacing) {
+    if !is_length(spacing) {
         return Err(Error::Spacing { name: name.to_owned(), spacing });
     }
     (0..=LEVEL_MAX).find(|&d| root.edge / f64::from(1_u32 << d) <= spacing).ok_or_else(|| {
@@ -97,24 +98,25 @@ fn level(root: &Root, name: &str, spacing: f64) -> Result<u32, Error> {
     })
 }
 
-/// The nearest lattice point, still as floating-point numbers, for it may be anywhere.
+/// The nearest lattice point. The coordinates remain floating-point numbers because they may be too
+/// large for an integer or not finite.
 fn quantised(root: &Root, x: [f64; 3]) -> [f64; 3] {
     let scale = ROOT_EDGE as f64 / root.edge;
     std::array::from_fn(|a| ((x[a] - root.origin[a]) * scale).round_ties_even())
 }
 
-fn on_lattice(root: &Root, index: usize, facet: &[[f64; 3]; 3]) -> Result<Facet, Error> {
+fn quantised_facet(root: &Root, index: usize, facet: &[[f64; 3]; 3]) -> Result<Facet, Error> {
     let mut points = [[0; 3]; 3];
     for (point, &vertex) in points.iter_mut().zip(facet) {
         let q = quantised(root, vertex);
         if !vertex.iter().chain(&q).all(|x| x.is_finite()) {
             return Err(Error::VertexNotFinite { facet: index, vertex });
         }
-        let near = -(ROOT_EDGE as f64)..=2.0 * ROOT_EDGE as f64;
-        if !q.iter().all(|x| near.contains(x)) {
+        let allowed = -(ROOT_EDGE as f64)..=2.0 * ROOT_EDGE as f64;
+        if !q.iter().all(|x| allowed.contains(x)) {
             return Err(Error::VertexOutside { facet: index, vertex, root: *root });
         }
-        // Exact: the numbers are whole and at most 2^28.
+        // The conversion is exact: q are integers of at most 2^28 in absolute value.
         *point = q.map(|x| x as i64);
     }
     Ok(points)

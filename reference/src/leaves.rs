@@ -1,6 +1,6 @@
-//! Leaf words: what can be read off them, and the digest.
+//! Digests and counts of leaf words (`DEFINITION.md`, section 8).
 
-/// The finaliser of a well-known generator (SplitMix64): every input bit sways every output bit.
+/// The finaliser of the SplitMix64 generator: every input bit affects every output bit.
 fn scramble(mut x: u64) -> u64 {
     x ^= x >> 30;
     x = x.wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -9,7 +9,7 @@ fn scramble(mut x: u64) -> u64 {
     x ^ x >> 31
 }
 
-/// What one leaf word adds to a digest.
+/// The contribution of one leaf word to a digest.
 #[must_use]
 pub fn mix(word: u64) -> u128 {
     let high = scramble(word.wrapping_add(0x9e37_79b9_7f4a_7c15));
@@ -17,7 +17,8 @@ pub fn mix(word: u64) -> u128 {
     u128::from(high) << 64 | u128::from(low)
 }
 
-/// The digest of a set of leaves: a sum, so that neither order nor partition matters.
+/// The digest of a set of leaves: a sum modulo 2^128, which depends neither on the order of the words nor
+/// on their partition.
 #[must_use]
 pub fn digest(words: &[u64]) -> u128 {
     words.iter().fold(0, |sum, &word| sum.wrapping_add(mix(word)))
@@ -26,21 +27,21 @@ pub fn digest(words: &[u64]) -> u128 {
 /// Counts and digests of a set of leaves.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tally {
-    /// How many leaves there are of each level.
+    /// Number of leaves of each level.
     pub leaves_by_level: [u64; 20],
-    /// How many leaves there are outside, inside and crossing.
+    /// Numbers of outside, inside and crossing leaves.
     pub leaves_by_side: [u64; 3],
-    /// The digest of them all.
+    /// The digest of all leaves.
     pub digest: u128,
     /// The digest of the leaves whose minimum corner lies in each octant of level 3, in Morton order.
     pub octant_digests: Vec<u128>,
 }
 
 impl Tally {
-    /// Of these leaves.
+    /// The counts and digests of the leaves with these words.
     ///
     /// # Panics
-    /// When a word is not a leaf's.
+    /// If a word is not a valid leaf word.
     #[must_use]
     pub fn of(words: &[u64]) -> Self {
         let mut tally = Self {
@@ -59,7 +60,7 @@ impl Tally {
     }
 }
 
-/// A digest as it is written: 32 hexadecimal digits.
+/// A digest as 32 lower-case hexadecimal digits.
 #[must_use]
 pub fn hex(digest: u128) -> String {
     format!("{digest:032x}")

@@ -1,11 +1,11 @@
-//! The serial algorithm of O'Connell and Karman, literally: the oracle of this workspace.
+//! The serial algorithm of O'Connell and Karman, implemented literally: the oracle of this workspace.
 //!
-//! A voxel tree is cut from the root wherever a facet crosses or an extent box asks for it
-//! ([`tree`], [`crossing`]); a flood fill and six rays say which leaves are inside ([`sides`],
-//! [`ray`]); the unwanted ones are deleted; from the finest level up, one enlarged extent box per
-//! cell asks for its layer and one for its balance ([`gradation`]); what is left is written as leaf
-//! words ([`leaves`]). Nothing here is fast: every step is the shortest statement of what
-//! `DEFINITION.md` says.
+//! The root is refined wherever a facet crosses it or an extent box requires it ([`tree`],
+//! [`crossing`]). A flood fill and rays determine which leaves are inside ([`sides`], [`ray`]). Leaves
+//! outside the kept region are deleted. For each level from the finest to the coarsest, every cell refines
+//! two enlarged extent boxes, one for its layer and one for balance ([`gradation`]). The remaining leaves
+//! are written as leaf words ([`leaves`], [`write`]). Nothing here is fast: each step is the shortest
+//! implementation of the corresponding section of `DEFINITION.md`.
 #![deny(missing_docs)]
 
 pub mod case;
@@ -31,41 +31,41 @@ pub use sides::Ambiguous;
 use lattice::{Input, LatticeBox};
 use tree::Tree;
 
-/// The leaves of a mesh, and what a reader of its manifest wants to know besides.
+/// The leaves of a mesh, and the results that its manifest reports about them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     /// One word per leaf, ascending.
     pub words: Vec<u64>,
-    /// The level D that `spacing_min` asks for.
+    /// The level D of `spacing_min`.
     pub level_surface: u32,
     /// The extent boxes, on the lattice.
     pub boxes: Vec<LatticeBox>,
-    /// The components that no candidate decided, if there are any.
+    /// The components that no candidate decided; `None` if every component was decided.
     pub ambiguous: Option<Ambiguous>,
 }
 
 /// The final mesh of a case.
 ///
 /// # Errors
-/// Whatever [`Input::new`] finds wrong with the case.
+/// Those of [`Input::new`].
 pub fn mesh(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
     let (mut tree, ambiguous) = base(&input);
     tree.delete(|side| !case.keep.keeps(side));
     gradation::grade(&mut tree, &input);
-    check(&tree);
+    debug_check(&tree);
     let words = tree.words(|side| case.keep_crossing || side != Side::Crossing);
-    Ok(finished(words, input, ambiguous))
+    Ok(Mesh::new(words, input, ambiguous))
 }
 
 /// The base tree T0 of a case: all leaves with their sides, before deletion and gradation.
 ///
 /// # Errors
-/// Whatever [`Input::new`] finds wrong with the case.
+/// Those of [`Input::new`].
 pub fn base_tree(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
     let (tree, ambiguous) = base(&input);
-    Ok(finished(tree.words(|_| true), input, ambiguous))
+    Ok(Mesh::new(tree.words(|_| true), input, ambiguous))
 }
 
 fn base(input: &Input) -> (Tree, Option<Ambiguous>) {
@@ -77,17 +77,19 @@ fn base(input: &Input) -> (Tree, Option<Ambiguous>) {
         tree.insert(facet, input.level_surface);
     }
     let ambiguous = sides::assign(&mut tree, input);
-    check(&tree);
+    debug_check(&tree);
     (tree, ambiguous)
 }
 
-fn check(tree: &Tree) {
+fn debug_check(tree: &Tree) {
     if cfg!(debug_assertions) {
         tree.check_invariants();
     }
 }
 
-fn finished(words: Vec<u64>, input: Input, ambiguous: Option<Ambiguous>) -> Mesh {
-    assert!(words.is_sorted_by(|a, b| a < b), "a tree is walked in Morton order");
-    Mesh { words, level_surface: input.level_surface, boxes: input.boxes, ambiguous }
+impl Mesh {
+    fn new(words: Vec<u64>, input: Input, ambiguous: Option<Ambiguous>) -> Self {
+        assert!(words.is_sorted_by(|a, b| a < b), "leaves are traversed in Morton order");
+        Self { words, level_surface: input.level_surface, boxes: input.boxes, ambiguous }
+    }
 }

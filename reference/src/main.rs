@@ -1,4 +1,4 @@
-//! `reference CASE.toml`: meshes a case by the serial algorithm of the paper.
+//! The program `reference`: meshes a case by the paper's serial algorithm.
 use clap::Parser;
 use reference::write::{self, AmbiguousCount, Which};
 use reference::{Error, Mesh, base_tree, case_file, leaves, mesh};
@@ -8,23 +8,23 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// The exit code of a bug, which is what a panic is.
+/// The exit code of a bug. Every panic is one.
 const EXIT_BUG: u8 = 70;
 
-/// Meshes a case by the paper's serial algorithm: plain, exact and slow.
+/// Mesh a case by the paper's serial algorithm: simple, exact and slow
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// The case file.
+    /// Case file
     #[arg(value_name = "CASE.toml")]
     case: PathBuf,
-    /// Where the leaf set goes: a directory that is absent or empty.
+    /// Write the leaf set to this directory, which must be empty or not exist
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Stop at the base tree: all leaves with their sides, before deletion and gradation.
+    /// Stop after the base tree: all leaves with their sides, before deletion and gradation
     #[arg(long)]
     ungraded: bool,
-    /// Where the record of this run goes.
+    /// Write a JSON record of the run to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -42,7 +42,7 @@ struct Run {
     components_ambiguous: AmbiguousCount,
     digest: String,
     time_wall_s: f64,
-    /// One number, the only rank's; none where the system does not tell.
+    /// One number, for the only rank; empty if the operating system does not report it.
     peak_rss_bytes: Vec<u64>,
 }
 
@@ -54,7 +54,7 @@ fn main() -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::from(error.exit_code())
         }
-        // The panic has already said what happened.
+        // The panic handler has already printed the message.
         Err(_) => ExitCode::from(EXIT_BUG),
     }
 }
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let start = Instant::now();
     if let Some(directory) = &arguments.out {
-        // Better now than after an hour of meshing.
+        // Meshing may take an hour: refuse an unusable directory before it starts.
         write::check_vacant(directory)?;
     }
     let case = case_file::read(&arguments.case)?;
@@ -91,10 +91,10 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     if let Some(path) = &arguments.json {
         write::json(path, &record)?;
     }
-    say(&mesh, &record)
+    print_summary(&mesh, &record)
 }
 
-fn say(mesh: &Mesh, record: &Run) -> Result<(), Error> {
+fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
     if let Some(ambiguous) = &mesh.ambiguous {
         let [x, y, z] = ambiguous.example;
         eprintln!(
@@ -108,7 +108,7 @@ fn say(mesh: &Mesh, record: &Run) -> Result<(), Error> {
         .map_err(|source| Error::Write { path: PathBuf::from("standard output"), source })
 }
 
-/// The most memory that this process has held, where the system tells.
+/// Peak resident memory of this process; `None` if the operating system does not report it.
 fn peak_rss_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! Octants on the lattice: where they are, what they meet, and the word that stands for a leaf.
+//! Octants on the lattice: geometry, intersection, and the word of a leaf.
 //!
 //! The root is the cube [0, 2^27]^3. An octant of level l is closed, has edge 2^(27-l), and its
 //! corners are multiples of that edge. No octant is narrower than 256 lattice units.
@@ -9,14 +9,14 @@ pub const LEVEL_MAX: u32 = 19;
 /// The edge of the root, in lattice units.
 pub const ROOT_EDGE: i64 = 1 << 27;
 
-/// Where a leaf lies with respect to the facets.
+/// The position of a leaf relative to the facets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// In a component that the rays find outside.
+    /// The rays found its component outside.
     Outside = 0,
-    /// In a component that the rays find inside.
+    /// The rays found its component inside.
     Inside = 1,
-    /// Crossed by a facet, or descended from a leaf that is.
+    /// A facet crosses the leaf or the leaf of T0 from which it descends.
     Crossing = 2,
 }
 
@@ -36,10 +36,10 @@ impl Extent {
         (0..3).all(|a| self.min[a].max(other.min[a]) < self.max[a].min(other.max[a]))
     }
 
-    /// The box grown by `margin` on every side.
+    /// The box enlarged by `margin` on every side.
     ///
-    /// Corners being integers, a closed box touches this one just if its interior meets the
-    /// interior of this one grown by 1.
+    /// Because corners are integers, a box with volume touches this one if and only if its interior meets
+    /// the interior of this one enlarged by 1.
     #[must_use]
     pub fn enlarged(&self, margin: i64) -> Extent {
         Extent { min: self.min.map(|x| x - margin), max: self.max.map(|x| x + margin) }
@@ -51,7 +51,7 @@ impl Extent {
 pub struct Octant {
     /// The minimum corner.
     pub min: [i64; 3],
-    /// How many times the root was halved.
+    /// Number of bisections of the root that lead to this octant.
     pub level: u32,
 }
 
@@ -77,7 +77,7 @@ impl Octant {
         self.min.map(|x| x + self.edge() / 2)
     }
 
-    /// Child `index`: bit 0 says the upper half in x, bit 1 in y, bit 2 in z.
+    /// Child `index`: bit 0 selects the upper half in x, bit 1 in y, bit 2 in z.
     #[must_use]
     pub fn child(&self, index: usize) -> Octant {
         let half = self.edge() / 2;
@@ -85,7 +85,8 @@ impl Octant {
         Octant { min, level: self.level + 1 }
     }
 
-    /// The Morton key: the minimum corner's coordinates in level-19 cells, interleaved, x lowest.
+    /// The Morton key: the interleaved coordinates of the minimum corner in level-19 cells, with x in the
+    /// lowest bit.
     #[must_use]
     pub fn key(&self) -> u64 {
         let mut key = 0;
@@ -98,7 +99,7 @@ impl Octant {
         key
     }
 
-    /// The word that stands for this octant as a leaf of `side`.
+    /// The leaf word of this octant with `side`.
     #[must_use]
     pub fn word(&self, side: Side) -> u64 {
         self.key() << 7 | u64::from(self.level) << 2 | side as u64

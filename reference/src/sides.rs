@@ -1,38 +1,39 @@
-//! Sides: a flood fill over faces, then six rays for each component.
+//! Sides: a flood fill over faces finds the components, and rays decide the side of each.
 use crate::lattice::{Facet, Input, location};
 use crate::octant::{Extent, Octant, Side};
 use crate::ray;
 use crate::tree::{Index, Tree};
 
-/// How many leaves of a component may speak for it.
+/// Maximum number of leaves of a component whose rays are cast.
 const CANDIDATES_MAX: usize = 32;
 
-/// The components that only a majority could decide: where the geometry leaks.
+/// Summary of the components that a majority of rays decided, because no candidate's six rays agreed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ambiguous {
-    /// How many there are.
+    /// Number of such components.
     pub components: u64,
-    /// The centroid of the coarsest candidate of all of them, the first by key among equals, in the
-    /// user's units.
+    /// Centroid of the coarsest leaf of these components, the first by key among leaves of the same level,
+    /// in the user's unit.
     pub example: [f64; 3],
 }
 
-/// Gives every leaf that is not `Crossing` the side of its component.
+/// Sets the side of every leaf that is not `Crossing` to the side of its component. Returns the ambiguous
+/// components, `None` if there are none.
 pub fn assign(tree: &mut Tree, input: &Input) -> Option<Ambiguous> {
-    let mut undecided: Vec<Octant> = Vec::new();
+    let mut ambiguous: Vec<Octant> = Vec::new();
     for mut component in components(tree) {
         component.sort_by_cached_key(|&leaf| coarsest_first(&tree.octant(leaf)));
         let candidates = component.iter().take(CANDIDATES_MAX).map(|&leaf| tree.octant(leaf));
         let verdict = vote(candidates, &input.facets);
         if !verdict.unanimous {
-            undecided.push(tree.octant(component[0]));
+            ambiguous.push(tree.octant(component[0]));
         }
         for leaf in component {
             tree.set_side(leaf, verdict.side);
         }
     }
-    let example = undecided.iter().min_by_key(|octant| coarsest_first(octant))?;
-    let components = undecided.len() as u64;
+    let example = ambiguous.iter().min_by_key(|octant| coarsest_first(octant))?;
+    let components = ambiguous.len() as u64;
     Some(Ambiguous { components, example: location(&input.root, example.centroid()) })
 }
 
@@ -40,7 +41,7 @@ fn coarsest_first(octant: &Octant) -> (u32, u64) {
     (octant.level, octant.key())
 }
 
-/// The components: leaves that no facet crosses, joined where they share part of a face.
+/// The components: sets of leaves that no facet crosses, connected through shared parts of faces.
 fn components(tree: &Tree) -> Vec<Vec<Index>> {
     let mut components = Vec::new();
     let leaves = tree.leaves();
@@ -51,9 +52,9 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
         }
         reached[start] = true;
         let mut component = vec![start];
-        let mut done = 0;
-        while let Some(&leaf) = component.get(done) {
-            done += 1;
+        let mut visited = 0;
+        while let Some(&leaf) = component.get(visited) {
+            visited += 1;
             for neighbour in face_neighbours(tree, leaf) {
                 if !reached[neighbour] && tree.side(neighbour) != Side::Crossing {
                     reached[neighbour] = true;
@@ -66,8 +67,8 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
     components
 }
 
-/// The leaves that share part of a face with `leaf`: those that meet the cube's faces thickened
-/// outwards by one lattice unit, which is less than any leaf's edge.
+/// The leaves that share part of a face with `leaf`: those that meet the faces of its cube thickened
+/// outwards by one lattice unit, which is less than the edge of any leaf.
 fn face_neighbours(tree: &Tree, leaf: Index) -> Vec<Index> {
     let Extent { min, max } = tree.octant(leaf).extent();
     let mut neighbours = Vec::new();
@@ -88,8 +89,8 @@ struct Verdict {
     unanimous: bool,
 }
 
-/// The first candidate whose six rays agree decides; failing that, the majority of all rays, a tie
-/// being outside.
+/// The first candidate whose six rays agree decides. If there is none, the majority of all rays decides,
+/// and a tie means outside.
 fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
     let (mut rays, mut rays_odd) = (0, 0);
     for candidate in candidates {

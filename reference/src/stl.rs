@@ -1,40 +1,40 @@
-//! STL files: triangle soup, binary or ASCII.
+//! Reader of STL files, binary or ASCII.
 //!
-//! A file is binary if its length is 84 + 50 n for the n in its header, whatever it begins with, for
-//! there are binary files that begin with "solid". Anything else must be ASCII.
+//! A file is binary if its length is 84 + 50 n for the n in its header, whatever its first bytes: some
+//! binary files begin with "solid". Any other file must be ASCII.
 mod ascii;
 
 use crate::error::Error;
 use std::path::Path;
 
-/// One facet, as STL stores it.
+/// The three vertices of a facet, in the precision of STL.
 pub type Facet = [[f32; 3]; 3];
 
 const HEADER_BYTES: usize = 84;
 const FACET_BYTES: usize = 50;
 
-/// Reads the facets of an STL file. A file may hold none; an empty file is an error.
+/// Reads the facets of an STL file. A valid file may contain no facets; a file of zero bytes is an error.
 ///
 /// # Errors
-/// A file that cannot be read, is damaged, or is not STL at all; a vertex that is not finite.
+/// The file cannot be read, is damaged or is not STL, or a vertex is not finite.
 pub fn read(path: &Path) -> Result<Vec<Facet>, Error> {
     let bytes =
         std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
     parse(&bytes).map_err(|problem| Error::Stl { path: path.to_owned(), problem })
 }
 
-/// The facets in the bytes of an STL file, or a sentence on what is wrong with them.
+/// Parses the bytes of an STL file.
 ///
 /// # Errors
-/// As [`read`], without the file.
+/// One sentence with the problem, its location and a remedy, without the path of the file.
 pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     if bytes.is_empty() {
         return Err("the file is empty; export the geometry again".to_owned());
     }
-    let facets = match facets_promised(bytes) {
-        Some(promised) if length_for(promised) == bytes.len() as u64 => binary(bytes),
+    let facets = match header_count(bytes) {
+        Some(count) if binary_length(count) == bytes.len() as u64 => binary(bytes),
         _ if ascii::is_likely(bytes) => ascii::parse(bytes)?,
-        Some(promised) => return Err(does_not_fit(promised, bytes.len())),
+        Some(count) => return Err(wrong_length(count, bytes.len())),
         None => {
             return Err(
                 "the file is neither ASCII STL, which begins with \"solid\", nor long enough \
@@ -53,32 +53,32 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     Ok(facets)
 }
 
-/// The facet count in a binary header. It may say anything: nothing is allocated for its sake.
-fn facets_promised(bytes: &[u8]) -> Option<u32> {
+/// The facet count in a binary header. It may be arbitrarily wrong, so nothing is allocated from it.
+fn header_count(bytes: &[u8]) -> Option<u32> {
     let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
     Some(u32::from_le_bytes(count.try_into().expect("four bytes")))
 }
 
-fn length_for(facets: u32) -> u64 {
+fn binary_length(facets: u32) -> u64 {
     HEADER_BYTES as u64 + FACET_BYTES as u64 * u64::from(facets)
 }
 
-fn does_not_fit(promised: u32, length: usize) -> String {
+fn wrong_length(count: u32, length: usize) -> String {
     format!(
-        "as binary STL its header promises {promised} facets, {} bytes in all, but the file has \
-         {length}, and it is not ASCII STL either; it is damaged or no STL: export it again",
-        length_for(promised)
+        "as binary STL the file should have {} bytes for the {count} facets of its header, but it has \
+         {length}, and it is not ASCII STL either; it is damaged or not STL: export it again",
+        binary_length(count)
     )
 }
 
-/// Every facet is a normal, which is ignored, three vertices, and two bytes of attributes.
+/// The record of a facet is a normal, which is ignored, three vertices, and two bytes of attributes.
 fn binary(bytes: &[u8]) -> Vec<Facet> {
     let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("four bytes"));
     let facet = |record: &[u8]| {
         std::array::from_fn(|vertex| {
             std::array::from_fn(|axis| {
-                let at = 12 + 12 * vertex + 4 * axis;
-                number(&record[at..at + 4])
+                let start = 12 + 12 * vertex + 4 * axis;
+                number(&record[start..start + 4])
             })
         })
     };

@@ -1,15 +1,17 @@
 //! The voxel tree: an arena of octants, each with no children or all eight.
 //!
-//! Invariants: the root is octant 0; a parent's children lie side by side in Morton order;
-//! `level_least` of an octant is the least level of the kept leaves below it.
+//! Invariants, executed by [`Tree::check_invariants`]: the root has index 0; the eight children of an
+//! octant are contiguous, in Morton order, at higher indices than their parent; `level_least` of an octant
+//! is the least level of the kept leaves among its descendants.
 use crate::crossing::crosses;
 use crate::lattice::Facet;
 use crate::octant::{Extent, Octant, Side};
 
-/// An octant of the tree, by its place in the arena.
+/// The index of an octant in the arena.
 pub type Index = usize;
 
-/// The `level_least` of an octant with no kept leaf below it: no refinement concerns it.
+/// The `level_least` of an octant without kept descendants. It exceeds every level, so such an octant is
+/// never refined.
 const NOTHING_KEPT: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
@@ -17,7 +19,7 @@ struct Node {
     octant: Octant,
     /// The first of eight children; `None` for a leaf.
     children: Option<Index>,
-    /// Only a leaf's side means anything.
+    /// Meaningful for leaves only.
     side: Side,
     level_least: u32,
 }
@@ -29,14 +31,14 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// The tree of one leaf.
+    /// The tree whose only leaf is the root.
     #[must_use]
     pub fn root() -> Self {
         Self { nodes: vec![Node::leaf(Octant::ROOT, Side::Outside)] }
     }
 
-    /// Splits leaves until every leaf that `facet` crosses has level `level` at least; those are
-    /// `Crossing` from now on.
+    /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks these
+    /// leaves `Crossing`.
     pub fn insert(&mut self, facet: &Facet, level: u32) {
         self.insert_below(0, facet, level);
     }
@@ -59,8 +61,8 @@ impl Tree {
         self.update_level_least(index);
     }
 
-    /// Splits kept leaves until every one whose interior meets that of `extent` has level `level`
-    /// at least.
+    /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least level
+    /// `level`.
     pub fn refine(&mut self, extent: &Extent, level: u32) {
         self.refine_below(0, extent, level);
     }
@@ -90,10 +92,10 @@ impl Tree {
         self.nodes[index].level_least = levels.min().unwrap_or(NOTHING_KEPT);
     }
 
-    /// Deletes the leaves of the sides that `unwanted` names: they stay in the tree, which must tile
-    /// the root, but are never refined and never among the kept leaves.
+    /// Deletes the leaves whose side satisfies `unwanted`. They stay in the tree, which must tile the root,
+    /// but they are never refined and no longer among the kept leaves.
     pub fn delete(&mut self, unwanted: impl Fn(Side) -> bool) {
-        // Children come after their parents in the arena, so backwards is from the leaves up.
+        // Children have higher indices than their parents, so the reverse order visits them first.
         for index in (0..self.nodes.len()).rev() {
             if self.nodes[index].children.is_some() {
                 self.update_level_least(index);
@@ -107,17 +109,17 @@ impl Tree {
         self.nodes[index].children.map_or(0..0, |first| first..first + 8)
     }
 
-    /// Checks the invariants at the head of this file.
+    /// Checks the invariants of this module.
     ///
     /// # Panics
-    /// When one does not hold.
+    /// If an invariant does not hold.
     pub fn check_invariants(&self) {
         assert_eq!(self.nodes[0].octant, Octant::ROOT);
         let parents = self.nodes.iter().filter(|node| node.children.is_some()).count();
         assert_eq!(
             self.nodes.len(),
             1 + 8 * parents,
-            "every octant but the root is a child of one"
+            "every octant except the root is the child of exactly one octant"
         );
         for (index, node) in self.nodes.iter().enumerate() {
             let kept = node.level_least != NOTHING_KEPT;
@@ -125,6 +127,7 @@ impl Tree {
                 assert!(!kept || node.level_least == node.octant.level);
                 continue;
             }
+            assert!(self.children(index).start > index, "children follow their parent");
             let children = || self.children(index).map(|child| &self.nodes[child]);
             assert!(children().enumerate().all(|(i, child)| child.octant == node.octant.child(i)));
             assert_eq!(Some(node.level_least), children().map(|child| child.level_least).min());
@@ -165,13 +168,13 @@ impl Tree {
         self.leaves().into_iter().filter(kept).map(|index| (self.octant(index), self.side(index)))
     }
 
-    /// The words of the kept leaves of the sides that `wanted` names, ascending.
+    /// The words of the kept leaves whose side satisfies `wanted`, in ascending order.
     pub fn words(&self, wanted: impl Fn(Side) -> bool) -> Vec<u64> {
         let leaves = self.kept_leaves().filter(|&(_, side)| wanted(side));
         leaves.map(|(octant, side)| octant.word(side)).collect()
     }
 
-    /// The octant itself.
+    /// The octant at an index.
     #[must_use]
     pub fn octant(&self, index: Index) -> Octant {
         self.nodes[index].octant
@@ -183,7 +186,7 @@ impl Tree {
         self.nodes[index].side
     }
 
-    /// Gives a leaf its side.
+    /// Sets the side of a leaf.
     pub fn set_side(&mut self, index: Index, side: Side) {
         self.nodes[index].side = side;
     }

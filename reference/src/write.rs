@@ -1,5 +1,5 @@
-//! Leaf-set directories: one file of words and the manifest, written so that a reader never sees half
-//! of either.
+//! Writer of leaf-set directories: one file of leaf words and the manifest. A reader never sees an
+//! incomplete file.
 use crate::Mesh;
 use crate::case::{Case, Keep, Root};
 use crate::error::Error;
@@ -9,13 +9,13 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// This program, as manifests name it.
+/// Name and version of this program, for manifests.
 pub const PROGRAM: &str = concat!("reference ", env!("CARGO_PKG_VERSION"));
 
 const LEAF_FILE: &str = "leaves-00000.npy";
 const MANIFEST_FILE: &str = "mesh.json";
 
-/// Which tree a leaf set is.
+/// The tree whose leaves a leaf set contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Which {
@@ -59,7 +59,7 @@ struct BySide {
     crossing: u64,
 }
 
-/// How many components were ambiguous, and where one of them is.
+/// The number of ambiguous components and the location of one of them, as written to JSON.
 #[derive(Serialize)]
 pub struct AmbiguousCount {
     count: u64,
@@ -67,7 +67,7 @@ pub struct AmbiguousCount {
 }
 
 impl AmbiguousCount {
-    /// Of a mesh.
+    /// The ambiguous components of a mesh.
     #[must_use]
     pub fn of(mesh: &Mesh) -> Self {
         let ambiguous = mesh.ambiguous.as_ref();
@@ -112,10 +112,10 @@ impl Manifest {
     }
 }
 
-/// Whether a leaf set may be written to `directory`: it must be absent or empty.
+/// Checks that `directory` does not exist or is empty, so that a leaf set can be written to it.
 ///
 /// # Errors
-/// A directory that holds something, or cannot be looked into.
+/// The directory is not empty or cannot be read.
 pub fn check_vacant(directory: &Path) -> Result<(), Error> {
     match fs::read_dir(directory).map(|mut entries| entries.next().is_none()) {
         Ok(true) => Ok(()),
@@ -125,10 +125,10 @@ pub fn check_vacant(directory: &Path) -> Result<(), Error> {
     }
 }
 
-/// Writes a mesh to `directory`, the manifest last: where there is one, the leaf set is whole.
+/// Writes a mesh to `directory`, the manifest last: a directory with a manifest is complete.
 ///
 /// # Errors
-/// Whatever keeps the files from being written.
+/// The directory is not empty, or a file cannot be written.
 pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Result<(), Error> {
     check_vacant(directory)?;
     fs::create_dir_all(directory)
@@ -137,10 +137,10 @@ pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Res
     json(&directory.join(MANIFEST_FILE), &Manifest::new(which, case, mesh))
 }
 
-/// Writes a JSON file.
+/// Writes `value` to a JSON file.
 ///
 /// # Errors
-/// Whatever keeps the file from being written.
+/// The file cannot be written.
 pub fn json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
     file(path, |to| {
         serde_json::to_writer_pretty(&mut *to, value)?;
@@ -148,26 +148,25 @@ pub fn json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
     })
 }
 
-/// Writes a file beside its place, makes sure of it, and moves it there.
+/// Writes a temporary file in the directory of `path`, synchronises it to disk, and renames it to `path`.
 fn file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".tmp");
-    let beside = path.with_file_name(name);
+    let temporary = path.with_file_name(name);
     let written = (|| {
-        let mut to = BufWriter::new(File::create(&beside)?);
+        let mut to = BufWriter::new(File::create(&temporary)?);
         fill(&mut to)?;
         to.into_inner()?.sync_all()?;
-        fs::rename(&beside, path)
+        fs::rename(&temporary, path)
     })();
     written.map_err(|source| {
-        // What could not be finished is of no use to anyone; that it may not be removable either is
-        // not news.
-        let _ = fs::remove_file(&beside);
+        // The first error is the one to report; the removal may fail for the same reason.
+        let _ = fs::remove_file(&temporary);
         Error::Write { path: path.to_owned(), source }
     })
 }
 
-/// NumPy's format, version 1.0: a header of a multiple of 64 bytes, then the words.
+/// Writes NumPy's format, version 1.0: a header whose length is a multiple of 64 bytes, then the words.
 fn npy(to: &mut dyn Write, words: &[u64]) -> io::Result<()> {
     const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
     let mut header =

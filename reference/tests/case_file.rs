@@ -1,4 +1,4 @@
-//! Case files: defaults, and a sentence for everything that can be wrong.
+//! Case files: defaults, and an informative message for each kind of error.
 use reference::{BoxSpec, Case, Error, Keep, Root, case_file};
 use std::fs;
 
@@ -12,13 +12,13 @@ fn read(text: &str) -> Result<Case, Error> {
     case_file::read(&path)
 }
 
-fn refused(text: &str, part: &str) {
+fn assert_refused(text: &str, part: &str) {
     let problem = read(text).unwrap_err().to_string();
-    assert!(problem.contains(part), "{problem:?} should say {part:?}");
+    assert!(problem.contains(part), "{problem:?} should contain {part:?}");
 }
 
 #[test]
-fn defaults() {
+fn missing_keys_take_their_defaults() {
     let case = read(&format!("spacing_min = 0.5\n{GENERATED}")).unwrap();
     assert_eq!((case.facets.len(), case.spacing_min, case.layer_cells_min), (12, 0.5, 4));
     assert_eq!((case.keep, case.keep_crossing, case.boxes.len()), (Keep::Outside, true, 0));
@@ -26,7 +26,7 @@ fn defaults() {
 }
 
 #[test]
-fn everything_given() {
+fn every_key_is_read() {
     let text = format!(
         "spacing_min = 1\nlayer_cells_min = 2\nkeep = \"inside\"\nkeep_crossing = false\n{ROOT}{GENERATED}\
          [[box]]\nmin = [0.0, -1.0, -1.0]\nmax = [4.0, 1.0, 1.0]\nspacing = 0.05\n\
@@ -40,9 +40,9 @@ fn everything_given() {
     assert_eq!(case.boxes, [first, second]);
 }
 
-/// The path of a geometry starts at the case file, and vertices are the nearest f32.
+/// The path of a geometry is relative to the case file, and coordinates are rounded to f32.
 #[test]
-fn geometry_beside_the_case() {
+fn geometry_files_are_relative_to_the_case_file() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("case.toml");
     let facet =
@@ -54,44 +54,56 @@ fn geometry_beside_the_case() {
     assert_eq!(case.root, Root::around(&case.facets, 2.0).unwrap());
 
     fs::write(directory.path().join("body.stl"), "solid\nendsolid\n").unwrap();
-    assert!(case_file::read(&path).unwrap_err().to_string().contains("no facets or no size"));
+    assert!(case_file::read(&path).unwrap_err().to_string().contains("no facets or its"));
     fs::write(&path, format!("geometry = \"body.stl\"\nspacing_min = 1.0\n{ROOT}")).unwrap();
-    assert!(case_file::read(&path).unwrap().facets.is_empty(), "a root of its own will do");
+    assert!(case_file::read(&path).unwrap().facets.is_empty(), "an explicit root suffices");
     fs::write(&path, "geometry = \"boddy.stl\"\nspacing_min = 1.0\n").unwrap();
     assert!(matches!(case_file::read(&path), Err(Error::Read { .. })));
 }
 
 #[test]
-fn unknown_keys_name_the_nearest_known_one() {
+fn an_unknown_key_is_refused_with_the_most_similar_known_one() {
     let with = |line: &str| format!("spacing_min = 1.0\n{line}\n{GENERATED}");
-    refused(&with("layer_cell_min = 3"), "line 2: unknown field `layer_cell_min`");
-    refused(&with("layer_cell_min = 3"), "did you mean `layer_cells_min`?");
-    refused(&with("rootscale = 3"), "did you mean `root_scale`?");
-    refused(&with("keep = \"outsde\""), "did you mean `outside`?");
-    refused(&with("[root]\norigin = [0, 0, 0]\nedges = 1"), "did you mean `edge`?");
-    refused(&with("[[box]]\nmin = [0, 0, 0]\nmxa = [1, 1, 1]\nspacing = 1"), "did you mean `max`?");
-    refused(&with("[[boxes]]\nspacing = 1"), "did you mean `box`?");
-    refused("spacing_min = 1\n[generator]\nshape = \"cube\"\nfacet = 12", "did you mean `facets`?");
-    refused("spacing_min = 1\n[generator]\nshape = \"cub\"\nfacets = 12", "did you mean `cube`?");
+    assert_refused(&with("layer_cell_min = 3"), "line 2: unknown field `layer_cell_min`");
+    assert_refused(&with("layer_cell_min = 3"), "did you mean `layer_cells_min`?");
+    assert_refused(&with("rootscale = 3"), "did you mean `root_scale`?");
+    assert_refused(&with("keep = \"outsde\""), "did you mean `outside`?");
+    assert_refused(&with("[root]\norigin = [0, 0, 0]\nedges = 1"), "did you mean `edge`?");
+    assert_refused(
+        &with("[[box]]\nmin = [0, 0, 0]\nmxa = [1, 1, 1]\nspacing = 1"),
+        "did you mean `max`?",
+    );
+    assert_refused(&with("[[boxes]]\nspacing = 1"), "did you mean `box`?");
+    assert_refused(
+        "spacing_min = 1\n[generator]\nshape = \"cube\"\nfacet = 12",
+        "did you mean `facets`?",
+    );
+    assert_refused(
+        "spacing_min = 1\n[generator]\nshape = \"cub\"\nfacets = 12",
+        "did you mean `cube`?",
+    );
 }
 
 #[test]
-fn what_makes_no_sense() {
-    refused(GENERATED, "missing field `spacing_min`");
-    refused("spacing_min = 1", "either `geometry` or a [generator] table");
+fn invalid_case_files_are_refused() {
+    assert_refused(GENERATED, "missing field `spacing_min`");
+    assert_refused("spacing_min = 1", "either `geometry` or a [generator] table");
     let both = format!("spacing_min = 1\ngeometry = \"body.stl\"\n{GENERATED}");
-    refused(&both, "either `geometry` or a [generator] table");
+    assert_refused(&both, "either `geometry` or a [generator] table");
     let with = |line: &str| format!("spacing_min = 1.0\n{line}\n{GENERATED}");
-    refused(&with(&format!("root_scale = 2.0\n{ROOT}")), "either `root_scale` or a [root] table");
+    assert_refused(
+        &with(&format!("root_scale = 2.0\n{ROOT}")),
+        "either `root_scale` or a [root] table",
+    );
     for scale in ["0", "-1.0", "nan", "inf"] {
-        refused(&with(&format!("root_scale = {scale}")), "finite and greater than 0");
+        assert_refused(&with(&format!("root_scale = {scale}")), "finite and greater than 0");
     }
-    refused(&with("layer_cells_min = -1"), "line 2");
-    refused(&with("layer_cells_min = 1.5"), "line 2");
-    refused(&with("keep_crossing = 1"), "expected a boolean");
-    refused(&with("[root]\norigin = [0, 0]\nedge = 1"), "line 3");
-    refused("spacing_min = = 1", "line 1");
-    refused("spacing_min = 1\nspacing_min = 2", "line 2");
+    assert_refused(&with("layer_cells_min = -1"), "line 2");
+    assert_refused(&with("layer_cells_min = 1.5"), "line 2");
+    assert_refused(&with("keep_crossing = 1"), "expected a boolean");
+    assert_refused(&with("[root]\norigin = [0, 0]\nedge = 1"), "line 3");
+    assert_refused("spacing_min = = 1", "line 1");
+    assert_refused("spacing_min = 1\nspacing_min = 2", "line 2");
     let directory = tempfile::tempdir().unwrap();
     let nowhere = case_file::read(&directory.path().join("nowhere.toml")).unwrap_err();
     assert!(nowhere.to_string().contains("nowhere.toml"));

@@ -1,4 +1,4 @@
-//! The program as a user meets it: exit codes, sentences and files.
+//! The program as its users see it: exit codes, messages and files.
 use reference::leaves::{Tally, hex};
 use reference::{Keep, case_file, digest, mesh};
 use serde_json::Value;
@@ -33,14 +33,15 @@ fn reference(directory: &Path, arguments: &[&str]) -> Output {
     command.current_dir(directory).args(arguments).output().unwrap()
 }
 
-/// Runs and returns what went to standard error, which must be one line.
-fn fails(directory: &Path, arguments: &[&str], code: i32) -> String {
+/// Runs the program, which must fail with `code`, and returns its error message, which must be one line.
+fn assert_fails(directory: &Path, arguments: &[&str], code: i32) -> String {
     let output = reference(directory, arguments);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(code), "{said}");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{message}");
     assert!(output.stdout.is_empty());
-    assert!(said.starts_with("error: ") && said.trim_end().lines().count() == 1, "{said}");
-    said
+    let is_one_line = message.trim_end().lines().count() == 1;
+    assert!(message.starts_with("error: ") && is_one_line, "{message}");
+    message
 }
 
 fn manifest(directory: &Path) -> Value {
@@ -53,12 +54,16 @@ fn words(directory: &Path) -> Vec<u64> {
     assert_eq!(file.shape().len(), 1);
     let words: Vec<u64> = file.into_vec().unwrap();
     let header_bytes = fs::metadata(path).unwrap().len() - 8 * words.len() as u64;
-    assert_eq!(header_bytes % 64, 0, "words are aligned for whoever maps the file");
+    assert_eq!(
+        header_bytes % 64,
+        0,
+        "the words are aligned, so that the file can be mapped to memory"
+    );
     words
 }
 
 #[test]
-fn leaf_set_and_record() {
+fn a_run_writes_a_leaf_set_and_a_record() {
     let directory = directory_with_case(CASE);
     let path = directory.path();
     let output = reference(path, &["case.toml", "--out", "new/mesh", "--json", "run.json"]);
@@ -78,12 +83,12 @@ fn leaf_set_and_record() {
     );
     assert_eq!(run["cells"], expected.words.len());
     assert!(run["time_wall_s"].as_f64().unwrap() > 0.0);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(said.contains(&digest), "{said}");
+    let summary = String::from_utf8(output.stdout).unwrap();
+    assert!(summary.contains(&digest), "{summary}");
 }
 
 #[test]
-fn manifest_says_what_the_leaves_say() {
+fn the_manifest_agrees_with_the_leaves() {
     let directory = directory_with_case(CASE);
     assert!(reference(directory.path(), &["case.toml", "--out", "mesh"]).status.success());
     let out = directory.path().join("mesh");
@@ -98,7 +103,7 @@ fn manifest_says_what_the_leaves_say() {
     equal("layer_cells_min", 2.into());
     equal("keep", "all".into());
     equal("keep_crossing", true.into());
-    // 1.0, 1.1 and 1.2 of 2.25 in 2^27ths; the box ends at the root.
+    // The distances 1.0, 1.1 and 1.2 of an edge of 2.25, in lattice units; the box is clamped to the root.
     let boxes = serde_json::json!(
         [{"min": [59_652_324, 65_617_556, 71_582_788], "max": [134_217_728, 95_443_718, 101_408_950], "level": 5}]
     );
@@ -121,7 +126,7 @@ fn manifest_says_what_the_leaves_say() {
 }
 
 #[test]
-fn ungraded_is_the_base_tree() {
+fn ungraded_writes_the_base_tree() {
     let directory = directory_with_case(&CASE.replace("all", "outside"));
     assert!(
         reference(directory.path(), &["case.toml", "--ungraded", "--out", "base"]).status.success()
@@ -137,9 +142,9 @@ fn ungraded_is_the_base_tree() {
     assert!(manifest["leaves_by_side"]["inside"].as_u64().unwrap() > 0, "nothing is deleted yet");
 }
 
-/// An internal mesh of nothing: a leaf set without leaves is a leaf set.
+/// A leaf set without leaves is valid: here, internal flow without a body.
 #[test]
-fn empty_mesh() {
+fn a_mesh_may_be_empty() {
     let text = CASE.replace("all", "inside").replace("origin = [-1.0", "origin = [1.0");
     let directory = directory_with_case(&text);
     let output = reference(directory.path(), &["case.toml", "--out", "mesh"]);
@@ -165,14 +170,14 @@ fn ambiguous_components_are_reported() {
 }
 
 #[test]
-fn the_users_input() {
+fn invalid_input_exits_with_2_and_writes_nothing() {
     let directory = directory_with_case(&CASE.replace("0.125", "1e-9"));
     let path = directory.path();
-    assert!(fails(path, &["case.toml"], 2).contains("spacing_min"));
-    assert!(fails(path, &["nowhere.toml"], 2).contains("nowhere.toml"));
+    assert!(assert_fails(path, &["case.toml"], 2).contains("spacing_min"));
+    assert!(assert_fails(path, &["nowhere.toml"], 2).contains("nowhere.toml"));
     fs::write(path.join("damaged.stl"), [0; 100]).unwrap();
     fs::write(path.join("damaged.toml"), "geometry = \"damaged.stl\"\nspacing_min = 1").unwrap();
-    assert!(fails(path, &["damaged.toml", "--out", "mesh"], 2).contains("damaged.stl"));
+    assert!(assert_fails(path, &["damaged.toml", "--out", "mesh"], 2).contains("damaged.stl"));
     assert!(!path.join("mesh").exists(), "nothing is written for a case that fails");
     for arguments in [&[][..], &["case.toml", "--unknown"], &["case.toml", "--out"]] {
         assert_eq!(reference(path, arguments).status.code(), Some(2), "{arguments:?}");
@@ -181,13 +186,20 @@ fn the_users_input() {
 }
 
 #[test]
-fn output_that_cannot_be_written() {
+fn output_that_cannot_be_written_exits_with_4() {
     let directory = directory_with_case(CASE);
     let path = directory.path();
     fs::create_dir(path.join("empty")).unwrap();
-    assert!(reference(path, &["case.toml", "--out", "empty"]).status.success(), "empty will do");
-    assert!(fails(path, &["case.toml", "--out", "empty"], 4).contains("not empty"));
-    assert!(fails(path, &["case.toml", "--out", "case.toml"], 4).contains("case.toml"));
-    assert!(fails(path, &["case.toml", "--out", "case.toml/mesh"], 4).contains("cannot write"));
-    assert!(fails(path, &["case.toml", "--json", "no/such/run.json"], 4).contains("run.json"));
+    assert!(
+        reference(path, &["case.toml", "--out", "empty"]).status.success(),
+        "an empty directory is accepted"
+    );
+    assert!(assert_fails(path, &["case.toml", "--out", "empty"], 4).contains("not empty"));
+    assert!(assert_fails(path, &["case.toml", "--out", "case.toml"], 4).contains("case.toml"));
+    assert!(
+        assert_fails(path, &["case.toml", "--out", "case.toml/mesh"], 4).contains("cannot write")
+    );
+    assert!(
+        assert_fails(path, &["case.toml", "--json", "no/such/run.json"], 4).contains("run.json")
+    );
 }

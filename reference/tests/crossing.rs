@@ -1,69 +1,67 @@
-//! The crossing test by cutting against the crossing test by separating axes.
+//! The crossing test, which clips, agrees with a second one, which uses separating axes.
 mod support;
 
+use proptest::array::uniform3;
+use proptest::prelude::*;
 use reference::crossing::crosses;
 use reference::octant::Extent;
-use support::{Seeded, crosses_by_axes};
+use std::cell::Cell;
+use support::crosses_by_axes;
+use support::random::{Facet, facet, for_all};
 
-fn agree(facet: &[[i64; 3]; 3], extent: &Extent) -> bool {
+fn assert_agree(facet: &Facet, extent: &Extent) -> bool {
     let crossing = crosses(facet, extent);
     let by_axes = crosses_by_axes(facet, extent.min, extent.max);
     assert_eq!(crossing, by_axes, "facet {facet:?}, box {extent:?}");
     crossing
 }
 
-/// Coordinates so few that touching, lying in a plane and having no area are the rule.
-#[test]
-fn small_coordinates() {
-    let mut seeded = Seeded::new(1);
-    let mut crossing = 0;
-    for round in 0..300_000 {
-        let reach = 3 + round % 6;
-        let facet: [[i64; 3]; 3] =
-            std::array::from_fn(|_| std::array::from_fn(|_| seeded.of(0..=reach)));
-        let min: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=reach - 1));
-        let edge = seeded.of(1..=2);
-        crossing += u32::from(agree(&facet, &Extent { min, max: min.map(|x| x + edge) }));
-    }
-    assert!((50_000..250_000).contains(&crossing), "both answers occur: {crossing}");
+/// A cube with its minimum corner in a range and an edge of 1 or 2.
+fn cube(range: std::ops::RangeInclusive<i64>) -> impl Strategy<Value = Extent> {
+    (uniform3(range), 1..=2_i64).prop_map(|(min, edge)| Extent { min, max: min.map(|x| x + edge) })
 }
 
-/// Points and segments: facets that repeat a vertex or have all three in a line.
+/// With few different coordinates, most facets touch a corner, lie in a plane or have no area.
 #[test]
-fn degenerate_facets() {
-    let mut seeded = Seeded::new(2);
-    for _ in 0..100_000 {
-        let a: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=6));
-        let step: [i64; 3] = std::array::from_fn(|_| seeded.of(-3..=3));
-        let (second, third) = (seeded.of(0..=2), seeded.of(-1..=2));
-        let along = |times: i64| std::array::from_fn(|i| a[i] + times * step[i]);
-        let min: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=5));
-        let extent = Extent { min, max: min.map(|x| x + 1) };
-        agree(&[a, along(second), along(third)], &extent);
-        agree(&[a, a, a], &extent);
-    }
+fn both_tests_agree_on_small_coordinates() {
+    let (tested, crossing) = (Cell::new(0), Cell::new(0));
+    let inputs =
+        (3..=8_i64).prop_flat_map(|greatest| (facet(0..=greatest), cube(0..=greatest - 1)));
+    for_all(file!(), 300_000, inputs, |(facet, extent)| {
+        tested.set(tested.get() + 1);
+        crossing.set(crossing.get() + u32::from(assert_agree(&facet, &extent)));
+    });
+    let (tested, crossing) = (tested.get(), crossing.get());
+    assert!((tested / 6..tested * 5 / 6).contains(&crossing), "{crossing} of {tested} cross");
 }
 
-/// The greatest coordinates there are, where an overflow would show.
+/// Facets that are points or segments: all vertices are equal or collinear.
 #[test]
-fn great_coordinates() {
-    let mut seeded = Seeded::new(3);
-    let (lo, hi) = (-(1 << 27), 1 << 28);
-    for _ in 0..100_000 {
-        let facet: [[i64; 3]; 3] = std::array::from_fn(|_| {
-            std::array::from_fn(|_| {
-                if seeded.chance(1, 3) { seeded.pick(&[lo, hi]) } else { seeded.of(lo..=hi) }
-            })
-        });
-        let level = seeded.of(0..=19);
-        let edge = (1 << 27) >> level;
-        let min: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=(1 << level) - 1) * edge);
-        agree(&facet, &Extent { min, max: min.map(|x| x + edge) });
-    }
+fn both_tests_agree_on_degenerate_facets() {
+    let inputs = (uniform3(0..=6_i64), uniform3(-3..=3_i64), 0..=2_i64, -1..=2_i64, cube(0..=5));
+    for_all(file!(), 100_000, inputs, |(a, step, second, third, extent)| {
+        let point = |times: i64| std::array::from_fn(|i| a[i] + times * step[i]);
+        assert_agree(&[a, point(second), point(third)], &extent);
+        assert_agree(&[a, a, a], &extent);
+    });
+}
+
+/// The greatest coordinates that the lattice allows, where arithmetic could overflow.
+#[test]
+fn both_tests_agree_on_the_greatest_coordinates() {
+    let (lo, hi) = (-(1_i64 << 27), 1_i64 << 28);
+    let coordinate = prop_oneof![1 => Just(lo), 1 => Just(hi), 4 => lo..=hi];
+    let octant =
+        (0..=19_u32).prop_flat_map(|level| (Just(1 << 27 >> level), uniform3(0..1_i64 << level)));
+    let inputs = (uniform3(uniform3(coordinate)), octant);
+    for_all(file!(), 100_000, inputs, |(facet, (edge, index))| {
+        let min = index.map(|x| x * edge);
+        assert_agree(&facet, &Extent { min, max: min.map(|x| x + edge) });
+    });
 }
 
 #[test]
-fn what_touches_crosses() {
+fn a_facet_that_touches_a_box_crosses_it() {
     let extent = Extent { min: [4; 3], max: [6; 3] };
     let in_the_face_plane = [[6, 0, 0], [6, 9, 0], [6, 0, 20]];
     let corner_only = [[6, 6, 6], [9, 7, 8], [7, 9, 9]];

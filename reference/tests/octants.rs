@@ -1,4 +1,4 @@
-//! Octant algebra, exhausted to level 3.
+//! Octant algebra, tested on all octants to level 3.
 mod support;
 
 use reference::octant::{Extent, LEVEL_MAX, Octant, Side};
@@ -7,11 +7,11 @@ use support::ROOT_EDGE;
 /// All octants down to level 3.
 fn octants() -> Vec<Octant> {
     let mut octants = vec![Octant::ROOT];
-    let mut done = 0;
-    while octants[done].level < 3 {
-        let parent = octants[done];
+    let mut parents = 0;
+    while octants[parents].level < 3 {
+        let parent = octants[parents];
         octants.extend((0..8).map(|i| parent.child(i)));
-        done += 1;
+        parents += 1;
     }
     octants
 }
@@ -37,20 +37,19 @@ fn children_tile_their_parent_in_morton_order() {
     }
 }
 
-/// Two octants' interiors meet just if one is within the other; they touch just if the closed cubes
-/// share a corner of the level-3 grid.
+/// The interiors of two octants meet if and only if one octant contains the other. The octants touch if and
+/// only if their closed cubes share a corner of the level-3 grid.
 #[test]
-fn meeting_and_touching() {
+fn octants_meet_if_nested_and_touch_if_they_share_a_corner() {
     let octants = octants();
     let cell = ROOT_EDGE / 8;
     let grid = |extent: &Extent, a: usize| extent.min[a] / cell..=extent.max[a] / cell;
     for p in &octants {
         for q in &octants {
-            let (level, cells) = (p.level.min(q.level), |o: &Octant| {
-                o.key() >> (3 * (LEVEL_MAX - p.level.min(q.level)))
-            });
-            let nested = cells(p) == cells(q);
-            assert_eq!(p.extent().interiors_meet(&q.extent()), nested, "{p:?} {q:?} {level}");
+            let coarser = p.level.min(q.level);
+            let ancestor = |o: &Octant| o.key() >> (3 * (LEVEL_MAX - coarser));
+            let nested = ancestor(p) == ancestor(q);
+            assert_eq!(p.extent().interiors_meet(&q.extent()), nested, "{p:?} {q:?}");
             let touch =
                 (0..3).all(|a| grid(&p.extent(), a).any(|x| grid(&q.extent(), a).contains(&x)));
             assert_eq!(p.extent().enlarged(1).interiors_meet(&q.extent()), touch, "{p:?} {q:?}");
@@ -66,7 +65,7 @@ fn boxes_without_volume_have_no_interior() {
 }
 
 #[test]
-fn words_tell_octants_and_sides_apart() {
+fn leaf_words_are_distinct_and_encode_key_level_and_side() {
     let mut words = Vec::new();
     for octant in octants() {
         for side in [Side::Outside, Side::Inside, Side::Crossing] {
@@ -82,7 +81,7 @@ fn words_tell_octants_and_sides_apart() {
 }
 
 #[test]
-fn the_last_octant_fills_the_key() {
+fn the_last_octant_of_level_19_has_the_greatest_key() {
     let mut octant = Octant::ROOT;
     for _ in 0..LEVEL_MAX {
         octant = octant.child(7);

@@ -1,80 +1,79 @@
-//! Rays: by hand, and against a second way of counting.
+//! Ray parities, verified by hand and by a second method.
 mod support;
 
+use proptest::array::{uniform3, uniform4};
+use proptest::prelude::*;
 use reference::ray::parities;
-use support::{Seeded, block, crosses_by_axes, parities_by_areas};
+use std::cell::Cell;
+use support::random::{facet, for_all};
+use support::{block, crosses_by_axes, parities_by_areas};
 
-/// Few coordinates, so that rays through edges and vertices are the rule.
+/// With few different coordinates, most rays pass through edges and vertices.
 #[test]
-fn any_facets() {
-    let mut seeded = Seeded::new(4);
-    let mut odd = 0;
-    for round in 0..30_000 {
-        let reach = if round % 10 == 0 { 1 << 27 } else { 4 };
-        let facets: Vec<[[i64; 3]; 3]> = (0..4)
-            .map(|_| std::array::from_fn(|_| std::array::from_fn(|_| seeded.of(0..=reach))))
-            .collect();
-        let point: [i64; 3] = std::array::from_fn(|_| seeded.of(0..=reach));
-        // Rays start on no facet.
+fn both_methods_agree_on_random_facets() {
+    let (tested, odd) = (Cell::new(0), Cell::new(0));
+    let inputs = prop_oneof![9 => Just(4_i64), 1 => Just(1 << 27)]
+        .prop_flat_map(|greatest| (uniform4(facet(0..=greatest)), uniform3(0..=greatest)));
+    for_all(file!(), 30_000, inputs, |(facets, point)| {
+        // Rays never start on a facet.
         if facets.iter().any(|facet| crosses_by_axes(facet, point, point)) {
-            continue;
+            return;
         }
         for axis in 0..3 {
             let found = parities(&facets, point, axis);
-            assert_eq!(
-                found,
-                parities_by_areas(&facets, point, axis),
-                "{facets:?} {point:?} {axis}"
-            );
-            odd += u32::from(found[0]) + u32::from(found[1]);
+            assert_eq!(found, parities_by_areas(&facets, point, axis), "axis {axis}");
+            tested.set(tested.get() + 2);
+            odd.set(odd.get() + u32::from(found[0]) + u32::from(found[1]));
         }
-    }
-    assert!(odd > 5_000, "rays meet facets: {odd}");
+    });
+    let (tested, odd) = (tested.get(), odd.get());
+    assert!(odd > tested / 20, "{odd} of {tested} rays are odd");
 }
 
-/// A block on even coordinates, whose edges and diagonals the rays from whole points run into: every
-/// point within must see an odd number of facets along all six rays, and every point without an even.
+/// The block has even coordinates, so rays from integer points pass through its edges and diagonals. All six
+/// rays from a point inside intersect an odd number of facets, those from a point outside an even number.
 #[test]
-fn block_from_everywhere() {
+fn all_rays_agree_on_a_block() {
     let facets = block([2, 2, 2], [6, 8, 10]);
     let mut inside = 0;
     for x in 0..=8 {
         for y in 0..=10 {
             for z in 0..=12 {
-                let within = (3..=5).contains(&x) && (3..=7).contains(&y) && (3..=9).contains(&z);
-                let without =
+                let inside_block =
+                    (3..=5).contains(&x) && (3..=7).contains(&y) && (3..=9).contains(&z);
+                let outside =
                     !((2..=6).contains(&x) && (2..=8).contains(&y) && (2..=10).contains(&z));
-                if !within && !without {
+                if !inside_block && !outside {
                     continue;
                 }
                 for axis in 0..3 {
                     assert_eq!(
                         parities(&facets, [x, y, z], axis),
-                        [within; 2],
+                        [inside_block; 2],
                         "{x} {y} {z} {axis}"
                     );
                 }
-                inside += u32::from(within);
+                inside += u32::from(inside_block);
             }
         }
     }
     assert_eq!(inside, 3 * 5 * 7);
 }
 
-/// Along z the ray is moved a little along x and very little along y: the facet to the right of an
-/// edge through the point is met, the one to its left is not.
+/// A ray along z is displaced by eps along x and by eps^2 along y. Of two facets that share an edge through the
+/// point, it intersects the one on the positive side.
 #[test]
-fn displacement() {
+fn the_displacement_decides_which_facet_at_an_edge_counts() {
     let right = [[0, 0, 5], [4, -1, 5], [4, 1, 5]];
     let left = [[0, 0, 5], [-4, -1, 5], [-4, 1, 5]];
     assert_eq!(parities(&[right], [0, 0, 0], 2), [false, true]);
     assert_eq!(parities(&[left], [0, 0, 0], 2), [false, false]);
-    // The x axis itself is the edge: the second displacement, along y, decides.
-    let above_it = [[0, 0, 5], [4, 0, 5], [4, 4, 5]];
-    let below_it = [[0, 0, 5], [4, 0, 5], [4, -4, 5]];
-    assert_eq!(parities(&[above_it], [0, 0, 0], 2), [false, true]);
-    assert_eq!(parities(&[below_it], [0, 0, 0], 2), [false, false]);
-    // Edge-on facets and facets without area are never met.
+    // The edge lies along x, so the second displacement, along y, decides.
+    let positive = [[0, 0, 5], [4, 0, 5], [4, 4, 5]];
+    let negative = [[0, 0, 5], [4, 0, 5], [4, -4, 5]];
+    assert_eq!(parities(&[positive], [0, 0, 0], 2), [false, true]);
+    assert_eq!(parities(&[negative], [0, 0, 0], 2), [false, false]);
+    // No ray intersects a facet that is parallel to it or has no area.
     let edge_on = [[0, 0, 5], [4, 0, 5], [4, 0, 9]];
     let segment = [[-4, 0, 5], [4, 0, 5], [8, 0, 5]];
     assert_eq!(parities(&[edge_on, segment], [0, 0, 0], 2), [false, false]);

@@ -1,16 +1,16 @@
-//! Cases that cannot be meshed: each is an error of its own, and the limits are where they should be.
+//! Invalid cases: each kind has its own error, and the limits of valid values are exact.
 mod support;
 
 use reference::{BoxSpec, Case, Error, mesh};
 use support::{ROOT_EDGE, case};
 
 #[test]
-fn what_cannot_be_meshed_is_an_error() {
-    let fine = case(&[[[0; 3]; 3], [[1; 3]; 3]], 3);
+fn each_invalid_input_has_its_own_error() {
+    let valid = case(&[[[0; 3]; 3], [[1; 3]; 3]], 3);
     let error = |change: &dyn Fn(&mut Case)| {
-        let mut wrong = fine.clone();
-        change(&mut wrong);
-        mesh(&wrong).unwrap_err()
+        let mut invalid = valid.clone();
+        change(&mut invalid);
+        mesh(&invalid).unwrap_err()
     };
     let edge = ROOT_EDGE as f64;
     let facets = [2.0 * edge + 1.0, -edge - 1.0].map(|x| error(&move |c| c.facets[1][2][0] = x));
@@ -19,9 +19,9 @@ fn what_cannot_be_meshed_is_an_error() {
         let error = error(&|c| c.facets[1][2][0] = x);
         assert!(matches!(error, Error::VertexNotFinite { facet: 1, .. }));
     }
-    let mut at_the_limit = fine.clone();
-    at_the_limit.facets[1][2] = [2.0 * edge, -edge, 0.0];
-    mesh(&at_the_limit).unwrap();
+    let mut limit = valid.clone();
+    limit.facets[1][2] = [2.0 * edge, -edge, 0.0];
+    mesh(&limit).unwrap();
 
     for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(error(&|c| c.spacing_min = spacing), Error::Spacing { .. }));

@@ -1,4 +1,4 @@
-//! STL files as they are met: what must be read, and what must be refused with a sentence.
+//! STL files as exporters write them: the variants that must be read and the errors that must be refused.
 use reference::stl::{Facet, parse};
 
 const FACET: Facet = [[0.0, 1.0, 2.5], [-1.0, 0.1, 1e-3], [3.0, 4.0, -5e10]];
@@ -26,14 +26,13 @@ fn binary(header: &[u8], count: u32, facets: &[Facet]) -> Vec<u8> {
     bytes
 }
 
-/// The sentence on what is wrong, which must hold `part`.
-fn refused(bytes: &[u8], part: &str) {
+fn assert_refused(bytes: &[u8], part: &str) {
     let problem = parse(bytes).unwrap_err();
-    assert!(problem.contains(part), "{problem:?} should say {part:?}");
+    assert!(problem.contains(part), "{problem:?} should contain {part:?}");
 }
 
 #[test]
-fn binary_files() {
+fn binary_files_are_recognised_by_their_length() {
     assert_eq!(parse(&binary(b"", 2, &[FACET, FACET])).unwrap(), [FACET, FACET]);
     assert_eq!(parse(&binary(b"solid but binary", 1, &[FACET])).unwrap(), [FACET]);
     let no_zero_byte = [b'x'; 80];
@@ -42,7 +41,7 @@ fn binary_files() {
 }
 
 #[test]
-fn ascii_files() {
+fn ascii_files_may_vary_in_case_white_space_and_names() {
     assert_eq!(parse(TEXT.as_bytes()).unwrap(), [FACET]);
     for (from, to) in [
         ("\n", "\r\n"),
@@ -62,72 +61,84 @@ fn ascii_files() {
     assert_eq!(parse(TEXT.to_uppercase().as_bytes()).unwrap(), [FACET]);
     assert_eq!(parse(format!("\n\r\n  {TEXT}\n\n").as_bytes()).unwrap(), [FACET]);
     assert_eq!(parse(format!("\u{feff}{TEXT}").as_bytes()).unwrap(), [FACET]);
-    assert_eq!(parse(TEXT.trim_end().as_bytes()).unwrap(), [FACET], "no line end at the end");
+    assert_eq!(parse(TEXT.trim_end().as_bytes()).unwrap(), [FACET], "no line feed at the end");
 }
 
 #[test]
-fn several_solids() {
+fn the_facets_of_all_solids_are_read() {
     let solids = [TEXT, "solid\nendsolid\n", &TEXT.to_uppercase(), TEXT].concat();
     assert_eq!(parse(solids.as_bytes()).unwrap(), [FACET; 3]);
     assert!(parse(b"solid nothing\nendsolid nothing\n").unwrap().is_empty());
 }
 
-/// Whatever is cut off at the end, it is missed; only a name may go.
+/// The last word that a file needs is `endsolid`; only the name after it may be missing.
 #[test]
-fn truncated_ascii_files() {
+fn truncated_ascii_files_are_refused() {
     let whole = TEXT.find("endsolid").unwrap() + "endsolid".len();
     for length in "solid".len()..whole {
         assert!(parse(&TEXT.as_bytes()[..length]).is_err(), "{length} bytes");
     }
-    refused(&TEXT.as_bytes()[..whole - 8], "line 9 where facet or endsolid should follow");
+    assert_refused(
+        &TEXT.as_bytes()[..whole - 8],
+        "ends in line 9, where facet or endsolid was expected",
+    );
 }
 
 #[test]
-fn truncated_and_overlong_binary_files() {
+fn binary_files_of_the_wrong_length_are_refused() {
     let whole = binary(b"solid", 2, &[FACET, FACET]);
     for length in 0..whole.len() {
         assert!(parse(&whole[..length]).is_err(), "{length} bytes");
     }
-    refused(&whole[..100], "promises 2 facets, 184 bytes in all, but the file has 100");
-    refused(&[&whole[..], b"x"].concat(), "but the file has 185");
-    refused(&binary(b"", 1, &[FACET, FACET]), "promises 1 facets");
-    // Nothing is allocated for a count that the file cannot hold.
-    refused(&binary(b"", u32::MAX, &[FACET]), "promises 4294967295 facets");
+    assert_refused(&whole[..100], "184 bytes for the 2 facets of its header, but it has 100");
+    assert_refused(&[&whole[..], b"x"].concat(), "but it has 185");
+    assert_refused(&binary(b"", 1, &[FACET, FACET]), "the 1 facets of its header");
+    // Nothing is allocated for a count that exceeds the length of the file.
+    assert_refused(&binary(b"", u32::MAX, &[FACET]), "the 4294967295 facets of its header");
 }
 
 #[test]
-fn what_is_not_stl() {
-    refused(b"", "empty");
-    refused(b"hello", "neither ASCII STL");
-    refused(b"   \n", "neither ASCII STL");
-    refused(&[b'#'; 5000], "it is damaged or no STL");
-    refused(b"solid\nhello", "line 2 says \"hello\"");
-    refused(
+fn files_that_are_not_stl_are_refused() {
+    assert_refused(b"", "empty");
+    assert_refused(b"hello", "neither ASCII STL");
+    assert_refused(b"   \n", "neither ASCII STL");
+    assert_refused(&[b'#'; 5000], "it is damaged or not STL");
+    assert_refused(b"solid\nhello", "line 2 has \"hello\"");
+    assert_refused(
         &[TEXT.as_bytes(), b"rubbish"].concat(),
-        "line 10 says \"rubbish\" where solid should be",
+        "line 10 has \"rubbish\" where solid was expected",
     );
-    refused(
+    assert_refused(
         TEXT.replace("2.5", "blah").as_bytes(),
-        "line 4 says \"blah\" where a number should be",
+        "line 4 has \"blah\" where a number was expected",
     );
-    refused(TEXT.replace("2.5", "").as_bytes(), "line 5 says \"vertex\" where a number should be");
-    refused(TEXT.replace("2.5", "2.5 1").as_bytes(), "line 4 says \"1\" where vertex should be");
-    refused(TEXT.replace("outer loop", "outer").as_bytes(), "where loop should be");
+    assert_refused(
+        TEXT.replace("2.5", "").as_bytes(),
+        "line 5 has \"vertex\" where a number was expected",
+    );
+    assert_refused(
+        TEXT.replace("2.5", "2.5 1").as_bytes(),
+        "line 4 has \"1\" where vertex was expected",
+    );
+    assert_refused(TEXT.replace("outer loop", "outer").as_bytes(), "where loop was expected");
     let crlf = TEXT.replace('\n', "\r\n").replace("2.5", "2,5");
-    refused(crlf.as_bytes(), "line 4 says \"2,5\"");
+    assert_refused(crlf.as_bytes(), "line 4 has \"2,5\"");
     let cr = TEXT.replace('\n', "\r").replace("2.5", "2,5");
-    refused(cr.as_bytes(), "line 4 says \"2,5\"");
+    assert_refused(cr.as_bytes(), "line 4 has \"2,5\"");
     let long = format!("solid\n{}", "x".repeat(100_000));
     assert!(parse(long.as_bytes()).unwrap_err().len() < 200);
-    refused(b"solid\n\xff\xfe", "line 2");
+    assert_refused(b"solid\n\xff\xfe", "line 2");
 }
 
 #[test]
-fn vertices_that_are_not_finite() {
+fn vertices_that_are_not_finite_are_refused() {
     for word in ["nan", "inf", "-Infinity", "1e999"] {
-        refused(TEXT.replace("2.5", word).as_bytes(), "facet 0 has a vertex that is not finite");
+        assert_refused(
+            TEXT.replace("2.5", word).as_bytes(),
+            "facet 0 has a vertex that is not finite",
+        );
     }
     let mut wrong = FACET;
     wrong[2][1] = f32::NAN;
-    refused(&binary(b"", 2, &[FACET, wrong]), "facet 1 has a vertex that is not finite");
+    assert_refused(&binary(b"", 2, &[FACET, wrong]), "facet 1 has a vertex that is not finite");
 }

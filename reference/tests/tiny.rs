@@ -1,21 +1,21 @@
-//! Meshes small enough to be worked out by hand.
+//! Meshes small enough to verify by hand.
 mod support;
 
 use reference::{Case, Keep, base_tree, mesh};
 use support::{ROOT_EDGE, UNIT, block, block_of_units, box_of_level, case, levels, sides, units};
 
 #[test]
-fn nothing_is_one_leaf_outside() {
-    let nothing = case(&[], 5);
-    assert_eq!(base_tree(&nothing).unwrap().words, [0]);
-    assert_eq!(mesh(&nothing).unwrap().words, [0]);
-    let inside = Case { keep: Keep::Inside, ..nothing };
+fn without_facets_the_root_is_the_only_leaf_and_outside() {
+    let empty = case(&[], 5);
+    assert_eq!(base_tree(&empty).unwrap().words, [0]);
+    assert_eq!(mesh(&empty).unwrap().words, [0]);
+    let inside = Case { keep: Keep::Inside, ..empty };
     assert!(mesh(&inside).unwrap().words.is_empty());
 }
 
-/// A point at the centre of the root touches the eight leaves around it, whatever the level.
+/// A point at the centre of the root touches the eight leaves around it at every level.
 #[test]
-fn point_in_the_middle() {
+fn a_point_at_the_centre_crosses_eight_leaves() {
     let point = [[units([4; 3]); 3]];
     let base = |level| base_tree(&case(&point, level)).unwrap().words;
     assert_eq!(base(0), [2], "the root itself, crossing");
@@ -24,15 +24,19 @@ fn point_in_the_middle() {
     assert_eq!((levels(&base(3)), sides(&base(3))), ([0, 0, 56, 64, 0], [112, 0, 8]));
     let layers =
         |cells| levels(&mesh(&Case { layer_cells_min: cells, ..case(&point, 3) }).unwrap().words);
-    assert_eq!(layers(1), [0, 0, 56, 64, 0], "balanced already");
-    assert_eq!(layers(2), [0, 0, 0, 512, 0], "one cell more reaches into every octant of level 2");
+    assert_eq!(layers(1), [0, 0, 56, 64, 0], "T0 is balanced");
+    assert_eq!(
+        layers(2),
+        [0, 0, 0, 512, 0],
+        "the second cell reaches into every octant of level 2"
+    );
     assert_eq!(layers(u32::MAX), [0, 0, 0, 512, 0], "a layer may be thicker than the root");
 }
 
-/// A point in the corner: the octants of level 2 by the corner are split for a second layer, and what
-/// touches those must follow.
+/// A second layer splits the octants of level 2 at the corner, and balance then splits the octants that
+/// touch them.
 #[test]
-fn point_in_the_corner() {
+fn a_point_in_a_corner_of_the_root_is_graded_from_there() {
     let point = [[[0; 3]; 3]];
     let layers =
         |cells| levels(&mesh(&Case { layer_cells_min: cells, ..case(&point, 3) }).unwrap().words);
@@ -41,19 +45,19 @@ fn point_in_the_corner() {
     assert_eq!(levels(&mesh(&case(&point, 4)).unwrap().words), [0, 7, 7, 7, 8]);
 }
 
-/// Balance over a corner only: a point next to the centre, in one octant of level 1 alone, makes all
-/// seven others split, for they touch a leaf of level 3.
+/// A point close to the centre lies in one octant of level 1. The seven other octants touch its leaf of
+/// level 3 by a face, an edge or a corner, and all of them are split.
 #[test]
-fn balance_over_corners() {
+fn balance_extends_over_corners() {
     let point = [[[ROOT_EDGE / 2 - 1; 3]; 3]];
     assert_eq!(levels(&base_tree(&case(&point, 3)).unwrap().words), [0, 7, 7, 8, 0]);
     assert_eq!(levels(&mesh(&case(&point, 3)).unwrap().words), [0, 0, 63, 8, 0]);
 }
 
-/// A block from 2 to 6 in an 8-unit root at level 3: its faces are cell faces, so cells on both sides
-/// cross, 1 to 7 without 3 to 5.
+/// A block from 2 to 6 in a root of 8 units at level 3. Its faces are cell faces, so the cells on both sides
+/// cross: those from 1 to 7, without those from 3 to 5.
 #[test]
-fn block_in_cell_planes() {
+fn cells_on_both_sides_of_a_face_in_a_cell_plane_cross() {
     let block = case(&block_of_units([2; 3], [6; 3]), 3);
     let base = base_tree(&block).unwrap();
     assert_eq!(levels(&base.words), [0, 0, 0, 512, 0]);
@@ -69,17 +73,17 @@ fn block_in_cell_planes() {
     assert_eq!(kept(Keep::All, false), [296, 8, 0]);
 }
 
-/// What is deleted is neither refined nor a source: a block from 0.5 to 7.5 at level 4, whose cells are
-/// half units. Cells 0, 1, 14 and 15 of each axis touch the hull; what they leave, from 1 to 7, is
-/// eight leaves of level 2 and around them 6^3 - 4^3 = 152 of level 3.
+/// Deleted leaves are neither refined nor sources. The hull is a block from 0.5 to 7.5 at level 4, whose
+/// cells are half units. Cells 0, 1, 14 and 15 of each axis touch it. The rest, from 1 to 7 units, consists
+/// of eight leaves of level 2 surrounded by 6^3 - 4^3 = 152 leaves of level 3.
 #[test]
-fn deleted_leaves_stay_as_they_are() {
+fn deleted_leaves_are_not_refined() {
     let hull = block([UNIT / 2; 3], [ROOT_EDGE - UNIT / 2; 3]);
     let hull = Case { layer_cells_min: 2, ..case(&hull, 4) };
     let base = base_tree(&hull).unwrap();
     assert_eq!(levels(&base.words), [0, 0, 8, 152, 2368]);
     assert_eq!(sides(&base.words), [0, 160, 2368]);
-    // A second layer takes the 152, and the eight touch that.
+    // The second layer splits the 152 leaves; balance then splits the eight, which touch the result.
     let all = mesh(&hull).unwrap();
     assert_eq!(levels(&all.words), [0, 0, 0, 64, 2368 + 8 * 152]);
     let outside = Case { keep: Keep::Outside, ..hull };
@@ -87,15 +91,16 @@ fn deleted_leaves_stay_as_they_are() {
     assert_eq!((levels(&outside.words), sides(&outside.words)), ([0, 0, 0, 0, 2368], [0, 0, 2368]));
 }
 
-/// Boxes ask for a level where interiors meet, and for nothing beyond their faces.
+/// Boxes refine the octants that their interior meets, but not those that touch their faces.
 #[test]
-fn boxes() {
+fn boxes_refine_where_interiors_meet() {
     let with = |boxes| Case { boxes, ..case(&[], 0) };
     let base = |boxes| levels(&base_tree(&with(boxes)).unwrap().words);
     assert_eq!(base(vec![box_of_level([0; 3], units([1; 3]), 3)]), [0, 7, 7, 8, 0]);
     assert_eq!(base(vec![box_of_level([0; 3], units([4; 3]), 3)]), [0, 7, 0, 64, 0]);
     assert_eq!(base(vec![box_of_level([0; 3], [UNIT * 4 + 1, UNIT, UNIT], 2)]), [0, 6, 16, 0, 0]);
-    // Outside the root, and thinner than the lattice: no interior is left.
+    // A box outside the root, and one thinner than a lattice unit: neither has volume after clamping and
+    // quantisation.
     assert_eq!(base(vec![box_of_level(units([8; 3]), units([9; 3]), 3)]), [1, 0, 0, 0, 0]);
     let mut thin = box_of_level(units([1; 3]), units([2; 3]), 3);
     thin.max[0] = thin.min[0] + 0.25;
@@ -103,9 +108,9 @@ fn boxes() {
     assert_eq!((levels(&thin.words), thin.boxes.len()), ([1, 0, 0, 0, 0], 1));
 }
 
-/// Where a box finer than the surface meets it, crossing leaves are of the box's level.
+/// Where a box finer than D meets the surface, crossing leaves have the level of the box.
 #[test]
-fn box_finer_than_the_surface() {
+fn a_box_finer_than_the_surface_refines_crossing_leaves() {
     let point = [[[1; 3]; 3]];
     let boxes = vec![box_of_level([0; 3], units([2; 3]), 3)];
     let base = base_tree(&Case { boxes, ..case(&point, 1) }).unwrap();
@@ -113,15 +118,16 @@ fn box_finer_than_the_surface() {
     assert_eq!(base.level_surface, 1);
 }
 
-/// The extra layer: the leaf of a point just below the centre touches all eight octants of level 1, so
-/// each is cut to level 3 there, where balance alone would stop at level 2.
+/// The leaf of a point just below the centre touches all eight octants of level 1. The extra layer refines
+/// each of them to level 3 there; balance alone would stop at level 2.
 #[test]
-fn extra_layer() {
+fn the_extra_layer_refines_to_the_level_of_the_surface() {
     let point = [[[ROOT_EDGE / 2 - 1; 3]; 3]];
     let without = Case { keep_crossing: false, ..case(&point, 3) };
-    // Eight times 7 leaves of level 2 and 8 of level 3, one of which crosses and goes.
+    // Eight times 7 leaves of level 2 and 8 of level 3, without the one that crosses.
     assert_eq!(levels(&mesh(&without).unwrap().words), [0, 0, 56, 63, 0]);
-    // With n = 3 the layer does it: from 2 to 4 units, enlarged by 2, is three octants of level 2.
+    // With n = 3 the layer suffices: from 3 to 4 units, enlarged by 2 on both sides, it meets three
+    // octants of level 2 along each axis.
     let thicker = Case { layer_cells_min: 3, ..without };
     assert_eq!(levels(&mesh(&thicker).unwrap().words), [0, 0, 64 - 27, 27 * 8 - 1, 0]);
 }

@@ -1,4 +1,4 @@
-//! The vectors that all programs share, computed by a program of their own: see `vectors/make.py`.
+//! The test vectors that all programs share (`DEFINITION.md`, section 14).
 use reference::lattice::Input;
 use reference::leaves::{Tally, hex};
 use reference::octant::Octant;
@@ -42,28 +42,28 @@ fn empty(origin: [f64; 3], edge: f64) -> Case {
 }
 
 #[test]
-fn mixes() {
+fn mixes_agree_with_the_vectors() {
     for case in cases("mix") {
         assert_eq!(hex(mix(word(&case["word"]))), case["mix"]);
     }
 }
 
 #[test]
-fn digests() {
+fn digests_agree_in_any_order() {
     for case in cases("digests") {
         let mut words: Vec<u64> = case["words"].as_array().unwrap().iter().map(word).collect();
         assert_eq!(hex(digest(&words)), case["digest"]);
         words.reverse();
-        assert_eq!(hex(digest(&words)), case["digest"], "whatever the order");
+        assert_eq!(hex(digest(&words)), case["digest"], "in reverse order");
         let tally = Tally::of(&words);
         assert_eq!(hex(tally.digest), case["digest"]);
         let merged = tally.octant_digests.iter().fold(0_u128, |sum, &d| sum.wrapping_add(d));
-        assert_eq!(hex(merged), case["digest"], "octants merge by addition");
+        assert_eq!(hex(merged), case["digest"], "the digests of octants add");
     }
 }
 
 #[test]
-fn words() {
+fn leaf_words_agree_with_the_vectors() {
     for case in cases("words") {
         let level = case["level"].as_u64().unwrap() as u32;
         let min = lattice_point(&case["cell"]).map(|x| x * 256);
@@ -81,7 +81,7 @@ fn words() {
 }
 
 #[test]
-fn levels() {
+fn levels_of_spacings_agree_with_the_vectors() {
     for case in cases("levels") {
         let edge = number(&case["edge"]);
         let spacing_min = number(&case["spacing"]);
@@ -94,7 +94,7 @@ fn levels() {
 }
 
 #[test]
-fn roots() {
+fn roots_by_scale_agree_with_the_vectors() {
     for case in cases("roots") {
         let vertices: Vec<[f64; 3]> =
             case["vertices"].as_array().unwrap().iter().map(point).collect();
@@ -105,7 +105,7 @@ fn roots() {
 }
 
 #[test]
-fn quantised() {
+fn quantised_vertices_agree_with_the_vectors() {
     for case in cases("quantised") {
         let vertex = point(&case["vertex"]);
         let facets = vec![[vertex; 3]];
@@ -120,7 +120,7 @@ fn quantised() {
 }
 
 #[test]
-fn boxes() {
+fn quantised_boxes_agree_with_the_vectors() {
     for case in cases("boxes") {
         let edge = number(&case["edge"]);
         let spec = BoxSpec { min: point(&case["min"]), max: point(&case["max"]), spacing: edge };

@@ -1,6 +1,7 @@
-"""Writes digest.json: what all programs of this workspace must agree on, computed from DEFINITION.md
-alone. Python's integers are exact and its floats are IEEE doubles, rounded to even as the definition
-wants. Run it in this directory: python3 make.py
+"""Write digest.json, the test vectors that all programs of this workspace share (DEFINITION.md, section 14).
+
+They are computed from the definition alone. Python's integers are exact, and its floats are IEEE doubles
+with rounding to even, as the definition requires. Run in this directory: python3 make.py
 """
 
 import json
@@ -66,7 +67,7 @@ def hex128(x):
 
 
 def numbers(xs):
-    """JSON readers may round the last bit of a number away; text they leave alone."""
+    """Numbers as text, because JSON readers may not round the last bit of a number correctly."""
     return [repr(x) for x in xs]
 
 
@@ -94,7 +95,7 @@ DIGESTS = [
     [0],
     [word(1, [(i & 1) << 18, (i >> 1 & 1) << 18, (i >> 2) << 18], "crossing") for i in range(8)],
     [word(*w) for w in WORDS],
-    # Enough words for the sum to wrap around 2^128.
+    # Enough words for the sum to wrap around modulo 2^128.
     [word(3, [x << 16, y << 16, z << 16], "outside") for z in range(8) for y in range(8) for x in range(8)],
 ]
 LEVELS = [
@@ -108,7 +109,7 @@ ROOTS = [
     ([[-0.051487, -0.050792, -0.012517], [0.046495, 0.05471, 0.018503], [0.0, 0.0, 0.0]], 2.5),
 ]
 QUANTISED = [
-    # Halves go to the even neighbour: a lattice unit is 1 here.
+    # The lattice unit is 1 here, and halves are rounded to the even neighbour.
     ([0.0, 0.0, 0.0], float(ROOT_EDGE), [0.5, 1.5, 2.5]),
     ([0.0, 0.0, 0.0], float(ROOT_EDGE), [-0.5, -1.5, 1.4999999]),
     ([0.0, 0.0, 0.0], float(ROOT_EDGE), [-float(ROOT_EDGE), 2.0 * ROOT_EDGE, 0.0]),

@@ -1,4 +1,4 @@
-//! Writes a generated shape as binary STL: from a case file's `[generator]` table, or from flags.
+//! The program `geometry`: writes a generated shape as binary STL.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -12,19 +12,19 @@ use geometries::{Generator, write_stl_binary};
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// A case file with a [generator] table
+    /// Case file with a [generator] table
     #[arg(required_unless_present = "shape", conflicts_with_all = ["shape", "facets", "size"])]
     case: Option<PathBuf>,
-    /// cube, sphere, torus, nested_spheres, plate, pipe, uav or fighter
+    /// Shape: cube, sphere, torus, nested_spheres, plate, pipe, uav or fighter
     #[arg(long, requires = "facets")]
     shape: Option<String>,
-    /// How many facets: met exactly if even
+    /// Number of facets: exact if even, otherwise one less
     #[arg(long)]
     facets: Option<usize>,
-    /// One of the shape's own sizes, as in the table: radius=0.5
+    /// Dimension of the shape, as in a [generator] table, for example radius=0.5; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     size: Vec<String>,
-    /// The STL file to write; it must not exist yet
+    /// STL file to write, which must not exist
     #[arg(short, long)]
     out: PathBuf,
 }
@@ -46,7 +46,10 @@ fn main() -> ExitCode {
             println!("{}: {} facets", arguments.out.display(), facets.len());
             ExitCode::SUCCESS
         }
-        Err(error) => fail(4, &format!("{}: {error}", arguments.out.display())),
+        Err(error) => {
+            let path = arguments.out.display();
+            fail(4, &format!("cannot write {path}: {error}; choose another path"))
+        }
     }
 }
 
@@ -55,7 +58,8 @@ fn fail(code: u8, message: &str) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// The flags are put as a table and read as a case file's would be, so that both know the same keys.
+/// The generator of the case file or of the options. The options are written as a `[generator]` table and
+/// parsed like one, so that both accept the same keys.
 fn generator(arguments: &Arguments) -> Result<Generator, String> {
     if let Some(case) = &arguments.case {
         return from_case(case);
@@ -64,21 +68,24 @@ fn generator(arguments: &Arguments) -> Result<Generator, String> {
     let facets = arguments.facets.unwrap_or_default();
     let mut table = format!("shape = \"{}\"\nfacets = {facets}\n", shape.escape_default());
     for size in &arguments.size {
-        let (key, value) = size.split_once('=').ok_or("--size takes KEY=VALUE")?;
+        let (key, value) = size.split_once('=').ok_or("--size must have the form KEY=VALUE")?;
         table += &format!("{key} = {value}\n");
     }
     toml::from_str(&table).map_err(|error| error.message().to_owned())
 }
 
 fn from_case(path: &Path) -> Result<Generator, String> {
-    let place = path.display();
-    let text = std::fs::read_to_string(path).map_err(|error| format!("{place}: {error}"))?;
-    let case: toml::Table = text.parse().map_err(|error| format!("{place}: {error}"))?;
+    let name = path.display();
+    let text =
+        std::fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    let case: toml::Table = text.parse().map_err(|error| format!("{name}: {error}"))?;
     let table = case.get("generator").ok_or_else(|| {
-        format!("{place}: no [generator] table; a case with a geometry file needs no generation")
+        format!(
+            "{name} has no [generator] table: give a case with one, or use --shape and --facets"
+        )
     })?;
     table
         .clone()
         .try_into()
-        .map_err(|error: toml::de::Error| format!("{place}: {}", error.message()))
+        .map_err(|error: toml::de::Error| format!("{name}: {}", error.message()))
 }

@@ -4,7 +4,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use super::{Mesh, MeshFault};
 
-/// One facet's run along an edge.
+/// A directed edge of one facet.
 #[derive(Clone, Copy)]
 pub(super) struct Half {
     from: u32,
@@ -12,40 +12,42 @@ pub(super) struct Half {
 }
 
 impl Half {
-    /// The same for both facets of an edge.
+    /// A key of the undirected edge, equal for both of its facets.
     pub(super) fn key(self) -> u64 {
         u64::from(self.from.min(self.to)) << 32 | u64::from(self.from.max(self.to))
     }
 
-    /// Whether the facet runs from the higher vertex number to the lower. Exactly one of an edge's two
-    /// facets does, where winding is consistent.
+    /// Whether the facet traverses the edge from the higher vertex index to the lower. If the winding is
+    /// consistent, exactly one of the two facets of an edge does.
     pub(super) fn is_down(self) -> bool {
         self.from > self.to
     }
 }
 
-/// Every facet's three runs, with the facet's index.
+/// The three directed edges of every facet, each with the index of the facet.
 pub(super) fn halves(triangles: &[[u32; 3]]) -> impl Iterator<Item = (usize, Half)> {
     triangles.iter().enumerate().flat_map(|(facet, t)| {
         (0..3).map(move |i| (facet, Half { from: t[i], to: t[(i + 1) % 3] }))
     })
 }
 
-/// An edge, by the facet that runs upward along it.
+/// An edge and the facet that traverses it from the lower vertex index to the higher.
 pub(super) struct Edge {
     pub(super) key: u64,
     pub(super) facet_up: usize,
+    /// The square of the length.
     square: f64,
 }
 
 impl Edge {
-    /// The vertex numbers, lower first.
+    /// The vertex indices, lower first.
     pub(super) fn ends(&self) -> [u32; 2] {
         [(self.key >> 32) as u32, self.key as u32]
     }
 }
 
-/// The `number` longest edges, longest first, equal ones by vertex numbers: the same on every machine.
+/// The `number` longest edges, longest first. Edges of equal length are ordered by vertex index, so the
+/// result is the same on every machine.
 pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
     let square = |half: Half| {
         let [p, q] = [half.from, half.to].map(|v| mesh.vertices[v as usize]);
@@ -64,30 +66,30 @@ pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
     edges
 }
 
-/// The first directed edge that is not matched by exactly one in the opposite direction.
+/// The first directed edge for which the number of directed edges in the opposite direction is not one.
 pub(super) fn fault(triangles: &[[u32; 3]]) -> Option<MeshFault> {
-    // The direction goes into the lowest place of the sort, so that a sound edge is a pair (up, down).
-    let mut runs: Vec<(u64, bool)> =
+    // Sorted by key and then by direction, a valid edge is a pair (up, down).
+    let mut directed: Vec<(u64, bool)> =
         halves(triangles).map(|(_, half)| (half.key(), half.is_down())).collect();
-    runs.sort_unstable();
-    let is_sound = |pair: &[(u64, bool)]| matches!(pair, [(k, false), (l, true)] if k == l);
-    let mut pairs = runs.chunks(2);
-    let mut before = None;
+    directed.sort_unstable();
+    let is_valid = |pair: &[(u64, bool)]| matches!(pair, [(k, false), (l, true)] if k == l);
+    let mut pairs = directed.chunks(2);
+    let mut previous_key = None;
     let wrong = pairs.find(|pair| {
-        let repeats = before == Some(pair[0].0);
-        before = pair.last().map(|run| run.0);
-        repeats || !is_sound(pair)
+        let repeats = previous_key == Some(pair[0].0);
+        previous_key = pair.last().map(|&(key, _)| key);
+        repeats || !is_valid(pair)
     })?;
     let (key, is_down) = wrong[0];
     let [low, high] = [(key >> 32) as u32, key as u32];
     Some(MeshFault::EdgeUnmatched { edge: if is_down { [high, low] } else { [low, high] } })
 }
 
-/// Hashes one u64 by a multiplication: edges are looked up by the million.
+/// Hashes one u64 by a multiplication, which is faster than the default for millions of edges.
 #[derive(Default)]
 pub(crate) struct KeyHasher(u64);
 
-/// For a `HashMap` with u64 keys. The maps are only ever looked up, never walked.
+/// Hasher for a `HashMap` with u64 keys. No program may iterate over such a map, as its order is not defined.
 pub(crate) type EdgeHasher = BuildHasherDefault<KeyHasher>;
 
 impl Hasher for KeyHasher {

@@ -1,12 +1,12 @@
-//! A fighter in the manner of the paper's F-22: chined nose, canopy, two hollow intakes, swept trapezoid
-//! wings, tailplanes, two canted fins and two hollow nozzles.
+//! A fighter similar to the F-22 of the paper: chined nose, canopy, two hollow intakes, swept trapezoidal wings,
+//! tailplanes, two canted fins and two hollow nozzles.
 //!
-//! Lengths in aircraft lengths. x points aft, z up; the nose is at x = 0.
+//! The unit is the length of the aircraft. x points aft and z up; the nose is at x = 0.
 
 use super::implicit::Body;
 use super::solids::{Panel, RoundCone, Section, Vec3, blend, carve, rounded_box};
 
-/// Half of the aircraft: y is taken without its sign.
+/// The half of the aircraft with y >= 0; the other half is its mirror image.
 pub(super) struct Fighter {
     nose: Vec<RoundCone>,
     canopy: Vec<RoundCone>,
@@ -49,7 +49,7 @@ impl Body for Fighter {
                 ([0.420, 0.0, 0.034], 0.012),
             ]),
             engine: RoundCone::new([0.700, 0.046, 0.0], r(0.046), [0.895, 0.046, 0.0], r(0.034)),
-            // A hollow narrows where a coarse grid needs its wall thicker.
+            // A coarse grid needs a thicker wall, so the hollow is narrower.
             nozzle: RoundCone::new(
                 [0.880, 0.046, 0.0],
                 (0.024 - radius_least).max(0.002),

@@ -1,4 +1,4 @@
-//! From a solid given by a distance function to a surface of so many triangles: which grid it takes.
+//! Surfaces of solids that a distance function defines. The grid spacing is fitted to the number of facets.
 
 use super::solids::Vec3;
 use crate::{Generator, GeneratorError, Mesh};
@@ -8,28 +8,29 @@ mod grid;
 
 /// A solid that can be drawn at any grid spacing.
 pub(super) trait Body {
-    /// Corners of a box that holds the solid as it is when nothing has to be thickened, minimum first.
+    /// Minimum and maximum corner of a box that contains the solid when no part is thickened.
     const BOUNDS: [Vec3; 2];
     /// The number of facets times the square of the spacing, for a fine grid.
     const FACETS_TIMES_SQUARE: f64;
 
-    /// The solid with nothing thinner than twice this radius. A grid misses what is thinner than its
-    /// cells, so a coarse aircraft is a stouter one.
+    /// The solid, in which no part is thinner than twice `radius_least`. A grid misses parts that are thinner
+    /// than its cells, so thin parts are thickened on a coarse grid.
     fn new(radius_least: f64) -> Self;
 
-    /// Negative inside; differs between two points by no more than they are apart.
+    /// A function that is negative inside and has a Lipschitz constant of at most 1.
     fn distance(&self, p: Vec3) -> f64;
 }
 
-/// What part of the facets asked for the grid should give; splitting edges gives the rest.
+/// The part of the requested facets that the grid should produce, and its minimum. Splitting edges adds the
+/// other facets.
 const AIM: f64 = 0.97;
 const AIM_LEAST: f64 = 0.92;
 
-/// How often the spacing is adjusted both ways.
+/// Number of attempts in which the spacing may decrease as well as increase.
 const ATTEMPTS: usize = 10;
 
-/// Draws a body in at most the facets asked for. The longest edge of its bounding box becomes `length`,
-/// and its middle along x comes to the origin; y = 0 stays the plane of symmetry.
+/// Draws a body with at most the requested number of facets. The longest edge of its bounding box is scaled to
+/// `length`, and the centre of the box along x is moved to the origin; y = 0 remains the plane of symmetry.
 pub(super) fn draw<B: Body>(of: &Generator) -> Result<Mesh, GeneratorError> {
     let length = of.size("length", of.length, 1.0)?;
     let mut mesh = fit::<B>(of.facets);
@@ -46,9 +47,9 @@ pub(super) fn draw<B: Body>(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(mesh)
 }
 
-/// The number of facets goes with the inverse square of the spacing, nearly: where the constant that is
-/// known for a fine drawing misses, as it does for a coarse and hence stouter one, the number that came
-/// out says where to try next.
+/// Finds the grid spacing for a number of facets. That number is nearly proportional to the inverse square of
+/// the spacing. The constant for fine grids gives the first spacing; it is inaccurate for coarse grids, on which
+/// the body is thickened, so each further spacing follows from the number of facets of the previous one.
 fn fit<B: Body>(facets: usize) -> Mesh {
     let aim = AIM * facets as f64;
     let mut spacing = (B::FACETS_TIMES_SQUARE / aim).sqrt();
@@ -58,7 +59,7 @@ fn fit<B: Body>(facets: usize) -> Mesh {
         if count <= facets && (count as f64 > AIM_LEAST * facets as f64 || attempt >= ATTEMPTS) {
             return mesh;
         }
-        // After the last attempt only coarser ones follow, so that this ends.
+        // After these attempts the spacing only increases, so the loop ends.
         let least = if attempt < ATTEMPTS { 0.0 } else { 1.02 };
         spacing *= (count as f64 / aim).sqrt().max(least);
     }
@@ -85,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_is_closed_and_round() {
+    fn a_ball_is_closed_and_has_the_volume_and_euler_number_of_a_ball() {
         let mesh = fit::<Ball>(30_000);
         assert!((27_000..=30_000).contains(&mesh.triangles.len()));
         assert_eq!(mesh.fault(), None);

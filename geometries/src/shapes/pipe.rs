@@ -1,6 +1,6 @@
-//! A curved pipe with closed flat caps, for internal flow: a straight, a bend, a straight.
+//! A curved pipe for internal flow: a straight section, a bend and a straight section, closed by flat caps.
 //!
-//! The bore's centre line comes along +x to the origin, where the bend starts towards +y.
+//! The centre line of the bore runs along +x to the origin, where the bend towards +y starts.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ pub(super) fn pipe(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(draw(&line, &line.divisions(pitch)))
 }
 
-/// The pipe's sizes.
+/// The centre line of the pipe, and the radius of its bore.
 struct CentreLine {
     radius: f64,
     radius_bend: f64,
@@ -35,7 +35,11 @@ impl CentreLine {
             return wrong("radius_bend", radius_bend, format!("must exceed radius = {radius}"));
         }
         if angle > 180.0 {
-            return wrong("angle", angle, "must be at most 180, or the straights may meet".into());
+            return wrong(
+                "angle",
+                angle,
+                "must be at most 180, so that the straight sections do not meet".into(),
+            );
         }
         Ok(Self { radius, radius_bend, angle: angle * (TAU / 360.0), straight })
     }
@@ -49,17 +53,17 @@ impl CentreLine {
     }
 
     fn divisions(&self, pitch: f64) -> Divisions {
-        let at = |length: f64, least: usize| ((length / pitch) as usize).max(least);
+        let count = |length: f64, least: usize| ((length / pitch) as usize).max(least);
         Divisions {
-            around: at(TAU * self.radius, 6),
-            straight: at(self.straight, 1),
-            bend: at(self.bend(), 2),
-            cap: at(self.radius, 1),
+            around: count(TAU * self.radius, 6),
+            straight: count(self.straight, 1),
+            bend: count(self.bend(), 2),
+            cap: count(self.radius, 1),
         }
     }
 
-    /// A point of the centre line and the direction, in the xy plane, that points away from the bend's
-    /// centre there. `step` counts divisions from the inlet.
+    /// A point of the centre line and the direction, in the xy plane, that points away from the centre of the
+    /// bend. `step` counts divisions from the inlet.
     fn frame(&self, divisions: &Divisions, step: usize) -> ([f64; 2], [f64; 2]) {
         let bend_end = divisions.straight + divisions.bend;
         let turned = match step {
@@ -79,7 +83,8 @@ impl CentreLine {
     }
 }
 
-/// Into how many pieces each part is cut.
+/// Number of divisions: around the circumference, along each straight section, along the bend, and along the
+/// radius of each cap.
 struct Divisions {
     around: usize,
     straight: usize,
@@ -92,7 +97,7 @@ impl Divisions {
         2 * self.straight + self.bend
     }
 
-    /// Walls in two facets a quadrilateral; each cap in rings around a fan.
+    /// Number of facets: two per quadrilateral of the wall; each cap consists of rings around a fan.
     fn facets(&self) -> usize {
         2 * self.around * (self.along() + 2 * self.cap - 1)
     }
@@ -101,7 +106,8 @@ impl Divisions {
 fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
     let mut mesh = Mesh::default();
     let last = divisions.along();
-    // The surface as rings of vertices: up the inlet's cap, along the wall, down the outlet's cap.
+    // The surface consists of rings of vertices: outward on the cap of the inlet, along the wall, and inward on
+    // the cap of the outlet.
     let inlet = (1..divisions.cap).map(|i| (0, i));
     let wall = (0..=last).map(|step| (step, divisions.cap));
     let outlet = (1..divisions.cap).rev().map(|i| (last, i));
@@ -118,12 +124,12 @@ fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
     let number = |ring: usize, i: usize| (ring * divisions.around + i % divisions.around) as u32;
     for ring in 1..rings {
         for i in 0..divisions.around {
-            let (before, at) = (ring - 1, ring);
+            let previous = ring - 1;
             mesh.add_quad([
-                number(before, i),
-                number(at, i),
-                number(at, i + 1),
-                number(before, i + 1),
+                number(previous, i),
+                number(ring, i),
+                number(ring, i + 1),
+                number(previous, i + 1),
             ]);
         }
     }

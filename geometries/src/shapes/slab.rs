@@ -1,4 +1,4 @@
-//! Axis-aligned boxes: the cube and the thin plate. Each face is a grid of rectangles cut in two.
+//! Axis-aligned boxes: the cube and the thin plate. Each face is a grid of rectangles of two facets each.
 
 use std::collections::HashMap;
 
@@ -31,16 +31,16 @@ fn slab(sizes: [f64; 3], facets: usize) -> Mesh {
     drawing.mesh
 }
 
-/// Facets of a box divided so often along each axis.
+/// Number of facets of a box with these divisions along the axes.
 fn facets_of([x, y, z]: [usize; 3]) -> usize {
     4 * (x * y + y * z + z * x)
 }
 
-/// The finest division into near-square rectangles that does not exceed the facets allowed.
+/// The finest division into nearly square rectangles that does not exceed the number of facets.
 fn divisions(sizes: [f64; 3], facets: usize) -> [usize; 3] {
-    let at = |pitch: f64| sizes.map(|size| ((size / pitch) as usize).max(1));
+    let divided = |pitch: f64| sizes.map(|size| ((size / pitch) as usize).max(1));
     let longest = sizes.into_iter().fold(0.0, f64::max);
-    at(pitch_finest(longest, facets, |pitch| facets_of(at(pitch))))
+    divided(pitch_finest(longest, facets, |pitch| facets_of(divided(pitch))))
 }
 
 struct Drawing {
@@ -73,7 +73,7 @@ impl Drawing {
         if let Some(&number) = self.numbers.get(&place) {
             return number;
         }
-        // The ends come out as exactly half the size, so that faces stay in their lattice planes.
+        // The first and the last position are exactly half the size, so faces stay in their lattice planes.
         let position = std::array::from_fn(|a| {
             let (i, of) = (place[a] as f64, self.divisions[a] as f64);
             (2.0 * i - of) / of * (self.sizes[a] * 0.5)
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cube_takes_twelve_facets_times_a_square() {
+    fn a_cube_is_divided_equally_along_all_axes() {
         assert_eq!(divisions([1.0; 3], 12), [1; 3]);
         assert_eq!(divisions([1.0; 3], 47), [1; 3]);
         assert_eq!(divisions([1.0; 3], 48), [2; 3]);

@@ -1,8 +1,7 @@
-//! Solids as distance functions, from which aircraft are put together.
+//! Solids as distance functions, of which the aircraft are composed.
 //!
-//! Invariant of everything here: between two points a function differs by no more than the points are
-//! apart (its Lipschitz constant is at most 1), and it is negative inside. That is what lets
-//! [`super::implicit`] skip space that cannot hold surface.
+//! Invariant of every function here: its Lipschitz constant is at most 1, and it is negative inside. The
+//! invariant allows [`super::implicit`] to skip space that cannot contain surface.
 
 /// A point or direction.
 pub(super) type Vec3 = [f64; 3];
@@ -15,16 +14,16 @@ fn dot(p: Vec3, q: Vec3) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
-fn mix(at: f64, from: f64, to: f64) -> f64 {
-    from + (to - from) * at
+fn interpolate(t: f64, from: f64, to: f64) -> f64 {
+    from + (to - from) * t
 }
 
-/// The hull of two balls.
+/// The convex hull of two balls.
 pub(super) struct RoundCone {
     from: Vec3,
     along: Vec3,
     radius: [f64; 2],
-    /// Square of the length, and of the length of the tangent cone's side.
+    /// Squares of the length and of the length of the side of the tangent cone.
     square: f64,
     square_side: f64,
 }
@@ -36,11 +35,11 @@ impl RoundCone {
         let square = dot(along, along);
         let shrink = radius_from - radius_to;
         let square_side = square - shrink * shrink;
-        assert!(square_side > 0.0, "one end of a round cone swallows the other");
+        assert!(square_side > 0.0, "one ball of a round cone contains the other");
         Self { from, along, radius: [radius_from, radius_to], square, square_side }
     }
 
-    /// After Inigo Quilez's exact distance to a round cone.
+    /// The exact distance, by Inigo Quilez's formula for a round cone.
     pub(super) fn distance(&self, p: Vec3) -> f64 {
         let [from, to] = self.radius;
         let (square, shrink) = (self.square, from - to);
@@ -66,7 +65,8 @@ pub(super) fn rounded_box(p: Vec3, centre: Vec3, half: Vec3, rounding: f64) -> f
     dot(out, out).sqrt() + q[0].max(q[1]).max(q[2]).min(0.0) - rounding
 }
 
-/// A wing's cross section at one end: where it begins and ends along x, and half its thickness.
+/// The cross section of a wing at one end: the x coordinates of its leading and trailing edge, and half its
+/// thickness.
 #[derive(Clone, Copy)]
 pub(super) struct Section {
     pub(super) leading: f64,
@@ -74,20 +74,20 @@ pub(super) struct Section {
     pub(super) thickness_half: f64,
 }
 
-/// A tapered wing, tail or pylon that reaches from a root along a direction normal to x.
+/// A tapered wing, tail or pylon that extends from a root along a direction normal to x.
 pub(super) struct Panel {
     root: [f64; 2],
     along: [f64; 2],
     span: f64,
     sections: [Section; 2],
-    /// Nothing is thinner than this radius, or a grid would miss it.
+    /// Minimum radius of every part, so that the grid does not miss any.
     radius_least: f64,
-    /// What taper and sweep add to the slope is taken out again.
+    /// Compensates for the slope that taper and sweep add, so that the Lipschitz constant is at most 1.
     shrink: f64,
 }
 
 impl Panel {
-    /// From `root` (y, z) in the direction `along` (y, z; a unit vector), `span` long.
+    /// A panel of length `span` from `root` (y, z) in the direction `along` (y, z; a unit vector).
     pub(super) fn new(
         root: [f64; 2],
         along: [f64; 2],
@@ -107,12 +107,12 @@ impl Panel {
         let (y, z) = (p[1] - self.root[0], p[2] - self.root[1]);
         let reach = y * self.along[0] + z * self.along[1];
         let off = (z * self.along[0] - y * self.along[1]).abs();
-        let at = (reach / self.span).clamp(0.0, 1.0);
+        let t = (reach / self.span).clamp(0.0, 1.0);
         let beyond = (reach - self.span).max(-reach).max(0.0);
         let [from, to] = &self.sections;
-        let leading = mix(at, from.leading, to.leading);
-        let trailing = mix(at, from.trailing, to.trailing);
-        let thick = mix(at, from.thickness_half, to.thickness_half).max(self.radius_least);
+        let leading = interpolate(t, from.leading, to.leading);
+        let trailing = interpolate(t, from.trailing, to.trailing);
+        let thick = interpolate(t, from.thickness_half, to.thickness_half).max(self.radius_least);
         let section = self.section(p[0], off, leading, trailing, thick);
         let rounded = if beyond > 0.0 {
             let side = (section + thick).max(0.0);
@@ -123,17 +123,18 @@ impl Panel {
         rounded * self.shrink
     }
 
-    /// An aerofoil: hulls of a nose circle, a thick circle at 35 % of the chord and a thin one aft.
+    /// An aerofoil: the hulls of a circle at the nose and a thick circle at 35 % of the chord, and of the latter
+    /// and a thin circle at the trailing edge.
     fn section(&self, x: f64, off: f64, leading: f64, trailing: f64, thick: f64) -> f64 {
         let [nose, tail] = [0.45, 0.12].map(|part| (thick * part).max(self.radius_least));
-        let middle = mix(0.35, leading, trailing);
+        let middle = interpolate(0.35, leading, trailing);
         let fore = hull_of_circles([x, off], [leading + nose, middle], [nose, thick]);
         let aft = hull_of_circles([x, off], [middle, trailing - tail], [thick, tail]);
         fore.min(aft)
     }
 }
 
-/// The hull of two circles that are centred on the axis `off = 0`, `off` being at least 0.
+/// The distance to the hull of two circles whose centres lie on the axis `off = 0`; `off` is at least 0.
 fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) -> f64 {
     let length = centres[1] - centres[0];
     let circle = |i: usize, radius: f64| {
@@ -156,7 +157,7 @@ fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) 
     }
 }
 
-/// The union of two solids with a fillet of about the size `fillet` where they meet.
+/// The union of two solids with a fillet of about the size `fillet` at their intersection.
 pub(super) fn blend(a: f64, b: f64, fillet: f64) -> f64 {
     let h = (fillet - (a - b).abs()).max(0.0);
     a.min(b) - h * h / (4.0 * fillet)
@@ -171,7 +172,7 @@ pub(super) fn carve(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Points on a grid around a unit-sized solid, and one a step away from each in some direction.
+    /// The greatest difference quotient over random pairs of nearby points around a solid of unit size.
     fn steepest(distance: impl Fn(Vec3) -> f64) -> f64 {
         let mut steepest = 0.0_f64;
         for i in 0..20_000_u64 {
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn no_distance_is_steeper_than_one() {
+    fn no_distance_function_is_steeper_than_one() {
         let cone = RoundCone::new([-0.5, 0.1, 0.0], 0.3, [0.6, 0.0, 0.2], 0.1);
         let root = Section { leading: -0.6, trailing: 0.6, thickness_half: 0.1 };
         let tip = Section { leading: 0.4, trailing: 0.7, thickness_half: 0.02 };
@@ -204,19 +205,19 @@ mod tests {
     }
 
     #[test]
-    fn a_round_cone_is_as_far_as_its_balls() {
+    fn the_distance_to_a_round_cone_is_exact() {
         let cone = RoundCone::new([0.0; 3], 0.5, [2.0, 0.0, 0.0], 0.25);
         assert_eq!(cone.distance([-1.5, 0.0, 0.0]), 1.0);
         assert_eq!(cone.distance([3.25, 0.0, 0.0]), 1.0);
         assert!(cone.distance([1.0, 0.3, 0.0]) < 0.0);
-        // The side touches both circles: at 7/64 of its length less than the radius of the first.
+        // The side is tangent to the first ball at this point.
         let sin = 0.125;
         let p = [0.5 * sin, 0.5 * (1.0_f64 - sin * sin).sqrt(), 0.0];
         assert!(cone.distance(p).abs() < 1e-12);
     }
 
     #[test]
-    fn a_panel_ends_where_it_says() {
+    fn the_surface_of_a_panel_passes_through_its_edges_and_its_thickest_point() {
         let section = Section { leading: 0.0, trailing: 1.0, thickness_half: 0.05 };
         let panel = Panel::new([0.0; 2], [1.0, 0.0], 2.0, [section; 2], 0.001);
         assert!(panel.distance([0.0, 1.0, 0.0]).abs() < 1e-12);

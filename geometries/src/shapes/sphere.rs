@@ -1,4 +1,4 @@
-//! Geodesic spheres: an icosahedron whose edges are divided evenly, thrown onto the sphere.
+//! Geodesic spheres: an icosahedron with evenly divided edges, projected onto the sphere.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ pub(super) fn sphere(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(geodesic(radius, of.facets))
 }
 
-/// A shell: the inner sphere is wound towards the centre, which is outside of what the shell encloses.
+/// A shell. The normals of the inner sphere point to the centre, because the core is outside the shell.
 pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
     let radius = of.size("radius", of.radius, 0.5)?;
     let radius_inner = of.size("radius_inner", of.radius_inner, radius * 0.5)?;
@@ -18,7 +18,7 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
         let (value, want) = (radius_inner, format!("must be less than radius = {radius}"));
         return Err(GeneratorError::SizeWrong { key: "radius_inner", value, want });
     }
-    // Facets of about one size on both.
+    // Facets have about the same size on both spheres.
     let (outer, inner) = (radius * radius, radius_inner * radius_inner);
     let facets_inner = ((of.facets as f64 * (inner / (outer + inner))) as usize).max(20);
     let mut inside = geodesic(radius_inner, facets_inner);
@@ -28,7 +28,7 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(mesh)
 }
 
-/// The finest geodesic sphere of at most so many facets: 20 for each square of the frequency.
+/// The finest geodesic sphere of at most `facets` facets. A sphere of frequency f has 20 f^2 facets.
 fn geodesic(radius: f64, facets: usize) -> Mesh {
     let frequency = (facets / 20).isqrt().max(1);
     let mut drawing = Drawing { radius, frequency, mesh: Mesh::default(), numbers: HashMap::new() };
@@ -38,7 +38,7 @@ fn geodesic(radius: f64, facets: usize) -> Mesh {
     drawing.mesh
 }
 
-/// Facets of the icosahedron, counter-clockwise seen from outside.
+/// Facets of the icosahedron, counter-clockwise as seen from outside.
 const ICOSAHEDRON: [[usize; 3]; 20] = [
     [0, 11, 5],
     [0, 5, 1],
@@ -78,7 +78,7 @@ struct Drawing {
     radius: f64,
     frequency: usize,
     mesh: Mesh,
-    /// Vertices by their weights at the corners of the icosahedron, which facets agree upon.
+    /// Vertex indices by barycentric coordinates (corner, weight), which are the same for all facets.
     numbers: HashMap<[(usize, usize); 3], u32>,
 }
 
@@ -87,9 +87,9 @@ impl Drawing {
         let f = self.frequency;
         for j in 0..f {
             for i in 0..f - j {
-                let mut at = |i: usize, j: usize| self.vertex(corners, [f - i - j, i, j]);
-                let (p, q, r) = (at(i, j), at(i + 1, j), at(i, j + 1));
-                let opposite = (i + j + 1 < f).then(|| at(i + 1, j + 1));
+                let mut vertex = |i: usize, j: usize| self.vertex(corners, [f - i - j, i, j]);
+                let (p, q, r) = (vertex(i, j), vertex(i + 1, j), vertex(i, j + 1));
+                let opposite = (i + j + 1 < f).then(|| vertex(i + 1, j + 1));
                 self.mesh.triangles.push([p, q, r]);
                 if let Some(s) = opposite {
                     self.mesh.triangles.push([q, s, r]);
@@ -105,7 +105,7 @@ impl Drawing {
         if let Some(&number) = self.numbers.get(&key) {
             return number;
         }
-        // Summed in the order of the key, so that the position does not depend on the facet either.
+        // The sum follows the order of the key, so the position does not depend on the facet.
         let mut p = [0.0; 3];
         for (c, weight) in key {
             let q = corner(c);

@@ -1,13 +1,12 @@
-//! An unmanned aircraft in the manner of the paper's Predator: bulbous nose with a sensor ball, long
-//! slender wings with stores on pylons, a boom, an inverted V tail and a ventral fin.
+//! An unmanned aircraft similar to the Predator of the paper: bulbous nose with a sensor ball, long slender wings
+//! with stores on pylons, a boom, an inverted V tail and a ventral fin.
 //!
-//! Lengths in spans. x points aft, z up; the nose is at x = 0, and the origin moves to the middle when
-//! it is drawn.
+//! The unit is the wing span. x points aft and z up; the nose is at x = 0. The drawn surface is centred along x.
 
 use super::implicit::Body;
 use super::solids::{Panel, RoundCone, Section, Vec3, blend};
 
-/// Half of the aircraft: y is taken without its sign.
+/// The half of the aircraft with y >= 0; the other half is its mirror image.
 pub(super) struct Uav {
     hull: Vec<RoundCone>,
     ball: RoundCone,

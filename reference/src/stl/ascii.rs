@@ -1,18 +1,18 @@
-//! ASCII STL: any number of solids, in words separated by any white space.
+//! Parser of ASCII STL: any number of solids, as words separated by any white space.
 //!
-//! Upper and lower case, the three kinds of line end, blank lines and solids without a name are all
-//! met in practice. Only `solid` and `endsolid` care for lines: what follows them is a name.
+//! Files in use contain upper and lower case, three kinds of line end, blank lines and solids without a
+//! name. Lines matter only after `solid` and `endsolid`, where the rest of the line is a name.
 use super::Facet;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Whether the bytes begin like ASCII STL and hold no zero byte, as text never does.
+/// Whether the first word is `solid` and no byte is zero. Text contains no zero bytes.
 pub fn is_likely(bytes: &[u8]) -> bool {
     let mut words = Words::new(bytes);
     words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) && !bytes.contains(&0)
 }
 
-/// The facets of all solids, or a sentence on the first thing that is wrong.
+/// The facets of all solids, or one sentence about the first error.
 pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     let mut words = Words::new(bytes);
     let mut facets = Vec::new();
@@ -34,11 +34,11 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     Ok(facets)
 }
 
-/// What follows the word `facet`, to `endfacet`.
+/// Parses a facet after its first word `facet`, up to and including `endfacet`.
 fn facet(words: &mut Words) -> Result<Facet, String> {
     words.expect("normal")?;
     for _ in 0..3 {
-        // Never used: exporters write nonsense here for facets without area.
+        // Normals are not used: exporters write arbitrary words for facets without area.
         words.next();
     }
     words.expect("outer")?;
@@ -55,11 +55,11 @@ fn facet(words: &mut Words) -> Result<Facet, String> {
     Ok(vertices)
 }
 
-/// The words of a text, one after the other.
+/// An iterator over the words of a text that counts lines.
 struct Words<'a> {
     rest: &'a [u8],
     line: usize,
-    /// Whether the last byte was a carriage return, so that a line feed now starts no new line.
+    /// Whether the previous byte was a carriage return, so that a line feed does not start another line.
     after_return: bool,
 }
 
@@ -80,7 +80,7 @@ impl<'a> Words<'a> {
         (!word.is_empty()).then_some(word)
     }
 
-    /// Goes to the end of the line.
+    /// Skips to the end of the line.
     fn skip_line(&mut self) {
         while self.rest.first().is_some_and(|&byte| byte != b'\n' && byte != b'\r') {
             self.step();
@@ -114,15 +114,15 @@ impl<'a> Words<'a> {
         let line = self.line;
         let Some(word) = found else {
             return format!(
-                "the file ends in line {line} where {wanted} should follow; \
-                 it is truncated: export it again"
+                "the file is truncated: it ends in line {line}, where {wanted} was expected; \
+                 export it again"
             );
         };
-        // Whatever the file holds instead, the message stays short.
+        // A word may be as long as the file; the message must be short.
         let word = String::from_utf8_lossy(&word[..word.len().min(40)]);
         format!(
-            "line {line} says {word:?} where {wanted} should be; \
-             mend the line or export the geometry again"
+            "line {line} has {word:?} where {wanted} was expected; \
+             correct the line or export the geometry again"
         )
     }
 }

@@ -1,5 +1,5 @@
-//! The whole algorithm a second time, on a dense grid of the finest cells: crossing by separating axes,
-//! components cell by cell, refinement cell by cell.
+//! A second implementation of the whole algorithm, on a dense grid of the finest cells: crossing by separating
+//! axes, flood fill cell by cell, refinement cell by cell.
 use super::{ROOT_EDGE, crosses_by_axes, parities_by_areas, spacing};
 use reference::{BoxSpec, Case};
 
@@ -9,7 +9,7 @@ pub const CROSSING: u64 = 2;
 
 pub type Facet = [[i64; 3]; 3];
 
-/// A grid of the finest cells, each knowing the leaf that it is part of.
+/// A grid of cells of level `finest`. Each cell stores the level and the side of the leaf that contains it.
 pub struct Dense {
     pub finest: u32,
     pub cells: Vec<Cell>,
@@ -17,7 +17,7 @@ pub struct Dense {
 
 #[derive(Clone, Copy)]
 pub struct Cell {
-    pub at: [i64; 3],
+    pub index: [i64; 3],
     pub level: u32,
     pub side: u64,
     pub kept: bool,
@@ -27,7 +27,7 @@ impl Dense {
     fn new(finest: u32) -> Self {
         let n = 1_i64 << finest;
         let cell = |i: i64| Cell {
-            at: [i % n, i / n % n, i / n / n],
+            index: [i % n, i / n % n, i / n / n],
             level: 0,
             side: OUTSIDE,
             kept: true,
@@ -35,36 +35,36 @@ impl Dense {
         Self { finest, cells: (0..n * n * n).map(cell).collect() }
     }
 
-    fn cell(&mut self, at: [i64; 3]) -> Option<&mut Cell> {
+    fn cell(&mut self, index: [i64; 3]) -> Option<&mut Cell> {
         let n = 1 << self.finest;
-        let inside = at.iter().all(|x| (0..n).contains(x));
-        inside.then(|| &mut self.cells[(at[0] + n * (at[1] + n * at[2])) as usize])
+        let exists = index.iter().all(|x| (0..n).contains(x));
+        exists.then(|| &mut self.cells[(index[0] + n * (index[1] + n * index[2])) as usize])
     }
 
-    /// The leaf's edge in cells, and its minimum corner.
-    pub fn leaf(&self, cell: Cell) -> (i64, [i64; 3]) {
+    /// The edge, in cells, and the minimum corner of the leaf that contains a cell.
+    fn leaf(&self, cell: Cell) -> (i64, [i64; 3]) {
         let edge = 1 << (self.finest - cell.level);
-        (edge, cell.at.map(|x| x / edge * edge))
+        (edge, cell.index.map(|x| x / edge * edge))
     }
 
-    /// One cell of every leaf: the one in the minimum corner.
+    /// One cell of every leaf: the one in its minimum corner.
     pub fn leaves(&self) -> Vec<Cell> {
-        self.cells.iter().copied().filter(|&cell| self.leaf(cell).1 == cell.at).collect()
+        self.cells.iter().copied().filter(|&cell| self.leaf(cell).1 == cell.index).collect()
     }
 
     /// Changes all cells of a leaf.
     fn change(&mut self, leaf: Cell, change: impl Fn(&mut Cell)) {
         let (edge, min) = self.leaf(leaf);
-        for at in cells_between(min, min.map(|x| x + edge)) {
-            change(self.cell(at).unwrap());
+        for index in indices_between(min, min.map(|x| x + edge)) {
+            change(self.cell(index).unwrap());
         }
     }
 
-    /// Splits the kept leaves around the cells from `min` to `max` until those cells are of `level`.
+    /// Splits the kept leaves that contain cells from `min` to `max` until they have at least `level`.
     fn refine(&mut self, min: [i64; 3], max: [i64; 3], level: u32) {
         let n = 1 << self.finest;
-        for at in cells_between(min.map(|x| x.max(0)), max.map(|x| x.min(n))) {
-            while let Some(&mut cell) = self.cell(at)
+        for index in indices_between(min.map(|x| x.max(0)), max.map(|x| x.min(n))) {
+            while let Some(&mut cell) = self.cell(index)
                 && cell.kept
                 && cell.level < level
             {
@@ -73,6 +73,7 @@ impl Dense {
         }
     }
 
+    /// The words of the leaves that satisfy `wanted`, in ascending order.
     pub fn words(&self, wanted: impl Fn(Cell) -> bool) -> Vec<u64> {
         let leaves = self.leaves().into_iter().filter(|&leaf| wanted(leaf));
         let mut words: Vec<u64> = leaves.map(|leaf| self.word(leaf)).collect();
@@ -84,14 +85,14 @@ impl Dense {
         let mut key = 0;
         for bit in 0..self.finest {
             for a in 0..3 {
-                let digit = leaf.at[a] as u64 >> bit & 1;
+                let digit = leaf.index[a] as u64 >> bit & 1;
                 key |= digit << (3 * (bit + 19 - self.finest) + a as u32);
             }
         }
         key << 7 | u64::from(leaf.level) << 2 | leaf.side
     }
 
-    /// In lattice units.
+    /// The minimum and the maximum corner of a leaf, in lattice units.
     fn extent(&self, leaf: Cell) -> ([i64; 3], [i64; 3]) {
         let unit = ROOT_EDGE >> self.finest;
         let (edge, min) = self.leaf(leaf);
@@ -99,17 +100,17 @@ impl Dense {
     }
 }
 
-fn cells_between(min: [i64; 3], max: [i64; 3]) -> Vec<[i64; 3]> {
-    let mut cells = Vec::new();
+fn indices_between(min: [i64; 3], max: [i64; 3]) -> Vec<[i64; 3]> {
+    let mut indices = Vec::new();
     for z in min[2]..max[2] {
         for y in min[1]..max[1] {
-            cells.extend((min[0]..max[0]).map(|x| [x, y, z]));
+            indices.extend((min[0]..max[0]).map(|x| [x, y, z]));
         }
     }
-    cells
+    indices
 }
 
-/// Splits what must be, level by level, until nothing must; then says which leaves cross.
+/// The base tree, with crossing leaves marked: splits level by level wherever a rule requires it.
 pub fn base(case: &Case, facets: &[Facet], finest: u32, level_surface: u32) -> Dense {
     let mut dense = Dense::new(finest);
     let crossed = |min, max| facets.iter().any(|f| crosses_by_axes(f, min, max));
@@ -134,31 +135,31 @@ pub fn base(case: &Case, facets: &[Facet], finest: u32, level_surface: u32) -> D
     dense
 }
 
-/// Spreads from cell to cell; returns the number of ambiguous components.
+/// Sets the sides of the leaves that do not cross and returns the number of ambiguous components.
 pub fn assign_sides(dense: &mut Dense, facets: &[Facet]) -> u64 {
     let mut ambiguous = 0;
     let mut reached: std::collections::HashSet<[i64; 3]> =
-        dense.cells.iter().filter(|cell| cell.side == CROSSING).map(|cell| cell.at).collect();
+        dense.cells.iter().filter(|cell| cell.side == CROSSING).map(|cell| cell.index).collect();
     for start in dense.cells.clone() {
-        if !reached.insert(start.at) {
+        if !reached.insert(start.index) {
             continue;
         }
         let mut component = vec![start];
-        let mut done = 0;
-        while done < component.len() {
+        let mut visited = 0;
+        while visited < component.len() {
             for (axis, step) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
-                let mut at = component[done].at;
-                at[axis] += step;
-                if let Some(&mut cell) = dense.cell(at)
-                    && reached.insert(at)
+                let mut index = component[visited].index;
+                index[axis] += step;
+                if let Some(&mut cell) = dense.cell(index)
+                    && reached.insert(index)
                 {
                     component.push(cell);
                 }
             }
-            done += 1;
+            visited += 1;
         }
         let mut candidates = component.clone();
-        candidates.retain(|&cell| dense.leaf(cell).1 == cell.at);
+        candidates.retain(|&cell| dense.leaf(cell).1 == cell.index);
         candidates.sort_by_key(|&leaf| (leaf.level, dense.word(leaf)));
         candidates.truncate(32);
         let votes: Vec<usize> = candidates
@@ -177,16 +178,17 @@ pub fn assign_sides(dense: &mut Dense, facets: &[Facet]) -> u64 {
         let (odd, rays) = decided.map_or((votes.iter().sum(), 6 * votes.len()), |odd| (odd, 6));
         let side = if odd > rays - odd { INSIDE } else { OUTSIDE };
         for cell in component {
-            dense.cell(cell.at).unwrap().side = side;
+            dense.cell(cell.index).unwrap().side = side;
         }
     }
     ambiguous
 }
 
+/// Gradation of the kept leaves, section 6 of the definition.
 pub fn grade(dense: &mut Dense, n: i64, keep_crossing: bool, level_surface: u32) {
     if !keep_crossing && n < 3 {
         for leaf in dense.leaves().into_iter().filter(|leaf| leaf.side == CROSSING) {
-            touching(dense, leaf, level_surface);
+            refine_touching(dense, leaf, level_surface);
         }
     }
     for level in (1..=dense.finest).rev() {
@@ -196,13 +198,13 @@ pub fn grade(dense: &mut Dense, n: i64, keep_crossing: bool, level_surface: u32)
             dense.refine(min.map(|x| x - margin), min.map(|x| x + edge + margin), level);
         }
         for leaf in kept_of_level(dense, level) {
-            touching(dense, leaf, level - 1);
+            refine_touching(dense, leaf, level - 1);
         }
     }
 }
 
-/// What touches a leaf holds one of the finest cells around it.
-fn touching(dense: &mut Dense, leaf: Cell, level: u32) {
+/// Refines the leaves that touch `leaf`. Each of them contains one of the cells around it.
+fn refine_touching(dense: &mut Dense, leaf: Cell, level: u32) {
     let (edge, min) = dense.leaf(leaf);
     dense.refine(min.map(|x| x - 1), min.map(|x| x + edge + 1), level);
 }

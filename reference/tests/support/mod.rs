@@ -1,48 +1,18 @@
-//! What several tests need: seeded numbers, and cases on the lattice.
-#![allow(dead_code)] // Every test is a crate of its own and uses its share.
+//! Cases on the lattice, second implementations of geometric predicates, and random inputs.
+#![allow(dead_code)] // Each test is a separate crate and uses a subset.
 
 pub mod dense;
+pub mod random;
 
 use reference::leaves::Tally;
 use reference::{BoxSpec, Case, Keep, Root};
 
-/// The root's edge in lattice units; also the edge of the cases' root, so that the user's units are
-/// lattice units.
+/// The edge of the root in lattice units. The root of every case here has this edge, so the user's unit is
+/// the lattice unit.
 pub const ROOT_EDGE: i64 = 1 << 27;
 
-/// Numbers that look random and are the same in every run.
-pub struct Seeded(u64);
-
-impl Seeded {
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    fn next(&mut self) -> u64 {
-        // Knuth's linear congruential generator; its high bits are good enough.
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.0 >> 33
-    }
-
-    /// A whole number of `range`.
-    pub fn of(&mut self, range: std::ops::RangeInclusive<i64>) -> i64 {
-        range.start() + (self.next() % (range.end() - range.start() + 1) as u64) as i64
-    }
-
-    /// Whether something with a chance of `one` in `many` happens.
-    pub fn chance(&mut self, one: i64, many: i64) -> bool {
-        self.of(1..=many) <= one
-    }
-
-    /// One of these.
-    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
-        from[self.of(0..=from.len() as i64 - 1) as usize]
-    }
-}
-
-/// A case without boxes whose root is the lattice cube, cut to `level` at the facets; everything is
-/// kept and layers are one cell thick.
+/// A case without boxes whose root is the lattice cube and whose surface has level `level`. All leaves are
+/// kept, and layers are one cell thick.
 pub fn case(facets: &[[[i64; 3]; 3]], level: u32) -> Case {
     Case {
         facets: facets.iter().map(|facet| facet.map(|v| v.map(|x| x as f64))).collect(),
@@ -55,18 +25,18 @@ pub fn case(facets: &[[[i64; 3]; 3]], level: u32) -> Case {
     }
 }
 
-/// The spacing that asks for `level`.
+/// The greatest spacing with this level.
 pub fn spacing(level: u32) -> f64 {
     (ROOT_EDGE >> level) as f64
 }
 
-/// A box with `level` inside.
+/// An extent box with level `level`.
 pub fn box_of_level(min: [i64; 3], max: [i64; 3], level: u32) -> BoxSpec {
     let corner = |c: [i64; 3]| c.map(|x| x as f64);
     BoxSpec { min: corner(min), max: corner(max), spacing: spacing(level) }
 }
 
-/// The twelve facets of a box.
+/// The surface of a box, as twelve facets.
 pub fn block(min: [i64; 3], max: [i64; 3]) -> Vec<[[i64; 3]; 3]> {
     let mut facets = Vec::new();
     for axis in 0..3 {
@@ -89,9 +59,9 @@ pub fn block(min: [i64; 3], max: [i64; 3]) -> Vec<[[i64; 3]; 3]> {
     facets
 }
 
-/// Whether the facet and the box share a point, by separating axes: two convex sets of corners are
-/// apart just if they are so along a face normal of either or a product of an edge of each. Axes of
-/// length zero, as degenerate facets have them, separate nothing.
+/// Whether the facet and the box share a point, by separating axes: two convex polyhedra are disjoint if and
+/// only if their projections on a face normal of either or on the cross product of an edge of each are
+/// disjoint. Degenerate facets produce axes of length zero, which separate nothing.
 pub fn crosses_by_axes(facet: &[[i64; 3]; 3], min: [i64; 3], max: [i64; 3]) -> bool {
     let corners: [[i64; 3]; 8] = std::array::from_fn(|i| {
         std::array::from_fn(|a| if i >> a & 1 == 0 { min[a] } else { max[a] })
@@ -109,8 +79,9 @@ pub fn crosses_by_axes(facet: &[[i64; 3]; 3], min: [i64; 3], max: [i64; 3]) -> b
 }
 
 fn range(points: &[[i64; 3]], axis: [i64; 3]) -> (i128, i128) {
-    let at = |p: &[i64; 3]| (0..3).map(|a| i128::from(p[a]) * i128::from(axis[a])).sum::<i128>();
-    let along = points.iter().map(at);
+    let project =
+        |p: &[i64; 3]| (0..3).map(|a| i128::from(p[a]) * i128::from(axis[a])).sum::<i128>();
+    let along = points.iter().map(project);
     (along.clone().min().unwrap(), along.max().unwrap())
 }
 
@@ -125,14 +96,14 @@ pub fn cross(p: [i64; 3], q: [i64; 3]) -> [i64; 3] {
     })
 }
 
-/// Whether an odd number of facets is met downwards and upwards, by a second way: the displacement is
-/// not infinitesimal but 2^-32 and 2^-64, and the place on the facet comes from the areas of the three
-/// triangles that the point makes with its edges.
+/// Whether the rays from `point` in the negative and the positive direction intersect an odd number of facets,
+/// by a second method. The displacements are 2^-32 and 2^-64 instead of infinitesimal, and barycentric
+/// coordinates give the position on the facet.
 pub fn parities_by_areas(facets: &[[[i64; 3]; 3]], point: [i64; 3], axis: usize) -> [bool; 2] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut odd = [false; 2];
     for facet in facets {
-        // Area i is opposite vertex i: of the point and the two other vertices.
+        // Area i is that of the triangle of the point and the two vertices other than vertex i.
         let areas: [(i128, i128); 3] = std::array::from_fn(|i| {
             let (p, q) = (facet[(i + 1) % 3], facet[(i + 2) % 3]);
             let (du, dv) = (i128::from(q[u] - p[u]), i128::from(q[v] - p[v]));
@@ -151,27 +122,27 @@ pub fn parities_by_areas(facets: &[[[i64; 3]; 3]], point: [i64; 3], axis: usize)
     odd
 }
 
-/// An eighth of the root's edge, for cases worked out by hand.
+/// An eighth of the root's edge, the unit of cases that are verified by hand.
 pub const UNIT: i64 = ROOT_EDGE / 8;
 
-/// A point in units.
+/// A point given in units.
 pub fn units(point: [i64; 3]) -> [i64; 3] {
     point.map(|x| x * UNIT)
 }
 
-/// The facets of a block, its corners in units.
+/// The surface of a block with corners given in units.
 pub fn block_of_units(min: [i64; 3], max: [i64; 3]) -> Vec<[[i64; 3]; 3]> {
     block(units(min), units(max))
 }
 
-/// Leaves by level, to level 4.
+/// Numbers of leaves of levels 0 to 4.
 pub fn levels(words: &[u64]) -> [u64; 5] {
     let levels = Tally::of(words).leaves_by_level;
     assert!(levels[5..].iter().all(|&leaves| leaves == 0));
     levels[..5].try_into().unwrap()
 }
 
-/// Leaves outside, inside and crossing.
+/// Numbers of outside, inside and crossing leaves.
 pub fn sides(words: &[u64]) -> [u64; 3] {
     Tally::of(words).leaves_by_side
 }

@@ -1,9 +1,9 @@
-//! One closed surface of triangles from a distance function and a grid.
+//! A closed surface of triangles from a distance function and a grid (marching tetrahedra).
 //!
-//! Space is a grid of cubes, each cut into the six tetrahedra around its diagonal. Every edge of that
-//! grid whose ends lie on different sides of the surface holds one vertex, found along the edge, and the
-//! tetrahedra join the vertices to triangles. Tetrahedra have no ambiguous cases, so the result is a
-//! closed manifold whatever the function: each triangle's edge lies in a face that two tetrahedra share.
+//! Each cube of the grid is divided into six tetrahedra around its diagonal. Every edge of a tetrahedron whose
+//! ends lie on different sides of the surface has one vertex, at the zero of the distance function along the
+//! edge, and each tetrahedron joins its vertices to triangles. Tetrahedra have no ambiguous cases, so the result
+//! is a closed manifold for every function: each edge of a triangle lies in a face shared by two tetrahedra.
 
 use std::collections::HashMap;
 
@@ -12,35 +12,36 @@ use crate::Mesh;
 use crate::mesh::EdgeHasher;
 use crate::shapes::solids::Vec3;
 
-/// A part thinner than a cell's diagonal could slip between the grid's points.
+/// Minimum radius of a part, in cells. A part thinner than the diagonal of a cell could lie between grid points.
 const RADIUS_LEAST: f64 = 0.95;
 
-/// Cells around the bounds.
+/// Cells of the grid on every side of the bounds.
 const ROOM: f64 = 3.0;
 
-/// Vertices keep this part of an edge away from its ends, so that no triangle degenerates.
+/// Minimum distance of a vertex from the ends of its edge, as a fraction of the edge, so that no triangle
+/// degenerates.
 const MARGIN: f64 = 0.05;
 
-/// Cells along an edge of a block that is sampled as a whole.
+/// Cells along the edge of a block, the unit of sampling.
 const BLOCK: usize = 4;
 
-/// A surface while it is drawn.
+/// A surface under construction.
 pub(super) struct Drawing<B> {
     body: B,
     low: Vec3,
     spacing: f64,
     mesh: Mesh,
-    /// Vertices by grid edge: its lower end, 20 bits a coordinate, and its direction, 3 bits.
+    /// Vertex indices by grid edge: its lower end, 20 bits per coordinate, and its direction, 3 bits.
     numbers: HashMap<u64, u32, EdgeHasher>,
 }
 
-/// A grid point.
+/// The integer coordinates of a grid point.
 type Place = [usize; 3];
 
 impl<B: Body> Drawing<B> {
-    /// The surface at a spacing.
+    /// The surface on a grid with this spacing.
     pub(super) fn of(spacing: f64) -> Mesh {
-        // Thickening reaches a radius beyond the bounds, and a block's corner may lie on them.
+        // A thickened part may extend one radius beyond the bounds.
         let room = ROOM * spacing;
         let [low, high] = B::BOUNDS;
         let widest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max) + 2.0 * room;
@@ -48,7 +49,7 @@ impl<B: Body> Drawing<B> {
         while (cells as f64) * spacing < widest {
             cells *= 2;
         }
-        assert!(cells < 1 << 20, "grid places have 20 bits");
+        assert!(cells < 1 << 20, "grid coordinates have 20 bits");
         let body = B::new(spacing * RADIUS_LEAST);
         let mut drawing = Self {
             body,
@@ -65,8 +66,8 @@ impl<B: Body> Drawing<B> {
         std::array::from_fn(|a| self.low[a] + place[a] as f64 * self.spacing)
     }
 
-    /// Goes down to the blocks that may hold surface: those whose centre is no farther from it than
-    /// their corners are.
+    /// Samples the blocks within a cube of the grid that may contain surface. A cube contains none if the
+    /// distance at its centre exceeds half its diagonal.
     fn visit(&mut self, place: Place, cells: usize) {
         let half = cells as f64 * 0.5 * self.spacing;
         let centre = self.position(place).map(|x| x + half);
@@ -78,8 +79,8 @@ impl<B: Body> Drawing<B> {
             return self.block(place);
         }
         for octant in 0..8 {
-            let part = cells / 2;
-            self.visit(std::array::from_fn(|a| place[a] + part * (octant >> a & 1)), part);
+            let half = cells / 2;
+            self.visit(std::array::from_fn(|a| place[a] + half * (octant >> a & 1)), half);
         }
     }
 
@@ -90,8 +91,8 @@ impl<B: Body> Drawing<B> {
         for z in 0..POINTS {
             for y in 0..POINTS {
                 for x in 0..POINTS {
-                    let at = [place[0] + x, place[1] + y, place[2] + z];
-                    values[index([x, y, z])] = self.body.distance(self.position(at));
+                    let point = [place[0] + x, place[1] + y, place[2] + z];
+                    values[index([x, y, z])] = self.body.distance(self.position(point));
                 }
             }
         }
@@ -110,8 +111,8 @@ impl<B: Body> Drawing<B> {
         }
     }
 
-    /// Corners are numbered by the bits of their offset; a tetrahedron is a way from 0 to 7 that sets
-    /// one bit after the other.
+    /// Draws the six tetrahedra of a cube. The bits of a corner's index are its offset along the axes. A
+    /// tetrahedron is a path from corner 0 to corner 7 that sets one bit at a time.
     fn cube(&mut self, place: Place, corners: &[f64; 8]) {
         for (first, second, is_even) in
             [(1, 2, true), (2, 4, true), (4, 1, true), (2, 1, false), (4, 2, false), (1, 4, false)]
@@ -120,10 +121,10 @@ impl<B: Body> Drawing<B> {
         }
     }
 
-    /// `is_even` says whether the four corners, in this order, are positively oriented.
+    /// Draws one tetrahedron. `is_even` is whether its four corners, in this order, are positively oriented.
     fn tetrahedron(&mut self, place: Place, values: &[f64; 8], masks: [usize; 4], is_even: bool) {
         let inside = masks.map(|mask| values[mask] < 0.0);
-        // An even reordering that puts the inside corners first leaves the orientation as it is.
+        // The permutation is even, so it preserves the orientation.
         let Some((order, count)) = inside_first(inside) else {
             return;
         };
@@ -144,7 +145,7 @@ impl<B: Body> Drawing<B> {
         }
     }
 
-    /// The vertex on the edge between two corners of a cube, one of which is part of the other's bits.
+    /// The vertex on the edge between two corners of a cube. The bits of one corner contain those of the other.
     fn vertex(&mut self, place: Place, values: &[f64; 8], from: usize, to: usize) -> u32 {
         let (low, high) = (from & to, from | to);
         let start: Place = std::array::from_fn(|a| place[a] + (low >> a & 1));
@@ -156,33 +157,34 @@ impl<B: Body> Drawing<B> {
         }
         let end = std::array::from_fn(|a| start[a] + (direction >> a & 1));
         let (p, q) = (self.position(start), self.position(end));
-        let at = self.crossing(p, q, values[low], values[high]).clamp(MARGIN, 1.0 - MARGIN);
-        let number = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
+        let t = self.zero(p, q, values[low], values[high]).clamp(MARGIN, 1.0 - MARGIN);
+        let number = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
         self.numbers.insert(key, number);
         number
     }
 
-    /// Where between two points of different sides the distance is zero, by the Illinois variant of
-    /// false position.
-    fn crossing(&self, p: Vec3, q: Vec3, at_p: f64, at_q: f64) -> f64 {
-        let (mut low, mut high) = ((0.0, at_p), (1.0, at_q));
-        let mut at = 0.5;
+    /// The parameter in [0, 1] at which the distance is zero between two points on different sides, by the
+    /// Illinois variant of the false position method.
+    fn zero(&self, p: Vec3, q: Vec3, value_p: f64, value_q: f64) -> f64 {
+        let (mut low, mut high) = ((0.0, value_p), (1.0, value_q));
+        let mut t = 0.5;
         for _ in 0..3 {
-            at = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let value = self.body.distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * at));
+            t = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+            let value = self.body.distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
             if (value < 0.0) == (low.1 < 0.0) {
-                low = (at, value);
+                low = (t, value);
                 high.1 *= 0.5;
             } else {
-                high = (at, value);
+                high = (t, value);
                 low.1 *= 0.5;
             }
         }
-        at
+        t
     }
 }
 
-/// An even permutation of four corners that puts the inside ones first, and their number, 1 to 3.
+/// An even permutation of the four corners that puts those inside first, and the number of these, 1 to 3. `None`
+/// if all corners are on one side.
 fn inside_first(inside: [bool; 4]) -> Option<([usize; 4], usize)> {
     let mask = inside.iter().enumerate().fold(0, |mask, (i, &is)| mask | usize::from(is) << i);
     let order = match mask {

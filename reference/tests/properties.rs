@@ -1,0 +1,266 @@
+//! Properties of base trees and meshes on random cases, and their equality with those of the dense-grid
+//! implementation.
+mod support;
+
+use reference::{Case, Keep, base_tree, mesh};
+use std::cell::Cell;
+use support::dense::{self, CROSSING, Dense, INSIDE, OUTSIDE};
+use support::random::{RandomCase, cases, for_all};
+use support::{ROOT_EDGE, crosses_by_axes, spacing};
+
+/// The finest level of the random cases of most properties: at most 4,096 leaves.
+const FINEST: u32 = 4;
+
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    /// Minimum corner and edge, in lattice units.
+    min: [i64; 3],
+    edge: i64,
+    level: u32,
+    side: u64,
+    /// The Morton keys of the level-19 cells in the leaf.
+    keys: (u64, u64),
+}
+
+impl Leaf {
+    fn of(word: u64) -> Self {
+        let (key, level) = (word >> 7, (word >> 2 & 31) as u32);
+        let mut min = [0; 3];
+        for bit in 0..57 {
+            min[bit % 3] |= ((key >> bit & 1) << (bit / 3)) as i64 * 256;
+        }
+        let keys = (key, key + (1 << (3 * (19 - level))));
+        Self { min, edge: ROOT_EDGE >> level, level, side: word & 3, keys }
+    }
+
+    fn parent(&self) -> Option<Self> {
+        let level = self.level.checked_sub(1)?;
+        let edge = 2 * self.edge;
+        Some(Self { min: self.min.map(|x| x / edge * edge), edge, level, ..*self })
+    }
+
+    fn max(&self) -> [i64; 3] {
+        self.min.map(|x| x + self.edge)
+    }
+
+    fn contains(&self, other: &Leaf) -> bool {
+        self.keys.0 <= other.keys.0 && other.keys.1 <= self.keys.1
+    }
+
+    /// Chebyshev distance of the closed cubes, in lattice units; 0 if they touch.
+    fn distance(&self, other: &Leaf) -> i64 {
+        let gap = |a: usize| (self.min[a] - other.max()[a]).max(other.min[a] - self.max()[a]);
+        (0..3).map(gap).fold(0, i64::max)
+    }
+
+    fn is_crossed(&self, random: &RandomCase) -> bool {
+        random.facets.iter().any(|facet| crosses_by_axes(facet, self.min, self.max()))
+    }
+
+    /// The greatest level of a box that the octant meets.
+    fn level_of_boxes(&self, case: &Case) -> u32 {
+        let meets = |min: [f64; 3], max: [f64; 3]| {
+            (0..3).all(|a| (self.min[a] as f64) < max[a] && min[a] < self.max()[a] as f64)
+        };
+        let met = case.boxes.iter().filter(|b| meets(b.min, b.max));
+        let level = |b: &reference::BoxSpec| (0..=19).find(|&l| spacing(l) <= b.spacing).unwrap();
+        met.map(level).max().unwrap_or(0)
+    }
+}
+
+fn leaves(words: &[u64]) -> Vec<Leaf> {
+    words.iter().copied().map(Leaf::of).collect()
+}
+
+fn base_leaves(random: &RandomCase) -> Vec<Leaf> {
+    leaves(&base_tree(&random.case).unwrap().words)
+}
+
+fn mesh_leaves(random: &RandomCase) -> Vec<Leaf> {
+    leaves(&mesh(&random.case).unwrap().words)
+}
+
+fn is_kept(keep: Keep, side: u64) -> bool {
+    match keep {
+        Keep::Outside => side != INSIDE,
+        Keep::Inside => side != OUTSIDE,
+        Keep::All => true,
+    }
+}
+
+/// The results of the dense-grid implementation.
+struct Expected {
+    base: Vec<u64>,
+    components_ambiguous: u64,
+    graded: Dense,
+}
+
+impl Expected {
+    fn of(RandomCase { facets, level_surface, case }: &RandomCase, finest: u32) -> Self {
+        let mut grid = dense::base(case, facets, finest, *level_surface);
+        let components_ambiguous = dense::assign_sides(&mut grid, facets);
+        let base = grid.words(|_| true);
+        for cell in &mut grid.cells {
+            cell.kept = is_kept(case.keep, cell.side);
+        }
+        dense::grade(&mut grid, case.layer_cells_min.into(), case.keep_crossing, *level_surface);
+        Self { base, components_ambiguous, graded: grid }
+    }
+
+    /// The words of the kept leaves whose side satisfies `wanted`.
+    fn words(&self, wanted: impl Fn(u64) -> bool) -> Vec<u64> {
+        self.graded.words(|leaf| leaf.kept && wanted(leaf.side))
+    }
+}
+
+fn assert_equals_dense_grid(random: &RandomCase, finest: u32) -> Expected {
+    let expected = Expected::of(random, finest);
+    let base = base_tree(&random.case).unwrap();
+    assert_eq!(base.words, expected.base, "base tree");
+    assert_eq!(base.ambiguous.map_or(0, |a| a.components), expected.components_ambiguous);
+    let words = expected.words(|side| random.case.keep_crossing || side != CROSSING);
+    assert_eq!(mesh(&random.case).unwrap().words, words, "final mesh");
+    expected
+}
+
+#[test]
+fn base_tree_and_mesh_equal_those_of_the_dense_grid() {
+    let (tested, inside, ambiguous, crossing_deep) =
+        (Cell::new(0), Cell::new(0), Cell::new(0), Cell::new(0));
+    for_all(file!(), 400, cases(FINEST), |random| {
+        let expected = assert_equals_dense_grid(&random, FINEST);
+        let cells = &expected.graded.cells;
+        let count =
+            |counter: &Cell<u32>, occurs: bool| counter.set(counter.get() + u32::from(occurs));
+        count(&tested, true);
+        count(&inside, cells.iter().any(|cell| cell.side == INSIDE));
+        count(&ambiguous, expected.components_ambiguous > 0);
+        let is_deep = |level: u32| level > random.level_surface;
+        count(&crossing_deep, cells.iter().any(|c| c.side == CROSSING && is_deep(c.level)));
+    });
+    // Rare situations must occur among the random cases.
+    let [tested, inside, ambiguous, crossing_deep] =
+        [tested, inside, ambiguous, crossing_deep].map(Cell::into_inner);
+    assert!(inside > tested / 8, "{inside} of {tested} cases have an inside");
+    assert!(ambiguous > tested / 20, "{ambiguous} of {tested} cases are ambiguous");
+    assert!(
+        crossing_deep > tested / 8,
+        "{crossing_deep} of {tested} have boxes finer than the surface"
+    );
+}
+
+#[test]
+fn base_tree_and_mesh_of_finer_cases_equal_those_of_the_dense_grid() {
+    for_all(file!(), 20, cases(5), |random| {
+        assert_equals_dense_grid(&random, 5);
+    });
+}
+
+#[test]
+fn base_trees_are_linear_and_complete() {
+    for_all(file!(), 200, cases(FINEST), |random| {
+        let leaves = base_leaves(&random);
+        assert_eq!(leaves[0].keys.0, 0);
+        assert!(leaves.windows(2).all(|pair| pair[0].keys.1 == pair[1].keys.0));
+        assert_eq!(leaves.last().unwrap().keys.1, 1 << 57);
+    });
+}
+
+#[test]
+fn base_leaves_have_the_level_that_facets_and_boxes_require() {
+    for_all(file!(), 100, cases(FINEST), |random| {
+        for leaf in base_leaves(&random) {
+            let is_crossed = leaf.is_crossed(&random);
+            assert_eq!(leaf.side == CROSSING, is_crossed, "{leaf:?}");
+            assert!(!is_crossed || leaf.level >= random.level_surface, "{leaf:?}");
+            assert!(leaf.level >= leaf.level_of_boxes(&random.case), "{leaf:?}");
+        }
+    });
+}
+
+/// A rule that requires the split of an octant also requires the split of its ancestors, so it suffices to
+/// test the parents of leaves.
+#[test]
+fn base_trees_split_no_octant_without_need() {
+    for_all(file!(), 100, cases(FINEST), |random| {
+        for parent in base_leaves(&random).iter().filter_map(Leaf::parent) {
+            let by_facets = parent.level < random.level_surface && parent.is_crossed(&random);
+            let by_boxes = parent.level < parent.level_of_boxes(&random.case);
+            assert!(by_facets || by_boxes, "{parent:?}");
+        }
+    });
+}
+
+/// Each leaf of the mesh lies in a kept leaf of T0 and has its side, and the kept leaves of T0 are filled.
+#[test]
+fn meshes_are_linear_and_fill_the_kept_leaves_of_the_base_tree() {
+    for_all(file!(), 200, cases(FINEST), |random| {
+        let leaves = mesh_leaves(&random);
+        assert!(leaves.windows(2).all(|pair| pair[0].keys.1 <= pair[1].keys.0));
+        let mut rest = &leaves[..];
+        let stays = |side| {
+            is_kept(random.case.keep, side) && (random.case.keep_crossing || side != CROSSING)
+        };
+        for base in base_leaves(&random).iter().filter(|base| stays(base.side)) {
+            let (within, after) =
+                rest.split_at(rest.iter().take_while(|l| base.contains(l)).count());
+            assert!(within.iter().all(|leaf| leaf.side == base.side), "{base:?}");
+            let filled: u64 = within.iter().map(|leaf| leaf.keys.1 - leaf.keys.0).sum();
+            assert_eq!(filled, base.keys.1 - base.keys.0, "{base:?}");
+            rest = after;
+        }
+        assert!(rest.is_empty(), "{:?} lies in no kept leaf of T0", rest[0]);
+    });
+}
+
+/// Calls `check` for every pair of kept leaves, the finer first. Crossing leaves that the mesh does not
+/// contain are included; only the dense grid still has them.
+fn for_all_pairs(random: &RandomCase, check: impl Fn(&Leaf, &Leaf)) {
+    let mut leaves = mesh_leaves(random);
+    if !random.case.keep_crossing {
+        let deleted = Expected::of(random, FINEST).words(|side| side == CROSSING);
+        leaves.extend(deleted.into_iter().map(Leaf::of));
+    }
+    leaves.sort_by_key(|leaf| std::cmp::Reverse(leaf.level));
+    for (i, fine) in leaves.iter().enumerate() {
+        for coarse in &leaves[i + 1..] {
+            check(fine, coarse);
+        }
+    }
+}
+
+#[test]
+fn levels_of_touching_leaves_differ_by_at_most_one() {
+    for_all(file!(), 100, cases(FINEST), |random| {
+        for_all_pairs(&random, |fine, coarse| {
+            assert!(
+                fine.level - coarse.level <= 1 || fine.distance(coarse) > 0,
+                "{fine:?} {coarse:?}"
+            );
+        });
+    });
+}
+
+#[test]
+fn layers_are_at_least_n_cells_thick() {
+    for_all(file!(), 100, cases(FINEST), |random| {
+        let RandomCase { case, level_surface, .. } = &random;
+        let n = i64::from(case.layer_cells_min);
+        let is_deleted = |leaf: &Leaf| !case.keep_crossing && leaf.side == CROSSING;
+        let edge = |level: u32| ROOT_EDGE >> level;
+        for_all_pairs(&random, |fine, coarse| {
+            let holds = |&l: &u32| l < *level_surface || case.keep == Keep::All;
+            // The thickest of these layers is that of the coarsest level.
+            if let Some(level) = (coarse.level + 1..fine.level).find(holds)
+                && !is_deleted(fine)
+                && !is_deleted(coarse)
+            {
+                assert!(fine.distance(coarse) >= n * edge(level), "{fine:?} {coarse:?}");
+            }
+            let is_surface = fine.side == CROSSING && fine.level == *level_surface;
+            if is_surface && fine.distance(coarse) < (n - 1) * edge(*level_surface) {
+                assert!(coarse.level >= *level_surface, "{fine:?} {coarse:?}");
+            }
+        });
+    });
+}
