@@ -96,6 +96,19 @@ pub const fn flood(seed: u64, within: u64) -> u64 {
     }
 }
 
+/// The local components of a brick: the subsets of `open` that are connected over faces inside the brick, by the lowest
+/// bit of each.
+#[inline]
+pub fn components(mut open: u64) -> impl Iterator<Item = u64> {
+    std::iter::from_fn(move || {
+        (open != 0).then(|| {
+            let component = flood(open & open.wrapping_neg(), open);
+            open &= !component;
+            component
+        })
+    })
+}
+
 /// Where the octants of `w` on the brick's face reach across it: bits of the brick next door
 /// along `axis`, up or down.
 #[inline]

@@ -12,7 +12,6 @@ use crate::comm::Comm;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, brick_start};
-use crate::sides::nodes::parts;
 use crate::tree::{LEVELS, PerLevel, Tree};
 use std::ops::Range;
 
@@ -74,7 +73,7 @@ fn weigh_level(tree: &Tree, l: Level, every: usize, scale: &mut Scale) {
 /// What a brick with these non-crossing leaves takes.
 fn cost(open: u64) -> i64 {
     let (mut components, mut single) = (0, 0);
-    for part in parts(open) {
+    for part in brick::components(open) {
         components += 1;
         single += u64::from(part.is_power_of_two());
     }

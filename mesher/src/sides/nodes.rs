@@ -70,18 +70,6 @@ pub fn open_bricks<'a>(
     })
 }
 
-/// The components inside a brick: the parts of `open` that are connected over faces.
-#[inline]
-pub fn parts(mut open: u64) -> impl Iterator<Item = u64> {
-    std::iter::from_fn(move || {
-        (open != 0).then(|| {
-            let part = brick::flood(open & open.wrapping_neg(), open);
-            open &= !part;
-            part
-        })
-    })
-}
-
 /// A node's children.
 #[derive(Clone, Copy)]
 pub struct Family {
@@ -134,7 +122,7 @@ impl Nodes {
                 out.places.push(ownership.placement(l, b.key));
             }
             out.components.push(self.masks.len() as Component);
-            self.masks.extend(parts(b.open));
+            self.masks.extend(brick::components(b.open));
         }
         out.components
             .push(Component::try_from(self.masks.len()).expect("fewer than 2^32 components"));
