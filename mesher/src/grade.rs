@@ -15,24 +15,22 @@
 //! # Whole groups as sources
 //! Let D be the surface level. For `l <= D` the sources are whole groups of eight siblings, although
 //! some siblings are split or deleted. The reach of a group in parents is the reach of its parent with
-//! half the radius, rounded up: an eighth of the work. The extra sources add no split. To see this, let
-//! S be a sibling of level `l` that is not a kept leaf, and Q an unsplit kept octant that S reaches. We
-//! show that a kept leaf of level `l` reaches Q as well, or that an earlier step has split Q. Two facts
-//! are used:
+//! half the radius, rounded up: an eighth of the work. The extra sources add no split. Proof: let
+//! S be a sibling of level `l` that is not a kept leaf, and Q an unsplit kept octant that S reaches. Then a
+//! kept leaf of level `l` reaches Q as well, or an earlier step has split Q. Two facts are used:
 //! - A crossing leaf of the base tree is kept, and its level is D or deeper. So are its descendants,
 //!   and `D >= l`.
 //! - Base leaves that share part of a face and do not cross belong to one component, so either all
 //!   of them are kept or none is.
 //!
 //! *Layer*: Q is of level `l - 1`, and the box of S, enlarged, meets Q in a set with interior. Choose a
-//! generic point s in S and a generic point y in Q and in this set, so that the segment from s to y
-//! lies in the box of s enlarged by the same distance, and passes from leaf to leaf through faces
-//! only. Consider the last part of the segment that is kept. It begins either in a leaf below S, or,
+//! generic point y in Q whose Chebyshev distance from a generic point s in S is less than the width by
+//! which the box is enlarged, so that the segment from s to y passes from leaf to leaf through faces only. Consider the last part of the segment that is kept. It begins either in a leaf below S, or,
 //! by the second fact, in a crossing leaf; in both cases in a leaf of level `l` or deeper. It ends in
 //! Q, which lies in a leaf of level `l - 1` or shallower. Earlier steps have balanced all leaves
 //! deeper than `l`: none of them touches an unsplit kept octant of level `l - 1`. Hence the segment
-//! passes through a kept leaf of level `l` itself. This leaf is no farther from y than s is, and
-//! reaches Q.
+//! passes through a kept leaf of level `l` itself. A point of the segment in this leaf is no farther from y
+//! than s is, so the leaf reaches Q.
 //!
 //! *Balance*: Q is of level `l - 2`, and S touches it at a point p. If a kept leaf of a level deeper than
 //! `l` touches Q at p, an earlier step has split an octant in Q and therefore Q. Otherwise the leaf at p
@@ -45,7 +43,7 @@
 //! part of the segment may then begin in a crossing leaf coarser than `l`: a whole group would act
 //! through a deleted body. Hence only leaves are sources there.
 
-use crate::brick::Brick;
+use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::comm::Comm;
 use crate::dilate::{Reach, Tile, Words};
@@ -191,10 +189,27 @@ impl Gradation<'_> {
                 let leaves = kept_leaves(&g.split, l, g.kept, g.ownership);
                 return reach.dilate_children(leaves, radius);
             }
-            let parents = g.split[l as usize - 1].bricks();
-            let owned = parents.filter(|b| g.ownership.owns(l - 1, b.key));
-            reach.dilate(owned, radius.div_ceil(2));
+            let exhausted = g.groups_without_kept_leaf(l);
+            let mut exhausted = exhausted.cursor();
+            let groups = (g.split[l as usize - 1].bricks())
+                .filter(|b| g.ownership.owns(l - 1, b.key))
+                .map(|b| Brick { bits: b.bits & !exhausted.get(b.key), ..b })
+                .filter(|b| b.bits != 0);
+            reach.dilate(groups, radius.div_ceil(2));
         })
+    }
+
+    /// Parents, of level `l - 1`, whose children are all split or deleted. As sources they would add no
+    /// split, but messages. Those that this rank cannot see, because it does not hold the children, may be
+    /// missing.
+    fn groups_without_kept_leaf(&self, l: Level) -> BrickSet {
+        let mut deleted = self.kept.deleted(l).cursor();
+        let mut set = BrickSet::default();
+        for b in self.split[l as usize].bricks() {
+            let full = !brick::parents(!(b.bits | deleted.get(b.key)));
+            set.push(b.key >> 3, u64::from(full) << (8 * (b.key & 7)));
+        }
+        set
     }
 
     /// The octants of level `l` that `dilate` reaches; counts the work.
