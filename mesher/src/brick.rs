@@ -7,7 +7,7 @@
 //!   of the octant of level `l - 1` with code `key << 3 | j`;
 //! - levels 0 and 1 have a single brick of key 0, of which 1 and 8 bits are in use.
 
-use crate::octant::Level;
+use crate::octant::{self, Level};
 use bytemuck::{Pod, Zeroable};
 
 /// A brick's key and its 64 bits.
@@ -48,6 +48,12 @@ pub const fn valid(l: Level) -> u64 {
         1 => 0xff,
         _ => u64::MAX,
     }
+}
+
+/// Minimum corner of a brick of level `l`, in lattice units.
+#[inline]
+pub fn min_corner(l: Level, key: u64) -> [i64; 3] {
+    if l < 2 { [0; 3] } else { octant::corner(l - 2, key) }
 }
 
 /// One bit per byte of `bits` that is not zero: the parents of the octants in the brick.

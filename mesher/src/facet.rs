@@ -1,17 +1,27 @@
-//! Which octants of a brick a facet crosses: one exact test for all 64.
+//! Facet-octant intersection: one exact test for the 64 octants of a brick.
 //!
-//! Closed octant and closed triangle are disjoint exactly when they are separated along one of 13
-//! axes: the three coordinate axes, the facet's normal, and the nine products of a coordinate axis
-//! with an edge of the facet (the separating axis theorem; Akenine-Moller, "Fast 3D triangle-box
-//! overlap testing", 2001). Every axis gives a 64-bit mask of the octants that it does not separate,
-//! and the masks are and-ed. The nine products are the edges of the facet's three projections, so
-//! each depends on two coordinates only.
+//! A closed octant and a closed triangle are disjoint if and only if one of 13 axes separates them: the
+//! three coordinate axes, the facet's normal, and the nine cross products of a coordinate axis with
+//! an edge of the facet (separating axis theorem; Akenine-Moller, "Fast 3D triangle-box overlap
+//! testing", 2001). Each axis gives a 64-bit mask of the octants that it does not separate from the
+//! facet; the result is the intersection of the masks. A cross product with coordinate axis `a` is a
+//! normal, within the projection along `a`, of an edge of the projected facet. So its test depends
+//! on two coordinates only, and is the sign of an edge function at a corner of a square.
 //!
-//! Exactness: vertices are lattice points in [-2^27, 2^28], relative to the brick's corner below
-//! 2^29 in magnitude. An edge function is a product of two such numbers, a sum of two: below 2^60.
-//! The normal's components are below 2^59; its product with a vertex takes i128. Octant corners are
-//! `h` times small integers and `h` is a power of two, so `h * m + c >= 0` holds exactly when
-//! `m + floor(c / h) >= 0`: constants are shifted down first, and all lanes stay in i64.
+//! # Exactness
+//! All arithmetic is on integers and none overflows. Let `h` be the octants' edge.
+//! - *Range.* The coordinates of vertices are lattice points in [-2^27, 2^28]. The brick's corner lies in
+//!   [0, 2^27], so relative to it they are in [-2^28, 2^28], and differences of two vertices are below
+//!   2^29 in magnitude. So are the coordinates, relative to a vertex, of the corner of a square at which an
+//!   edge function is evaluated.
+//! - *Edge functions.* `eu * qw - ew * qu` is a difference of two products of numbers below 2^29: below
+//!   2^59 in magnitude, which fits i64.
+//! - *Plane.* The components of the normal are differences of two such products, too, so their sum is
+//!   below 2^61. The scalar product of the normal with a vertex needs i128.
+//! - *Scaling.* Octant corners are `h` times small integers (i, j, k), so each test has the form
+//!   `h * m + c >= 0` with integers `m` and `c`. As `m` is an integer, this is equivalent to
+//!   `m + floor(c / h) >= 0`. Since `h` is a power of two, the floor is an arithmetic shift. Constants are
+//!   therefore shifted first, and the lanes evaluate `m + floor(c / h)` in i64 for all octants.
 
 use crate::brick::{X, Y, Z, valid};
 use crate::lattice::ExtentBox;

@@ -1,27 +1,47 @@
 //! Gradation: layers and 2:1 balance in one sweep from the deepest level up (the paper's section
 //! II.C, "bottom up").
 //!
-//! For each level: the kept leaves are frozen as sources; their extent boxes, enlarged by
-//! `layer_cells_min - 1` cells, are one [dilation](crate::dilate); the parents of what they reach are
-//! split where that is in the kept region; and the same again with one cell and one level coarser,
-//! for balance. An octant that splits needs split ancestors; they are added when the sweep comes to
-//! their level, which is before anything reads that level.
+//! At each level `l` the kept leaves are final and serve as sources. Their extent boxes, enlarged by
+//! `layer_cells_min - 1` cells of level `l`, are one [dilation](crate::dilate). The parents of the
+//! octants that it reaches are split where they are kept: this makes the layer. The same with one cell
+//! of level `l` and grandparents instead of parents makes the balance. An octant that is split needs
+//! split ancestors. They are added when the sweep comes to their level, before anything reads it.
 //!
-//! # Whole groups
-//! Most sources are whole groups of eight siblings, and a group's reach in parents is the parent's,
-//! dilated by half the radius rounded up: an eighth of the work. It is exact even where some of the siblings
-//! are split, as long as nothing below the parent is deleted and the level is not deeper than the
-//! surface's:
-//! - *Balance.* Say a split sibling touches an unsplit kept octant Q two levels up. The leaf below it that
-//!   touches Q is kept and finer than the sibling, so an earlier step has split Q: nothing is added.
-//! - *Layer.* Say a split sibling's enlarged box meets an unsplit kept octant at a point y. Go straight
-//!   from the sibling to y, and look at the last stretch in the kept region. It starts in a leaf
-//!   finer than this level: below the sibling, or in a crossing leaf, as only those part deleted from kept.
-//!   It ends in one coarser. Kept leaves that touch differ by one level down to here, so the stretch
-//!   passes a leaf of this very level, a source, which is nearer to y than the sibling: nothing is added.
+//! Invariants of the result ([`check_invariants`]):
+//! - it contains all splits of the base tree, and the parent of every split octant is split;
+//! - no deleted leaf is split;
+//! - kept leaves that share a face, an edge or a corner differ by at most one level.
 //!
-//! The others, *impure* parents, above which something was deleted, and levels of boxes finer than
-//! the surface, where a box may look through a deleted body, go leaf by leaf.
+//! # Whole groups as sources
+//! Let D be the surface level. For `l <= D` the sources are whole groups of eight siblings, although
+//! some siblings are split or deleted. The reach of a group in parents is the reach of its parent with
+//! half the radius, rounded up: an eighth of the work. The extra sources add no split. Proof: let
+//! S be a sibling of level `l` that is not a kept leaf, and Q an unsplit kept octant that S reaches. Then a
+//! kept leaf of level `l` reaches Q as well, or an earlier step has split Q. Two facts are used:
+//! - A crossing leaf of the base tree is kept, and its level is D or deeper. So are its descendants,
+//!   and `D >= l`.
+//! - Base leaves that share part of a face and do not cross belong to one component, so either all
+//!   of them are kept or none is.
+//!
+//! *Layer*: Q is of level `l - 1`, and the box of S, enlarged, meets Q in a set with interior. Choose a
+//! generic point y in Q whose Chebyshev distance from a generic point s in S is less than the width by
+//! which the box is enlarged, so that the segment from s to y passes from leaf to leaf through faces only. Consider the last part of the segment that is kept. It begins either in a leaf below S, or,
+//! by the second fact, in a crossing leaf; in both cases in a leaf of level `l` or deeper. It ends in
+//! Q, which lies in a leaf of level `l - 1` or shallower. Earlier steps have balanced all leaves
+//! deeper than `l`: none of them touches an unsplit kept octant of level `l - 1`. Hence the segment
+//! passes through a kept leaf of level `l` itself. A point of the segment in this leaf is no farther from y
+//! than s is, so the leaf reaches Q.
+//!
+//! *Balance*: Q is of level `l - 2`, and S touches it at a point p. If a kept leaf of a level deeper than
+//! `l` touches Q at p, an earlier step has split an octant in Q and therefore Q. Otherwise the leaf at p
+//! in S is deleted, whereas Q is kept. The base leaves that contain p are connected through faces
+//! around p. As they are not all of one side, one of them crosses. A kept leaf of level `l` or deeper
+//! in that one contains p: if it is deeper, Q has been split, as above; if not, it is a source of level
+//! `l` that touches Q.
+//!
+//! For `l > D`, in extent boxes finer than the surface, the first fact gives only `D < l`. The last kept
+//! part of the segment may then begin in a crossing leaf coarser than `l`: a whole group would act
+//! through a deleted body. Hence only leaves are sources there.
 
 use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
@@ -30,23 +50,23 @@ use crate::dilate::{Reach, Tile, Words};
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::octant::Level;
-use crate::partition::ownership::Ownership;
-use crate::tree::{PerLevel, Tree};
+use crate::partition::ownership::{Ownership, Placement};
+use crate::tree::{PerLevel, Tree, assert_none, check_split};
 
-/// What was done; repeats exactly.
+/// The work done on this rank; repeats exactly.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Work {
     /// Words of the dilated tiles.
     pub words_dilated: Words,
-    /// Octants split by gradation, in bricks that this rank answers for.
+    /// Octants split by gradation, in bricks that this rank owns.
     pub octants_split: u64,
     /// Bricks sent to other ranks.
     pub bricks_sent: u64,
 }
 
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
-/// at most one level. Makes the base tree's `split` sets the graded tree's; `crossing` are the base tree's.
-/// Collective.
+/// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
+/// `crossing` are the base tree's crossing leaves. Collective.
 pub fn grade(
     split: PerLevel,
     crossing: &PerLevel,
@@ -56,21 +76,13 @@ pub fn grade(
     comm: &dyn Comm,
 ) -> (PerLevel, Work) {
     let surface = rules.level_surface;
-    let mut g = Gradation {
-        split,
-        impure: BrickSet::default(),
-        crossing,
-        kept,
-        surface,
-        ownership,
-        comm,
-        tile: Tile::default(),
-        work: Work::default(),
-    };
+    let tile = Tile::default();
+    let work = Work::default();
+    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, tile, work };
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
     }
-    // What balance reaches two levels up goes to its holders together with what is closed there.
+    // Grandparents reached for balance are redistributed together with the parents of the next level.
     let mut touched = BrickSet::default();
     for l in (1..=rules.level_deepest()).rev() {
         g.close(l, touched);
@@ -83,65 +95,124 @@ pub fn grade(
     (g.split, g.work)
 }
 
+/// Checks the invariants of a graded tree on the bricks that this rank holds; `base` are the splits of
+/// the base tree. Balance is checked for the leaves that this rank owns against all octants that it
+/// holds. Checks leaf by leaf, and so does not rely on the argument about whole groups.
+///
+/// # Panics
+/// If an invariant is violated; the message names it, the level and an octant.
+pub fn check_invariants(graded: &PerLevel, base: &PerLevel, kept: &Kept, ownership: &Ownership) {
+    check_split(graded);
+    for (l, split) in (0..).zip(graded) {
+        let (mut cursor, mut deleted) = (split.cursor(), kept.deleted(l).cursor());
+        for b in base[l as usize].bricks() {
+            assert_none(l, b.key, b.bits & !cursor.get(b.key), "is split in T0, but not graded");
+        }
+        for b in split.bricks() {
+            assert_none(l, b.key, b.bits & deleted.get(b.key), "is deleted and split");
+        }
+    }
+    for l in 2..graded.len() as Level {
+        if let Some(b) = unbalanced(graded, l, kept, ownership).bricks().next() {
+            assert_none(l - 2, b.key, b.bits, "is not split, but touches a leaf two levels deeper");
+        }
+    }
+}
+
+/// The kept octants of level `l - 2` that are not split, although a kept leaf of level `l` touches
+/// them over a face, an edge or a corner.
+fn unbalanced(split: &PerLevel, l: Level, kept: &Kept, ownership: &Ownership) -> BrickSet {
+    let mut tile = Tile::default();
+    let mut reach = Reach::new(l - 1, &mut tile);
+    reach.dilate_children(kept_leaves(split, l, kept, ownership), 1);
+    let touched = reach.finish().0.coarsen().without(&split[l as usize - 2]);
+    let mut wrong = kept.only(split, l - 2, touched);
+    let is_remote = |key| matches!(ownership.placement(l - 2, key), Placement::Remote(_));
+    wrong.retain(|b| if is_remote(b.key) { 0 } else { b.bits });
+    wrong
+}
+
+/// The kept leaves of level `l` in bricks that this rank owns.
+fn kept_leaves<'a>(
+    split: &'a PerLevel,
+    l: Level,
+    kept: &Kept<'a>,
+    ownership: &'a Ownership,
+) -> impl Iterator<Item = Brick> + 'a {
+    let (mut splits, mut deleted) = (split[l as usize].cursor(), kept.deleted(l).cursor());
+    Tree::exists(split, l)
+        .filter(move |b| ownership.owns(l, b.key))
+        .map(move |b| Brick { bits: b.bits & !splits.get(b.key) & !deleted.get(b.key), ..b })
+        .filter(|b| b.bits != 0)
+}
+
 struct Gradation<'a> {
     split: PerLevel,
-    /// Octants, of the level above the sweep's, below which something was deleted.
-    impure: BrickSet,
     crossing: &'a PerLevel,
     kept: &'a Kept<'a>,
     surface: Level,
     ownership: &'a Ownership,
     comm: &'a dyn Comm,
-    /// Empty; scratch.
+    /// Scratch; empty between dilations.
     tile: Tile,
     work: Work,
 }
 
 impl Gradation<'_> {
-    /// Splits the parents of what is split at level `l`, marks those that are impure, and splits what was `touched` of
-    /// their level where it is kept. Collective: a rank's own brick may have its parents in one of several ranks.
+    /// Splits the parents of the split octants of level `l`, and those of the octants `touched`, of
+    /// level `l - 1`, that are kept. Collective: another rank may own the parent of an octant.
     fn close(&mut self, l: Level, touched: BrickSet) {
-        let impure = std::mem::take(&mut self.impure).union(self.kept.deleted(l).clone());
-        let [above, impure] = [&self.split[l as usize], &impure].map(|set| self.parents(l, set));
-        let fresh = above.without(&self.split[l as usize - 1]);
-        let ([fresh, impure, touched], sent) =
-            self.ownership.redistribute(l - 1, [fresh, impure, touched], self.comm);
+        let fresh = self.parents_of_split(l).without(&self.split[l as usize - 1]);
+        let ([fresh, touched], sent) =
+            self.ownership.redistribute(l - 1, [fresh, touched], self.comm);
         self.work.bricks_sent += sent;
-        self.impure = impure;
         self.split_more(l - 1, fresh);
         self.split_kept(l - 1, touched);
     }
 
-    /// The parents of octants of level `l` in bricks that this rank answers for: of several equal copies one tells.
-    fn parents(&self, l: Level, set: &BrickSet) -> BrickSet {
+    /// The parents of the split octants of level `l` in bricks that this rank owns.
+    fn parents_of_split(&self, l: Level) -> BrickSet {
+        let split = &self.split[l as usize];
         if !self.ownership.is_replicated(l) {
-            return set.coarsen();
+            return split.coarsen();
         }
-        let mut mine = set.clone();
-        mine.retain(|b| if self.ownership.owns(l, b.key) { b.bits } else { 0 });
-        mine.coarsen()
+        let mut owned = split.clone();
+        owned.retain(|b| if self.ownership.owns(l, b.key) { b.bits } else { 0 });
+        owned.coarsen()
     }
 
-    /// The parents, of level `l - 1`, that the kept leaves of level `l` in bricks that this rank answers
-    /// for reach within `radius` cells.
+    /// The octants of level `l - 1` that the kept leaves of level `l` in bricks that this rank owns
+    /// reach within `radius` cells.
     fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
         self.reached(l - 1, |g, reach| {
             if l > g.surface {
-                return reach.dilate_children(g.leaves(l, |_| u64::MAX), radius);
+                let leaves = kept_leaves(&g.split, l, g.kept, g.ownership);
+                return reach.dilate_children(leaves, radius);
             }
-            let mut impure = g.impure.cursor();
-            let pure = (g.split[l as usize - 1].bricks())
+            let exhausted = g.groups_without_kept_leaf(l);
+            let mut exhausted = exhausted.cursor();
+            let groups = (g.split[l as usize - 1].bricks())
                 .filter(|b| g.ownership.owns(l - 1, b.key))
-                .map(|b| Brick { key: b.key, bits: b.bits & !impure.get(b.key) })
+                .map(|b| Brick { bits: b.bits & !exhausted.get(b.key), ..b })
                 .filter(|b| b.bits != 0);
-            reach.dilate(pure, radius.div_ceil(2));
-            let mut impure = g.impure.cursor();
-            let within = |key| brick::children(brick::byte(impure.get(key >> 3), key & 7));
-            reach.dilate_children(g.leaves(l, within), radius);
+            reach.dilate(groups, radius.div_ceil(2));
         })
     }
 
-    /// What `dilate` reaches of a level; counts the work.
+    /// Parents, of level `l - 1`, whose children are all split or deleted. As sources they would add no
+    /// split, but messages. Those that this rank cannot see, because it does not hold the children, may be
+    /// missing.
+    fn groups_without_kept_leaf(&self, l: Level) -> BrickSet {
+        let mut deleted = self.kept.deleted(l).cursor();
+        let mut set = BrickSet::default();
+        for b in self.split[l as usize].bricks() {
+            let full = !brick::parents(!(b.bits | deleted.get(b.key)));
+            set.push(b.key >> 3, u64::from(full) << (8 * (b.key & 7)));
+        }
+        set
+    }
+
+    /// The octants of level `l` that `dilate` reaches; counts the work.
     fn reached(&mut self, l: Level, dilate: impl FnOnce(&Self, &mut Reach)) -> BrickSet {
         let mut tile = std::mem::take(&mut self.tile);
         let mut reach = Reach::new(l, &mut tile);
@@ -152,36 +223,21 @@ impl Gradation<'_> {
         reached
     }
 
-    /// Kept leaves of level `l` in bricks that this rank answers for, as far as `within` lets them through.
-    fn leaves(&self, l: Level, mut within: impl FnMut(u64) -> u64) -> impl Iterator<Item = Brick> {
-        let mut split = self.split[l as usize].cursor();
-        let mut deleted = self.kept.deleted(l).cursor();
-        Tree::exists(&self.split, l)
-            .filter(move |b| self.ownership.owns(l, b.key))
-            .map(move |b| Brick { key: b.key, bits: b.bits & within(b.key) })
-            .filter(|b| b.bits != 0)
-            .map(move |b| Brick {
-                key: b.key,
-                bits: b.bits & !split.get(b.key) & !deleted.get(b.key),
-            })
-            .filter(|b| b.bits != 0)
-    }
-
-    /// The paper's exchange of extent boxes: what was reached goes to whoever holds it, and is split
-    /// there where it is kept. Collective.
+    /// The paper's exchange of extent boxes: sends the octants that were reached to the ranks that hold
+    /// them, which split those that are kept. Collective.
     fn split_where_kept(&mut self, l: Level, reached: BrickSet) {
         let ([reached], sent) = self.ownership.redistribute(l, [reached], self.comm);
         self.work.bricks_sent += sent;
         self.split_kept(l, reached);
     }
 
-    /// Splits what is kept of some octants in bricks that this rank holds.
+    /// Splits those of the octants that are kept, in bricks that this rank holds.
     fn split_kept(&mut self, l: Level, reached: BrickSet) {
         let fresh = reached.without(&self.split[l as usize]);
         self.split_more(l, self.kept.only(&self.split, l, fresh));
     }
 
-    /// Splits octants, not split yet, in bricks that this rank holds.
+    /// Splits octants that are not split yet, in bricks that this rank holds.
     fn split_more(&mut self, l: Level, fresh: BrickSet) {
         self.work.octants_split += (fresh.bricks())
             .filter(|b| self.ownership.owns(l, b.key))
@@ -191,8 +247,8 @@ impl Gradation<'_> {
         self.split[l as usize] = before.union(fresh);
     }
 
-    /// The layer of finest cells that a mesh without crossing leaves starts from: kept regions of the
-    /// surface level's size that touch a crossing leaf. Collective.
+    /// The layer of finest cells that a mesh without crossing leaves starts from: kept octants of the
+    /// surface level that touch a crossing leaf. Collective.
     fn extra_layer(&mut self) {
         let surface = self.surface;
         if surface == 0 {
@@ -208,5 +264,54 @@ impl Gradation<'_> {
             }
             self.split_where_kept(surface - 1, touched);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::Solo;
+    use crate::tree::per_level;
+    use crate::tree::tests::{rules, set, small};
+
+    fn graded() -> (Tree, PerLevel) {
+        let (tree, nothing) = (small(), per_level());
+        let (solo, kept) = (Ownership::solo(), Kept::new(&nothing));
+        let split = grade(tree.split.clone(), &tree.crossing, &kept, &rules(), &solo, &Solo).0;
+        check_invariants(&split, &tree.split, &kept, &solo);
+        (tree, split)
+    }
+
+    fn check(tree: &Tree, split: &PerLevel, deleted: &PerLevel) {
+        check_invariants(split, &tree.split, &Kept::new(deleted), &Ownership::solo());
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.0 of level 2 is split in T0, but not graded")]
+    fn a_split_of_the_base_tree_that_gradation_lost_is_found() {
+        let (tree, mut split) = graded();
+        split[2] = BrickSet::EMPTY;
+        check(&tree, &split, &per_level());
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.7 of level 2 is deleted and split")]
+    fn a_deleted_leaf_that_is_split_is_found() {
+        let (tree, mut split) = graded();
+        split[2] = set(&[0, 7]);
+        let mut deleted = per_level();
+        deleted[2] = set(&[7]);
+        check(&tree, &split, &deleted);
+    }
+
+    /// The leaves below octant 0.0.7, of level 4, touch octant 0.7 at its corner only.
+    #[test]
+    #[should_panic(expected = "octant 0.7 of level 2 is not split, but touches a leaf two levels")]
+    fn an_imbalance_over_a_corner_is_found() {
+        let (tree, mut split) = graded();
+        split[1] = set(&[0, 1, 2, 3, 4, 5, 6, 7]);
+        split[2] = set(&[0, 1, 2, 3, 4, 5, 6]);
+        split[3] = set(&[7]);
+        check(&tree, &split, &per_level());
     }
 }

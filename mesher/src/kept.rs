@@ -1,25 +1,25 @@
-//! The kept region: what is wanted of the base tree; the rest is deleted before gradation.
+//! The kept region: the part of the base tree that the mesh consists of. The rest is deleted before
+//! gradation.
 //!
-//! Invariants: `deleted[l]` holds leaves of the base tree, none of them crossing; empty at all levels
-//! if everything is kept.
+//! Invariant: `deleted[l]` holds leaves of the base tree, none of them crossing. If everything is
+//! kept, it is empty at all levels.
 
-use crate::brick::{self, Brick};
+use crate::brick;
 use crate::brickset::BrickSet;
 use crate::octant::Level;
 use crate::tree::{PerLevel, Tree};
 
-/// The kept region of a base tree, by what was deleted.
+/// The kept region of a base tree, stored as its complement.
 #[derive(Clone, Copy, Debug)]
 pub struct Kept<'a> {
     deleted: &'a PerLevel,
-    any: bool,
+    is_partial: bool,
 }
 
 impl<'a> Kept<'a> {
-    /// The region that is left when these leaves are deleted.
+    /// The region that remains when these leaves are deleted.
     pub fn new(deleted: &'a PerLevel) -> Self {
-        let any = deleted.iter().any(|s| !s.is_empty());
-        Self { deleted, any }
+        Self { deleted, is_partial: deleted.iter().any(|s| !s.is_empty()) }
     }
 
     /// The deleted leaves of level `l`.
@@ -29,12 +29,13 @@ impl<'a> Kept<'a> {
 
     /// The octants of `set`, of level `l`, that lie in a kept leaf of the base tree or are split in it.
     ///
-    /// An octant whose parent is split in the base tree is one of its octants, and is looked up. The
-    /// others are kept where their parents are: so the question goes up, level by level, for ever
-    /// fewer octants, and each level's sets are read once in order. `split` may be the graded tree's as
-    /// well as the base tree's: what gradation has split lies in a kept leaf, so all below it is kept.
+    /// An octant whose parent is split in the base tree is an octant of that tree and is looked up.
+    /// Any other octant is kept if its parent is. So the question passes to coarser levels, for ever
+    /// fewer octants, and reads each level's sets once in order. `split` may be the graded tree's as
+    /// well as the base tree's: an octant that gradation has split lies in a kept leaf, so all its
+    /// descendants are kept.
     pub fn only(&self, split: &PerLevel, l: Level, mut set: BrickSet) -> BrickSet {
-        if !self.any || set.is_empty() {
+        if !self.is_partial || set.is_empty() {
             return set;
         }
         let mut deleted = self.deleted[l as usize].cursor();
@@ -46,26 +47,33 @@ impl<'a> Kept<'a> {
         let parents = self.only(split, l - 1, parents);
         let (mut below_leaf, mut split) = (parents.cursor(), split[l as usize - 1].cursor());
         set.retain(|b| {
-            let of = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
-            let here = of(split.get(b.key >> 3)) & !deleted.get(b.key);
-            b.bits & (here | of(below_leaf.get(b.key >> 3)))
+            let children = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
+            let in_tree = children(split.get(b.key >> 3)) & !deleted.get(b.key);
+            b.bits & (in_tree | children(below_leaf.get(b.key >> 3)))
         });
         set
     }
 
-    /// Debug check that deleted leaves are leaves of the base tree.
+    /// Checks the invariant on the bricks that this rank holds.
+    ///
+    /// # Panics
+    /// If an octant that is not a non-crossing leaf of `base` is deleted.
     pub fn check_invariants(&self, base: &Tree) {
-        for l in 0..self.deleted.len() {
-            self.deleted[l].check_invariants();
-            let mut split = base.split[l].cursor();
-            let mut crossing = base.crossing[l].cursor();
-            for Brick { key, bits } in self.deleted[l].bricks() {
-                assert_eq!(
-                    bits & (split.get(key) | crossing.get(key)),
-                    0,
-                    "level {l}: only leaves off the surface are deleted"
-                );
-            }
-        }
+        base.check_open_leaves(self.deleted, "is deleted, but no leaf off the surface");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tree::per_level;
+    use crate::tree::tests::{set, small};
+
+    #[test]
+    #[should_panic(expected = "octant 0.0 of level 2 is deleted, but no leaf off the surface")]
+    fn a_deleted_octant_that_is_split_is_found() {
+        let mut deleted = per_level();
+        deleted[2] = set(&[0, 1]);
+        Kept::new(&deleted).check_invariants(&small());
     }
 }

@@ -1,21 +1,26 @@
-//! The base tree T0 as levels of brick sets.
+//! The base tree T0, stored as one brick set per level.
 //!
-//! Invariants (with `exists(l)` the children of `split[l - 1]`, the root alone for `l = 0`):
-//! - `split[l]` is within `exists(l)`: whatever is split has a split parent;
-//! - `crossing[l]` is within `exists(l)` and has nothing of `split[l]`: it holds leaves;
-//! - nothing is split at the deepest level.
+//! Invariants (with `exists(l)` the children of `split[l - 1]`, and the root alone for `l = 0`):
+//! - `split[l]` is a subset of `exists(l)`: every octant that exists has a split parent;
+//! - `crossing[l]` is a subset of `exists(l)` without `split[l]`: only leaves are marked;
+//! - no leaf is shallower than its rule: crossing leaves are at the surface level or deeper, and the
+//!   leaves whose interior meets an extent box are at the box's level or deeper;
+//! - nothing is split at the deepest level that the rules ask for, or below it.
 //!
-//! On several ranks each holds its own bricks and a copy of those above the base tree; then the
-//! first two hold for bricks whose parent brick is here.
+//! On several ranks, each rank stores the bricks that it holds. A rank that holds a brick holds all
+//! its ancestors, so [`Tree::check_invariants`] needs no communication.
 
-use crate::brick::Brick;
-use crate::brickset::BrickSet;
-use crate::octant::{LEVEL_MAX, Level};
+use crate::brick::{self, Brick};
+use crate::brickset::{BrickSet, ones};
+use crate::facet::box_mask;
+use crate::lattice::Rules;
+use crate::octant::{LEVEL_MAX, Level, path};
+use crate::partition::ownership::{Ownership, Placement};
 
-/// Number of levels that sets are kept for: voxelisation looks one level below the deepest leaf.
+/// Number of levels that sets are stored for: voxelisation looks one level below the deepest leaf.
 pub const LEVELS: usize = LEVEL_MAX as usize + 2;
 
-/// A set for each level.
+/// One set for each level.
 pub type PerLevel = Vec<BrickSet>;
 
 /// Empty sets for all levels.
@@ -23,7 +28,7 @@ pub fn per_level() -> PerLevel {
     vec![BrickSet::default(); LEVELS]
 }
 
-/// An oct-tree whose crossing leaves are marked. Leaves of level `l` are the children of
+/// An oct-tree whose crossing leaves are marked. The leaves of level `l` are the children of
 /// `split[l - 1]` that are not in `split[l]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tree {
@@ -48,32 +53,185 @@ impl Tree {
         root.into_iter().chain(above.child_bricks())
     }
 
-    /// The deepest level at which something is split, plus one; 0 for a lone root.
+    /// The deepest level at which an octant is split, plus one; 0 for a root that is a leaf.
     pub fn depth(&self) -> Level {
         (0..LEVELS).rev().find(|&l| !self.split[l].is_empty()).map_or(0, |l| l as Level + 1)
     }
 
-    /// Checks the invariants of a whole tree (on one rank).
-    pub fn check_invariants(&self) {
-        for l in 0..LEVELS {
-            self.split[l].check_invariants();
-            self.crossing[l].check_invariants();
-            let mut split = self.split[l].cursor();
-            let mut crossing = self.crossing[l].cursor();
-            let (mut splits, mut crossings) = (0, 0);
-            for b in Self::exists(&self.split, l as Level) {
-                let (s, c) = (split.get(b.key), crossing.get(b.key));
-                assert_eq!(s & !b.bits, 0, "level {l}: split octants must exist");
-                assert_eq!(c & (!b.bits | s), 0, "level {l}: crossing octants must be leaves");
-                splits += u64::from(s.count_ones());
-                crossings += u64::from(c.count_ones());
+    /// Checks all invariants on the bricks that this rank holds. Replicas must be synchronised.
+    ///
+    /// # Panics
+    /// If an invariant is violated; the message names it, the level and an octant.
+    pub fn check_invariants(&self, rules: &Rules, ownership: &Ownership) {
+        self.check_structure();
+        for l in 0..LEVELS as Level {
+            let held = |key| !matches!(ownership.placement(l, key), Placement::Remote(_));
+            if l < rules.level_surface {
+                for b in self.crossing[l as usize].bricks() {
+                    assert_none(l, b.key, b.bits, "is a crossing leaf above the surface level");
+                }
             }
-            assert_eq!(splits, self.split[l].count(), "level {l}: a split octant has no parent");
-            assert_eq!(
-                crossings,
-                self.crossing[l].count(),
-                "level {l}: a crossing leaf has no parent"
-            );
+            if l >= rules.level_deepest() {
+                for b in self.split[l as usize].bricks() {
+                    assert_none(l, b.key, b.bits, "is split, though no rule asks for its children");
+                }
+            }
+            let finer = || rules.boxes.iter().filter(|b| b.level > l);
+            let mut split = self.split[l as usize].cursor();
+            for b in Self::exists(&self.split, l).filter(|b| finer().count() > 0 && held(b.key)) {
+                let corner = brick::min_corner(l, b.key);
+                let asked = finer().fold(0, |mask, extent| mask | box_mask(extent, corner, l));
+                let wrong = b.bits & asked & !split.get(b.key);
+                assert_none(l, b.key, wrong, "is a leaf coarser than an extent box that it meets");
+            }
         }
+    }
+
+    /// Checks the invariants that no rule enters into: the first two.
+    ///
+    /// # Panics
+    /// As [`check_invariants`](Self::check_invariants).
+    pub fn check_structure(&self) {
+        check_split(&self.split);
+        self.check_leaves(&self.crossing, "is crossing, but no leaf");
+    }
+
+    /// Checks that some sets hold leaves of this tree that do not cross.
+    ///
+    /// # Panics
+    /// If an octant of `sets` is no such leaf; `violation` completes the sentence that names it.
+    pub fn check_open_leaves(&self, sets: &PerLevel, violation: &str) {
+        self.check_leaves(sets, violation);
+        for (l, (set, crossing)) in (0..).zip(sets.iter().zip(&self.crossing)) {
+            let mut crossing = crossing.cursor();
+            for b in set.bricks() {
+                assert_none(l, b.key, b.bits & crossing.get(b.key), violation);
+            }
+        }
+    }
+
+    fn check_leaves(&self, sets: &PerLevel, violation: &str) {
+        check_existing(&self.split, sets, violation);
+        for (l, (set, split)) in (0..).zip(sets.iter().zip(&self.split)) {
+            let mut split = split.cursor();
+            for b in set.bricks() {
+                assert_none(l, b.key, b.bits & split.get(b.key), violation);
+            }
+        }
+    }
+}
+
+/// Checks that `split` are the split octants of a tree: the parent of each is split, too.
+///
+/// # Panics
+/// If one is not.
+pub fn check_split(split: &PerLevel) {
+    check_existing(split, split, "is split, but its parent is not");
+}
+
+/// Checks the sets themselves, and that all their octants have split parents.
+fn check_existing(split: &PerLevel, sets: &PerLevel, violation: &str) {
+    assert_eq!((split.len(), sets.len()), (LEVELS, LEVELS), "one set for each level");
+    for (l, set) in (0..).zip(sets) {
+        set.check_invariants();
+        let mut above = split[(l as usize).saturating_sub(1)].cursor();
+        for b in set.bricks() {
+            let exists = match l {
+                0 => u64::from(b.key == 0),
+                _ => brick::children(brick::byte(above.get(b.key >> 3), b.key & 7)),
+            };
+            assert_none(l, b.key, b.bits & !exists, violation);
+        }
+    }
+}
+
+/// Panics if a brick has an octant that violates an invariant, with the octant's level and path.
+#[track_caller]
+pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
+    if let Some(bit) = ones(wrong).next() {
+        panic!("octant {} of level {l} {violation}", path(l, key << 6 | u64::from(bit)));
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::lattice::{ExtentBox, Keep, Root};
+
+    /// Some octants of one level.
+    pub fn set(codes: &[u64]) -> BrickSet {
+        let brick = |c: &u64| Brick { key: c >> 6, bits: 1 << (c & 63) };
+        BrickSet::from_unsorted(codes.iter().map(brick).collect())
+    }
+
+    /// Rules with surface level 3 that keep everything.
+    pub fn rules() -> Rules {
+        Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface: 3,
+            layer_cells_min: 1,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: vec![],
+        }
+    }
+
+    /// A tree of level 3 around a facet at the root's minimum corner.
+    pub fn small() -> Tree {
+        let mut tree = Tree::default();
+        for l in 0..3 {
+            tree.split[l] = set(&[0]);
+        }
+        tree.crossing[3] = set(&[0, 1]);
+        tree.check_invariants(&rules(), &Ownership::solo());
+        tree
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 1.0 of level 2 is split, but its parent is not")]
+    fn a_split_octant_without_a_split_parent_is_found() {
+        let mut tree = small();
+        tree.split[2] = set(&[0, 0o10]);
+        tree.check_structure();
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.0 of level 2 is crossing, but no leaf")]
+    fn a_crossing_octant_that_is_split_is_found() {
+        let mut tree = small();
+        tree.crossing[2] = set(&[0]);
+        tree.check_structure();
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.1 of level 2 is a crossing leaf above the surface level")]
+    fn a_shallow_crossing_leaf_is_found() {
+        let mut tree = small();
+        tree.crossing[2] = set(&[1]);
+        tree.check_invariants(&rules(), &Ownership::solo());
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 7 of level 1 is a leaf coarser than an extent box")]
+    fn a_leaf_that_is_too_coarse_for_its_box_is_found() {
+        let far = crate::octant::ROOT_EDGE;
+        let extent = ExtentBox { min: [far - 5; 3], max: [far; 3], level: 2 };
+        small().check_invariants(&Rules { boxes: vec![extent], ..rules() }, &Ownership::solo());
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.0.0 of level 3 is split, though no rule")]
+    fn a_split_below_the_deepest_level_is_found() {
+        let mut tree = small();
+        (tree.split[3], tree.crossing[3]) = (set(&[0]), set(&[1]));
+        tree.check_invariants(&rules(), &Ownership::solo());
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.0.1 of level 3 is deleted")]
+    fn a_deleted_leaf_that_crosses_is_found() {
+        let mut deleted = per_level();
+        deleted[3] = set(&[1, 2]);
+        small().check_open_leaves(&deleted, "is deleted");
     }
 }

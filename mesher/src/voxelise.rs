@@ -229,7 +229,7 @@ impl Voxeliser<'_> {
     /// Decides the octants of level `l` in a brick, and of `l - 1` above them; goes on below.
     fn brick(&mut self, l: Level, key: u64, load: Load, boxes: &[ExtentBox], allowed: u64) {
         self.work.bricks_voxelised += 1;
-        let at = if l < 2 { [0; 3] } else { corner(l - 2, key) };
+        let at = brick::min_corner(l, key);
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
         let crossing = (self.test(&load, l, at)

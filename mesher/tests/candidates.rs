@@ -25,7 +25,7 @@ fn by_mesher(case: &Small) -> Firsts {
         .expect("near the root");
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     let (tree, _) = refine(&Filed::new(&facets), &depth, &[Start { level: 0, code: 0 }]);
-    tree.check_invariants();
+    tree.check_structure();
     let share = Ownership::solo();
     let nodes = Nodes::new(&tree, &share);
     let mut local = components::join(&nodes, &share);

@@ -3,10 +3,12 @@
 
 mod support;
 
+use mesher::case::BoxSpec;
 use mesher::lattice::{Keep, Root};
+use mesher::octant::position;
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
-use support::{Run, Small, config, division, leaky_on_rays, run, small, soup, thin};
+use support::{Run, Small, config, cuboid, division, leaky_on_rays, run, small, soup, thin};
 
 proptest! {
     #![proptest_config(config(300))]
@@ -60,5 +62,34 @@ fn a_facet_beside_the_root() {
         assert_eq!(case.reference(true), [0], "the reference's root is a leaf");
         assert_eq!(case.solo(true), [0]);
         assert_eq!(case.ranks(3, 1, division(Partitioner::Metis, None), true), [0]);
+    }
+}
+
+/// A plate across the root, three cells thick, of which the middle one is deleted. The extent box covers
+/// one side of the plate with cells a quarter as large. Its layer ends before the other side, but twice
+/// its layer would not: a sibling group of cells half as large must not act through the plate.
+#[test]
+fn a_layer_of_fine_cells_does_not_reach_through_a_deleted_plate() {
+    for axis in 0..3 {
+        let slab = |first: f64, last: f64| {
+            let (mut lo, mut hi) = ([-8.0; 3], [72.0; 3]);
+            (lo[axis], hi[axis]) = (first, last);
+            (lo, hi)
+        };
+        let (lo, hi) = slab(44.0, 60.0);
+        let (min, max) = slab(0.0, 40.0);
+        let case = Small {
+            facets: cuboid(lo.map(|c| c as f32), hi.map(|c| c as f32)),
+            root: Root { origin: [0.0; 3], edge: 64.0 },
+            spacing_min: 8.0,
+            layer_cells_min: 4,
+            keep: Keep::Outside,
+            keep_crossing: true,
+            boxes: vec![BoxSpec { min, max, spacing: 2.0 }],
+        };
+        let words = case.solo(false);
+        assert_eq!(words, case.reference(false));
+        let far = words.iter().filter(|w| position(*w >> 7)[axis] >= 7 << 16);
+        assert!(far.clone().count() > 0 && far.clone().all(|w| w >> 2 & 31 == 3), "axis {axis}");
     }
 }

@@ -289,7 +289,7 @@ mod tests {
                 tree.split[l] = tree.split[l].coarsen();
             }
         }
-        tree.check_invariants();
+        tree.check_structure();
         let mut some = Scale::new(&Ownership::solo(), LEVEL);
         let mut all = Scale::new(&Ownership::solo(), LEVEL);
         for l in 1..tree.split.len() as Level {

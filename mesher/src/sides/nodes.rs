@@ -293,7 +293,7 @@ mod tests {
             asked in prop::collection::vec((2..=DEEPEST, any::<prop::sample::Index>(), 0u64..80, any::<u64>()), 1..40),
         ) {
             let tree = tree(&deepest);
-            tree.check_invariants();
+            tree.check_structure();
             let nodes = Nodes::new(&tree, &Ownership::solo());
             let mut finder = nodes.finder();
             for (l, near, beside, bits) in asked {
