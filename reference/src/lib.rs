@@ -5,7 +5,7 @@
 //! [`crossing`]). A flood fill and rays determine which leaves are inside ([`sides`], [`ray`]).
 //! Leaves outside the kept region are deleted. For each level from the finest to the coarsest,
 //! every cell refines two enlarged extent boxes, one for its layer and one for balance
-//! ([`gradation`]). The remaining leaves are written as leaf words ([`leaves`], [`write`]). Nothing
+//! ([`gradation`]). The remaining leaves are written as leaf words ([`leaves`], [`mod@write`]). Nothing
 //! here is fast: each step is the shortest implementation of the corresponding section of
 //! `DEFINITION.md`.
 #![deny(missing_docs)]
