@@ -11,8 +11,8 @@ export PATH CARGO_TERM_COLOR="${CARGO_TERM_COLOR:-never}"
 # 64 ranks on 2 cores does.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 
-# say MESSAGE...: prints the current step and the seconds since the start, so that a log shows the time of each step.
-say() { printf '[%4ds] %s: %s\n' "$SECONDS" "$(basename "$0")" "$*"; }
+# log MESSAGE...: prints the current step and the seconds since the start, so that a log shows the time of each step.
+log() { printf '[%4ds] %s: %s\n' "$SECONDS" "$(basename "$0")" "$*"; }
 
 # fail CODE MESSAGE...: prints one sentence and exits with CODE: 2 for invalid input, 3 if something is missing.
 fail() {

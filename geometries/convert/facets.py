@@ -1,6 +1,6 @@
-"""Facets out of the formats that `fetch` meets, and binary STL out of facets. Standard library only.
+"""Readers of the formats of the fetched geometries, and a writer of binary STL, with the standard library only.
 
-A facet is three vertices of three numbers. Polygons become fans around their first corner.
+A facet is a tuple of three vertices of three numbers. Polygons are triangulated as fans around their first corner.
 """
 
 import math
@@ -13,14 +13,14 @@ def fan(corners):
 
 
 def stl_text(data):
-    """ASCII STL, any number of solids, one after the other."""
+    """The facets of ASCII STL with any number of solids."""
     lines = (line.split() for line in data.decode().splitlines())
     vertices = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["vertex"]]
     return list(zip(vertices[0::3], vertices[1::3], vertices[2::3]))
 
 
 def off(data):
-    """Object File Format: counts, vertices, polygons by index."""
+    """The facets of an Object File Format file: counts, vertices, polygons by vertex index."""
     words = iter(data.decode().split())
     assert next(words) == "OFF"
     vertices, polygons, _ = (int(next(words)) for _ in range(3))
@@ -33,7 +33,7 @@ def off(data):
 
 
 def obj(data):
-    """Wavefront: `v` and `f` lines, indices from 1."""
+    """The facets of a Wavefront file: `v` and `f` lines, indices from 1."""
     points, facets = [], []
     for line in data.decode().splitlines():
         words = line.split()
@@ -45,7 +45,10 @@ def obj(data):
 
 
 def ac3d(data):
-    """AC3D: a tree of objects, each moved by its ancestors; y is up there, z is up here."""
+    """The facets of an AC3D file, a tree of objects that inherit the transformations of their ancestors.
+
+    The y axis, which points up in AC3D, is mapped to the z axis.
+    """
     lines = iter(data.decode(errors="replace").splitlines())
     assert next(lines).startswith("AC3D")
     facets = []
@@ -58,25 +61,25 @@ def ac3d(data):
 IDENTITY = ((1, 0, 0, 0, 1, 0, 0, 0, 1), (0, 0, 0))
 
 
-def ac3d_object(lines, above, facets):
-    """Reads one object after its OBJECT line, `kids` and all, and adds its facets."""
-    rotation, place, points = IDENTITY[0], IDENTITY[1], []
+def ac3d_object(lines, parent, facets):
+    """Read an object and its children, after its OBJECT line, and append its facets. `parent` is a frame."""
+    rotation, location, points = IDENTITY[0], IDENTITY[1], []
     for line in lines:
         key, _, rest = line.partition(" ")
         if key == "rot":
             rotation = tuple(map(float, rest.split()))
         elif key == "loc":
-            place = tuple(map(float, rest.split()))
+            location = tuple(map(float, rest.split()))
         elif key == "data":
             next(lines)
         elif key == "numvert":
-            frame = within(above, rotation, place)
-            points = [moved(frame, map(float, next(lines).split()[:3])) for _ in range(int(rest))]
+            frame = composed(parent, rotation, location)
+            points = [transformed(frame, map(float, next(lines).split()[:3])) for _ in range(int(rest))]
         elif key == "numsurf":
             for _ in range(int(rest)):
                 facets += ac3d_surface(lines, points)
         elif key == "kids":
-            frame = within(above, rotation, place)
+            frame = composed(parent, rotation, location)
             for _ in range(int(rest)):
                 assert next(lines).startswith("OBJECT")
                 ac3d_object(lines, frame, facets)
@@ -84,7 +87,7 @@ def ac3d_object(lines, above, facets):
 
 
 def ac3d_surface(lines, points):
-    """One polygon, or nothing if it is a line."""
+    """The facets of one surface: those of a polygon, none for a line."""
     kind = 0
     for line in lines:
         key, _, rest = line.partition(" ")
@@ -96,17 +99,17 @@ def ac3d_surface(lines, points):
     raise ValueError("the file ends within a surface")
 
 
-def moved(frame, point):
-    """A point of an object's own frame, as the world sees it. Vectors are rows, as in the format."""
-    rotation, place = frame
+def transformed(frame, point):
+    """A point in the frame of an object, transformed to world coordinates. Vectors are rows, as in the format."""
+    rotation, location = frame
     x, y, z = point
-    return tuple(x * rotation[a] + y * rotation[3 + a] + z * rotation[6 + a] + place[a] for a in range(3))
+    return tuple(x * rotation[a] + y * rotation[3 + a] + z * rotation[6 + a] + location[a] for a in range(3))
 
 
-def within(above, rotation, place):
-    """The frame of an object that is turned and placed within another's."""
-    turned = [moved((above[0], (0, 0, 0)), rotation[3 * row : 3 * row + 3]) for row in range(3)]
-    return tuple(x for row in turned for x in row), moved(above, place)
+def composed(parent, rotation, location):
+    """The frame of an object with this rotation and location in the frame of its parent."""
+    rows = [transformed((parent[0], (0, 0, 0)), rotation[3 * row : 3 * row + 3]) for row in range(3)]
+    return tuple(x for row in rows for x in row), transformed(parent, location)
 
 
 def single(x):
@@ -115,7 +118,7 @@ def single(x):
 
 
 def normal(p, q, r):
-    """The unit normal by the right-hand rule; zero where there is no area."""
+    """The unit normal by the right-hand rule; zero for a facet without area."""
     u = [q[a] - p[a] for a in range(3)]
     v = [r[a] - p[a] for a in range(3)]
     n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
@@ -124,7 +127,7 @@ def normal(p, q, r):
 
 
 def stl_binary(facets):
-    """Binary STL with normals computed from the f32 vertices, and an empty header."""
+    """Binary STL with a header of zeros and normals computed from the vertices in f32."""
     records = []
     for facet in facets:
         facet = [tuple(map(single, vertex)) for vertex in facet]

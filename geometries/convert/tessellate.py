@@ -1,6 +1,6 @@
-"""Tessellate a boundary representation: `tessellate.py BODY.brep BODY.stl`, within `fetch`'s environment.
+"""Tessellate a boundary representation: `tessellate.py BODY.brep BODY.stl`, in the environment that `fetch` makes.
 
-The tolerances are those that made the pinned file: 0.003 along, 0.2 rad in angle.
+The tolerances, a deflection of 0.003 and an angle of 0.2 rad, are those of the file with the pinned checksum.
 """
 
 import sys
@@ -23,6 +23,7 @@ LINEAR, ANGULAR = 0.003, 0.2
 
 
 def faces(shape):
+    """The faces of a shape."""
     explorer = TopExp_Explorer(shape, TopAbs_FACE)
     while explorer.More():
         yield TopoDS.Face(explorer.Current())
@@ -30,7 +31,7 @@ def faces(shape):
 
 
 def facets_of(face):
-    """One face's triangles, turned outward where the face is reversed."""
+    """The triangles of a face, wound outward even if the face is reversed."""
     location = TopLoc_Location()
     mesh = BRep_Tool.Triangulation_s(face, location)
     move = location.Transformation()
@@ -46,7 +47,7 @@ def main():
     source, target = sys.argv[1:]
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, source, BRep_Builder()):
-        sys.exit(f"{source}: not a boundary representation")
+        sys.exit(f"{source} is not a boundary representation: give a .brep file")
     BRepMesh_IncrementalMesh(shape, LINEAR, False, ANGULAR, False)
     soup = [facet for face in faces(shape) for facet in facets_of(face)]
     Path(target).write_bytes(facets.stl_binary(soup))

@@ -1,4 +1,4 @@
-"""Tests of the readers: python3 -m unittest discover -s geometries/convert"""
+"""Tests of the readers and the writer. Run with: python3 -m unittest discover -s geometries/convert"""
 
 import struct
 import unittest
@@ -53,24 +53,24 @@ kids 0
 
 
 class Readers(unittest.TestCase):
-    def test_ac3d_moves_children_with_their_parents_and_turns_z_up(self):
-        # The inner object's points move by 1 along x, turn x to y, then move by 10 along x; y up is z up.
-        turned = ((10, 0, 2), (9, 0, 1), (10, -1, 1))
+    def test_ac3d_objects_inherit_transformations_and_z_points_up(self):
+        # The points of the inner object are translated by 1 along x, rotated from x to y, and translated by 10 along x.
+        rotated = ((10, 0, 2), (9, 0, 1), (10, -1, 1))
         flat = [((0, 0, 0), (1, 0, 0), (1, 0, 2)), ((0, 0, 0), (1, 0, 2), (0, 0, 2))]
-        self.assertEqual(facets.ac3d(AC3D), [turned, *flat])
+        self.assertEqual(facets.ac3d(AC3D), [rotated, *flat])
 
-    def test_off_and_obj_make_fans_of_polygons(self):
+    def test_off_and_obj_polygons_are_triangulated_as_fans(self):
         off = b"OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"
         obj = b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng x\nf 1/1 2/1 3/1 4/1\n"
         square = [((0, 0, 0), (1, 0, 0), (1, 1, 0)), ((0, 0, 0), (1, 1, 0), (0, 1, 0))]
         self.assertEqual(facets.off(off), square)
         self.assertEqual(facets.obj(obj), square)
 
-    def test_ascii_solids_come_one_after_the_other(self):
+    def test_ascii_stl_may_contain_several_solids(self):
         solid = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
         self.assertEqual(facets.stl_text(solid * 2), [((0, 0, 0), (1, 0, 0), (0, 1, 0))] * 2)
 
-    def test_binary_stl_has_a_normal_where_there_is_area(self):
+    def test_binary_stl_has_unit_normals_or_zero_for_facets_without_area(self):
         data = facets.stl_binary([((0, 0, 0), (2, 0, 0), (0, 2, 0)), ((1, 1, 1),) * 3])
         self.assertEqual(len(data), 84 + 2 * 50)
         self.assertEqual(struct.unpack_from("<I3f", data, 80), (2, 0, 0, 1))

@@ -1,4 +1,5 @@
-//! The `[generator]` table of a case file: a shape, a number of facets, and the dimensions of the shape.
+//! The `[generator]` table of a case file: a shape, a number of facets, and the dimensions of the
+//! shape.
 //!
 //! A dimension that the shape does not have is an error, as an unknown key is.
 
@@ -46,8 +47,8 @@ impl fmt::Display for Shape {
     }
 }
 
-/// The contents of a `[generator]` table. Dimensions that are not given take the defaults of the shape. All
-/// lengths are in the user's unit.
+/// The contents of a `[generator]` table. Dimensions that are not given take the defaults of the
+/// shape. All lengths are in the user's unit.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Generator {
@@ -61,8 +62,8 @@ pub struct Generator {
     /// `cube`: the edge, default 1.
     #[serde(default)]
     pub edge: Option<f64>,
-    /// `sphere`, and the outer sphere of `nested_spheres`: default 0.5. `torus`: of the centre line, default
-    /// 0.5. `pipe`: of the bore, default 0.1.
+    /// `sphere`, and the outer sphere of `nested_spheres`: default 0.5. `torus`: of the centre
+    /// line, default 0.5. `pipe`: of the bore, default 0.1.
     #[serde(default)]
     pub radius: Option<f64>,
     /// `nested_spheres`: of the inner sphere, default half of `radius`.
@@ -77,8 +78,8 @@ pub struct Generator {
     /// `pipe`: angle of the bend in degrees, at most 180, default 90.
     #[serde(default)]
     pub angle: Option<f64>,
-    /// `plate`: along x, default 1. `pipe`: of each straight section, default 5 times `radius`. `uav` and
-    /// `fighter`: the longest edge of the bounding box, default 1.
+    /// `plate`: along x, default 1. `pipe`: of each straight section, default 5 times `radius`.
+    /// `uav` and `fighter`: the longest edge of the bounding box, default 1.
     #[serde(default)]
     pub length: Option<f64>,
     /// `plate`: along y, default 0.5.
@@ -94,7 +95,7 @@ pub struct Generator {
 pub enum GeneratorError {
     /// The shape does not have this dimension.
     #[error("the shape {shape} has no dimension `{key}`; it has {known}")]
-    SizeForeign {
+    UnknownDimension {
         /// The shape.
         shape: Shape,
         /// The key of the dimension.
@@ -103,18 +104,19 @@ pub enum GeneratorError {
         known: String,
     },
     /// A dimension is zero, negative, not finite, or contradicts another.
-    #[error("[generator] {key} = {value}: {want}")]
-    SizeWrong {
+    #[error("[generator] {key} = {value}: {requirement}")]
+    InvalidDimension {
         /// The key of the dimension.
         key: &'static str,
         /// Its value.
         value: f64,
         /// The condition that it must satisfy.
-        want: String,
+        requirement: String,
     },
-    /// The number of facets is less than the minimum of the shape, or exceeds the range of vertex indices.
+    /// The number of facets is less than the minimum of the shape, or exceeds the range of vertex
+    /// indices.
     #[error("[generator] facets = {facets}: {shape} needs at least {least} and at most {most}")]
-    FacetsWrong {
+    InvalidFacets {
         /// The shape.
         shape: Shape,
         /// The requested number.
@@ -129,8 +131,8 @@ pub enum GeneratorError {
     Unrepresentable(String),
 }
 
-/// Maximum number of facets. Vertex indices are 32 bits wide, and a closed surface has about half as many
-/// vertices as facets.
+/// Maximum number of facets. Vertex indices are 32 bits wide, and a closed surface has about half
+/// as many vertices as facets.
 const FACETS_MOST: usize = 1 << 31;
 
 impl Generator {
@@ -169,7 +171,7 @@ impl Generator {
         let least = shapes::facets_least(self.shape);
         if self.facets < least || self.facets > FACETS_MOST {
             let (shape, facets, most) = (self.shape, self.facets, FACETS_MOST);
-            return Err(GeneratorError::FacetsWrong { shape, facets, least, most });
+            return Err(GeneratorError::InvalidFacets { shape, facets, least, most });
         }
         let mut mesh = shapes::draw(self)?;
         mesh.translate(self.centre.unwrap_or([0.0; 3]));
@@ -181,7 +183,7 @@ impl Generator {
     }
 
     /// A dimension of the table or its default, checked to be positive and finite.
-    pub(crate) fn size(
+    pub(crate) fn dimension(
         &self,
         key: &'static str,
         given: Option<f64>,
@@ -191,11 +193,15 @@ impl Generator {
         if value.is_finite() && value > 0.0 {
             return Ok(value);
         }
-        Err(GeneratorError::SizeWrong { key, value, want: "must be positive and finite".into() })
+        Err(GeneratorError::InvalidDimension {
+            key,
+            value,
+            requirement: "must be positive and finite".into(),
+        })
     }
 
     /// The keys of the dimensions that the table gives.
-    fn sizes_given(&self) -> impl Iterator<Item = &'static str> {
+    fn dimensions_given(&self) -> impl Iterator<Item = &'static str> {
         [
             ("edge", self.edge),
             ("radius", self.radius),
@@ -212,17 +218,17 @@ impl Generator {
     }
 
     fn check_keys(&self) -> Result<(), GeneratorError> {
-        let known = shapes::sizes(self.shape);
-        if let Some(key) = self.sizes_given().find(|key| !known.contains(key)) {
+        let known = shapes::dimensions(self.shape);
+        if let Some(key) = self.dimensions_given().find(|key| !known.contains(key)) {
             let known = known.join(", ");
-            return Err(GeneratorError::SizeForeign { shape: self.shape, key, known });
+            return Err(GeneratorError::UnknownDimension { shape: self.shape, key, known });
         }
         match self.centre.iter().flatten().find(|x| !x.is_finite()) {
             None => Ok(()),
-            Some(&value) => Err(GeneratorError::SizeWrong {
+            Some(&value) => Err(GeneratorError::InvalidDimension {
                 key: "centre",
                 value,
-                want: "must be finite".into(),
+                requirement: "must be finite".into(),
             }),
         }
     }

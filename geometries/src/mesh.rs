@@ -1,12 +1,12 @@
 //! A closed triangulated surface with indexed vertices.
 //!
 //! Invariants of a finished mesh, executed by [`Mesh::fault`]:
-//! - every edge belongs to exactly two facets, which traverse it in opposite directions (the surface is
-//!   watertight and consistently wound);
+//! - every edge belongs to exactly two facets, which traverse it in opposite directions (the surface
+//!   is watertight and consistently wound);
 //! - every facet has a positive area after its vertices are rounded to f32.
 //!
-//! Positions are f64 until [`Mesh::facets`] rounds each vertex to f32, so all facets at a vertex get the same
-//! bits.
+//! Positions are f64 until [`Mesh::facets`] rounds each vertex to f32, so all facets at a vertex
+//! get the same bits.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -106,9 +106,9 @@ impl Mesh {
         six_fold / 6.0
     }
 
-    /// Splits the longest edges at their midpoints until the mesh has `facets` facets, one less if that number
-    /// is odd. Each split adds two facets. One pass splits a facet at most once, and each pass selects the
-    /// longest edges of the mesh that the previous pass produced.
+    /// Splits the longest edges at their midpoints until the mesh has `facets` facets, one less if
+    /// that number is odd. Each split adds two facets. One pass splits a facet at most once, and
+    /// each pass selects the longest edges of the mesh that the previous pass produced.
     pub(crate) fn split_edges_until(&mut self, facets: usize) {
         while self.triangles.len() + 1 < facets {
             let wanted = (facets - self.triangles.len()) / 2;

@@ -12,7 +12,7 @@ mod torus;
 mod uav;
 
 /// The keys of the dimensions of a shape.
-pub(crate) fn sizes(shape: Shape) -> &'static [&'static str] {
+pub(crate) fn dimensions(shape: Shape) -> &'static [&'static str] {
     match shape {
         Shape::Cube => &["edge"],
         Shape::Sphere => &["radius"],
@@ -36,7 +36,8 @@ pub(crate) fn facets_least(shape: Shape) -> usize {
     }
 }
 
-/// Draws the shape about its own origin with at most the requested number of facets, and not many fewer.
+/// Draws the shape about its own origin with at most the requested number of facets, and not many
+/// fewer.
 pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
     match of.shape {
         Shape::Cube => slab::cube(of),
@@ -50,8 +51,8 @@ pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
     }
 }
 
-/// The least pitch, at most `longest`, for which `count` does not exceed `facets`. `count` is a step function
-/// that does not increase with the pitch, so bisection finds the step.
+/// The least pitch, at most `longest`, for which `count` does not exceed `facets`. `count` is a
+/// step function that does not increase with the pitch, so bisection finds the step.
 fn pitch_finest(longest: f64, facets: usize, count: impl Fn(f64) -> usize) -> f64 {
     let (mut fine, mut coarse) = (longest / (facets as f64 + 1.0), longest);
     for _ in 0..100 {

@@ -4,9 +4,9 @@ use std::io::{self, Write};
 
 use crate::Facet;
 
-/// Writes facets as little-endian binary STL, with normals by the right-hand rule (zero for a facet without
-/// area) and attribute bytes of zero. The header does not start with "solid", because some readers take such
-/// files for ASCII STL.
+/// Writes facets as little-endian binary STL, with normals by the right-hand rule (zero for a facet
+/// without area) and attribute bytes of zero. The header does not start with "solid", because some
+/// readers take such files for ASCII STL.
 ///
 /// # Errors
 /// Writing fails, or the number of facets exceeds 32 bits.

@@ -1,5 +1,5 @@
-//! Properties of every generated shape, tested on facets as an STL reader sees them: two vertices are the same
-//! only if their bits are equal.
+//! Properties of every generated shape, tested on facets as an STL reader sees them: two vertices
+//! are the same only if their bits are equal.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};

@@ -1,7 +1,7 @@
-"""Sides by open3d: parity of embree's hits along several rays, by majority.
+"""Sides by open3d: the majority of the parities of embree's hits along several rays.
 
-Known weaknesses: it computes in float32; it promises an answer for watertight bodies only; and casts a
-single ray unless told otherwise, hence an odd number of samples.
+Known weaknesses: it computes in float32, and its answer is defined for watertight bodies only. By default it casts
+a single ray; this oracle requests an odd number of rays.
 """
 
 import numpy as np

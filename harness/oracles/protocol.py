@@ -1,15 +1,15 @@
-"""The one protocol that every oracle here speaks.
+"""The protocol of all oracles.
 
     python <oracle>.py POINTS.npy BODY.stl SIDES.npy
 
-POINTS.npy holds float64 coordinates of shape (N, 3), BODY.stl is a binary STL file, and SIDES.npy
-receives N bytes: 1 where the oracle holds the point to be inside the body, 0 where outside. The oracle
-prints one line, its name and version. Exit codes: 0 done; 2 wrong arguments; 3 the oracle's package
-is missing; anything else is the oracle's own failure.
+POINTS.npy contains float64 coordinates of shape (N, 3), and BODY.stl is a binary STL file. The oracle writes N bytes
+to SIDES.npy, 1 for each point that it finds inside the body and 0 for each point outside, and prints its name and
+version on one line. Exit codes: 0 success; 2 invalid arguments; 3 the package of the oracle is missing; any other
+code is a failure of the oracle itself.
 
-An oracle is a function sides(points, facets) -> array of N bools. Points and facets come to it shifted
-so that the body's bounding box is centred on the origin: embree and open3d compute in float32, and a body
-far from the origin would lose to cancellation what the shift, made here in float64, keeps.
+An oracle is a function sides(points, facets) -> array of N bools. Points and facets are translated so that the
+bounding box of the body is centred on the origin. embree and open3d compute in float32, which would lose digits for a
+body far from the origin; the translation here is in float64.
 """
 
 import sys
@@ -26,12 +26,12 @@ def read_facets(path):
         count = int(np.fromfile(file, "<u4", 1)[0])
         facets = np.fromfile(file, STL_FACET, count)
     if len(facets) != count:
-        raise SystemExit(f"{path} holds {len(facets)} of the {count} facets that it announces")
+        raise SystemExit(f"{path} contains {len(facets)} of the {count} facets of its header")
     return facets["vertices"].astype(np.float64)
 
 
 def run(name, version, sides):
-    """Does what the module text says, with the given oracle; the whole of an oracle's main."""
+    """The main function of an oracle: runs the protocol with its function `sides`."""
     if len(sys.argv) != 4:
         print(f"usage: {sys.argv[0]} POINTS.npy BODY.stl SIDES.npy", file=sys.stderr)
         raise SystemExit(2)
@@ -46,6 +46,6 @@ def run(name, version, sides):
 
 
 def missing(error):
-    """Ends an oracle whose package cannot be imported, in one sentence."""
-    print(f"{error.name or error} cannot be imported: {error}", file=sys.stderr)
+    """Reports that the package of an oracle cannot be imported, and exits."""
+    print(f"{error.name or error} cannot be imported: {error}; ci/setup installs it", file=sys.stderr)
     raise SystemExit(3)

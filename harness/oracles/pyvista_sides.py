@@ -1,7 +1,7 @@
-"""Sides by VTK, through pyvista: random rays from each point until a vote is clear.
+"""Sides by VTK, through pyvista: random rays from each point until one side has a clear majority.
 
-Known weaknesses: hits nearer to each other than a tolerance count once, so that sheets closer than that
-are seen as one; it expects a closed surface.
+Known weaknesses: hits closer to each other than a tolerance count once, so two sheets closer than that appear as
+one. It expects a closed surface.
 """
 
 import numpy as np
@@ -12,16 +12,16 @@ try:
 except (ImportError, OSError) as error:
     protocol.missing(error)
 
-# As a share of the body's bounding box. VTK's own 0.001 merges the two sheets of a thin wing.
+# Relative to the size of the bounding box. VTK's default of 0.001 merges the two sheets of a thin wing.
 TOLERANCE = 1e-6
 
 
 def sides(points, facets):
-    # Vertices are merged where they are equal to the bit, which is all that VTK's cell locator wants.
+    # Merging bit-equal vertices suffices for VTK's cell locator.
     vertices, index = np.unique(facets.reshape(-1, 3), axis=0, return_inverse=True)
     faces = np.column_stack([np.full(len(facets), 3), index.reshape(-1, 3)])
     body = pyvista.PolyData(vertices, faces.ravel())
-    # The other method, signed distance, takes facets that are turned the wrong way for the inside.
+    # The other method, signed distance, gives wrong sides at facets that are wound inward.
     chosen = pyvista.PolyData(points).select_interior_points(
         body, method="cell_locator", check_surface=False, locator_tolerance=TOLERANCE
     )

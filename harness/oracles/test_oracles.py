@@ -1,4 +1,4 @@
-"""What each oracle must get right before it may vote. Run with: python -m unittest discover harness/oracles"""
+"""Bodies whose sides every oracle must find. Run with: python -m unittest discover harness/oracles"""
 
 import pathlib
 import subprocess
@@ -14,7 +14,7 @@ ORACLES = ["trimesh", "open3d", "pyvista"]
 
 
 def torus(rings=48, sides=24, large=1.0, small=0.3):
-    """A closed torus about the z axis: facets of shape (2 rings sides, 3, 3)."""
+    """A closed torus about the z axis: facets of shape (2 * rings * sides, 3, 3)."""
     u, v = np.meshgrid(np.arange(rings + 1) % rings, np.arange(sides + 1) % sides, indexing="ij")
     u, v = 2 * np.pi * u / rings, 2 * np.pi * v / sides
     reach = large + small * np.cos(v)
@@ -24,6 +24,7 @@ def torus(rings=48, sides=24, large=1.0, small=0.3):
 
 
 def write_stl(path, facets):
+    """Write binary STL with normals of zero."""
     records = np.zeros(len(facets), protocol.STL_FACET)
     records["vertices"] = facets
     with open(path, "wb") as file:
@@ -31,14 +32,14 @@ def write_stl(path, facets):
 
 
 def ask(oracle, points, facets):
-    """Runs the oracle as the harness does and returns its answer."""
-    with tempfile.TemporaryDirectory() as directory:
-        at = pathlib.Path(directory)
-        np.save(at / "points.npy", points)
-        write_stl(at / "body.stl", facets)
-        arguments = [at / "points.npy", at / "body.stl", at / "sides.npy"]
+    """Run the oracle as the harness does and return its answer."""
+    with tempfile.TemporaryDirectory() as name:
+        directory = pathlib.Path(name)
+        np.save(directory / "points.npy", points)
+        write_stl(directory / "body.stl", facets)
+        arguments = [directory / "points.npy", directory / "body.stl", directory / "sides.npy"]
         subprocess.run([sys.executable, HERE / f"{oracle}_sides.py", *arguments], check=True, capture_output=True)
-        return np.load(at / "sides.npy")
+        return np.load(directory / "sides.npy")
 
 
 class OracleTest(unittest.TestCase):
@@ -48,40 +49,41 @@ class OracleTest(unittest.TestCase):
                 yield oracle
 
     def points_and_truth(self):
+        """Random points away from the surface of the torus, and whether each is inside."""
         points = np.random.default_rng(7).uniform(-1.5, 1.5, (5000, 3))
         points[:, 2] /= 3
         tube = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 1.0, points[:, 2])
         clear = np.abs(tube - 0.3) > 0.02
         return points[clear], tube[clear] < 0.3
 
-    def test_torus(self):
+    def test_sides_of_a_torus(self):
         points, truth = self.points_and_truth()
         for oracle in self.each():
             answer = ask(oracle, points, torus())
             self.assertEqual(answer.dtype, np.uint8)
             self.assertTrue((answer == truth).all())
 
-    def test_facets_turned_at_random(self):
+    def test_sides_do_not_depend_on_orientation(self):
         points, truth = self.points_and_truth()
         facets = torus()
-        turned = np.random.default_rng(8).random(len(facets)) < 0.5
-        facets[turned] = facets[turned][:, ::-1]
+        flipped = np.random.default_rng(8).random(len(facets)) < 0.5
+        facets[flipped] = facets[flipped][:, ::-1]
         for oracle in self.each():
             self.assertTrue((ask(oracle, points, facets) == truth).all())
 
-    def test_far_from_the_origin(self):
+    def test_sides_of_a_body_far_from_the_origin(self):
         points, truth = self.points_and_truth()
-        away = np.array([4096.0, -8192.0, 1024.0])
-        facets = (torus() + away).astype(np.float32)
+        offset = np.array([4096.0, -8192.0, 1024.0])
+        facets = (torus() + offset).astype(np.float32)
         for oracle in self.each():
-            self.assertTrue((ask(oracle, points + away, facets) == truth).all())
+            self.assertTrue((ask(oracle, points + offset, facets) == truth).all())
 
-    def test_no_facets_and_no_points(self):
+    def test_facets_or_points_may_be_missing(self):
         for oracle in self.each():
             self.assertFalse(ask(oracle, np.ones((3, 3)), torus()[:0]).any())
             self.assertEqual(ask(oracle, np.ones((0, 3)), torus()).shape, (0,))
 
-    def test_short_file_is_refused(self):
+    def test_a_truncated_file_is_refused(self):
         with tempfile.TemporaryDirectory() as directory:
             path = pathlib.Path(directory) / "short.stl"
             write_stl(path, torus())

@@ -1,8 +1,8 @@
-"""Sides by trimesh: one ray along x and, where its two directions differ, others; cast by embree.
+"""Sides by trimesh: rays along x in both directions, and further rays if the two disagree, all cast by embree.
 
-Known weaknesses: a ray through an edge counts twice and through a vertex n times; embree computes in
-float32, and on hard bodies does not always repeat itself. Without embreex it would need minutes for what
-takes embree a second, so that counts as missing.
+Known weaknesses: a ray through an edge hits two facets, and a ray through a vertex hits all facets there. embree
+computes in float32, and its answers for difficult bodies are not always reproducible. Without embreex, trimesh takes
+minutes instead of a second, so a missing embreex is reported as a missing package.
 """
 
 import protocol
@@ -16,7 +16,7 @@ except ImportError as error:
 
 
 def sides(points, facets):
-    # Not merged and not repaired: the oracle is to see the soup that the mesher saw.
+    # Neither merged nor repaired: the oracle must see the same facets as the mesher.
     vertices = facets.reshape(-1, 3)
     faces = [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(len(facets))]
     body = trimesh.Trimesh(vertices, faces, process=False, validate=False)

@@ -32,8 +32,8 @@ pub struct Root {
 }
 
 impl Root {
-    /// The root centred on the bounding box of all vertices, with an edge of `scale` times the longest
-    /// edge of that box. `None` if there are no facets.
+    /// The root centred on the bounding box of all vertices, with an edge of `scale` times the
+    /// longest edge of that box. `None` if there are no facets.
     #[must_use]
     pub fn around(facets: &[[[f64; 3]; 3]], scale: f64) -> Option<Self> {
         let mut lo = facets.first()?[0];

@@ -1,13 +1,14 @@
 //! Exact test whether a closed facet and a closed box share a point.
 //!
-//! The facet is clipped to the x range of the box, and the result to the y range. The clipped facet is
-//! convex, so its z coordinates form one interval, which is compared with the z range of the box. A
-//! clipped facet is represented by points whose convex hull it is. Facets that degenerate to points or
-//! segments are convex hulls too and need no special case.
+//! The facet is clipped to the x range of the box, and the result to the y range. The clipped facet
+//! is convex, so its z coordinates form one interval, which is compared with the z range of the
+//! box. A clipped facet is represented by points whose convex hull it is. Facets that degenerate to
+//! points or segments are convex hulls too and need no special case.
 //!
-//! The coordinates of clipped points are fractions that fit i128. Facet coordinates are at most 2^28 in
-//! absolute value and box planes lie in [0, 2^27], so the distance of a point from a plane is at most
-//! 2^28, and a coordinate with denominator w has a numerator of at most 2^28 w. Upper bounds:
+//! The coordinates of clipped points are fractions that fit i128. Facet coordinates are at most
+//! 2^28 in absolute value and box planes lie in [0, 2^27], so the distance of a point from a plane
+//! is at most 2^28, and a coordinate with denominator w has a numerator of at most 2^28 w. Upper
+//! bounds:
 //!
 //! | | denominator | numerator | distance from a plane, times the denominator |
 //! |---|---|---|---|
@@ -48,18 +49,19 @@ pub fn crosses(facet: &Facet, extent: &Extent) -> bool {
         && clipped_xy.iter().any(|p| p.above(2, extent.max[2]) <= 0)
 }
 
-/// Whether the bounding box of the facet touches the box. For speed only: most octants that a facet is
-/// tested against are far away from it.
+/// Whether the bounding box of the facet touches the box. For speed only: most octants that a facet
+/// is tested against are far away from it.
 fn bounds_touch(facet: &Facet, extent: &Extent) -> bool {
     (0..3).all(|a| {
         facet.iter().any(|v| v[a] >= extent.min[a]) && facet.iter().any(|v| v[a] <= extent.max[a])
     })
 }
 
-/// Points whose convex hull is the hull of `points` clipped to the range of the extent along `axis`.
+/// Points whose convex hull is the hull of `points` clipped to the range of the extent along
+/// `axis`.
 ///
-/// A corner of the clipped hull is either a corner of the hull or the intersection of an edge of the hull
-/// with one of the two planes, and every edge of the hull joins two of `points`.
+/// A corner of the clipped hull is either a corner of the hull or the intersection of an edge of
+/// the hull with one of the two planes, and every edge of the hull joins two of `points`.
 fn clip(points: &[Point], axis: usize, extent: &Extent) -> Vec<Point> {
     let planes = [extent.min[axis], extent.max[axis]];
     let within = |p: &&Point| p.above(axis, planes[0]) >= 0 && p.above(axis, planes[1]) <= 0;

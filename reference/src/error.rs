@@ -1,5 +1,5 @@
-//! Errors of the user's input and output. Each message is one sentence: the problem, its location and a
-//! remedy.
+//! Errors of the user's input and output. Each message is one sentence: the problem, its location
+//! and a remedy.
 use crate::case::Root;
 use std::io;
 use std::path::PathBuf;

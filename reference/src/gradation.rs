@@ -1,10 +1,11 @@
-//! Gradation: for each level from the finest to the coarsest, a layer around every cell, then balance.
+//! Gradation: for each level from the finest to the coarsest, a layer around every cell, then
+//! balance.
 use crate::lattice::Input;
 use crate::octant::{Octant, Side};
 use crate::tree::Tree;
 
-/// Refines the kept leaves of `tree` until layers are at least `layer_cells_min` cells thick and the
-/// levels of touching leaves differ by at most one.
+/// Refines the kept leaves of `tree` until layers are at least `layer_cells_min` cells thick and
+/// the levels of touching leaves differ by at most one.
 pub fn grade(tree: &mut Tree, input: &Input) {
     if !input.keep_crossing && input.layer_cells_min < 3 {
         extra_layer(tree, input.level_surface);
@@ -16,8 +17,8 @@ pub fn grade(tree: &mut Tree, input: &Input) {
     }
 }
 
-/// Refines every kept leaf that touches a crossing leaf to the level of the surface. The crossing leaves
-/// will be deleted and no longer contribute to the thickness of the layer.
+/// Refines every kept leaf that touches a crossing leaf to the level of the surface. The crossing
+/// leaves will be deleted and no longer contribute to the thickness of the layer.
 fn extra_layer(tree: &mut Tree, level_surface: u32) {
     let leaves: Vec<_> = tree.kept_leaves().filter(|&(_, side)| side == Side::Crossing).collect();
     for (leaf, _) in leaves {
@@ -25,7 +26,8 @@ fn extra_layer(tree: &mut Tree, level_surface: u32) {
     }
 }
 
-/// Refines everything kept within `layer_cells_min` - 1 cells of a leaf of this level to this level.
+/// Refines everything kept within `layer_cells_min` - 1 cells of a leaf of this level to this
+/// level.
 fn layer(tree: &mut Tree, level: u32, layer_cells_min: u32) {
     for source in leaves_of_level(tree, level) {
         // Fewer than 2^32 cells of at most 2^27 units each fit i64.
@@ -41,8 +43,8 @@ fn balance(tree: &mut Tree, level: u32) {
     }
 }
 
-/// The kept leaves of a level at this moment. The caller refines while it iterates over them, and leaves
-/// made by that refinement must not become sources.
+/// The kept leaves of a level at this moment. The caller refines while it iterates over them, and
+/// leaves made by that refinement must not become sources.
 fn leaves_of_level(tree: &Tree, level: u32) -> Vec<Octant> {
     tree.kept_leaves().map(|(leaf, _)| leaf).filter(|leaf| leaf.level == level).collect()
 }

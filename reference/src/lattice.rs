@@ -36,9 +36,10 @@ impl Input {
     /// Validates a case and quantises it to the lattice.
     ///
     /// # Errors
-    /// An edge or a spacing is not finite and positive; the origin is not finite; a layer has no cells; a
-    /// spacing requires a level beyond 19; a box has a corner that is not finite, or min >= max along an
-    /// axis; a vertex is not finite or more than one root edge outside the root.
+    /// An edge or a spacing is not finite and positive; the origin is not finite; a layer has no
+    /// cells; a spacing requires a level beyond 19; along an axis, a box has a corner that is not
+    /// finite or a minimum that is not less than its maximum; a vertex is not finite or more than
+    /// one root edge outside the root.
     pub fn new(case: &Case) -> Result<Self, Error> {
         let root = case.root;
         if !root.origin.iter().all(|x| x.is_finite()) {

@@ -17,8 +17,8 @@ pub fn mix(word: u64) -> u128 {
     u128::from(high) << 64 | u128::from(low)
 }
 
-/// The digest of a set of leaves: a sum modulo 2^128, which depends neither on the order of the words nor
-/// on their partition.
+/// The digest of a set of leaves: a sum modulo 2^128, which depends neither on the order of the
+/// words nor on their partition.
 #[must_use]
 pub fn digest(words: &[u64]) -> u128 {
     words.iter().fold(0, |sum, &word| sum.wrapping_add(mix(word)))
@@ -33,7 +33,8 @@ pub struct Tally {
     pub leaves_by_side: [u64; 3],
     /// The digest of all leaves.
     pub digest: u128,
-    /// The digest of the leaves whose minimum corner lies in each octant of level 3, in Morton order.
+    /// The digest of the leaves whose minimum corner lies in each octant of level 3, in Morton
+    /// order.
     pub octant_digests: Vec<u128>,
 }
 

@@ -1,11 +1,13 @@
-//! The serial algorithm of O'Connell and Karman, implemented literally: the oracle of this workspace.
+//! The serial algorithm of O'Connell and Karman, implemented literally: the oracle of this
+//! workspace.
 //!
 //! The root is refined wherever a facet crosses it or an extent box requires it ([`tree`],
-//! [`crossing`]). A flood fill and rays determine which leaves are inside ([`sides`], [`ray`]). Leaves
-//! outside the kept region are deleted. For each level from the finest to the coarsest, every cell refines
-//! two enlarged extent boxes, one for its layer and one for balance ([`gradation`]). The remaining leaves
-//! are written as leaf words ([`leaves`], [`write`]). Nothing here is fast: each step is the shortest
-//! implementation of the corresponding section of `DEFINITION.md`.
+//! [`crossing`]). A flood fill and rays determine which leaves are inside ([`sides`], [`ray`]).
+//! Leaves outside the kept region are deleted. For each level from the finest to the coarsest,
+//! every cell refines two enlarged extent boxes, one for its layer and one for balance
+//! ([`gradation`]). The remaining leaves are written as leaf words ([`leaves`], [`mod@write`]). Nothing
+//! here is fast: each step is the shortest implementation of the corresponding section of
+//! `DEFINITION.md`.
 #![deny(missing_docs)]
 
 pub mod case;

@@ -38,8 +38,8 @@ impl Extent {
 
     /// The box enlarged by `margin` on every side.
     ///
-    /// Because corners are integers, a box with volume touches this one if and only if its interior meets
-    /// the interior of this one enlarged by 1.
+    /// Because corners are integers, a box with volume touches this one if and only if its interior
+    /// meets the interior of this one enlarged by 1.
     #[must_use]
     pub fn enlarged(&self, margin: i64) -> Extent {
         Extent { min: self.min.map(|x| x - margin), max: self.max.map(|x| x + margin) }
@@ -85,8 +85,8 @@ impl Octant {
         Octant { min, level: self.level + 1 }
     }
 
-    /// The Morton key: the interleaved coordinates of the minimum corner in level-19 cells, with x in the
-    /// lowest bit.
+    /// The Morton key: the interleaved coordinates of the minimum corner in level-19 cells, with x
+    /// in the lowest bit.
     #[must_use]
     pub fn key(&self) -> u64 {
         let mut key = 0;

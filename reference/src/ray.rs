@@ -1,15 +1,16 @@
 //! Exact parity of the number of facets that axis-parallel rays intersect.
 //!
-//! A ray along axis a is displaced by +eps along axis a+1 and +eps^2 along axis a+2 (modulo 3), for an
-//! infinitesimal eps > 0, so it never passes through an edge or a vertex. Nothing is rounded: the sign of
-//! a polynomial in eps is the sign of its first nonzero term.
+//! A ray along axis a is displaced by +eps along axis a+1 and +eps^2 along axis a+2 (modulo 3), for
+//! an infinitesimal eps > 0, so it never passes through an edge or a vertex. Nothing is rounded:
+//! the sign of a polynomial in eps is the sign of its first nonzero term.
 //!
-//! Coordinates are at most 2^28 and their differences less than 2^29 in absolute value. A product of two
-//! differences is below 2^58 and fits i64; a 3 x 3 determinant is below 6 * 2^87 and needs i128.
+//! Coordinates are at most 2^28 and their differences less than 2^29 in absolute value. A product
+//! of two differences is below 2^58 and fits i64; a 3 x 3 determinant is below 6 * 2^87 and needs
+//! i128.
 use crate::lattice::Facet;
 
-/// Whether the rays from `point` along `axis` intersect an odd number of facets: first the ray in the
-/// negative direction, then the one in the positive direction.
+/// Whether the rays from `point` along `axis` intersect an odd number of facets: first the ray in
+/// the negative direction, then the one in the positive direction.
 ///
 /// No facet may contain `point`. The centroids of leaves that no facet crosses satisfy this.
 #[must_use]
@@ -24,8 +25,8 @@ pub fn parities(facets: &[Facet], point: [i64; 3], axis: usize) -> [bool; 2] {
     odd
 }
 
-/// Whether the projection of the facet along `axis` contains the displaced point. A projection without
-/// area contains nothing.
+/// Whether the projection of the facet along `axis` contains the displaced point. A projection
+/// without area contains nothing.
 fn projection_contains(facet: &Facet, point: [i64; 3], axis: usize) -> bool {
     let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
     // For speed only: most facets are far from the ray.
@@ -56,8 +57,9 @@ fn edge_sign(p: &[i64; 3], q: &[i64; 3], point: [i64; 3], u: usize, v: usize) ->
 
 /// Whether the plane of the facet is above `point` along `axis`.
 ///
-/// The displacement has no effect here. If the plane contained the point itself, the point would lie on
-/// the facet: the facet is closed, and its projection contains points arbitrarily close to the point.
+/// The displacement has no effect here. If the plane contained the point itself, the point would
+/// lie on the facet: the facet is closed, and its projection contains points arbitrarily close to
+/// the point.
 fn is_above(facet: &Facet, point: [i64; 3], axis: usize) -> bool {
     let [a, _, _] = facet;
     let offset =

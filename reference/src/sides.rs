@@ -7,18 +7,19 @@ use crate::tree::{Index, Tree};
 /// Maximum number of leaves of a component whose rays are cast.
 const CANDIDATES_MAX: usize = 32;
 
-/// Summary of the components that a majority of rays decided, because no candidate's six rays agreed.
+/// Summary of the components that a majority of rays decided, because no candidate's six rays
+/// agreed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ambiguous {
     /// Number of such components.
     pub components: u64,
-    /// Centroid of the coarsest leaf of these components, the first by key among leaves of the same level,
-    /// in the user's unit.
+    /// Centroid of the coarsest leaf of these components, the first by key among leaves of the same
+    /// level, in the user's unit.
     pub example: [f64; 3],
 }
 
-/// Sets the side of every leaf that is not `Crossing` to the side of its component. Returns the ambiguous
-/// components, `None` if there are none.
+/// Sets the side of every leaf that is not `Crossing` to the side of its component. Returns the
+/// ambiguous components, `None` if there are none.
 pub fn assign(tree: &mut Tree, input: &Input) -> Option<Ambiguous> {
     let mut ambiguous: Vec<Octant> = Vec::new();
     for mut component in components(tree) {
@@ -67,8 +68,8 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
     components
 }
 
-/// The leaves that share part of a face with `leaf`: those that meet the faces of its cube thickened
-/// outwards by one lattice unit, which is less than the edge of any leaf.
+/// The leaves that share part of a face with `leaf`: those that meet the faces of its cube
+/// thickened outwards by one lattice unit, which is less than the edge of any leaf.
 fn face_neighbours(tree: &Tree, leaf: Index) -> Vec<Index> {
     let Extent { min, max } = tree.octant(leaf).extent();
     let mut neighbours = Vec::new();
@@ -89,8 +90,8 @@ struct Verdict {
     unanimous: bool,
 }
 
-/// The first candidate whose six rays agree decides. If there is none, the majority of all rays decides,
-/// and a tie means outside.
+/// The first candidate whose six rays agree decides. If there is none, the majority of all rays
+/// decides, and a tie means outside.
 fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
     let (mut rays, mut rays_odd) = (0, 0);
     for candidate in candidates {

@@ -1,7 +1,7 @@
 //! Reader of STL files, binary or ASCII.
 //!
-//! A file is binary if its length is 84 + 50 n for the n in its header, whatever its first bytes: some
-//! binary files begin with "solid". Any other file must be ASCII.
+//! A file is binary if its length is 84 + 50 n for the n in its header, whatever its first bytes:
+//! some binary files begin with "solid". Any other file must be ASCII.
 mod ascii;
 
 use crate::error::Error;
@@ -13,7 +13,8 @@ pub type Facet = [[f32; 3]; 3];
 const HEADER_BYTES: usize = 84;
 const FACET_BYTES: usize = 50;
 
-/// Reads the facets of an STL file. A valid file may contain no facets; a file of zero bytes is an error.
+/// Reads the facets of an STL file. A valid file may contain no facets; a file of zero bytes is an
+/// error.
 ///
 /// # Errors
 /// The file cannot be read, is damaged or is not STL, or a vertex is not finite.
@@ -53,7 +54,8 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     Ok(facets)
 }
 
-/// The facet count in a binary header. It may be arbitrarily wrong, so nothing is allocated from it.
+/// The facet count in a binary header. It may be arbitrarily wrong, so nothing is allocated from
+/// it.
 fn header_count(bytes: &[u8]) -> Option<u32> {
     let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
     Some(u32::from_le_bytes(count.try_into().expect("four bytes")))
@@ -65,13 +67,14 @@ fn binary_length(facets: u32) -> u64 {
 
 fn wrong_length(count: u32, length: usize) -> String {
     format!(
-        "as binary STL the file should have {} bytes for the {count} facets of its header, but it has \
-         {length}, and it is not ASCII STL either; it is damaged or not STL: export it again",
+        "as binary STL the file should have {} bytes for the {count} facets of its header, but it \
+         has {length}, and it is not ASCII STL either; it is damaged or not STL: export it again",
         binary_length(count)
     )
 }
 
-/// The record of a facet is a normal, which is ignored, three vertices, and two bytes of attributes.
+/// The record of a facet is a normal, which is ignored, three vertices, and two bytes of
+/// attributes.
 fn binary(bytes: &[u8]) -> Vec<Facet> {
     let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("four bytes"));
     let facet = |record: &[u8]| {

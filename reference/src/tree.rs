@@ -1,8 +1,8 @@
 //! The voxel tree: an arena of octants, each with no children or all eight.
 //!
-//! Invariants, executed by [`Tree::check_invariants`]: the root has index 0; the eight children of an
-//! octant are contiguous, in Morton order, at higher indices than their parent; `level_least` of an octant
-//! is the least level of the kept leaves among its descendants.
+//! Invariants, executed by [`Tree::check_invariants`]: the root has index 0; the eight children of
+//! an octant are contiguous, in Morton order, at higher indices than their parent; `level_least` of
+//! an octant is the least level of the kept leaves among its descendants.
 use crate::crossing::crosses;
 use crate::lattice::Facet;
 use crate::octant::{Extent, Octant, Side};
@@ -10,8 +10,8 @@ use crate::octant::{Extent, Octant, Side};
 /// The index of an octant in the arena.
 pub type Index = usize;
 
-/// The `level_least` of an octant without kept descendants. It exceeds every level, so such an octant is
-/// never refined.
+/// The `level_least` of an octant without kept descendants. It exceeds every level, so such an
+/// octant is never refined.
 const NOTHING_KEPT: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
@@ -37,8 +37,8 @@ impl Tree {
         Self { nodes: vec![Node::leaf(Octant::ROOT, Side::Outside)] }
     }
 
-    /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks these
-    /// leaves `Crossing`.
+    /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks
+    /// these leaves `Crossing`.
     pub fn insert(&mut self, facet: &Facet, level: u32) {
         self.insert_below(0, facet, level);
     }
@@ -61,8 +61,8 @@ impl Tree {
         self.update_level_least(index);
     }
 
-    /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least level
-    /// `level`.
+    /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least
+    /// level `level`.
     pub fn refine(&mut self, extent: &Extent, level: u32) {
         self.refine_below(0, extent, level);
     }
@@ -92,8 +92,8 @@ impl Tree {
         self.nodes[index].level_least = levels.min().unwrap_or(NOTHING_KEPT);
     }
 
-    /// Deletes the leaves whose side satisfies `unwanted`. They stay in the tree, which must tile the root,
-    /// but they are never refined and no longer among the kept leaves.
+    /// Deletes the leaves whose side satisfies `unwanted`. They stay in the tree, which must tile
+    /// the root, but they are never refined and no longer among the kept leaves.
     pub fn delete(&mut self, unwanted: impl Fn(Side) -> bool) {
         // Children have higher indices than their parents, so the reverse order visits them first.
         for index in (0..self.nodes.len()).rev() {

@@ -148,7 +148,8 @@ pub fn json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
     })
 }
 
-/// Writes a temporary file in the directory of `path`, synchronises it to disk, and renames it to `path`.
+/// Writes a temporary file in the directory of `path`, synchronises it to disk, and renames it to
+/// `path`.
 fn file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".tmp");
@@ -166,7 +167,8 @@ fn file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Res
     })
 }
 
-/// Writes NumPy's format, version 1.0: a header whose length is a multiple of 64 bytes, then the words.
+/// Writes NumPy's format, version 1.0: a header whose length is a multiple of 64 bytes, then the
+/// words.
 fn npy(to: &mut dyn Write, words: &[u64]) -> io::Result<()> {
     const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
     let mut header =

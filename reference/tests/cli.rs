@@ -33,7 +33,8 @@ fn reference(directory: &Path, arguments: &[&str]) -> Output {
     command.current_dir(directory).args(arguments).output().unwrap()
 }
 
-/// Runs the program, which must fail with `code`, and returns its error message, which must be one line.
+/// Runs the program, which must fail with `code`, and returns its error message, which must be one
+/// line.
 fn assert_fails(directory: &Path, arguments: &[&str], code: i32) -> String {
     let output = reference(directory, arguments);
     let message = String::from_utf8(output.stderr).unwrap();
@@ -103,7 +104,8 @@ fn the_manifest_agrees_with_the_leaves() {
     equal("layer_cells_min", 2.into());
     equal("keep", "all".into());
     equal("keep_crossing", true.into());
-    // The distances 1.0, 1.1 and 1.2 of an edge of 2.25, in lattice units; the box is clamped to the root.
+    // The distances 1.0, 1.1 and 1.2 of an edge of 2.25, in lattice units; the box is clamped to
+    // the root.
     let boxes = serde_json::json!(
         [{"min": [59_652_324, 65_617_556, 71_582_788], "max": [134_217_728, 95_443_718, 101_408_950], "level": 5}]
     );

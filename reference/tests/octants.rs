@@ -37,8 +37,8 @@ fn children_tile_their_parent_in_morton_order() {
     }
 }
 
-/// The interiors of two octants meet if and only if one octant contains the other. The octants touch if and
-/// only if their closed cubes share a corner of the level-3 grid.
+/// The interiors of two octants meet if and only if one octant contains the other. The octants
+/// touch if and only if their closed cubes share a corner of the level-3 grid.
 #[test]
 fn octants_meet_if_nested_and_touch_if_they_share_a_corner() {
     let octants = octants();

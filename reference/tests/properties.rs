@@ -1,5 +1,5 @@
-//! Properties of base trees and meshes on random cases, and their equality with those of the dense-grid
-//! implementation.
+//! Properties of base trees and meshes on random cases, and their equality with those of the
+//! dense-grid implementation.
 mod support;
 
 use reference::{Case, Keep, base_tree, mesh};
@@ -178,8 +178,8 @@ fn base_leaves_have_the_level_that_facets_and_boxes_require() {
     });
 }
 
-/// A rule that requires the split of an octant also requires the split of its ancestors, so it suffices to
-/// test the parents of leaves.
+/// A rule that requires the split of an octant also requires the split of its ancestors, so it
+/// suffices to test the parents of leaves.
 #[test]
 fn base_trees_split_no_octant_without_need() {
     for_all(file!(), 100, cases(FINEST), |random| {
@@ -191,7 +191,8 @@ fn base_trees_split_no_octant_without_need() {
     });
 }
 
-/// Each leaf of the mesh lies in a kept leaf of T0 and has its side, and the kept leaves of T0 are filled.
+/// Each leaf of the mesh lies in a kept leaf of T0 and has its side, and the kept leaves of T0 are
+/// filled.
 #[test]
 fn meshes_are_linear_and_fill_the_kept_leaves_of_the_base_tree() {
     for_all(file!(), 200, cases(FINEST), |random| {
@@ -213,8 +214,8 @@ fn meshes_are_linear_and_fill_the_kept_leaves_of_the_base_tree() {
     });
 }
 
-/// Calls `check` for every pair of kept leaves, the finer first. Crossing leaves that the mesh does not
-/// contain are included; only the dense grid still has them.
+/// Calls `check` for every pair of kept leaves, the finer first. Crossing leaves that the mesh does
+/// not contain are included; only the dense grid still has them.
 fn for_all_pairs(random: &RandomCase, check: impl Fn(&Leaf, &Leaf)) {
     let mut leaves = mesh_leaves(random);
     if !random.case.keep_crossing {

@@ -30,8 +30,9 @@ fn both_methods_agree_on_random_facets() {
     assert!(odd > tested / 20, "{odd} of {tested} rays are odd");
 }
 
-/// The block has even coordinates, so rays from integer points pass through its edges and diagonals. All six
-/// rays from a point inside intersect an odd number of facets, those from a point outside an even number.
+/// The block has even coordinates, so rays from integer points pass through its edges and
+/// diagonals. All six rays from a point inside intersect an odd number of facets, those from a
+/// point outside an even number.
 #[test]
 fn all_rays_agree_on_a_block() {
     let facets = block([2, 2, 2], [6, 8, 10]);
@@ -60,8 +61,8 @@ fn all_rays_agree_on_a_block() {
     assert_eq!(inside, 3 * 5 * 7);
 }
 
-/// A ray along z is displaced by eps along x and by eps^2 along y. Of two facets that share an edge through the
-/// point, it intersects the one on the positive side.
+/// A ray along z is displaced by eps along x and by eps^2 along y. Of two facets that share an edge
+/// through the point, it intersects the one on the positive side.
 #[test]
 fn the_displacement_decides_which_facet_at_an_edge_counts() {
     let right = [[0, 0, 5], [4, -1, 5], [4, 1, 5]];

@@ -22,7 +22,8 @@ fn both_sides_of_a_sheet_are_ambiguous() {
     );
 }
 
-/// If every facet occurs twice, the surface still crosses the same leaves, but every ray count is even.
+/// If every facet occurs twice, the surface still crosses the same leaves, but every ray count is
+/// even.
 #[test]
 fn a_surface_of_doubled_facets_has_no_inside() {
     let once = block_of_units([2; 3], [6; 3]);
@@ -30,8 +31,9 @@ fn a_surface_of_doubled_facets_has_no_inside() {
     assert_eq!(sides(&base_tree(&case(&twice, 3)).unwrap().words), [304, 0, 208]);
 }
 
-/// A rectangle in the plane where coordinate `axis` is -1 unit. It lies outside the root, so it crosses no
-/// octant, but rays intersect it. `u` and `v` are its ranges along the other two axes, in order.
+/// A rectangle in the plane where coordinate `axis` is -1 unit. It lies outside the root, so it
+/// crosses no octant, but rays intersect it. `u` and `v` are its ranges along the other two axes,
+/// in order.
 fn blind(axis: usize, u: [i64; 2], v: [i64; 2]) -> [[[i64; 3]; 3]; 2] {
     let corner = |x: i64, y: i64| {
         let mut others = [x, y].into_iter();
@@ -42,8 +44,9 @@ fn blind(axis: usize, u: [i64; 2], v: [i64; 2]) -> [[[i64; 3]; 3]; 2] {
     [[a, b, c], [a, c, d]]
 }
 
-/// All 64 leaves of level 2 form one component. Blinds make the six rays of all but a few leaves disagree.
-/// The first leaf whose rays agree is number 31, counted from 0, in one case, and number 32 in the other.
+/// All 64 leaves of level 2 form one component. Blinds make the six rays of all but a few leaves
+/// disagree. The first leaf whose rays agree is number 31, counted from 0, in one case, and number
+/// 32 in the other.
 #[test]
 fn at_most_thirty_two_candidates_vote() {
     let ambiguous = |facets: Vec<[[[i64; 3]; 3]; 2]>| {
@@ -52,13 +55,14 @@ fn at_most_thirty_two_candidates_vote() {
         assert_eq!(sides(&base.words), [64, 0, 0]);
         base.ambiguous.map(|a| a.components)
     };
-    // Blinds below all columns except that of the leaves (3, 3, z), and beside the lowest leaf of this
-    // column, number 27. The next leaf of the column, (3, 3, 1), is child 7 of octant 3: number 31.
+    // Blinds below all columns except that of the leaves (3, 3, z), and beside the lowest leaf of
+    // this column, number 27. The next leaf of the column, (3, 3, 1), is child 7 of octant 3:
+    // number 31.
     let last_candidate =
         vec![blind(2, [0, 6], [0, 8]), blind(2, [6, 8], [0, 6]), blind(1, [6, 8], [0, 2])];
     assert_eq!(ambiguous(last_candidate), None);
-    // Blinds below all columns except that of the leaves (0, 0, z), and beside the lower two leaves of this
-    // column, numbers 0 and 4. The next leaf, (0, 0, 2), is child 0 of octant 4: number 32.
+    // Blinds below all columns except that of the leaves (0, 0, z), and beside the lower two leaves
+    // of this column, numbers 0 and 4. The next leaf, (0, 0, 2), is child 0 of octant 4: number 32.
     let one_too_late =
         vec![blind(2, [2, 8], [0, 8]), blind(2, [0, 2], [2, 8]), blind(1, [0, 2], [0, 4])];
     assert_eq!(ambiguous(one_too_late), Some(1));

@@ -1,4 +1,5 @@
-//! STL files as exporters write them: the variants that must be read and the errors that must be refused.
+//! STL files as exporters write them: the variants that must be read and the errors that must be
+//! refused.
 use reference::stl::{Facet, parse};
 
 const FACET: Facet = [[0.0, 1.0, 2.5], [-1.0, 0.1, 1e-3], [3.0, 4.0, -5e10]];

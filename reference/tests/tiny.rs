@@ -33,8 +33,8 @@ fn a_point_at_the_centre_crosses_eight_leaves() {
     assert_eq!(layers(u32::MAX), [0, 0, 0, 512, 0], "a layer may be thicker than the root");
 }
 
-/// A second layer splits the octants of level 2 at the corner, and balance then splits the octants that
-/// touch them.
+/// A second layer splits the octants of level 2 at the corner, and balance then splits the octants
+/// that touch them.
 #[test]
 fn a_point_in_a_corner_of_the_root_is_graded_from_there() {
     let point = [[[0; 3]; 3]];
@@ -45,8 +45,8 @@ fn a_point_in_a_corner_of_the_root_is_graded_from_there() {
     assert_eq!(levels(&mesh(&case(&point, 4)).unwrap().words), [0, 7, 7, 7, 8]);
 }
 
-/// A point close to the centre lies in one octant of level 1. The seven other octants touch its leaf of
-/// level 3 by a face, an edge or a corner, and all of them are split.
+/// A point close to the centre lies in one octant of level 1. The seven other octants touch its
+/// leaf of level 3 by a face, an edge or a corner, and all of them are split.
 #[test]
 fn balance_extends_over_corners() {
     let point = [[[ROOT_EDGE / 2 - 1; 3]; 3]];
@@ -54,8 +54,8 @@ fn balance_extends_over_corners() {
     assert_eq!(levels(&mesh(&case(&point, 3)).unwrap().words), [0, 0, 63, 8, 0]);
 }
 
-/// A block from 2 to 6 in a root of 8 units at level 3. Its faces are cell faces, so the cells on both sides
-/// cross: those from 1 to 7, without those from 3 to 5.
+/// A block from 2 to 6 in a root of 8 units at level 3. Its faces are cell faces, so the cells on
+/// both sides cross: those from 1 to 7, without those from 3 to 5.
 #[test]
 fn cells_on_both_sides_of_a_face_in_a_cell_plane_cross() {
     let block = case(&block_of_units([2; 3], [6; 3]), 3);
@@ -73,9 +73,9 @@ fn cells_on_both_sides_of_a_face_in_a_cell_plane_cross() {
     assert_eq!(kept(Keep::All, false), [296, 8, 0]);
 }
 
-/// Deleted leaves are neither refined nor sources. The hull is a block from 0.5 to 7.5 at level 4, whose
-/// cells are half units. Cells 0, 1, 14 and 15 of each axis touch it. The rest, from 1 to 7 units, consists
-/// of eight leaves of level 2 surrounded by 6^3 - 4^3 = 152 leaves of level 3.
+/// Deleted leaves are neither refined nor sources. The hull is a block from 0.5 to 7.5 at level 4,
+/// whose cells are half units. Cells 0, 1, 14 and 15 of each axis touch it. The rest, from 1 to 7
+/// units, consists of eight leaves of level 2 surrounded by 6^3 - 4^3 = 152 leaves of level 3.
 #[test]
 fn deleted_leaves_are_not_refined() {
     let hull = block([UNIT / 2; 3], [ROOT_EDGE - UNIT / 2; 3]);
@@ -83,7 +83,8 @@ fn deleted_leaves_are_not_refined() {
     let base = base_tree(&hull).unwrap();
     assert_eq!(levels(&base.words), [0, 0, 8, 152, 2368]);
     assert_eq!(sides(&base.words), [0, 160, 2368]);
-    // The second layer splits the 152 leaves; balance then splits the eight, which touch the result.
+    // The second layer splits the 152 leaves; balance then splits the eight, which touch the
+    // result.
     let all = mesh(&hull).unwrap();
     assert_eq!(levels(&all.words), [0, 0, 0, 64, 2368 + 8 * 152]);
     let outside = Case { keep: Keep::Outside, ..hull };
@@ -99,8 +100,8 @@ fn boxes_refine_where_interiors_meet() {
     assert_eq!(base(vec![box_of_level([0; 3], units([1; 3]), 3)]), [0, 7, 7, 8, 0]);
     assert_eq!(base(vec![box_of_level([0; 3], units([4; 3]), 3)]), [0, 7, 0, 64, 0]);
     assert_eq!(base(vec![box_of_level([0; 3], [UNIT * 4 + 1, UNIT, UNIT], 2)]), [0, 6, 16, 0, 0]);
-    // A box outside the root, and one thinner than a lattice unit: neither has volume after clamping and
-    // quantisation.
+    // A box outside the root, and one thinner than a lattice unit: neither has volume after
+    // clamping and quantisation.
     assert_eq!(base(vec![box_of_level(units([8; 3]), units([9; 3]), 3)]), [1, 0, 0, 0, 0]);
     let mut thin = box_of_level(units([1; 3]), units([2; 3]), 3);
     thin.max[0] = thin.min[0] + 0.25;
@@ -118,8 +119,8 @@ fn a_box_finer_than_the_surface_refines_crossing_leaves() {
     assert_eq!(base.level_surface, 1);
 }
 
-/// The leaf of a point just below the centre touches all eight octants of level 1. The extra layer refines
-/// each of them to level 3 there; balance alone would stop at level 2.
+/// The leaf of a point just below the centre touches all eight octants of level 1. The extra layer
+/// refines each of them to level 3 there; balance alone would stop at level 2.
 #[test]
 fn the_extra_layer_refines_to_the_level_of_the_surface() {
     let point = [[[ROOT_EDGE / 2 - 1; 3]; 3]];

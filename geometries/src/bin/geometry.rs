@@ -58,8 +58,8 @@ fn fail(code: u8, message: &str) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// The generator of the case file or of the options. The options are written as a `[generator]` table and
-/// parsed like one, so that both accept the same keys.
+/// The generator of the case file or of the options. The options are written as a `[generator]`
+/// table and parsed like one, so that both accept the same keys.
 fn generator(arguments: &Arguments) -> Result<Generator, String> {
     if let Some(case) = &arguments.case {
         return from_case(case);

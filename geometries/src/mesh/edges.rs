@@ -17,8 +17,8 @@ impl Half {
         u64::from(self.from.min(self.to)) << 32 | u64::from(self.from.max(self.to))
     }
 
-    /// Whether the facet traverses the edge from the higher vertex index to the lower. If the winding is
-    /// consistent, exactly one of the two facets of an edge does.
+    /// Whether the facet traverses the edge from the higher vertex index to the lower. If the
+    /// winding is consistent, exactly one of the two facets of an edge does.
     pub(super) fn is_down(self) -> bool {
         self.from > self.to
     }
@@ -46,8 +46,8 @@ impl Edge {
     }
 }
 
-/// The `number` longest edges, longest first. Edges of equal length are ordered by vertex index, so the
-/// result is the same on every machine.
+/// The `number` longest edges, longest first. Edges of equal length are ordered by vertex index, so
+/// the result is the same on every machine.
 pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
     let square = |half: Half| {
         let [p, q] = [half.from, half.to].map(|v| mesh.vertices[v as usize]);
@@ -66,7 +66,8 @@ pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
     edges
 }
 
-/// The first directed edge for which the number of directed edges in the opposite direction is not one.
+/// The first directed edge for which the number of directed edges in the opposite direction is not
+/// one.
 pub(super) fn fault(triangles: &[[u32; 3]]) -> Option<MeshFault> {
     // Sorted by key and then by direction, a valid edge is a pair (up, down).
     let mut directed: Vec<(u64, bool)> =
@@ -89,7 +90,8 @@ pub(super) fn fault(triangles: &[[u32; 3]]) -> Option<MeshFault> {
 #[derive(Default)]
 pub(crate) struct KeyHasher(u64);
 
-/// Hasher for a `HashMap` with u64 keys. No program may iterate over such a map, as its order is not defined.
+/// Hasher for a `HashMap` with u64 keys. No program may iterate over such a map, as its order is
+/// not defined.
 pub(crate) type EdgeHasher = BuildHasherDefault<KeyHasher>;
 
 impl Hasher for KeyHasher {

@@ -1,5 +1,5 @@
-//! A fighter similar to the F-22 of the paper: chined nose, canopy, two hollow intakes, swept trapezoidal wings,
-//! tailplanes, two canted fins and two hollow nozzles.
+//! A fighter similar to the F-22 of the paper: chined nose, canopy, two hollow intakes, swept
+//! trapezoidal wings, tailplanes, two canted fins and two hollow nozzles.
 //!
 //! The unit is the length of the aircraft. x points aft and z up; the nose is at x = 0.
 

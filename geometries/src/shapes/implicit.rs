@@ -1,4 +1,5 @@
-//! Surfaces of solids that a distance function defines. The grid spacing is fitted to the number of facets.
+//! Surfaces of solids that a distance function defines. The grid spacing is fitted to the number of
+//! facets.
 
 use super::solids::Vec3;
 use crate::{Generator, GeneratorError, Mesh};
@@ -13,26 +14,27 @@ pub(super) trait Body {
     /// The number of facets times the square of the spacing, for a fine grid.
     const FACETS_TIMES_SQUARE: f64;
 
-    /// The solid, in which no part is thinner than twice `radius_least`. A grid misses parts that are thinner
-    /// than its cells, so thin parts are thickened on a coarse grid.
+    /// The solid, in which no part is thinner than twice `radius_least`. A grid misses parts that
+    /// are thinner than its cells, so thin parts are thickened on a coarse grid.
     fn new(radius_least: f64) -> Self;
 
     /// A function that is negative inside and has a Lipschitz constant of at most 1.
     fn distance(&self, p: Vec3) -> f64;
 }
 
-/// The part of the requested facets that the grid should produce, and its minimum. Splitting edges adds the
-/// other facets.
+/// The part of the requested facets that the grid should produce, and its minimum. Splitting edges
+/// adds the other facets.
 const AIM: f64 = 0.97;
 const AIM_LEAST: f64 = 0.92;
 
 /// Number of attempts in which the spacing may decrease as well as increase.
 const ATTEMPTS: usize = 10;
 
-/// Draws a body with at most the requested number of facets. The longest edge of its bounding box is scaled to
-/// `length`, and the centre of the box along x is moved to the origin; y = 0 remains the plane of symmetry.
+/// Draws a body with at most the requested number of facets. The longest edge of its bounding box
+/// is scaled to `length`, and the centre of the box along x is moved to the origin; y = 0 remains
+/// the plane of symmetry.
 pub(super) fn draw<B: Body>(of: &Generator) -> Result<Mesh, GeneratorError> {
-    let length = of.size("length", of.length, 1.0)?;
+    let length = of.dimension("length", of.length, 1.0)?;
     let mut mesh = fit::<B>(of.facets);
     let bounds: [[f64; 2]; 3] = std::array::from_fn(|a| {
         let along = mesh.vertices.iter().map(|p| p[a]);
@@ -47,9 +49,10 @@ pub(super) fn draw<B: Body>(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(mesh)
 }
 
-/// Finds the grid spacing for a number of facets. That number is nearly proportional to the inverse square of
-/// the spacing. The constant for fine grids gives the first spacing; it is inaccurate for coarse grids, on which
-/// the body is thickened, so each further spacing follows from the number of facets of the previous one.
+/// Finds the grid spacing for a number of facets. That number is nearly proportional to the inverse
+/// square of the spacing. The constant for fine grids gives the first spacing; it is inaccurate for
+/// coarse grids, on which the body is thickened, so each further spacing follows from the number of
+/// facets of the previous one.
 fn fit<B: Body>(facets: usize) -> Mesh {
     let aim = AIM * facets as f64;
     let mut spacing = (B::FACETS_TIMES_SQUARE / aim).sqrt();

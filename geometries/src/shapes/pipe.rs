@@ -1,4 +1,5 @@
-//! A curved pipe for internal flow: a straight section, a bend and a straight section, closed by flat caps.
+//! A curved pipe for internal flow: a straight section, a bend and a straight section, closed by
+//! flat caps.
 //!
 //! The centre line of the bore runs along +x to the origin, where the bend towards +y starts.
 
@@ -26,16 +27,18 @@ struct CentreLine {
 
 impl CentreLine {
     fn of(of: &Generator) -> Result<Self, GeneratorError> {
-        let radius = of.size("radius", of.radius, 0.1)?;
-        let radius_bend = of.size("radius_bend", of.radius_bend, radius * 3.0)?;
-        let angle = of.size("angle", of.angle, 90.0)?;
-        let straight = of.size("length", of.length, radius * 5.0)?;
-        let wrong = |key, value, want| Err(GeneratorError::SizeWrong { key, value, want });
+        let radius = of.dimension("radius", of.radius, 0.1)?;
+        let radius_bend = of.dimension("radius_bend", of.radius_bend, radius * 3.0)?;
+        let angle = of.dimension("angle", of.angle, 90.0)?;
+        let straight = of.dimension("length", of.length, radius * 5.0)?;
+        let invalid = |key, value, requirement| {
+            Err(GeneratorError::InvalidDimension { key, value, requirement })
+        };
         if radius_bend <= radius {
-            return wrong("radius_bend", radius_bend, format!("must exceed radius = {radius}"));
+            return invalid("radius_bend", radius_bend, format!("must exceed radius = {radius}"));
         }
         if angle > 180.0 {
-            return wrong(
+            return invalid(
                 "angle",
                 angle,
                 "must be at most 180, so that the straight sections do not meet".into(),
@@ -62,8 +65,8 @@ impl CentreLine {
         }
     }
 
-    /// A point of the centre line and the direction, in the xy plane, that points away from the centre of the
-    /// bend. `step` counts divisions from the inlet.
+    /// A point of the centre line and the direction, in the xy plane, that points away from the
+    /// centre of the bend. `step` counts divisions from the inlet.
     fn frame(&self, divisions: &Divisions, step: usize) -> ([f64; 2], [f64; 2]) {
         let bend_end = divisions.straight + divisions.bend;
         let turned = match step {
@@ -83,8 +86,8 @@ impl CentreLine {
     }
 }
 
-/// Number of divisions: around the circumference, along each straight section, along the bend, and along the
-/// radius of each cap.
+/// Number of divisions: around the circumference, along each straight section, along the bend, and
+/// along the radius of each cap.
 struct Divisions {
     around: usize,
     straight: usize,
@@ -97,7 +100,8 @@ impl Divisions {
         2 * self.straight + self.bend
     }
 
-    /// Number of facets: two per quadrilateral of the wall; each cap consists of rings around a fan.
+    /// Number of facets: two per quadrilateral of the wall; each cap consists of rings around a
+    /// fan.
     fn facets(&self) -> usize {
         2 * self.around * (self.along() + 2 * self.cap - 1)
     }
@@ -106,8 +110,8 @@ impl Divisions {
 fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
     let mut mesh = Mesh::default();
     let last = divisions.along();
-    // The surface consists of rings of vertices: outward on the cap of the inlet, along the wall, and inward on
-    // the cap of the outlet.
+    // The surface consists of rings of vertices: outward on the cap of the inlet, along the wall,
+    // and inward on the cap of the outlet.
     let inlet = (1..divisions.cap).map(|i| (0, i));
     let wall = (0..=last).map(|step| (step, divisions.cap));
     let outlet = (1..divisions.cap).rev().map(|i| (last, i));
@@ -121,15 +125,15 @@ fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
         }
         rings += 1;
     }
-    let number = |ring: usize, i: usize| (ring * divisions.around + i % divisions.around) as u32;
+    let index = |ring: usize, i: usize| (ring * divisions.around + i % divisions.around) as u32;
     for ring in 1..rings {
         for i in 0..divisions.around {
             let previous = ring - 1;
             mesh.add_quad([
-                number(previous, i),
-                number(ring, i),
-                number(ring, i + 1),
-                number(previous, i + 1),
+                index(previous, i),
+                index(ring, i),
+                index(ring, i + 1),
+                index(previous, i + 1),
             ]);
         }
     }
@@ -138,8 +142,8 @@ fn draw(line: &CentreLine, divisions: &Divisions) -> Mesh {
         mesh.add_vertex([x, y, 0.0])
     });
     for i in 0..divisions.around {
-        mesh.triangles.push([inlet, number(0, i), number(0, i + 1)]);
-        mesh.triangles.push([outlet, number(rings - 1, i + 1), number(rings - 1, i)]);
+        mesh.triangles.push([inlet, index(0, i), index(0, i + 1)]);
+        mesh.triangles.push([outlet, index(rings - 1, i + 1), index(rings - 1, i)]);
     }
     mesh
 }

@@ -1,4 +1,5 @@
-//! Axis-aligned boxes: the cube and the thin plate. Each face is a grid of rectangles of two facets each.
+//! Axis-aligned boxes: the cube and the thin plate. Each face is a grid of rectangles of two facets
+//! each.
 
 use std::collections::HashMap;
 
@@ -7,23 +8,23 @@ use crate::{Generator, GeneratorError, Mesh};
 
 /// A cube centred on the origin.
 pub(super) fn cube(of: &Generator) -> Result<Mesh, GeneratorError> {
-    let edge = of.size("edge", of.edge, 1.0)?;
+    let edge = of.dimension("edge", of.edge, 1.0)?;
     Ok(slab([edge; 3], of.facets))
 }
 
 /// A thin plate centred on the origin.
 pub(super) fn plate(of: &Generator) -> Result<Mesh, GeneratorError> {
     let sizes = [
-        of.size("length", of.length, 1.0)?,
-        of.size("width", of.width, 0.5)?,
-        of.size("thickness", of.thickness, 0.01)?,
+        of.dimension("length", of.length, 1.0)?,
+        of.dimension("width", of.width, 0.5)?,
+        of.dimension("thickness", of.thickness, 0.01)?,
     ];
     Ok(slab(sizes, of.facets))
 }
 
 fn slab(sizes: [f64; 3], facets: usize) -> Mesh {
     let divisions = divisions(sizes, facets);
-    let mut drawing = Drawing { sizes, divisions, mesh: Mesh::default(), numbers: HashMap::new() };
+    let mut drawing = Drawing { sizes, divisions, mesh: Mesh::default(), indices: HashMap::new() };
     for axis in 0..3 {
         drawing.face(axis, false);
         drawing.face(axis, true);
@@ -47,7 +48,7 @@ struct Drawing {
     sizes: [f64; 3],
     divisions: [usize; 3],
     mesh: Mesh,
-    numbers: HashMap<[usize; 3], u32>,
+    indices: HashMap<[usize; 3], u32>,
 }
 
 impl Drawing {
@@ -57,11 +58,11 @@ impl Drawing {
         for j in 0..self.divisions[c] {
             for i in 0..self.divisions[b] {
                 let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(di, dj)| {
-                    let mut place = [0; 3];
-                    place[axis] = if high { self.divisions[axis] } else { 0 };
-                    place[b] = i + di;
-                    place[c] = j + dj;
-                    self.vertex(place)
+                    let mut point = [0; 3];
+                    point[axis] = if high { self.divisions[axis] } else { 0 };
+                    point[b] = i + di;
+                    point[c] = j + dj;
+                    self.vertex(point)
                 });
                 let [p, q, r, s] = corners;
                 self.mesh.add_quad(if high { [p, q, r, s] } else { [p, s, r, q] });
@@ -69,18 +70,19 @@ impl Drawing {
         }
     }
 
-    fn vertex(&mut self, place: [usize; 3]) -> u32 {
-        if let Some(&number) = self.numbers.get(&place) {
-            return number;
+    fn vertex(&mut self, point: [usize; 3]) -> u32 {
+        if let Some(&index) = self.indices.get(&point) {
+            return index;
         }
-        // The first and the last position are exactly half the size, so faces stay in their lattice planes.
+        // The first and the last position are exactly half the size, so faces stay in their lattice
+        // planes.
         let position = std::array::from_fn(|a| {
-            let (i, of) = (place[a] as f64, self.divisions[a] as f64);
+            let (i, of) = (point[a] as f64, self.divisions[a] as f64);
             (2.0 * i - of) / of * (self.sizes[a] * 0.5)
         });
-        let number = self.mesh.add_vertex(position);
-        self.numbers.insert(place, number);
-        number
+        let index = self.mesh.add_vertex(position);
+        self.indices.insert(point, index);
+        index
     }
 }
 

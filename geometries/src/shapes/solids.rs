@@ -1,7 +1,7 @@
 //! Solids as distance functions, of which the aircraft are composed.
 //!
-//! Invariant of every function here: its Lipschitz constant is at most 1, and it is negative inside. The
-//! invariant allows [`super::implicit`] to skip space that cannot contain surface.
+//! Invariant of every function here: its Lipschitz constant is at most 1, and it is negative
+//! inside. The invariant allows [`super::implicit`] to skip space that cannot contain surface.
 
 /// A point or direction.
 pub(super) type Vec3 = [f64; 3];
@@ -65,8 +65,8 @@ pub(super) fn rounded_box(p: Vec3, centre: Vec3, half: Vec3, rounding: f64) -> f
     dot(out, out).sqrt() + q[0].max(q[1]).max(q[2]).min(0.0) - rounding
 }
 
-/// The cross section of a wing at one end: the x coordinates of its leading and trailing edge, and half its
-/// thickness.
+/// The cross section of a wing at one end: the x coordinates of its leading and trailing edge, and
+/// half its thickness.
 #[derive(Clone, Copy)]
 pub(super) struct Section {
     pub(super) leading: f64,
@@ -82,7 +82,8 @@ pub(super) struct Panel {
     sections: [Section; 2],
     /// Minimum radius of every part, so that the grid does not miss any.
     radius_least: f64,
-    /// Compensates for the slope that taper and sweep add, so that the Lipschitz constant is at most 1.
+    /// Compensates for the slope that taper and sweep add, so that the Lipschitz constant is at
+    /// most 1.
     shrink: f64,
 }
 
@@ -123,8 +124,8 @@ impl Panel {
         rounded * self.shrink
     }
 
-    /// An aerofoil: the hulls of a circle at the nose and a thick circle at 35 % of the chord, and of the latter
-    /// and a thin circle at the trailing edge.
+    /// An aerofoil: the hulls of a circle at the nose and a thick circle at 35 % of the chord, and
+    /// of the latter and a thin circle at the trailing edge.
     fn section(&self, x: f64, off: f64, leading: f64, trailing: f64, thick: f64) -> f64 {
         let [nose, tail] = [0.45, 0.12].map(|part| (thick * part).max(self.radius_least));
         let middle = interpolate(0.35, leading, trailing);
@@ -134,7 +135,8 @@ impl Panel {
     }
 }
 
-/// The distance to the hull of two circles whose centres lie on the axis `off = 0`; `off` is at least 0.
+/// The distance to the hull of two circles whose centres lie on the axis `off = 0`; `off` is at
+/// least 0.
 fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) -> f64 {
     let length = centres[1] - centres[0];
     let circle = |i: usize, radius: f64| {
@@ -172,7 +174,8 @@ pub(super) fn carve(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The greatest difference quotient over random pairs of nearby points around a solid of unit size.
+    /// The greatest difference quotient over random pairs of nearby points around a solid of unit
+    /// size.
     fn steepest(distance: impl Fn(Vec3) -> f64) -> f64 {
         let mut steepest = 0.0_f64;
         for i in 0..20_000_u64 {

@@ -6,17 +6,18 @@ use crate::{Generator, GeneratorError, Mesh};
 
 /// A sphere about the origin.
 pub(super) fn sphere(of: &Generator) -> Result<Mesh, GeneratorError> {
-    let radius = of.size("radius", of.radius, 0.5)?;
+    let radius = of.dimension("radius", of.radius, 0.5)?;
     Ok(geodesic(radius, of.facets))
 }
 
-/// A shell. The normals of the inner sphere point to the centre, because the core is outside the shell.
+/// A shell. The normals of the inner sphere point to the centre, because the core is outside the
+/// shell.
 pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
-    let radius = of.size("radius", of.radius, 0.5)?;
-    let radius_inner = of.size("radius_inner", of.radius_inner, radius * 0.5)?;
+    let radius = of.dimension("radius", of.radius, 0.5)?;
+    let radius_inner = of.dimension("radius_inner", of.radius_inner, radius * 0.5)?;
     if radius_inner >= radius {
-        let (value, want) = (radius_inner, format!("must be less than radius = {radius}"));
-        return Err(GeneratorError::SizeWrong { key: "radius_inner", value, want });
+        let (value, requirement) = (radius_inner, format!("must be less than radius = {radius}"));
+        return Err(GeneratorError::InvalidDimension { key: "radius_inner", value, requirement });
     }
     // Facets have about the same size on both spheres.
     let (outer, inner) = (radius * radius, radius_inner * radius_inner);
@@ -28,10 +29,11 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(mesh)
 }
 
-/// The finest geodesic sphere of at most `facets` facets. A sphere of frequency f has 20 f^2 facets.
+/// The finest geodesic sphere of at most `facets` facets. A sphere of frequency f has 20 f^2
+/// facets.
 fn geodesic(radius: f64, facets: usize) -> Mesh {
     let frequency = (facets / 20).isqrt().max(1);
-    let mut drawing = Drawing { radius, frequency, mesh: Mesh::default(), numbers: HashMap::new() };
+    let mut drawing = Drawing { radius, frequency, mesh: Mesh::default(), indices: HashMap::new() };
     for corners in ICOSAHEDRON {
         drawing.face(corners);
     }
@@ -78,8 +80,9 @@ struct Drawing {
     radius: f64,
     frequency: usize,
     mesh: Mesh,
-    /// Vertex indices by barycentric coordinates (corner, weight), which are the same for all facets.
-    numbers: HashMap<[(usize, usize); 3], u32>,
+    /// Vertex indices by barycentric coordinates (corner, weight), which are the same for all
+    /// facets.
+    indices: HashMap<[(usize, usize); 3], u32>,
 }
 
 impl Drawing {
@@ -102,8 +105,8 @@ impl Drawing {
         let mut key =
             [0, 1, 2].map(|c| if weights[c] == 0 { (0, 0) } else { (corners[c], weights[c]) });
         key.sort_unstable();
-        if let Some(&number) = self.numbers.get(&key) {
-            return number;
+        if let Some(&index) = self.indices.get(&key) {
+            return index;
         }
         // The sum follows the order of the key, so the position does not depend on the facet.
         let mut p = [0.0; 3];
@@ -112,8 +115,8 @@ impl Drawing {
             p = std::array::from_fn(|a| p[a] + q[a] * weight as f64);
         }
         let scale = self.radius / (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
-        let number = self.mesh.add_vertex(p.map(|x| x * scale));
-        self.numbers.insert(key, number);
-        number
+        let index = self.mesh.add_vertex(p.map(|x| x * scale));
+        self.indices.insert(key, index);
+        index
     }
 }

@@ -7,11 +7,11 @@ use crate::{Generator, GeneratorError, Mesh};
 
 /// A torus about the origin.
 pub(super) fn torus(of: &Generator) -> Result<Mesh, GeneratorError> {
-    let radius = of.size("radius", of.radius, 0.5)?;
-    let radius_tube = of.size("radius_tube", of.radius_tube, radius * 0.2)?;
+    let radius = of.dimension("radius", of.radius, 0.5)?;
+    let radius_tube = of.dimension("radius_tube", of.radius_tube, radius * 0.2)?;
     if radius_tube >= radius {
-        let (value, want) = (radius_tube, format!("must be less than radius = {radius}"));
-        return Err(GeneratorError::SizeWrong { key: "radius_tube", value, want });
+        let (value, requirement) = (radius_tube, format!("must be less than radius = {radius}"));
+        return Err(GeneratorError::InvalidDimension { key: "radius_tube", value, requirement });
     }
     let around = |radius: f64, pitch: f64| ((TAU * radius / pitch) as usize).max(3);
     let divisions = |pitch| (around(radius, pitch), around(radius_tube, pitch));
@@ -29,10 +29,10 @@ pub(super) fn torus(of: &Generator) -> Result<Mesh, GeneratorError> {
             mesh.add_vertex([reach * cos, reach * sin, radius_tube * up]);
         }
     }
-    let number = |i: usize, j: usize| ((i % ring) * tube + j % tube) as u32;
+    let index = |i: usize, j: usize| ((i % ring) * tube + j % tube) as u32;
     for i in 0..ring {
         for j in 0..tube {
-            mesh.add_quad([number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]);
+            mesh.add_quad([index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)]);
         }
     }
     Ok(mesh)

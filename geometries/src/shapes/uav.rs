@@ -1,7 +1,8 @@
-//! An unmanned aircraft similar to the Predator of the paper: bulbous nose with a sensor ball, long slender wings
-//! with stores on pylons, a boom, an inverted V tail and a ventral fin.
+//! An unmanned aircraft similar to the Predator of the paper: bulbous nose with a sensor ball, long
+//! slender wings with stores on pylons, a boom, an inverted V tail and a ventral fin.
 //!
-//! The unit is the wing span. x points aft and z up; the nose is at x = 0. The drawn surface is centred along x.
+//! The unit is the wing span. x points aft and z up; the nose is at x = 0. The drawn surface is
+//! centred along x.
 
 use super::implicit::Body;
 use super::solids::{Panel, RoundCone, Section, Vec3, blend};

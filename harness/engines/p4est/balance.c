@@ -1,16 +1,16 @@
-/* Balances a base tree with p4est: the outside proof of this workspace's own balance.
+/* Balances a base tree with p4est, as an independent test of the balance of this workspace.
  *
  *   p4est-balance TREE OUT
  *
- * Reads the leaves of the leaf-set directory TREE (every part, in any order), builds a forest of one
- * unit cube with exactly those leaves, balances it over faces, edges and corners, and writes the
- * leaves that result to OUT/leaves-00000.npy, sorted, with side bits 0. OUT must exist.
+ * Reads the leaves of the leaf-set directory TREE (all parts, in any order), builds a forest of one unit
+ * cube with exactly these leaves, balances it over faces, edges and corners, and writes the resulting
+ * leaves to OUT/leaves-00000.npy, sorted, with side bits 0. The directory OUT must exist.
  *
- * A leaf word is morton57 << 7 | level << 2 | side; p4est counts coordinates in units of level 19 as
- * the words do, but splits no further than level 18.
+ * A leaf word is morton57 << 7 | level << 2 | side. The coordinates of p4est are in units of level 19, like
+ * those of leaf words, but p4est splits no octant beyond level 18.
  *
- * Exit codes: 0 done, 2 the tree cannot be read or is no complete tree, 3 it has leaves of level 19,
- * 4 the result could not be written.
+ * Exit codes: 0 success, 2 the tree cannot be read or is not complete, 3 it has leaves of level 19, 4 the
+ * result could not be written.
  */
 #include <dirent.h>
 #include <inttypes.h>
@@ -24,17 +24,18 @@
 #include <p8est_extended.h>
 
 #if P8EST_MAXLEVEL != 19
-#error "leaf words count coordinates in units of level 19, and so must p4est"
+#error "leaf words have coordinates in units of level 19, and p4est must have the same"
 #endif
 
 enum { EXIT_TREE = 2, EXIT_DEPTH = 3, EXIT_WRITE = 4 };
 
-/* Leaf words, in one growing array. */
+/* A growing array of leaf words. */
 struct words {
-    uint64_t *at;
+    uint64_t *data;
     size_t count;
 };
 
+/* Prints a message and exits. */
 static _Noreturn void fail(int code, const char *format, ...)
 {
     va_list values;
@@ -46,7 +47,7 @@ static _Noreturn void fail(int code, const char *format, ...)
     exit(code);
 }
 
-/* Reads past the header of a .npy file of 1-D little-endian u64 and returns the number of elements. */
+/* Reads the header of a .npy file of 1-D little-endian u64 and returns the number of elements. */
 static size_t read_npy_header(FILE *file, const char *path)
 {
     unsigned char start[12];
@@ -59,7 +60,7 @@ static size_t read_npy_header(FILE *file, const char *path)
         length |= (size_t) start[10] << 16 | (size_t) start[11] << 24;
     }
     if (length > 65536)
-        fail(EXIT_TREE, "%s has a header of %zu bytes", path, length);
+        fail(EXIT_TREE, "%s has a header of %zu bytes, more than the 65536 supported", path, length);
     char *header = malloc(length + 1);
     if (header == NULL || fread(header, 1, length, file) != length)
         fail(EXIT_TREE, "%s ends in its header", path);
@@ -69,22 +70,23 @@ static size_t read_npy_header(FILE *file, const char *path)
     char tail[2];
     if (strstr(header, "'<u8'") == NULL || shape == NULL ||
         sscanf(shape, "'shape': (%zu, %1[)]", &count, tail) != 2)
-        fail(EXIT_TREE, "%s does not hold one dimension of '<u8'", path);
+        fail(EXIT_TREE, "%s is not a one-dimensional array of '<u8'", path);
     free(header);
     return count;
 }
 
+/* Appends the words of one part. */
 static void read_part(const char *path, struct words *words)
 {
     FILE *file = fopen(path, "rb");
     if (file == NULL)
         fail(EXIT_TREE, "%s cannot be opened", path);
     size_t count = read_npy_header(file, path);
-    words->at = realloc(words->at, (words->count + count + 1) * sizeof(uint64_t));
-    if (words->at == NULL)
-        fail(EXIT_TREE, "no memory for the %zu leaves of %s", count, path);
-    if (fread(words->at + words->count, sizeof(uint64_t), count, file) != count)
-        fail(EXIT_TREE, "%s is shorter than its header says", path);
+    words->data = realloc(words->data, (words->count + count + 1) * sizeof(uint64_t));
+    if (words->data == NULL)
+        fail(EXIT_TREE, "there is not enough memory for the %zu leaves of %s", count, path);
+    if (fread(words->data + words->count, sizeof(uint64_t), count, file) != count)
+        fail(EXIT_TREE, "%s has fewer leaves than its header specifies", path);
     words->count += count;
     fclose(file);
 }
@@ -95,12 +97,13 @@ static int by_value(const void *a, const void *b)
     return (left > right) - (left < right);
 }
 
+/* The words of all parts in a leaf-set directory, sorted. */
 static struct words read_tree(const char *directory)
 {
     struct words words = {NULL, 0};
     DIR *entries = opendir(directory);
     if (entries == NULL)
-        fail(EXIT_TREE, "%s is no directory", directory);
+        fail(EXIT_TREE, "%s is not a directory", directory);
     for (struct dirent *entry; (entry = readdir(entries)) != NULL;) {
         size_t length = strlen(entry->d_name);
         if (strncmp(entry->d_name, "leaves-", 7) != 0 || length < 4 ||
@@ -113,12 +116,12 @@ static struct words read_tree(const char *directory)
     }
     closedir(entries);
     if (words.count == 0)
-        fail(EXIT_TREE, "%s holds no leaves", directory);
-    qsort(words.at, words.count, sizeof(uint64_t), by_value);
+        fail(EXIT_TREE, "%s contains no leaves", directory);
+    qsort(words.data, words.count, sizeof(uint64_t), by_value);
     return words;
 }
 
-/* The 19 bits of morton57 that belong to one axis. */
+/* The coordinate along one axis, from the 19 bits of morton57 that belong to it. */
 static p4est_qcoord_t coordinate(uint64_t morton, int axis)
 {
     p4est_qcoord_t value = 0;
@@ -127,6 +130,7 @@ static p4est_qcoord_t coordinate(uint64_t morton, int axis)
     return value;
 }
 
+/* The morton57 of three coordinates. */
 static uint64_t interleaved(p4est_qcoord_t x, p4est_qcoord_t y, p4est_qcoord_t z)
 {
     uint64_t morton = 0;
@@ -136,20 +140,20 @@ static uint64_t interleaved(p4est_qcoord_t x, p4est_qcoord_t y, p4est_qcoord_t z
     return morton;
 }
 
-/* p4est completes what it is given to a whole tree, so a gap or an overlap in the input shows as a
- * number of leaves other than that given. */
+/* The forest with exactly these leaves. p4est fills gaps to make a tree complete, so the leaves are checked
+ * to be contiguous, and the number of leaves is compared with that of the input. */
 static p8est_t *forest_of(p8est_t *root, const struct words *words)
 {
     p8est_build_t *build = p8est_build_new(root, 0, NULL, NULL);
     uint64_t next = 0;
     for (size_t i = 0; i < words->count; ++i) {
-        uint64_t word = words->at[i], morton = word >> 7;
+        uint64_t word = words->data[i], morton = word >> 7;
         int level = word >> 2 & 31;
         if (level > P8EST_QMAXLEVEL)
-            fail(level > 19 ? EXIT_TREE : EXIT_DEPTH, "leaf %zu has level %d, p4est stops at %d", i, level,
-                 P8EST_QMAXLEVEL);
+            fail(level > 19 ? EXIT_TREE : EXIT_DEPTH, "leaf %zu has level %d, but the deepest level of p4est is %d",
+                 i, level, P8EST_QMAXLEVEL);
         if (morton != next)
-            fail(EXIT_TREE, "leaf %zu leaves a gap or overlaps: this is no complete tree", i);
+            fail(EXIT_TREE, "the tree is not complete: there is a gap or an overlap before leaf %zu", i);
         next = morton + ((uint64_t) 1 << 3 * (19 - level));
         p8est_quadrant_t quadrant;
         P8EST_QUADRANT_INIT(&quadrant);
@@ -160,14 +164,15 @@ static p8est_t *forest_of(p8est_t *root, const struct words *words)
         p8est_build_add(build, 0, &quadrant);
     }
     if (next != (uint64_t) 1 << 57)
-        fail(EXIT_TREE, "the tree ends before the root does: this is no complete tree");
+        fail(EXIT_TREE, "the tree is not complete: its last leaf does not reach the end of the root");
     p8est_t *forest = p8est_build_complete(build);
     if ((size_t) forest->local_num_quadrants != words->count)
-        fail(EXIT_TREE, "p4est made %d leaves of the %zu given", (int) forest->local_num_quadrants,
-             words->count);
+        fail(EXIT_TREE, "the input has %zu leaves, but p4est built a tree of %d", words->count,
+             (int) forest->local_num_quadrants);
     return forest;
 }
 
+/* Writes the words of the quadrants as the only part of a leaf-set directory. */
 static void write_npy(const char *directory, const sc_array_t *quadrants)
 {
     char path[4096], header[128];
@@ -179,7 +184,7 @@ static void write_npy(const char *directory, const sc_array_t *quadrants)
     size_t count = quadrants->elem_count;
     int used = snprintf(header, sizeof header,
                         "{'descr': '<u8', 'fortran_order': False, 'shape': (%zu,), }", count);
-    /* The header is padded to 128 bytes with the ten before it, and ends in a line feed. */
+    /* The first ten bytes and the header have 128 bytes together, of which the last is a line feed. */
     memset(header + used, ' ', 118 - (size_t) used);
     header[117] = '\n';
     fwrite("\x93NUMPY\x01\x00\x76\x00", 1, 10, file);
@@ -190,7 +195,7 @@ static void write_npy(const char *directory, const sc_array_t *quadrants)
         fwrite(&word, sizeof word, 1, file);
     }
     if (ferror(file) | fclose(file))
-        fail(EXIT_WRITE, "%s could not be written whole", path);
+        fail(EXIT_WRITE, "%s could not be written completely", path);
 }
 
 int main(int argc, char **argv)
@@ -208,7 +213,7 @@ int main(int argc, char **argv)
     p8est_t *root = p8est_new_ext(sc_MPI_COMM_SELF, cube, 0, 0, 0, 0, NULL, NULL);
     p8est_t *forest = forest_of(root, &words);
     p8est_destroy(root);
-    free(words.at);
+    free(words.data);
 
     p8est_balance(forest, P8EST_CONNECT_FULL, NULL);
     write_npy(argv[2], &p8est_tree_array_index(forest->trees, 0)->quadrants);

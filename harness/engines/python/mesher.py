@@ -1,5 +1,5 @@
-"""An oct-tree mesher on a dense grid: every step of reference/DEFINITION.md as whole-array operations, for small
-levels. The worked example of how a program that is not ours is verified by `harness verify --engine python`."""
+"""An oct-tree mesher on a dense grid: each step of reference/DEFINITION.md as operations on whole arrays, for coarse
+levels. It is the example of an external program that `harness verify --engine python` verifies."""
 
 import argparse
 import json
@@ -13,6 +13,7 @@ OUTSIDE, INSIDE, CROSSING = 0, 1, 2
 
 
 def read_stl(path):
+    """The vertices of an STL file, binary or ASCII, as float64 of shape (facets, 3, 3)."""
     data = path.read_bytes()
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
         facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -22,22 +23,24 @@ def read_stl(path):
 
 
 def level_for(edge, spacing):
+    """The level of a spacing in a root with this edge (section 1)."""
     return next(level for level in range(20) if edge / 2**level <= spacing)
 
 
 def pool(grid, level):
-    """Whether anything within each cell of a coarser level is set."""
+    """For each cell of a coarser level, whether any cell within it is set."""
     n, f = 1 << level, grid.shape[0] >> level
     return grid.reshape(n, f, n, f, n, f).any(axis=(1, 3, 5))
 
 
 def spread(grid, size):
-    """Cells of a coarser level on a finer grid."""
+    """The values of a coarser level on a grid of `size` cells along each axis."""
     f = size // grid.shape[0]
     return grid.repeat(f, 0).repeat(f, 1).repeat(f, 2)
 
 
 def dilate(grid, by):
+    """The cells within a Chebyshev distance of `by` cells of a set cell."""
     for axis in range(3):
         old, new = np.moveaxis(grid, axis, 0), np.moveaxis(grid := grid.copy(), axis, 0)
         for step in range(1, min(by, len(old) - 1) + 1):
@@ -47,11 +50,11 @@ def dilate(grid, by):
 
 
 def crossed(facet, edge, size):
-    """Cells that a facet shares a point with, as index arrays: separating axes, in integers (section 2)."""
+    """The cells that a facet crosses, as index arrays: separating axes in integer arithmetic (section 2)."""
     low = np.clip(-(-facet.min(0) // edge) - 1, 0, size)
     high = np.clip(facet.max(0) // edge, -1, size - 1)
     cells = np.stack(np.meshgrid(*map(np.arange, low, high + 1), indexing="ij"), -1).reshape(-1, 3)
-    corners = 2 * facet[None] - (2 * cells * edge + edge)[:, None]  # doubled, from the cell's centre
+    corners = 2 * facet[None] - (2 * cells * edge + edge)[:, None]  # doubled, relative to the centre of the cell
     edges = facet[[1, 2, 0]] - facet
     meets = np.ones(len(cells), bool)
     for a in range(3):
@@ -60,13 +63,13 @@ def crossed(facet, edge, size):
             along = corners[..., v] * e[u] - corners[..., u] * e[v]
             reach = edge * (abs(e[u]) + abs(e[v]))
             meets &= (along.min(1) <= reach) & (along.max(1) >= -reach)
-    normal = np.cross(edges[0], edges[1]).astype(object)  # beyond 64 bits from here
+    normal = np.cross(edges[0], edges[1]).astype(object)  # Python integers, as the products exceed 64 bits
     along = (corners[:, 0].astype(object) * normal).sum(1) if len(cells) else np.zeros(0)
     return tuple(cells[meets & (abs(along) <= edge * abs(normal).sum()).astype(bool)].T)
 
 
 def rays(point, facets):
-    """Whether each of a point's six rays finds it inside (section 4)."""
+    """For each of the six rays from a point, whether it votes inside (section 4)."""
     votes = []
     normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
     for a in range(3):
@@ -82,66 +85,68 @@ def rays(point, facets):
 
 
 def flood(region, free):
-    """Everything that is joined to the region by faces of free cells."""
+    """The free cells that are connected to the region by faces, including the region."""
     while True:
-        before = region.sum()
+        count = region.sum()
         for axis in range(3):
             r, f = np.moveaxis(region, axis, 0), np.moveaxis(free, axis, 0)
             for i in range(1, len(r)):
                 r[i] |= r[i - 1] & f[i]
             for i in range(len(r) - 2, -1, -1):
                 r[i] |= r[i + 1] & f[i]
-        if region.sum() == before:
+        if region.sum() == count:
             return region
 
 
 def words_of(level, side, chosen):
-    """Sorted leaf words (section 8) of the leaves in the chosen cells."""
+    """The sorted leaf words (section 8) of the leaves in the chosen cells."""
     size, words = level.shape[0], [np.zeros(0, np.uint64)]
     for l in range(int(level.max()) + 1):
-        at = np.argwhere(pool((level == l) & chosen, l))
-        corner, key = (at << (19 - l)).astype(np.uint64), np.zeros(len(at), np.uint64)
+        index = np.argwhere(pool((level == l) & chosen, l))
+        corner, key = (index << (19 - l)).astype(np.uint64), np.zeros(len(index), np.uint64)
         for bit in range(19):
             for a in range(3):
                 key |= (corner[:, a] >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + a)
-        sides = side[tuple((at * (size >> l)).T)].astype(np.uint64)
+        sides = side[tuple((index * (size >> l)).T)].astype(np.uint64)
         words.append(key << np.uint64(7) | np.uint64(l << 2) | sides)
     return np.sort(np.concatenate(words))
 
 
+def centroid(word):
+    """The centroid of a leaf, in lattice units."""
+    half = UNITS >> (word >> 2 & 31) + 1
+    return [256 * sum((word >> (7 + 3 * bit + a) & 1) << bit for bit in range(19)) + half for a in range(3)]
+
+
 def sides(level, crossing, facets, root):
-    """The side of every cell, how many components were decided by majority, and where one is."""
+    """The side of every cell, and the number and one location of the ambiguous components (section 4)."""
     side = np.where(crossing, CROSSING, OUTSIDE).astype(np.uint8)
-    left, firsts = ~crossing, []
-    while left.any():
-        seed = np.zeros_like(left)
-        seed.flat[left.argmax()] = True
-        component = flood(seed, left)
+    unassigned, firsts = ~crossing, []
+    while unassigned.any():
+        seed = np.zeros_like(unassigned)
+        seed.flat[unassigned.argmax()] = True
+        component = flood(seed, unassigned)
         leaves = sorted(map(int, words_of(level, side, component)), key=lambda w: (w >> 2 & 31, w))
         total = []
         for word in leaves[:32]:
-            edge = UNITS >> (word >> 2 & 31)
-            key = word >> 7
-            at = [256 * sum((key >> (3 * bit + a) & 1) << bit for bit in range(19)) + edge // 2 for a in range(3)]
-            votes = rays(np.array(at), facets)
+            votes = rays(np.array(centroid(word)), facets)
             total += votes
             if len(set(votes)) == 1:
                 inside = votes[0]
                 break
         else:
             inside = 2 * sum(total) > len(total)
-            word, edge = leaves[0], UNITS >> (leaves[0] >> 2 & 31)
-            at = [256 * sum((word >> (7 + 3 * bit + a) & 1) << bit for bit in range(19)) + edge // 2 for a in range(3)]
-            firsts.append(((word >> 2 & 31, word), at))
+            firsts.append(((leaves[0] >> 2 & 31, leaves[0]), centroid(leaves[0])))
         side[component] = INSIDE if inside else OUTSIDE
-        left &= ~component
+        unassigned &= ~component
     example = [o + c * (root["edge"] / UNITS) for o, c in zip(root["origin"], min(firsts)[1])] if firsts else None
     return side, {"count": len(firsts), "example": example}
 
 
 def grade(split, kept, level_of, n, deep):
-    """Layers and balance, from fine to coarse (section 6)."""
+    """Layers and balance, from the finest level to the coarsest (section 6)."""
     def refine(marks, level):
+        """Split the ancestors of the marked cells of a level."""
         for coarser in range(level):
             split[coarser] |= pool(marks, coarser)
 
@@ -152,6 +157,7 @@ def grade(split, kept, level_of, n, deep):
 
 
 def mesh(case, facets, ungraded):
+    """The leaf words of a case, and the keys of the manifest that do not depend on them."""
     root, n = case["root"], case.get("layer_cells_min", 4)
     scale = UNITS / root["edge"]
     on_lattice = lambda x: np.rint((np.asarray(x, np.float64) - root["origin"]) * scale)
@@ -168,8 +174,8 @@ def mesh(case, facets, ungraded):
     split = [pool(touched, l) & (l < surface) for l in range(deep)]
     for b in boxes:
         for l in range(b["level"]):
-            at, edge = np.arange(1 << l), UNITS >> l
-            x, y, z = (np.maximum(at * edge, low) < np.minimum((at + 1) * edge, high) for low, high in zip(b["min"], b["max"]))
+            index, edge = np.arange(1 << l), UNITS >> l
+            x, y, z = (np.maximum(index * edge, low) < np.minimum((index + 1) * edge, high) for low, high in zip(b["min"], b["max"]))
             split[l] |= x[:, None, None] & y[None, :, None] & z[None, None, :]
     level_of = lambda: sum((spread(s, size).astype(np.uint8) for s in split), np.zeros((size,) * 3, np.uint8))
     level, crossing = level_of(), np.zeros((size,) * 3, bool)
@@ -192,6 +198,7 @@ def mesh(case, facets, ungraded):
 
 
 def digest(words):
+    """The digest of leaf words, as hexadecimal digits (section 8)."""
     def f(x):
         x = (x ^ x >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
         x = (x ^ x >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
@@ -204,6 +211,7 @@ def digest(words):
 
 
 def write(words, terms, out, ungraded):
+    """Write a leaf-set directory (section 11)."""
     levels = np.bincount((words >> np.uint64(2) & np.uint64(31)).astype(int), minlength=20).tolist()
     counts = np.bincount((words & np.uint64(3)).astype(int), minlength=3).tolist()
     octants = (words >> np.uint64(55)).astype(int)
@@ -220,10 +228,10 @@ def write(words, terms, out, ungraded):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("case", type=Path)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--ungraded", action="store_true")
+    parser.add_argument("case", type=Path, help="case file with a geometry file and a [root] table")
+    parser.add_argument("--out", type=Path, metavar="DIR", required=True, help="directory for the leaf set")
+    parser.add_argument("--ungraded", action="store_true", help="stop after the base tree")
     options = parser.parse_args()
-    given = tomllib.loads(options.case.read_text())
-    made = mesh(given, read_stl(options.case.parent / given["geometry"]), options.ungraded)
-    write(*made, options.out, options.ungraded)
+    case = tomllib.loads(options.case.read_text())
+    facets = read_stl(options.case.parent / case["geometry"])
+    write(*mesh(case, facets, options.ungraded), options.out, options.ungraded)

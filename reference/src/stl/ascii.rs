@@ -1,7 +1,8 @@
 //! Parser of ASCII STL: any number of solids, as words separated by any white space.
 //!
-//! Files in use contain upper and lower case, three kinds of line end, blank lines and solids without a
-//! name. Lines matter only after `solid` and `endsolid`, where the rest of the line is a name.
+//! Files in use contain upper and lower case, three kinds of line end, blank lines and solids
+//! without a name. Lines matter only after `solid` and `endsolid`, where the rest of the line is a
+//! name.
 use super::Facet;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
@@ -59,7 +60,8 @@ fn facet(words: &mut Words) -> Result<Facet, String> {
 struct Words<'a> {
     rest: &'a [u8],
     line: usize,
-    /// Whether the previous byte was a carriage return, so that a line feed does not start another line.
+    /// Whether the previous byte was a carriage return, so that a line feed does not start another
+    /// line.
     after_return: bool,
 }
 

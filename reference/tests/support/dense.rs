@@ -1,5 +1,5 @@
-//! A second implementation of the whole algorithm, on a dense grid of the finest cells: crossing by separating
-//! axes, flood fill cell by cell, refinement cell by cell.
+//! A second implementation of the whole algorithm, on a dense grid of the finest cells: crossing by
+//! separating axes, flood fill cell by cell, refinement cell by cell.
 use super::{ROOT_EDGE, crosses_by_axes, parities_by_areas, spacing};
 use reference::{BoxSpec, Case};
 
@@ -9,7 +9,8 @@ pub const CROSSING: u64 = 2;
 
 pub type Facet = [[i64; 3]; 3];
 
-/// A grid of cells of level `finest`. Each cell stores the level and the side of the leaf that contains it.
+/// A grid of cells of level `finest`. Each cell stores the level and the side of the leaf that
+/// contains it.
 pub struct Dense {
     pub finest: u32,
     pub cells: Vec<Cell>,
@@ -60,7 +61,8 @@ impl Dense {
         }
     }
 
-    /// Splits the kept leaves that contain cells from `min` to `max` until they have at least `level`.
+    /// Splits the kept leaves that contain cells from `min` to `max` until they have at least
+    /// `level`.
     fn refine(&mut self, min: [i64; 3], max: [i64; 3], level: u32) {
         let n = 1 << self.finest;
         for index in indices_between(min.map(|x| x.max(0)), max.map(|x| x.min(n))) {

@@ -7,12 +7,12 @@ pub mod random;
 use reference::leaves::Tally;
 use reference::{BoxSpec, Case, Keep, Root};
 
-/// The edge of the root in lattice units. The root of every case here has this edge, so the user's unit is
-/// the lattice unit.
+/// The edge of the root in lattice units. The root of every case here has this edge, so the user's
+/// unit is the lattice unit.
 pub const ROOT_EDGE: i64 = 1 << 27;
 
-/// A case without boxes whose root is the lattice cube and whose surface has level `level`. All leaves are
-/// kept, and layers are one cell thick.
+/// A case without boxes whose root is the lattice cube and whose surface has level `level`. All
+/// leaves are kept, and layers are one cell thick.
 pub fn case(facets: &[[[i64; 3]; 3]], level: u32) -> Case {
     Case {
         facets: facets.iter().map(|facet| facet.map(|v| v.map(|x| x as f64))).collect(),
@@ -59,9 +59,10 @@ pub fn block(min: [i64; 3], max: [i64; 3]) -> Vec<[[i64; 3]; 3]> {
     facets
 }
 
-/// Whether the facet and the box share a point, by separating axes: two convex polyhedra are disjoint if and
-/// only if their projections on a face normal of either or on the cross product of an edge of each are
-/// disjoint. Degenerate facets produce axes of length zero, which separate nothing.
+/// Whether the facet and the box share a point, by separating axes: two convex polyhedra are
+/// disjoint if and only if their projections on a face normal of either or on the cross product of
+/// an edge of each are disjoint. Degenerate facets produce axes of length zero, which separate
+/// nothing.
 pub fn crosses_by_axes(facet: &[[i64; 3]; 3], min: [i64; 3], max: [i64; 3]) -> bool {
     let corners: [[i64; 3]; 8] = std::array::from_fn(|i| {
         std::array::from_fn(|a| if i >> a & 1 == 0 { min[a] } else { max[a] })
@@ -96,9 +97,9 @@ pub fn cross(p: [i64; 3], q: [i64; 3]) -> [i64; 3] {
     })
 }
 
-/// Whether the rays from `point` in the negative and the positive direction intersect an odd number of facets,
-/// by a second method. The displacements are 2^-32 and 2^-64 instead of infinitesimal, and barycentric
-/// coordinates give the position on the facet.
+/// Whether the rays from `point` in the negative and the positive direction intersect an odd number
+/// of facets, by a second method. The displacements are 2^-32 and 2^-64 instead of infinitesimal,
+/// and barycentric coordinates give the position on the facet.
 pub fn parities_by_areas(facets: &[[[i64; 3]; 3]], point: [i64; 3], axis: usize) -> [bool; 2] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut odd = [false; 2];

@@ -11,8 +11,9 @@ use std::ops::RangeInclusive;
 
 pub type Facet = [[i64; 3]; 3];
 
-/// Tests `property` on random values of `inputs`, as many as the environment variable `PROPTEST_CASES`
-/// gives or else `cases`. The seed of a failure is written to a file beside `source`, the test's `file!()`.
+/// Tests `property` on random values of `inputs`, as many as the environment variable
+/// `PROPTEST_CASES` gives or else `cases`. The seed of a failure is written to a file beside
+/// `source`, the test's `file!()`.
 ///
 /// # Panics
 /// If the property panics, with the simplest failing value that was found.
@@ -70,8 +71,8 @@ pub fn cases(finest: u32) -> impl Strategy<Value = RandomCase> {
     )
 }
 
-/// Facets of every kind: blocks, closed or with a hole, triangles, segments and points, in cell planes and
-/// outside them, within the root and reaching out of it.
+/// Facets of every kind: blocks, closed or with a hole, triangles, segments and points, in cell
+/// planes and outside them, within the root and reaching out of it.
 fn soup() -> impl Strategy<Value = Vec<Facet>> {
     (3..=5_u32).prop_flat_map(|level| {
         let unit = ROOT_EDGE >> level;

@@ -1,9 +1,10 @@
 //! A closed surface of triangles from a distance function and a grid (marching tetrahedra).
 //!
-//! Each cube of the grid is divided into six tetrahedra around its diagonal. Every edge of a tetrahedron whose
-//! ends lie on different sides of the surface has one vertex, at the zero of the distance function along the
-//! edge, and each tetrahedron joins its vertices to triangles. Tetrahedra have no ambiguous cases, so the result
-//! is a closed manifold for every function: each edge of a triangle lies in a face shared by two tetrahedra.
+//! Each cube of the grid is divided into six tetrahedra around its diagonal. Every edge of a
+//! tetrahedron whose ends lie on different sides of the surface has one vertex, at the zero of the
+//! distance function along the edge, and each tetrahedron joins its vertices to triangles.
+//! Tetrahedra have no ambiguous cases, so the result is a closed manifold for every function: each
+//! edge of a triangle lies in a face shared by two tetrahedra.
 
 use std::collections::HashMap;
 
@@ -12,14 +13,15 @@ use crate::Mesh;
 use crate::mesh::EdgeHasher;
 use crate::shapes::solids::Vec3;
 
-/// Minimum radius of a part, in cells. A part thinner than the diagonal of a cell could lie between grid points.
+/// Minimum radius of a part, in cells. A part thinner than the diagonal of a cell could lie between
+/// grid points.
 const RADIUS_LEAST: f64 = 0.95;
 
 /// Cells of the grid on every side of the bounds.
 const ROOM: f64 = 3.0;
 
-/// Minimum distance of a vertex from the ends of its edge, as a fraction of the edge, so that no triangle
-/// degenerates.
+/// Minimum distance of a vertex from the ends of its edge, as a fraction of the edge, so that no
+/// triangle degenerates.
 const MARGIN: f64 = 0.05;
 
 /// Cells along the edge of a block, the unit of sampling.
@@ -31,12 +33,13 @@ pub(super) struct Drawing<B> {
     low: Vec3,
     spacing: f64,
     mesh: Mesh,
-    /// Vertex indices by grid edge: its lower end, 20 bits per coordinate, and its direction, 3 bits.
-    numbers: HashMap<u64, u32, EdgeHasher>,
+    /// Vertex indices by grid edge: its lower end, 20 bits per coordinate, and its direction, 3
+    /// bits.
+    indices: HashMap<u64, u32, EdgeHasher>,
 }
 
 /// The integer coordinates of a grid point.
-type Place = [usize; 3];
+type GridPoint = [usize; 3];
 
 impl<B: Body> Drawing<B> {
     /// The surface on a grid with this spacing.
@@ -56,43 +59,43 @@ impl<B: Body> Drawing<B> {
             low: low.map(|x| x - room),
             spacing,
             mesh: Mesh::default(),
-            numbers: HashMap::default(),
+            indices: HashMap::default(),
         };
         drawing.visit([0; 3], cells);
         drawing.mesh
     }
 
-    fn position(&self, place: Place) -> Vec3 {
-        std::array::from_fn(|a| self.low[a] + place[a] as f64 * self.spacing)
+    fn position(&self, point: GridPoint) -> Vec3 {
+        std::array::from_fn(|a| self.low[a] + point[a] as f64 * self.spacing)
     }
 
-    /// Samples the blocks within a cube of the grid that may contain surface. A cube contains none if the
-    /// distance at its centre exceeds half its diagonal.
-    fn visit(&mut self, place: Place, cells: usize) {
+    /// Samples the blocks within a cube of the grid that may contain surface. A cube contains none
+    /// if the distance at its centre exceeds half its diagonal.
+    fn visit(&mut self, origin: GridPoint, cells: usize) {
         let half = cells as f64 * 0.5 * self.spacing;
-        let centre = self.position(place).map(|x| x + half);
+        let centre = self.position(origin).map(|x| x + half);
         let reach = half * 1.7321;
         if self.body.distance(centre).abs() > reach {
             return;
         }
         if cells == BLOCK {
-            return self.block(place);
+            return self.block(origin);
         }
         for octant in 0..8 {
             let half = cells / 2;
-            self.visit(std::array::from_fn(|a| place[a] + half * (octant >> a & 1)), half);
+            self.visit(std::array::from_fn(|a| origin[a] + half * (octant >> a & 1)), half);
         }
     }
 
-    fn block(&mut self, place: Place) {
+    fn block(&mut self, origin: GridPoint) {
         const POINTS: usize = BLOCK + 1;
         let mut values = [0.0; POINTS * POINTS * POINTS];
-        let index = |[x, y, z]: Place| (z * POINTS + y) * POINTS + x;
+        let index = |[x, y, z]: GridPoint| (z * POINTS + y) * POINTS + x;
         for z in 0..POINTS {
             for y in 0..POINTS {
                 for x in 0..POINTS {
-                    let point = [place[0] + x, place[1] + y, place[2] + z];
-                    values[index([x, y, z])] = self.body.distance(self.position(point));
+                    let sample = [origin[0] + x, origin[1] + y, origin[2] + z];
+                    values[index([x, y, z])] = self.body.distance(self.position(sample));
                 }
             }
         }
@@ -104,36 +107,43 @@ impl<B: Body> Drawing<B> {
                     });
                     let inside = corners.iter().filter(|&&value| value < 0.0).count();
                     if inside % 8 != 0 {
-                        self.cube([place[0] + x, place[1] + y, place[2] + z], &corners);
+                        self.cube([origin[0] + x, origin[1] + y, origin[2] + z], &corners);
                     }
                 }
             }
         }
     }
 
-    /// Draws the six tetrahedra of a cube. The bits of a corner's index are its offset along the axes. A
-    /// tetrahedron is a path from corner 0 to corner 7 that sets one bit at a time.
-    fn cube(&mut self, place: Place, corners: &[f64; 8]) {
+    /// Draws the six tetrahedra of a cube. The bits of a corner's index are its offset along the
+    /// axes. A tetrahedron is a path from corner 0 to corner 7 that sets one bit at a time.
+    fn cube(&mut self, origin: GridPoint, corners: &[f64; 8]) {
         for (first, second, is_even) in
             [(1, 2, true), (2, 4, true), (4, 1, true), (2, 1, false), (4, 2, false), (1, 4, false)]
         {
-            self.tetrahedron(place, corners, [0, first, first | second, 7], is_even);
+            self.tetrahedron(origin, corners, [0, first, first | second, 7], is_even);
         }
     }
 
-    /// Draws one tetrahedron. `is_even` is whether its four corners, in this order, are positively oriented.
-    fn tetrahedron(&mut self, place: Place, values: &[f64; 8], masks: [usize; 4], is_even: bool) {
+    /// Draws one tetrahedron. `is_even` is whether its four corners, in this order, are positively
+    /// oriented.
+    fn tetrahedron(
+        &mut self,
+        origin: GridPoint,
+        values: &[f64; 8],
+        masks: [usize; 4],
+        is_even: bool,
+    ) {
         let inside = masks.map(|mask| values[mask] < 0.0);
         // The permutation is even, so it preserves the orientation.
         let Some((order, count)) = inside_first(inside) else {
             return;
         };
         let [a, b, c, d] = order.map(|i| masks[i]);
-        let mut cut = |from: usize, to: usize| self.vertex(place, values, from, to);
+        let mut vertex = |from: usize, to: usize| self.vertex(origin, values, from, to);
         let corners = match count {
-            1 => [cut(a, b), cut(a, c), cut(a, d), 0],
-            2 => [cut(a, c), cut(a, d), cut(b, d), cut(b, c)],
-            _ => [cut(a, d), cut(b, d), cut(c, d), 0],
+            1 => [vertex(a, b), vertex(a, c), vertex(a, d), 0],
+            2 => [vertex(a, c), vertex(a, d), vertex(b, d), vertex(b, c)],
+            _ => [vertex(a, d), vertex(b, d), vertex(c, d), 0],
         };
         let [p, q, r, s] = corners;
         let mut triangle = |p, q, r| {
@@ -145,26 +155,27 @@ impl<B: Body> Drawing<B> {
         }
     }
 
-    /// The vertex on the edge between two corners of a cube. The bits of one corner contain those of the other.
-    fn vertex(&mut self, place: Place, values: &[f64; 8], from: usize, to: usize) -> u32 {
+    /// The vertex on the edge between two corners of a cube. The bits of one corner contain those
+    /// of the other.
+    fn vertex(&mut self, origin: GridPoint, values: &[f64; 8], from: usize, to: usize) -> u32 {
         let (low, high) = (from & to, from | to);
-        let start: Place = std::array::from_fn(|a| place[a] + (low >> a & 1));
+        let start: GridPoint = std::array::from_fn(|a| origin[a] + (low >> a & 1));
         let direction = high ^ low;
         let key = (start[2] as u64) << 43 | (start[1] as u64) << 23 | (start[0] as u64) << 3;
         let key = key | direction as u64;
-        if let Some(&number) = self.numbers.get(&key) {
-            return number;
+        if let Some(&index) = self.indices.get(&key) {
+            return index;
         }
         let end = std::array::from_fn(|a| start[a] + (direction >> a & 1));
         let (p, q) = (self.position(start), self.position(end));
         let t = self.zero(p, q, values[low], values[high]).clamp(MARGIN, 1.0 - MARGIN);
-        let number = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
-        self.numbers.insert(key, number);
-        number
+        let index = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
+        self.indices.insert(key, index);
+        index
     }
 
-    /// The parameter in [0, 1] at which the distance is zero between two points on different sides, by the
-    /// Illinois variant of the false position method.
+    /// The parameter in [0, 1] at which the distance is zero between two points on different sides,
+    /// by the Illinois variant of the false position method.
     fn zero(&self, p: Vec3, q: Vec3, value_p: f64, value_q: f64) -> f64 {
         let (mut low, mut high) = ((0.0, value_p), (1.0, value_q));
         let mut t = 0.5;
@@ -183,8 +194,8 @@ impl<B: Body> Drawing<B> {
     }
 }
 
-/// An even permutation of the four corners that puts those inside first, and the number of these, 1 to 3. `None`
-/// if all corners are on one side.
+/// An even permutation of the four corners that puts those inside first, and the number of these, 1
+/// to 3. `None` if all corners are on one side.
 fn inside_first(inside: [bool; 4]) -> Option<([usize; 4], usize)> {
     let mask = inside.iter().enumerate().fold(0, |mask, (i, &is)| mask | usize::from(is) << i);
     let order = match mask {
@@ -217,8 +228,8 @@ mod tests {
             let inside: [bool; 4] = std::array::from_fn(|i| mask >> i & 1 == 1);
             let (order, count) = inside_first(inside).unwrap();
             assert_eq!(count, mask.count_ones() as usize);
-            for (place, &corner) in order.iter().enumerate() {
-                assert_eq!(inside[corner], place < count, "mask {mask:04b}");
+            for (position, &corner) in order.iter().enumerate() {
+                assert_eq!(inside[corner], position < count, "mask {mask:04b}");
             }
             let mut seen = order;
             seen.sort_unstable();
