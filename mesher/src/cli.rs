@@ -1,88 +1,95 @@
-//! The command line, and the case that it stands for.
+//! The command line, and the case that it describes.
 
-use clap::Parser;
+use crate::launch;
+use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, value_parser};
+use clap_complete::Shell;
 use mesher::case::{BoxSpec, Case, LAYER_CELLS_MIN, ROOT_SCALE, RootSpec};
 use mesher::error::Error;
 use mesher::ingest::Source;
 use mesher::lattice::{Keep, Root};
 use mesher::partition::{Partitioner, Weights};
+use std::io::{self, Write};
 use std::path::PathBuf;
+use std::process::exit;
 
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
-/// Serial as it is; `mpirun -n 8 mesher ...` is all that parallel takes. Exit codes: 0 done, 2 unusable
-/// input, 4 output not written, 70 a bug, 130 interrupted.
+/// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
+/// input, 4 output could not be written, 70 a bug, 130 interrupted.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
-    /// A case file (.toml), or an STL file together with --spacing-min
+    /// Case file (.toml), or STL file together with --spacing-min
     input: PathBuf,
-    /// Directory to write the leaf set to; absent or empty. Without it nothing is written
+    /// Write the leaf set to this directory, which must be empty or not exist; default: write nothing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write the report as JSON to this file, too
+    /// Also write the report to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Have in it who sent how much to whom in exchanges: [from, to, messages, bytes] of each pair that did
+    /// Include the message matrix in the JSON report: messages and bytes for every pair of ranks
     #[arg(long, requires = "json")]
     pub message_matrix: bool,
-    /// Stop at the base tree T0: all leaves with their sides, nothing deleted or graded
+    /// Stop at the base tree T0: all leaves with their sides, none deleted, none graded
     #[arg(long)]
     pub ungraded: bool,
-    /// Who cuts the base tree into parts
+    /// Method that assigns base leaves to ranks
     #[arg(long, value_enum, default_value = "morton")]
     pub partitioner: Partitioner,
-    /// What a base leaf weighs in the partition
+    /// Weights of the partition
     #[arg(long, value_enum, default_value = "rebalance")]
     pub weights: Weights,
-    /// Level at which the tree is cut into base leaves: a number, or auto
+    /// Level of the base leaves: 0 to 19, or auto
     #[arg(long, default_value = "auto", value_parser = level_base)]
     pub level_base: LevelBase,
-    /// How ranks talk: auto, solo, mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
+    /// Communication between ranks: auto, solo (one rank), mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
     #[arg(long, default_value = "auto", value_parser = comm_choice)]
     pub comm: CommChoice,
-    /// Each rank keeps DIR/rank-00000.txt with the phase that it is in
+    /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated
+    #[arg(long)]
+    pub check: bool,
+    /// Each rank keeps the name of its current phase in DIR/rank-00000.txt
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
-    /// Print nothing but errors
+    /// Print errors only
     #[arg(long)]
     pub quiet: bool,
     #[command(flatten)]
     body: Body,
 }
 
-/// The case, where the input is an STL file.
+/// The case, if the input is an STL file.
 #[derive(clap::Args)]
-#[command(next_help_heading = "Without a case file")]
+#[command(next_help_heading = "Options for an STL file")]
 struct Body {
-    /// Cells at the surface are this size or smaller
+    /// Greatest edge of cells at the surface
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     spacing_min: Option<f64>,
-    /// Minimum thickness of a layer, in cells [default: 4]
+    /// Least number of cells across a layer [default: 4]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     layer_cells_min: Option<u32>,
-    /// Which side stays [default: outside]
+    /// Side of the surface to keep [default: outside]
     #[arg(long, value_enum)]
     keep: Option<Keep>,
-    /// Leave crossing leaves out of the mesh
+    /// Remove crossing leaves from the mesh
     #[arg(long)]
     drop_crossing: bool,
-    /// Root edge in longest edges of the bounding box, centred on it [default: 10]
+    /// Edge of the root, in longest edges of the bounding box, on which it is centred [default: 10]
     #[arg(long, value_name = "X", conflicts_with = "root", allow_negative_numbers = true)]
     root_scale: Option<f64>,
     /// Root cube: minimum corner and edge
     #[arg(long, value_name = "X,Y,Z,EDGE", allow_hyphen_values = true, value_parser = numbers::<4>)]
     root: Option<[f64; 4]>,
-    /// Extent box: minimum corner, maximum corner, spacing; any number of times
+    /// Extent box: minimum corner, maximum corner, spacing; may be repeated
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1,SPACING", allow_hyphen_values = true, value_parser = numbers::<7>)]
     boxes: Vec<[f64; 7]>,
 }
 
-/// A level to cut at; chosen by the number of ranks if none.
+/// The level of the base leaves; chosen automatically if none.
 #[derive(Clone, Copy)]
 pub struct LevelBase(pub Option<u32>);
 
-/// How ranks talk.
+/// Communication between ranks.
 #[derive(Clone, Copy)]
 pub enum CommChoice {
     /// MPI under a launcher of MPI jobs, else a single rank.
@@ -93,9 +100,9 @@ pub enum CommChoice {
     Mpi,
     /// Ranks simulated in this process.
     Sim {
-        /// How many.
+        /// Number of ranks.
         ranks: usize,
-        /// Of their schedule.
+        /// Seed of their schedule.
         seed: u64,
     },
 }
@@ -135,24 +142,68 @@ fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The command line; what is wrong with it in one sentence, as all other errors. Help and version end
-/// the process here.
+/// The definition of the command line, with the options that print something and exit.
+fn command() -> Command {
+    let prints = |name| {
+        Arg::new(name).long(name).exclusive(true).help_heading("Options that print and exit")
+    };
+    Args::command()
+        .arg(
+            prints("completions")
+                .value_name("SHELL")
+                .value_parser(value_parser!(Shell))
+                .help("Print the completion script for a shell"),
+        )
+        .arg(prints("man").action(ArgAction::SetTrue).help("Print the man page, in roff"))
+}
+
+/// The command line. Help, version, completions and the man page are printed here, on the first rank of a job, and end the
+/// process.
+///
+/// # Errors
+/// In one sentence, as all other errors.
 pub fn parse() -> Result<Args, Error> {
-    Args::try_parse().map_err(|e| {
+    let parsed = command().try_get_matches().and_then(|m| {
+        if let Some(&shell) = m.get_one::<Shell>("completions") {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut command(), "mesher", &mut script);
+            print_and_exit(&script);
+        }
+        if m.get_flag("man") {
+            let mut page = Vec::new();
+            let rendered = clap_mangen::Man::new(command()).render(&mut page);
+            rendered.expect("memory can be written to");
+            print_and_exit(&page);
+        }
+        Args::from_arg_matches(&m)
+    });
+    parsed.map_err(|e| {
         if !e.use_stderr() {
-            e.exit();
+            if launch::is_first() {
+                e.exit();
+            }
+            exit(e.exit_code());
         }
         let text = e.to_string();
         let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
-        let told: Vec<&str> = lines
+        let sentence: Vec<&str> = lines
             .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
             .collect();
-        let told = told.join(" ");
-        Error::input(format!("{}; see --help", told.strip_prefix("error: ").unwrap_or(&told)))
+        let sentence = sentence.join(" ");
+        let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
+        Error::input(format!("{sentence}; see --help"))
     })
 }
 
-/// The case that the command line asks for.
+fn print_and_exit(text: &[u8]) -> ! {
+    if launch::is_first() {
+        // A closed pipe is no reason to fail.
+        let _ = io::stdout().write_all(text);
+    }
+    exit(0)
+}
+
+/// The case that the command line describes.
 pub fn case(args: &Args) -> Result<Case, Error> {
     let b = &args.body;
     let is_case = args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
@@ -163,7 +214,7 @@ pub fn case(args: &Args) -> Result<Case, Error> {
             || b.drop_crossing;
         if given || b.root_scale.is_some() || b.root.is_some() || !b.boxes.is_empty() {
             return Err(Error::input(format!(
-                "{} is a case file, which says it all: change it there",
+                "{} is a case file: set the spacing, layers, sides, root and boxes there, not on the command line",
                 args.input.display()
             )));
         }
@@ -171,7 +222,7 @@ pub fn case(args: &Args) -> Result<Case, Error> {
     }
     let spacing_min = b.spacing_min.ok_or_else(|| {
         Error::input(format!(
-            "{} is taken for an STL file: give --spacing-min, or a case file (.toml)",
+            "{} is read as an STL file: give --spacing-min, or a case file (.toml)",
             args.input.display()
         ))
     })?;

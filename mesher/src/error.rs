@@ -1,19 +1,19 @@
-//! Errors of the user's; bugs panic instead.
+//! Errors that a user can correct; bugs panic instead.
 //!
-//! Exit codes: 0 done, 2 unusable input, 4 output that could not be written, 70 a bug, 130 interrupted.
+//! Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 130 interrupted.
 
 use thiserror::Error;
 
-/// What a user can put right. One sentence: what, where, what to do.
+/// An error with a message of one sentence: what, where, what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Error {
     /// The case, the geometry or an option is unusable.
     #[error("{0}")]
     Input(String),
-    /// Something could not be written.
+    /// Output could not be written.
     #[error("{0}")]
     Output(String),
-    /// The run was interrupted.
+    /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,
 }

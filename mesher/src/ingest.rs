@@ -1,7 +1,9 @@
-//! Reading geometry: every rank reads its share of the facets.
+//! Reading geometry: every rank gets its slice of the facets.
 //!
-//! A binary STL is told by its length, 84 + 50 per facet, whatever its header says; each rank reads
-//! its own records. Text is read by rank 0, which deals the facets out; so are generated shapes.
+//! A file whose length is 84 + 50 bytes per facet is a binary STL file, whatever its header says; each rank reads its own records.
+//! Text is read by rank 0, which sends each rank its slice. The same holds for generated shapes.
+//!
+//! Invariant: the slices of the ranks are contiguous, in the order of the ranks, and add up to all facets.
 
 use crate::comm::{Comm, MessageBuffer, agree};
 use crate::error::Error;
@@ -9,7 +11,7 @@ use crate::stl;
 use geometries::{Facet, Generator};
 use std::path::PathBuf;
 
-/// Where facets come from.
+/// The source of the facets.
 #[derive(Clone, Debug)]
 pub enum Source {
     /// An STL file.
@@ -20,71 +22,80 @@ pub enum Source {
     Given(Vec<Facet>),
 }
 
-/// A rank's share of the geometry.
+/// A rank's slice of the facets.
 #[derive(Clone, Debug)]
-pub struct Share {
+pub struct Slice {
     /// The facets, all finite.
     pub facets: Vec<Facet>,
-    /// Number of the first one in the whole geometry.
+    /// Index of the first one in the whole geometry.
     pub first: u64,
     /// Number of facets on all ranks.
     pub total: u64,
 }
 
-/// Reads this rank's share. Collective.
-pub fn read(source: &Source, comm: &dyn Comm) -> Result<Share, Error> {
-    let ownership = match source {
+/// Reads this rank's slice. Collective.
+///
+/// # Errors
+/// If the file cannot be read or is no STL file, or a coordinate is not finite.
+pub fn read(source: &Source, comm: &dyn Comm) -> Result<Slice, Error> {
+    let slice = match source {
         Source::Stl(path) => {
             let file = agree(comm, stl::open(path))?;
             match file.binary {
                 Some(total) => {
-                    let (first, end) = slice(total, comm);
+                    let (first, end) = range(total, comm.rank(), comm);
                     let facets = agree(comm, file.read(first, end))?;
-                    Share { facets, first, total }
+                    Slice { facets, first, total }
                 }
-                None => deal(comm, || file.read_text())?,
+                None => distribute(comm, || file.read_text())?,
             }
         }
         Source::Generated(g) => {
-            deal(comm, || g.facets().map_err(|e| Error::input(format!("[generator]: {e}"))))?
+            distribute(comm, || g.facets().map_err(|e| Error::input(format!("[generator]: {e}"))))?
         }
-        Source::Given(facets) => deal(comm, || Ok(facets.clone()))?,
+        Source::Given(facets) => distribute(comm, || Ok(facets.clone()))?,
     };
-    comm.agree(stl::check_finite(&ownership.facets, ownership.first))?;
-    Ok(ownership)
+    comm.agree(stl::check_finite(&slice.facets, slice.first))?;
+    Ok(slice)
 }
 
-/// This rank's part of `total` things: from the first to before the last.
-fn slice(total: u64, comm: &dyn Comm) -> (u64, u64) {
-    let at = |r: usize| (u128::from(total) * r as u128 / comm.size() as u128) as u64;
-    (at(comm.rank()), at(comm.rank() + 1))
+/// The start and the end of a rank's slice of `total` facets.
+fn range(total: u64, rank: usize, comm: &dyn Comm) -> (u64, u64) {
+    let start = |r: usize| (u128::from(total) * r as u128 / comm.size() as u128) as u64;
+    (start(rank), start(rank + 1))
 }
 
-/// Rank 0 makes the facets and deals them out. Collective.
-fn deal(comm: &dyn Comm, make: impl FnOnce() -> Result<Vec<Facet>, Error>) -> Result<Share, Error> {
+/// Rank 0 makes the facets and sends each rank its slice. Collective.
+fn distribute(
+    comm: &dyn Comm,
+    make: impl FnOnce() -> Result<Vec<Facet>, Error>,
+) -> Result<Slice, Error> {
     let made = if comm.rank() == 0 { make() } else { Ok(Vec::new()) };
     let facets = agree(comm, made)?;
     let total = comm.sum(facets.len() as u64);
-    let (first, end) = slice(total, comm);
+    let (first, end) = range(total, comm.rank(), comm);
     if comm.size() == 1 {
-        return Ok(Share { facets, first, total });
+        return Ok(Slice { facets, first, total });
     }
-    let out = if comm.rank() == 0 {
-        let at = |r: usize| (u128::from(total) * r as u128 / comm.size() as u128) as usize;
-        (1..comm.size()).map(|r| (r, pack(&facets[at(r)..at(r + 1)]))).collect()
+    let messages = if comm.rank() == 0 {
+        let slice = |r: usize| {
+            let (start, end) = range(total, r, comm);
+            (r, pack(&facets[start as usize..end as usize]))
+        };
+        (1..comm.size()).map(slice).collect()
     } else {
         MessageBuffer::default()
     };
-    let heard = comm.sparse_all_to_all(out);
+    let received = comm.sparse_all_to_all(messages);
     let facets = if comm.rank() == 0 {
         facets[..end as usize].to_vec()
     } else {
-        unpack(heard.words()).into_iter().take((end - first) as usize).collect()
+        unpack(received.words()).into_iter().take((end - first) as usize).collect()
     };
-    Ok(Share { facets, first, total })
+    Ok(Slice { facets, first, total })
 }
 
-/// Coordinates, two to the word.
+/// Coordinates, two in each word.
 fn pack(facets: &[Facet]) -> impl Iterator<Item = u64> {
     let flat: &[f32] = facets.as_flattened().as_flattened();
     let word = |c: &[f32]| -> u64 {
@@ -93,7 +104,7 @@ fn pack(facets: &[Facet]) -> impl Iterator<Item = u64> {
     flat.chunks(2).map(word)
 }
 
-/// Inverse of [`pack`], with the padding's facet cut off by the caller's count.
+/// Inverse of [`pack`]; the last facet may be padding.
 fn unpack(words: &[u64]) -> Vec<Facet> {
     let flat: Vec<f32> = words
         .iter()
@@ -110,14 +121,14 @@ mod tests {
     use crate::comm::sim;
 
     #[test]
-    fn every_facet_is_dealt_once_and_in_order() {
+    fn every_facet_is_in_one_slice_and_slices_are_in_order() {
         for total in [0usize, 1, 2, 5, 64, 101] {
             let facets: Vec<Facet> = (0..total).map(|i| [[i as f32, 0.5, -1.0]; 3]).collect();
             for ranks in [1, 2, 3, 7, 30] {
-                let shares =
+                let slices =
                     sim::run(ranks, 5, |c| read(&Source::Given(facets.clone()), c).unwrap());
-                assert!(shares.iter().all(|s| s.total == total as u64));
-                let all: Vec<Facet> = shares.iter().flat_map(|s| s.facets.clone()).collect();
+                assert!(slices.iter().all(|s| s.total == total as u64));
+                let all: Vec<Facet> = slices.iter().flat_map(|s| s.facets.clone()).collect();
                 assert_eq!(all, facets);
             }
         }

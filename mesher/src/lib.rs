@@ -1,15 +1,17 @@
 //! Off-body hexahedral oct-tree meshes around facets, on any number of ranks, after O'Connell and
 //! Karman, "Advances in Parallelization For Large Scale Oct-Tree Mesh Generation".
 //!
-//! [`mesh`] reads like the paper: ingest, base tree and partition, refinement, inside and outside,
-//! gradation, leaves. The mesh is a function of the facets and the rules alone (see
-//! `reference/DEFINITION.md`), not of ranks, partitioner or base level.
+//! [`mesh`] runs ten phases, each in a module: 1 read, 2 quantise, 3 partition, 4 refine, 5 repartition after refinement, 6 sides,
+//! 7 gradation, 8 repartition after gradation, 9 leaves, 10 finish. Each phase ends with a check of the invariants of what
+//! it has made ([`check`]). The mesh is a function of the facets and the rules alone (see
+//! `reference/DEFINITION.md`), not of the ranks, the partitioner or the base level.
 
 #![deny(missing_docs)]
 
 pub mod brick;
 pub mod brickset;
 pub mod case;
+pub mod check;
 pub mod comm;
 pub mod digest;
 pub mod dilate;
@@ -19,11 +21,13 @@ pub mod grade;
 pub mod ingest;
 pub mod kept;
 pub mod lattice;
+pub mod leaves;
 pub mod octant;
 pub mod partition;
+pub mod quantise;
 pub mod record;
+pub mod refine;
 pub mod report;
-
 pub mod sides;
 pub mod stl;
 pub mod stream;
@@ -33,21 +37,26 @@ mod wide;
 pub mod write;
 
 use case::Case;
+use check::debug_check;
 use comm::{Comm, agree};
 use error::Error;
-use lattice::{Bounds, Rules};
-use partition::initial::{self as base, Division};
-use partition::ownership::{self, Ownership};
-use partition::repartition as rebalance;
+use kept::Kept;
+use lattice::Rules;
+use partition::Division;
+use partition::base_leaves::cells_heaviest;
+use partition::initial::{self, Partition};
+use partition::ownership::Ownership;
+use partition::repartition::{self, LeafCounts, Sets};
 use record::{Recorder, check_interrupt};
 use report::{Counters, Report};
 use sides::Sides;
 use std::path::PathBuf;
-use stream::{Counts, Leaves};
-use tree::{PerLevel, Tree};
-use write::{Manifest, OutDir, Written};
+use stream::Leaves;
+use tree::PerLevel;
+use voxelise::Filed;
+use write::OutDir;
 
-/// What to do besides meshing.
+/// Options that have no effect on the mesh, but for `ungraded`.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// How to divide the work among ranks.
@@ -56,23 +65,64 @@ pub struct Options {
     pub ungraded: bool,
     /// Directory to write the mesh to.
     pub out: Option<PathBuf>,
+    /// Check invariants after each phase, which debug builds do in any case.
+    pub check: bool,
 }
 
-/// Meshes a case. Collective; `Recorder` keeps this rank's times, the report is the same on all ranks.
+/// A mesh as one rank holds it.
+pub struct Mesh {
+    /// Number of facets on all ranks.
+    pub facets: u64,
+    /// The rules on the lattice.
+    pub rules: Rules,
+    /// The ranks that own and hold bricks.
+    pub ownership: Ownership,
+    /// Level of the base leaves, or of the octants between which partition boundaries lie.
+    pub level_base: octant::Level,
+    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
+    pub split: PerLevel,
+    /// Crossing leaves of T0.
+    pub crossing: PerLevel,
+    /// Sides of the leaves of T0.
+    pub sides: Sides,
+    /// Whether the tree is T0, of which all leaves are in the mesh.
+    pub is_base: bool,
+}
+
+impl Mesh {
+    /// The leaves that this rank owns.
+    pub fn leaves(&self) -> Leaves<'_> {
+        Leaves {
+            split: &self.split,
+            crossing: &self.crossing,
+            sides: &self.sides,
+            ownership: &self.ownership,
+            everything: self.is_base,
+            rules: &self.rules,
+        }
+    }
+}
+
+/// Meshes a case: all ten phases. The recorder keeps this rank's times; the report is the same on all ranks. Collective.
+///
+/// # Errors
+/// The same on all ranks. Then nothing is left in the output directory.
 pub fn mesh(
     case: &Case,
     options: &Options,
     comm: &dyn Comm,
     record: &mut Recorder,
 ) -> Result<Report, Error> {
-    let out = agree(comm, make_out(options, comm))?;
-    let result = mesh_into(case, options, out.as_ref(), comm, record);
+    let path = options.out.as_ref();
+    let open = |p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) };
+    let out = agree(comm, path.map(|p| open(p)).transpose())?;
+    let result = mesh_into(out.as_ref(), case, options, comm, record);
     if let (Err(_), Some(out)) = (&result, &out) {
-        // Ranks first clear their own files, then the one that made the directory removes it.
+        // All ranks remove their own files before rank 0 removes the directory.
         if comm.rank() != 0 {
             out.discard(comm.rank());
         }
-        comm.sum(0);
+        comm.barrier();
         if comm.rank() == 0 {
             out.discard(0);
         }
@@ -80,262 +130,173 @@ pub fn mesh(
     result
 }
 
-fn make_out(options: &Options, comm: &dyn Comm) -> Result<Option<OutDir>, Error> {
-    let path = options.out.as_ref();
-    path.map(|p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) }).transpose()
-}
-
 fn mesh_into(
+    out: Option<&OutDir>,
     case: &Case,
     options: &Options,
-    out: Option<&OutDir>,
     comm: &dyn Comm,
     record: &mut Recorder,
 ) -> Result<Report, Error> {
-    let (meshed, mut counters) = build(case, options, comm, record)?;
-    let (counts, written) = record.phase("leaves", comm, || emit(&meshed, out, comm))?;
-    let Meshed { rules, sides, .. } = &meshed;
-    let finished = record.phase("finish", comm, || {
-        finish(rules, options.ungraded, counts, &written, sides, out, comm)
-    });
-    let (counts, digests, parts) = finished?;
-    counters.sides(sides, comm.rank());
-    counters.traffic(comm.traffic());
-    Ok(Report::gather(
-        meshed.facets,
-        rules,
-        &counts,
-        &digests,
-        &parts,
-        sides,
-        meshed.refined.level_base,
-        record,
-        &counters,
-        comm,
-    ))
+    let mut counters = Counters::default();
+    let mesh = make(case, options, comm, record, &mut counters)?;
+
+    // 9. Leaves: streamed in Morton order into the digest, and to disk if a directory is given.
+    let (counts, written) = record.phase("leaves", comm, || leaves::emit(&mesh, out, comm))?;
+    debug_check(options, comm, || check::leaves(&mesh, &counts, &written, comm));
+
+    // 10. Finish: sums over the ranks, and the manifest.
+    let totals =
+        record.phase("finish", comm, || leaves::finish(&mesh, &counts, &written, out, comm))?;
+    counters.leaves = written.leaves;
+    // All ranks cast the same number of rays in total.
+    counters.rays = if comm.rank() == 0 { mesh.sides.rays } else { 0 };
+    counters.add_traffic(comm.traffic());
+    debug_check(options, comm, || check::totals(&totals, &written, comm));
+    Ok(Report::gather(&mesh, &totals, &counters, record, comm))
 }
 
-/// The leaf words that this rank answers for, in order, and the components decided by majority: the
-/// whole result without a report. Collective.
+/// The leaf words that this rank owns, in order, and the components decided by majority: phases 1 to 8, and no
+/// report. Collective.
 pub fn words(
     case: &Case,
     options: &Options,
     comm: &dyn Comm,
 ) -> Result<(Vec<u64>, Option<sides::Ambiguous>), Error> {
-    let (meshed, _) = build(case, options, comm, &mut Recorder::default())?;
+    let mesh = make(case, options, comm, &mut Recorder::default(), &mut Counters::default())?;
     let mut words = Vec::new();
-    meshed.leaves().emit(|w| {
+    mesh.leaves().emit(|w| {
         words.extend_from_slice(w);
         Ok::<(), Error>(())
     })?;
-    Ok((words, meshed.sides.ambiguous))
+    Ok((words, mesh.sides.ambiguous))
 }
 
-/// A mesh that has not been written out.
-struct Meshed {
-    facets: u64,
-    rules: Rules,
-    refined: Refined,
-    sides: Sides,
-    /// The graded tree's splits; none for the base tree.
-    graded: Option<PerLevel>,
-}
-
-impl Meshed {
-    fn leaves(&self) -> Leaves<'_> {
-        Leaves {
-            split: self.graded.as_ref().unwrap_or(&self.refined.tree.split),
-            crossing: &self.refined.tree.crossing,
-            sides: &self.sides,
-            ownership: &self.refined.ownership,
-            everything: self.graded.is_none(),
-            rules: &self.rules,
-        }
-    }
-}
-
-/// The phases up to the finished tree. Collective.
-fn build(
+/// Phases 1 to 8, which make the tree. Collective.
+fn make(
     case: &Case,
     options: &Options,
     comm: &dyn Comm,
     record: &mut Recorder,
-) -> Result<(Meshed, Counters), Error> {
-    let mut counters = Counters::default();
-    let geometry = record.phase("read", comm, || ingest::read(&case.source, comm))?;
-    let (rules, facets, total) =
-        record.phase("quantise", comm, || quantise(case, geometry, comm))?;
-    let mut refined = refine(&facets, &rules, &options.division, comm, record, &mut counters)?;
+    counters: &mut Counters,
+) -> Result<Mesh, Error> {
+    let division = &options.division;
+    let is_parallel = comm.size() > 1;
+
+    // 1. Read: each rank reads its slice of the facets.
+    let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
+    debug_check(options, comm, || check::slices(&slice, comm));
+    let facets_total = slice.total;
+
+    // 2. Quantise: the facets and the rules on the lattice.
+    let (rules, facets) =
+        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
+    debug_check(options, comm, || check::rules(&rules, comm));
+
+    // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
+    let mark = |level| {
+        let (tree, work) = refine::refine_top(&facets, &rules, level);
+        counters.add_voxelised(&work);
+        tree.split
+    };
+    let Partition { mut ownership, base_leaves, level_base } = match is_parallel {
+        false => Partition::solo(),
+        true => record.phase("base tree", comm, || {
+            initial::partition(&facets, &rules, division, mark, comm)
+        })?,
+    };
+    debug_check(options, comm, || check::ownership(&ownership, comm));
+
+    // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
+    let routed = is_parallel
+        .then(|| record.phase("route", comm, || refine::route(&facets, &ownership, comm)));
+    if let Some(routed) = &routed {
+        debug_check(options, comm, || check::facets(&facets, routed, &ownership, comm));
+    }
+    let (mut tree, work) = record.phase("refine", comm, || {
+        let binned = Filed::new(routed.as_ref().unwrap_or(&facets));
+        drop(routed);
+        refine::refine(&binned, &rules, &ownership)
+    });
+    counters.add_voxelised(&work);
+
+    // 5. Repartition after refinement: by the predicted work on T0. Replicas of bricks become equal.
+    if is_parallel {
+        let name = if division.repartitions() { "rebalance" } else { "share top" };
+        record.phase(name, comm, || {
+            if division.repartitions() {
+                ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);
+            }
+            ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
+        });
+    }
+    debug_check(options, comm, || {
+        check::ownership(&ownership, comm);
+        check::base_tree(&tree, &ownership, comm);
+    });
     comm.agree(check_interrupt())?;
 
-    let mut sides = record.phase("sides", comm, || {
-        sides::decide(&refined.tree, &refined.ownership, &facets, rules.keep, comm)
-    });
+    // 6. Sides: inside or outside, for every component of non-crossing leaves.
+    let sides =
+        record.phase("sides", comm, || sides::decide(&tree, &ownership, &facets, rules.keep, comm));
+    debug_check(options, comm, || check::sides(&sides, &tree, &ownership, &rules, comm));
     drop(facets);
     comm.agree(check_interrupt())?;
+    let tree::Tree { split, crossing } = tree;
+    let mut mesh = Mesh {
+        facets: facets_total,
+        rules,
+        ownership,
+        level_base,
+        split,
+        crossing,
+        sides,
+        is_base: options.ungraded,
+    };
+    if options.ungraded {
+        comm.agree(check_interrupt())?;
+        return Ok(mesh);
+    }
 
-    let graded = (!options.ungraded).then(|| {
-        let kept = kept::Kept::new(&sides.deleted);
-        // From here on the base tree is known by its crossing and deleted leaves.
-        let split = std::mem::take(&mut refined.tree.split);
-        let (split, work) = record.phase("grade", comm, || {
-            grade::grade(split, &refined.tree.crossing, &kept, &rules, &refined.ownership, comm)
-        });
-        counters.grade(&work);
-        split
+    // 7. Gradation: layers and 2:1 balance, from the deepest level up.
+    let base = check::is_on(options).then(|| mesh.split.clone());
+    let (split, work) = record.phase("grade", comm, || {
+        let split = std::mem::take(&mut mesh.split);
+        let kept = Kept::new(&mesh.sides.deleted);
+        grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
     });
+    mesh.split = split;
+    counters.add_graded(&work);
+    debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
     comm.agree(check_interrupt())?;
-    let graded = graded.map(|mut split| {
-        counters.base_leaf(match refined.level_cut {
-            None => base::cells_heaviest(&split, &sides.deleted, &refined.dealt),
-            Some(level) => {
-                let anew = options.division.rebalances();
-                let mut deal =
-                    || deal_leaves(level, anew, &mut split, &mut refined, &mut sides, &rules, comm);
-                if anew { record.phase("rebalance", comm, deal) } else { deal() }
-            }
-        });
-        split
-    });
-    Ok((Meshed { facets: total, rules, refined, sides, graded }, counters))
-}
 
-/// The rules, this rank's facets on the lattice, and the number of all. Collective.
-fn quantise(
-    case: &Case,
-    geometry: ingest::Share,
-    comm: &dyn Comm,
-) -> Result<(Rules, Vec<facet::Facet>, u64), Error> {
-    let ingest::Share { facets, first, total } = geometry;
-    let mine = Bounds::of(&facets);
-    let words: Vec<u64> = mine.lo.iter().chain(&mine.hi).map(|c| c.to_bits()).collect();
-    let bounds = comm.all_gather(&words).messages().fold(Bounds::EMPTY, |b, (_, w)| {
-        let at = |i: usize| f64::from_bits(w[i]);
-        b.union(Bounds { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] })
-    });
-    let rules = case.rules(&bounds)?;
-    let facets = agree(comm, rules.root.facets(facets, &mine, first))?;
-    Ok((rules, facets, total))
-}
-
-/// The base tree T0 as this rank holds it.
-struct Refined {
-    tree: Tree,
-    ownership: Ownership,
-    /// This rank's base leaves as they were dealt out, if there are any.
-    dealt: Vec<ownership::BaseLeaf>,
-    level_base: octant::Level,
-    /// Level of the octants between which the Morton curve is cut, if it is.
-    level_cut: Option<octant::Level>,
-}
-
-/// Base tree, partition, and refinement of this rank's part. Collective.
-fn refine(
-    facets: &[facet::Facet],
-    rules: &Rules,
-    division: &Division,
-    comm: &dyn Comm,
-    record: &mut Recorder,
-    counters: &mut Counters,
-) -> Result<Refined, Error> {
-    let depth = voxelise::Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    if comm.size() == 1 {
-        let root = [voxelise::Start { level: 0, code: 0 }];
-        let (tree, work) = record.phase("refine", comm, || {
-            voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
-        });
-        counters.voxelise(&work);
-        let (ownership, dealt) = (Ownership::solo(), vec![ownership::BaseLeaf::ROOT]);
-        return Ok(Refined { tree, dealt, ownership, level_base: 0, level_cut: None });
+    // 8. Repartition after gradation: by the number of leaves.
+    if !(is_parallel && division.is_of_curve()) {
+        counters.base_leaf_cells_max =
+            cells_heaviest(&mesh.split, &mesh.sides.deleted, &base_leaves);
+        return Ok(mesh);
     }
-    let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
-    counters.voxelise(&base.work);
-    let base::Base { mut ownership, dealt, level_base, .. } = base;
-    let filed = record
-        .phase("route", comm, || voxelise::Filed::new(&base::route(facets, &ownership, comm)));
-    let (mut tree, work) = record
-        .phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&ownership)));
-    counters.voxelise(&work);
-    let level_cut = division.is_of_curve().then_some(level_base);
-    let synchronise_replicas = if division.rebalances() { "rebalance" } else { "share top" };
-    record.phase(synchronise_replicas, comm, || {
-        if division.rebalances() {
-            ownership = rebalance::of_base_tree(&tree, &ownership, level_base, comm);
-        }
-        // What several ranks hold of T0, each knows as far as its own octants ask for it.
-        ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
+    let mut by_leaves = || repartition_by_leaves(&mut mesh, division.repartitions(), comm);
+    counters.base_leaf_cells_max = match division.repartitions() {
+        true => record.phase("rebalance", comm, by_leaves),
+        false => by_leaves(),
+    };
+    debug_check(options, comm, || {
+        check::ownership(&mesh.ownership, comm);
+        check::graded(&mesh, None, comm);
     });
-    Ok(Refined { tree, ownership, dealt, level_base, level_cut })
+    Ok(mesh)
 }
 
-/// Weighs the leaves of the finished tree by octants of a level, and deals them out `anew` or not. Returns how many are in
-/// the octant that has most. Collective.
-fn deal_leaves(
-    level: octant::Level,
-    anew: bool,
-    split: &mut PerLevel,
-    refined: &mut Refined,
-    sides: &mut Sides,
-    rules: &Rules,
-    comm: &dyn Comm,
-) -> u64 {
-    let Refined { tree, ownership, .. } = refined;
-    let (crossing, inside, deleted) = (&mut tree.crossing, &mut sides.inside, &mut sides.deleted);
-    let parts = rebalance::Parts { split, crossing, inside, deleted };
-    let weighed = rebalance::Weighed::new(&parts, ownership, level, rules.keep_crossing);
-    let heaviest = weighed.heaviest();
-    if anew {
-        *ownership = weighed.deal(parts, ownership, comm);
+/// Counts the leaves by octants of the base level, and repartitions by these counts if `moves` is true. Returns the greatest count.
+/// Collective.
+fn repartition_by_leaves(mesh: &mut Mesh, moves: bool, comm: &dyn Comm) -> u64 {
+    let (inside, deleted) = (&mut mesh.sides.inside, &mut mesh.sides.deleted);
+    let sets = Sets { split: &mut mesh.split, crossing: &mut mesh.crossing, inside, deleted };
+    let with_crossing = mesh.rules.keep_crossing;
+    let counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
+    let max = counts.max();
+    if moves {
+        mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
     }
-    heaviest
-}
-
-/// Streams the leaves into the digest, and to disk if asked. Collective.
-fn emit(
-    meshed: &Meshed,
-    out: Option<&OutDir>,
-    comm: &dyn Comm,
-) -> Result<(Counts, Written), Error> {
-    let work = || match out {
-        None => {
-            let mut written = Written::default();
-            let counts = meshed.leaves().emit(|words| {
-                written.leaves += words.len() as u64;
-                written.digests.add(words);
-                check_interrupt()
-            })?;
-            Ok((counts, written))
-        }
-        Some(out) => {
-            let mut part = out.part(comm.rank())?;
-            let counts = meshed.leaves().emit(|words| {
-                check_interrupt()?;
-                part.add(words)
-            })?;
-            Ok((counts, part.finish()?))
-        }
-    };
-    agree(comm, work())
-}
-
-/// Sums over the ranks, and writes the manifest. Collective.
-fn finish(
-    rules: &Rules,
-    base: bool,
-    counts: Counts,
-    written: &Written,
-    sides: &Sides,
-    out: Option<&OutDir>,
-    comm: &dyn Comm,
-) -> Result<(Counts, digest::Digests, Vec<[u64; 3]>), Error> {
-    let counts = counts.gather(comm);
-    let (digests, parts) = write::gather(written, comm);
-    let publish = || match out {
-        Some(out) if comm.rank() == 0 => {
-            out.manifest(&Manifest::new(rules, base, &counts, sides.ambiguous, &digests, &parts))
-        }
-        _ => Ok(()),
-    };
-    comm.agree(publish())?;
-    Ok((counts, digests, parts))
+    max
 }

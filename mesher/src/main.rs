@@ -1,15 +1,16 @@
-//! The mesher's program: chooses how ranks talk, meshes, tells. Only this file prints.
+//! The program: chooses the communication between ranks, meshes, reports. Only this file prints.
 
 #![deny(missing_docs)]
 
 mod cli;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod heap;
+mod launch;
 
 use cli::{Args, CommChoice, case, parse};
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
-use mesher::partition::initial::Division;
+use mesher::partition::Division;
 use mesher::record::{INTERRUPTED, Recorder};
 use mesher::report::Report;
 use mesher::{Options, mesh};
@@ -18,7 +19,7 @@ use signal_hook::flag;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::exit;
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 /// Exit code of a bug.
 const BUG: i32 = 70;
@@ -42,58 +43,43 @@ fn main() {
             abort_on_panic(|| exit(BUG));
             exit(run(&args, &Solo));
         }
-        Err(e) => exit(fail(&e)),
+        Err(e) => exit(fail(&e, launch::is_first())),
     }
 }
 
-/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop; a second one ends the process at once. No thread waits for
-/// them: starting one allocates at some moment or other, and who compares meshers counts allocations.
+/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop; a second signal ends the process at once. Signal handlers set a flag, as a
+/// thread that waits for signals would allocate at random times, and allocations are measured.
 fn remember_interrupts() -> std::io::Result<()> {
     for signal in [SIGINT, SIGTERM, SIGHUP] {
-        // They run in this order, so that the first signal finds the flag down.
+        // Handlers run in this order, so the first signal finds the flag unset.
         flag::register_conditional_shutdown(signal, STOPPED, Arc::clone(&INTERRUPTED))?;
         flag::register(signal, Arc::clone(&INTERRUPTED))?;
     }
     Ok(())
 }
 
-/// Number of ranks that an MPI launcher has started, if one has.
-fn launched() -> Option<usize> {
-    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS"]
-        .iter()
-        .find_map(|v| std::env::var(v).ok()?.parse().ok())
-}
-
+/// Resolves `auto` by the launcher's environment.
 fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
-    let wants_mpi = match asked {
-        CommChoice::Auto => {
-            launched().is_some()
-                || std::env::var("SLURM_PROCID").is_ok() && std::env::var("PMIX_RANK").is_ok()
-        }
-        CommChoice::Mpi => true,
-        _ => return Ok(asked),
-    };
-    if !wants_mpi {
-        return Ok(CommChoice::Solo);
-    }
-    if cfg!(feature = "mpi") {
-        return Ok(CommChoice::Mpi);
-    }
-    match launched() {
-        Some(1) => Ok(CommChoice::Solo),
-        _ => Err(Error::input(
-            "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
-        )),
+    match asked {
+        CommChoice::Auto if !launch::is_mpi_job() => Ok(CommChoice::Solo),
+        CommChoice::Auto | CommChoice::Mpi if cfg!(feature = "mpi") => Ok(CommChoice::Mpi),
+        CommChoice::Auto | CommChoice::Mpi => match launch::ranks() {
+            Some(1) => Ok(CommChoice::Solo),
+            _ => Err(Error::input(
+                "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
+            )),
+        },
+        _ => Ok(asked),
     }
 }
 
 #[cfg(feature = "mpi")]
 fn run_mpi(args: &Result<Args, Error>) {
     let comm = mesher::comm::mpi::Mpi::start();
-    // A panic that unwinds would leave the other ranks waiting for ever.
+    // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
     let code = run(args, &comm);
-    // All ranks have the same code, as errors are agreed on.
+    // All ranks have the same exit code, as they agree on errors.
     drop(comm);
     exit(code);
 }
@@ -103,18 +89,24 @@ fn run_mpi(_: &Result<Args, Error>) {
     unreachable!("MPI is chosen only where it is built in");
 }
 
-/// Makes a panic on any thread end the whole run.
+/// Makes a panic on any thread end the whole job, with one notice per process. Every rank that panics prints where.
 fn abort_on_panic(end: fn() -> !) {
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         report(info);
-        eprintln!("this is a bug in the mesher: please report it with the case");
+        static NOTICE: Once = Once::new();
+        NOTICE.call_once(|| {
+            eprintln!("this is a bug in the mesher: please report it with the case");
+        });
         end();
     }));
 }
 
-fn fail(e: &Error) -> i32 {
-    eprintln!("mesher: {e}");
+/// Prints an error, on one rank of a job; returns the exit code.
+fn fail(e: &Error, prints: bool) -> i32 {
+    if prints {
+        eprintln!("mesher: {e}");
+    }
     e.exit_code()
 }
 
@@ -123,8 +115,7 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
     let args = match args {
         Ok(args) => args,
-        Err(e) if first => return fail(e),
-        Err(e) => return e.exit_code(),
+        Err(e) => return fail(e, first),
     };
     let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
@@ -138,13 +129,12 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     match result {
         Ok(report) => {
             if first && !args.quiet {
-                // A reader that went away is no reason to fail.
+                // A closed pipe is no reason to fail.
                 let _ = writeln!(std::io::stdout(), "{report}");
             }
             0
         }
-        Err(e) if first => fail(&e),
-        Err(e) => e.exit_code(),
+        Err(e) => fail(&e, first),
     }
 }
 
@@ -154,7 +144,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
             Error::output(format!("{}: {e}: choose another --status", dir.display()))
         }))?;
     }
-    // A place that cannot be written is found out now rather than after the meshing.
+    // Fails now rather than after meshing if the file cannot be written.
     let json = args.json.as_ref().filter(|_| comm.rank() == 0).map(|p| Json::begin(p)).transpose();
     let json = mesher::comm::agree(comm, json)?;
     let case = mesher::comm::agree(comm, case(args))?;
@@ -166,6 +156,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         },
         ungraded: args.ungraded,
         out: args.out.clone(),
+        check: args.check,
     };
     let mut report = mesh(&case, &options, comm, record)?;
     if args.message_matrix {
@@ -175,7 +166,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     Ok(report)
 }
 
-/// The report's JSON file: written beside its place, and put there when it is complete.
+/// The JSON file of the report: written under a temporary name, and renamed when it is complete.
 struct Json {
     path: PathBuf,
     file: tempfile::NamedTempFile,
@@ -188,7 +179,7 @@ impl Json {
             if path.is_dir() {
                 return Err(std::io::ErrorKind::IsADirectory.into());
             }
-            // Readable by whom the user's other files are.
+            // The permissions of the user's other files.
             let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
             tempfile::Builder::new().permissions(permissions).tempfile_in(folder)
         };

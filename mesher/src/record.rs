@@ -1,4 +1,4 @@
-//! What a run took: time per phase, and where a rank is right now.
+//! Times and messages of each phase on one rank, and the phase that it is in.
 
 use crate::comm::{Comm, Traffic};
 use crate::error::Error;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::time::Instant;
 
-/// Set when the user asks the run to stop; looked at between phases and while writing.
+/// Set when the user asks the run to stop; read between phases and while leaves are written.
 pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// An error if the user asked the run to stop.
@@ -19,17 +19,17 @@ pub fn check_interrupt() -> Result<(), Error> {
 /// One phase on one rank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
-    /// Its name.
+    /// Name of the phase.
     pub name: &'static str,
-    /// Time from its start to its end, in seconds.
+    /// Wall time, in seconds.
     pub time_wall_s: f64,
     /// CPU time of the rank's thread, in seconds, calls to other ranks included.
     pub time_cpu_s: f64,
-    /// What was sent in it, and the time in calls.
+    /// Messages sent in the phase, and the time in calls.
     pub traffic: Traffic,
 }
 
-/// Times phases, in the order in which they run, and tells a status file which one that is.
+/// Times phases, in the order in which they run, and reports the current one.
 #[derive(Debug, Default)]
 pub struct Recorder {
     phases: Vec<Phase>,
@@ -38,13 +38,13 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder that keeps the name of the phase in the file `status`, if given, and on standard error
-    /// if `progress`.
+    /// A recorder that writes the name of the current phase to the file `status`, if given, and to standard error if `progress` is
+    /// true.
     pub fn new(status: Option<PathBuf>, progress: bool) -> Self {
         Self { phases: Vec::new(), status, progress }
     }
 
-    /// Runs and times a phase. A phase that runs several times adds up.
+    /// Runs and times a phase. The times of phases with the same name add up.
     pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
         self.report_status(name);
         let before = comm.traffic();
@@ -52,7 +52,7 @@ impl Recorder {
         let result = work();
         let (time_wall_s, time_cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
         let after = comm.traffic();
-        let at = self.phases.iter().position(|p| p.name == name).unwrap_or_else(|| {
+        let index = self.phases.iter().position(|p| p.name == name).unwrap_or_else(|| {
             self.phases.push(Phase {
                 name,
                 time_wall_s: 0.0,
@@ -61,7 +61,7 @@ impl Recorder {
             });
             self.phases.len() - 1
         });
-        let p = &mut self.phases[at];
+        let p = &mut self.phases[index];
         p.time_wall_s += time_wall_s;
         p.time_cpu_s += time_cpu_s;
         p.traffic.messages += after.messages - before.messages;
@@ -71,14 +71,14 @@ impl Recorder {
         result
     }
 
-    /// Says what the rank is doing.
-    pub fn report_status(&self, what: &str) {
+    /// Reports the current phase.
+    pub fn report_status(&self, phase: &str) {
         if let Some(path) = &self.status {
-            // For whoever investigates a hang; a status that cannot be written must not end the run.
-            let _ = std::fs::write(path, format!("{what}\n"));
+            // For the diagnosis of hangs; an error here must not end the run.
+            let _ = std::fs::write(path, format!("{phase}\n"));
         }
         if self.progress {
-            eprint!("\r\x1b[K{what}");
+            eprint!("\r\x1b[K{phase}");
         }
     }
 
@@ -88,7 +88,7 @@ impl Recorder {
     }
 }
 
-/// Peak resident memory of this process in bytes; 0 where the system does not tell.
+/// Peak resident memory of this process, in bytes; 0 on systems that do not provide it.
 pub fn peak_rss_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

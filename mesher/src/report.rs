@@ -1,72 +1,73 @@
-//! What a run says at its end: a table for people, JSON for programs.
+//! The report of a run: a table for people, JSON for programs.
 
 use crate::comm::{Comm, Traffic, matrix};
-use crate::digest::{Digests, hex};
-use crate::lattice::Rules;
+use crate::digest::hex;
+use crate::leaves::Totals;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::record::{Phase, Recorder, peak_rss_bytes};
-use crate::sides::{Ambiguous, Sides};
-use crate::stream::Counts;
-use crate::{grade, voxelise};
+use crate::sides::Ambiguous;
+use crate::{Mesh, grade, voxelise};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// What a rank did, in numbers that repeat exactly.
+/// Work done by one rank, in numbers that repeat exactly.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counters {
-    values: [u64; COUNTERS.len()],
+    /// Tests of a facet against the 64 octants of a brick.
+    pub facet_brick_tests: u64,
+    /// Bricks visited by voxelisation.
+    pub bricks_voxelised: u64,
+    /// Rays cast by all ranks; counted on rank 0.
+    pub rays: u64,
+    /// Octants split by gradation.
+    pub octants_split_graded: u64,
+    /// Words of dilated tiles.
+    pub words_dilated: u64,
+    /// Bricks sent to other ranks by gradation.
+    pub halo_bricks: u64,
+    /// Messages sent.
+    pub messages: u64,
+    /// Payload sent, in bytes.
+    pub message_bytes: u64,
+    /// Leaves of the mesh.
+    pub leaves: u64,
+    /// Leaves in the rank's heaviest base leaf.
+    pub base_leaf_cells_max: u64,
 }
 
-/// Names of the counters, in the order of their values.
-const COUNTERS: [&str; 10] = [
-    "facet_brick_tests",
-    "bricks_voxelised",
-    "rays",
-    "octants_split_graded",
-    "words_dilated",
-    "halo_bricks",
-    "messages",
-    "message_bytes",
-    "leaves",
-    "base_leaf_cells_max",
+/// A counter's name in the report, and its value.
+type Counter = (&'static str, fn(&Counters) -> u64);
+
+/// All counters of the report.
+const COUNTERS: [Counter; 10] = [
+    ("facet_brick_tests", |c| c.facet_brick_tests),
+    ("bricks_voxelised", |c| c.bricks_voxelised),
+    ("rays", |c| c.rays),
+    ("octants_split_graded", |c| c.octants_split_graded),
+    ("words_dilated", |c| c.words_dilated),
+    ("halo_bricks", |c| c.halo_bricks),
+    ("messages", |c| c.messages),
+    ("message_bytes", |c| c.message_bytes),
+    ("leaves", |c| c.leaves),
+    ("base_leaf_cells_max", |c| c.base_leaf_cells_max),
 ];
 
 impl Counters {
-    fn add(&mut self, name: &str, v: u64) {
-        let at =
-            COUNTERS.iter().position(|n| *n == name).expect("the counter has a name in the list");
-        self.values[at] += v;
+    pub(crate) fn add_voxelised(&mut self, w: &voxelise::Work) {
+        self.facet_brick_tests += w.facet_brick_tests;
+        self.bricks_voxelised += w.bricks_voxelised;
     }
 
-    pub(crate) fn voxelise(&mut self, w: &voxelise::Work) {
-        self.add("facet_brick_tests", w.facet_brick_tests);
-        self.add("bricks_voxelised", w.bricks_voxelised);
+    pub(crate) fn add_graded(&mut self, w: &grade::Work) {
+        self.octants_split_graded += w.octants_split;
+        self.words_dilated += w.words_dilated;
+        self.halo_bricks += w.bricks_sent;
     }
 
-    pub(crate) fn grade(&mut self, w: &grade::Work) {
-        self.add("octants_split_graded", w.octants_split);
-        self.add("words_dilated", w.words_dilated);
-        self.add("halo_bricks", w.bricks_sent);
-    }
-
-    /// Rays are the same on all ranks, each casting them at its share of the facets; rank 0 counts them.
-    pub(crate) fn sides(&mut self, s: &Sides, rank: usize) {
-        self.add("rays", if rank == 0 { s.rays } else { 0 });
-    }
-
-    pub(crate) fn traffic(&mut self, t: Traffic) {
-        self.add("messages", t.messages);
-        self.add("message_bytes", t.bytes);
-    }
-
-    /// Cells in the heaviest of the rank's base leaves.
-    pub(crate) fn base_leaf(&mut self, cells: u64) {
-        self.add("base_leaf_cells_max", cells);
-    }
-
-    pub(crate) fn leaves(&mut self, n: u64) {
-        self.add("leaves", n);
+    pub(crate) fn add_traffic(&mut self, t: Traffic) {
+        self.messages += t.messages;
+        self.message_bytes += t.bytes;
     }
 }
 
@@ -81,7 +82,7 @@ pub struct PhaseEntry {
     pub time_cpu_s: Vec<f64>,
     /// Wall time in calls to other ranks, waiting included, by rank, in seconds.
     pub time_comm_wall_s: Vec<f64>,
-    /// CPU time in calls to other ranks, by rank, in seconds; waiting may spin.
+    /// CPU time in calls to other ranks, by rank, in seconds; includes busy waiting.
     pub time_comm_cpu_s: Vec<f64>,
     /// Messages sent, by rank.
     pub messages: Vec<u64>,
@@ -89,7 +90,7 @@ pub struct PhaseEntry {
     pub message_bytes: Vec<u64>,
 }
 
-/// Words that a phase takes in the gathering of the report.
+/// Words per phase in the message of the report.
 const PHASE_WORDS: usize = 6;
 
 /// A run's results. In JSON, under `schema`, `octree-mesher-run/1`.
@@ -111,48 +112,42 @@ pub struct Report {
     pub root_edge: f64,
     /// Surface level.
     pub level_surface: Level,
-    /// Level at which the tree was cut into base leaves.
+    /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
     /// Components of non-crossing leaves.
     pub components: u64,
-    /// Those decided by majority.
+    /// Components decided by majority.
     pub components_ambiguous: u64,
-    /// Where one of them is.
+    /// A point in one of them.
     pub ambiguous_example: Option<[f64; 3]>,
     /// Number of ranks.
     pub ranks: usize,
     /// Wall time of the slowest rank, in seconds, from reading to the last leaf.
     pub time_wall_s: f64,
-    /// Peak resident memory by rank; simulated ranks have equal parts of their process's.
+    /// Peak resident memory by rank; simulated ranks report equal fractions of their process's.
     pub peak_rss_bytes: Vec<u64>,
     /// Times by phase and rank.
     pub phases: Vec<PhaseEntry>,
     /// Counters by rank.
     pub counters: BTreeMap<&'static str, Vec<u64>>,
-    /// Who sent how much to whom, where asked for.
+    /// Sender, receiver, messages and bytes for every pair of ranks that exchanged messages; only on request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub message_matrix: Option<Vec<matrix::Entry>>,
 }
 
 impl Report {
-    /// Gathers what all ranks have. Collective.
-    #[expect(clippy::too_many_arguments, reason = "a report draws on everything")]
+    /// Gathers the counters and times of all ranks. Collective.
     pub(crate) fn gather(
-        facets: u64,
-        rules: &Rules,
-        counts: &Counts,
-        digests: &Digests,
-        parts: &[[u64; 3]],
-        sides: &Sides,
-        level_base: Level,
-        record: &Recorder,
+        mesh: &Mesh,
+        totals: &Totals,
         counters: &Counters,
+        record: &Recorder,
         comm: &dyn Comm,
     ) -> Self {
-        let mut counters = *counters;
-        counters.leaves(parts[comm.rank()][0]);
+        let Mesh { rules, sides, .. } = mesh;
+        let Totals { counts, digests, .. } = totals;
         let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
-        words.extend(counters.values);
+        words.extend(COUNTERS.iter().map(|(_, value)| value(counters)));
         words.extend(record.phases().iter().flat_map(|p| {
             let t = p.traffic;
             let times =
@@ -164,15 +159,15 @@ impl Report {
         let seconds = |i: usize| column(i).into_iter().map(f64::from_bits).collect::<Vec<f64>>();
         let first = 1 + COUNTERS.len();
         let entry = |(i, p): (usize, &Phase)| {
-            let at = first + PHASE_WORDS * i;
+            let start = first + PHASE_WORDS * i;
             PhaseEntry {
                 name: p.name.into(),
-                time_wall_s: seconds(at),
-                time_cpu_s: seconds(at + 1),
-                time_comm_wall_s: seconds(at + 2),
-                time_comm_cpu_s: seconds(at + 3),
-                messages: column(at + 4),
-                message_bytes: column(at + 5),
+                time_wall_s: seconds(start),
+                time_cpu_s: seconds(start + 1),
+                time_comm_wall_s: seconds(start + 2),
+                time_comm_cpu_s: seconds(start + 3),
+                messages: column(start + 4),
+                message_bytes: column(start + 5),
             }
         };
         let phases: Vec<PhaseEntry> = record.phases().iter().enumerate().map(entry).collect();
@@ -182,7 +177,7 @@ impl Report {
         Self {
             schema: "octree-mesher-run/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
-            facets,
+            facets: mesh.facets,
             cells: counts.total(),
             cells_by_level: counts.by_level[..=LEVEL_MAX as usize]
                 .iter()
@@ -192,7 +187,7 @@ impl Report {
             digest: hex(digests.whole()),
             root_edge: rules.root.edge,
             level_surface: rules.level_surface,
-            level_base,
+            level_base: mesh.level_base,
             components: sides.components,
             components_ambiguous: ambiguous.map_or(0, |a| a.count),
             ambiguous_example: ambiguous.map(|a| rules.root.locate(a.example)),
@@ -200,18 +195,18 @@ impl Report {
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
             peak_rss_bytes: column(0),
             phases,
-            counters: COUNTERS.iter().enumerate().map(|(i, n)| (*n, column(1 + i))).collect(),
+            counters: (1..).zip(COUNTERS).map(|(i, (name, _))| (name, column(i))).collect(),
             message_matrix: None,
         }
     }
 
-    /// Adds the message matrix of the run to rank 0's report. Collective.
+    /// Adds the message matrix of the run to the report of rank 0. Collective.
     pub fn with_message_matrix(self, comm: &dyn Comm) -> Self {
         Self { message_matrix: Some(matrix::gather(comm)), ..self }
     }
 }
 
-/// Greatest over mean: 1 is perfect balance.
+/// The greatest value divided by the mean: 1 is perfect balance.
 fn imbalance(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     if mean > 0.0 { values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean } else { 1.0 }
@@ -254,12 +249,12 @@ impl fmt::Display for Report {
             )?,
         }
         writeln!(f, "digest         {}", self.digest)?;
-        let ownership: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
+        let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
         writeln!(
             f,
             "ranks          {}, cells max/mean {:.3}, base level {}",
             self.ranks,
-            imbalance(&ownership),
+            imbalance(&leaves),
             self.level_base
         )?;
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
@@ -288,7 +283,7 @@ impl fmt::Display for Report {
     }
 }
 
-/// A number with its digits in threes.
+/// A number with a comma before each group of three digits.
 fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
@@ -306,7 +301,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_in_threes() {
+    fn digits_are_grouped_in_threes() {
         assert_eq!(
             [0, 12, 123, 1234, 1_234_567].map(grouped),
             ["0", "12", "123", "1,234", "1,234,567"]

@@ -74,7 +74,7 @@ fn what_gradation_splits_is_counted_once() {
     assert!(
         split * 7 < sum(&solo, "leaves") && split * 7 + sum(&base, "leaves") > sum(&solo, "leaves")
     );
-    for weights in ["unit", "area", "rehearsal", "rebalance"] {
+    for weights in ["unit", "area", "rebalance"] {
         for comm in ["sim:3", "sim:13", "sim:64"] {
             let ranks = told(&place, &["--comm", comm, "--weights", weights]);
             assert_eq!(sum(&ranks, "octants_split_graded"), split, "{weights} {comm}");

@@ -5,8 +5,7 @@ mod support;
 
 use clap::ValueEnum;
 use mesher::lattice::{Keep, Root};
-use mesher::partition::initial::Division;
-use mesher::partition::{Partitioner, Weights};
+use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 use support::symmetry::Symmetry;
 use support::{Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup};

@@ -7,13 +7,12 @@ use mesher::case::{Case, RootSpec};
 use mesher::comm::Solo;
 use mesher::dilate::{Reach, Tile};
 use mesher::facet::{Facet, crossed};
-use mesher::ingest::{Share, Source, read};
+use mesher::ingest::{Slice, Source, read};
 use mesher::kept::Kept;
 use mesher::lattice::{Bounds, Keep, Rules};
 use mesher::octant::ROOT_BITS;
-use mesher::partition::initial::Division;
 use mesher::partition::ownership::Ownership;
-use mesher::partition::{Partitioner, Weights};
+use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Sides, decide};
 use mesher::stream::Leaves;
 use mesher::tree::{PerLevel, Tree};
@@ -52,12 +51,12 @@ pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Cas
 pub fn options() -> Options {
     let (partitioner, weights) = (Partitioner::Morton, Weights::Area);
     let division = Division { partitioner, weights, level_base: None };
-    Options { division, ungraded: false, out: None }
+    Options { division, ungraded: false, out: None, check: false }
 }
 
 /// What the phases make of the aircraft, kept for as long as the benches run.
 struct Phases {
-    given: Share,
+    given: Slice,
     facets: Vec<Facet>,
     rules: Rules,
     share: Ownership,
@@ -175,7 +174,7 @@ pub fn kernels() -> Vec<Kernel> {
 }
 
 /// Reads a binary STL file.
-fn stl_read(given: &Share) -> Box<dyn FnMut() -> u64> {
+fn stl_read(given: &Slice) -> Box<dyn FnMut() -> u64> {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     geometries::write_stl_binary(&given.facets, &file).expect("room for it");
     let total = given.total;

@@ -1,9 +1,9 @@
-//! What a message costs between two ranks: `mpirun -n 2 pingpong` prints sizes and the median time of
-//! one way, as JSON of the schema `octree-pingpong/1`. `harness bench` projects run times with it.
+//! Measures the time of a message between two ranks: `mpirun -n 2 pingpong` prints message sizes with the median time of one way, as
+//! JSON of the schema `octree-pingpong/1`. `harness bench` projects run times with it.
 
 #![deny(missing_docs)]
 
-/// Sizes of messages, in bytes.
+/// Message sizes, in bytes.
 #[cfg(feature = "mpi")]
 const SIZES: [usize; 6] = [0, 8, 1024, 1 << 16, 1 << 20, 1 << 23];
 
@@ -27,7 +27,7 @@ fn main() {
     }
 }
 
-/// Median over the rounds of half the time there and back; of ranks 0 and 1, the others look on.
+/// Half the time of a round trip between ranks 0 and 1, in seconds: the median over many. Other ranks return 0.
 #[cfg(feature = "mpi")]
 fn one_way_s(world: &mpi::topology::SimpleCommunicator, bytes: usize) -> f64 {
     use mpi::traits::{Communicator, Destination, Source};

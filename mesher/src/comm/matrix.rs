@@ -1,7 +1,7 @@
-//! Who sends how much to whom: the message matrix.
+//! The message matrix: messages and bytes for every pair of ranks.
 //!
-//! Only exchanges are between pairs of ranks; what collective calls move depends on the library's
-//! algorithm, and is in [`Traffic`](super::Traffic) alone. What a rank keeps for itself is no message.
+//! Only sparse all-to-alls are included. The messages of other collective calls depend on the algorithm of the MPI library; they are
+//! counted in [`Traffic`](super::Traffic) only. Words that a rank sends to itself are not counted.
 
 use super::{Comm, MessageBuffer};
 use std::cell::RefCell;
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// One entry: sender, receiver, messages, bytes.
 pub type Entry = [u64; 4];
 
-/// What a rank has sent in exchanges, by receiver: messages and bytes.
+/// Messages and bytes that a rank has sent, by receiver.
 #[derive(Debug, Default)]
 pub(crate) struct Row(RefCell<BTreeMap<usize, (u64, u64)>>);
 
@@ -29,12 +29,12 @@ impl Row {
     }
 }
 
-/// The matrix up to now, on rank 0, by sender and receiver; nothing on the others, as it may have as
-/// many entries as there are pairs. Gathering it is not in it. Collective.
+/// The matrix so far, sorted by sender and receiver, on rank 0; empty on the others, as there may be an entry for every pair of ranks.
+/// The messages of this call are not in it. Collective.
 pub fn gather(comm: &dyn Comm) -> Vec<Entry> {
-    let mine = comm.sent().into_iter().map(|entry| (0, entry)).collect();
+    let local = comm.sent().into_iter().map(|entry| (0, entry)).collect();
     let mut rows: Vec<Entry> =
-        comm.sparse_all_to_all(MessageBuffer::of_entries(mine)).words().as_chunks().0.to_vec();
+        comm.sparse_all_to_all(MessageBuffer::of_entries(local)).words().as_chunks().0.to_vec();
     rows.sort_unstable();
     rows
 }
@@ -44,7 +44,7 @@ mod tests {
     use super::super::{Comm, Solo, sim};
     use super::*;
 
-    /// Rank r sends r + 1 words to each of the ranks above it, twice to the next one, and some to itself.
+    /// Rank r sends r + 1 words to each higher rank, twice to the next one, and to itself.
     fn talk(c: &dyn Comm) {
         let words = || vec![7; c.rank() + 1];
         c.sparse_all_to_all((c.rank()..c.size()).map(|r| (r, words())).collect());
@@ -53,9 +53,9 @@ mod tests {
     }
 
     #[test]
-    fn entries_are_what_was_sent_and_sum_to_the_meters_totals() {
-        let told = sim::run(5, 1, |c| {
-            // A call without letters tells what agreeing on their arrival takes.
+    fn entries_add_up_to_the_traffic_of_each_rank() {
+        let results = sim::run(5, 1, |c| {
+            // The messages of a call without payload: acknowledgement and barrier.
             c.sparse_all_to_all(MessageBuffer::default());
             let agreed = c.traffic();
             talk(c);
@@ -63,14 +63,14 @@ mod tests {
             let own = [t.messages - 3 * agreed.messages, t.bytes - 3 * agreed.bytes];
             (own, gather(c))
         });
-        let matrix = &told[0].1;
-        assert!(told[1..].iter().all(|(_, m)| m.is_empty()), "rank 0 alone has it");
-        for (rank, (own, _)) in told.iter().enumerate() {
+        let matrix = &results[0].1;
+        assert!(results[1..].iter().all(|(_, m)| m.is_empty()), "only rank 0 has the matrix");
+        for (rank, (own, _)) in results.iter().enumerate() {
             let row: Vec<&Entry> = matrix.iter().filter(|e| e[0] == rank as u64).collect();
             let sum = |i: usize| row.iter().map(|e| e[i]).sum::<u64>();
             assert_eq!([sum(2), sum(3)], *own, "rank {rank}");
         }
-        // Nothing goes down, so the matrix is not symmetric; nothing is on its diagonal.
+        // No rank sends to a lower one or counts messages to itself: all entries are above the diagonal.
         assert!(matrix.iter().all(|e| e[0] < e[1]), "{matrix:?}");
         assert_eq!(matrix.len(), 10);
         assert_eq!((matrix[0], matrix[1]), ([0, 1, 2, 16], [0, 2, 1, 8]));

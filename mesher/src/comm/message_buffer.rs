@@ -1,18 +1,18 @@
-//! Letters to ranks or from them, behind each other.
+//! Messages to or from many ranks, contiguous in memory.
 //!
-//! One rank of a thousand writes to dozens of others, and a few words to most of them. Memory of its own for each letter
-//! would take longer to get and to give back than the letter to write and to read.
+//! One rank of a thousand sends to dozens of others, to most of them a few words. Allocating memory for each message would take
+//! longer than writing and reading the message.
 
 use std::ops::Range;
 
-/// Words by rank: one letter at most to a receiver, or from a sender. None is empty.
+/// Words by rank: at most one message for each receiver, or from each sender. No message is empty.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MessageBuffer {
     words: Vec<u64>,
     messages: Vec<Message>,
 }
 
-/// One letter; it starts where the one before it ends.
+/// A message; it starts where the one before it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Message {
     rank: usize,
@@ -20,12 +20,12 @@ struct Message {
 }
 
 impl MessageBuffer {
-    /// No letters, and room for so many words.
+    /// An empty buffer with capacity for a number of words.
     pub fn with_capacity(words: usize) -> Self {
         Self { words: Vec::with_capacity(words), messages: Vec::new() }
     }
 
-    /// One letter to each rank that entries are for, with those in the order in which they are given.
+    /// One message for each receiver, with its entries in the order given.
     pub fn of_entries<const N: usize>(mut entries: Vec<(usize, [u64; N])>) -> Self {
         entries.sort_by_key(|e| e.0);
         let mut message_buffer = Self::with_capacity(N * entries.len());
@@ -33,7 +33,7 @@ impl MessageBuffer {
         message_buffer
     }
 
-    /// A letter from each rank, of so many words that are to be written in place.
+    /// A message of each given length, zero at first, to be written in place; the lengths are by rank.
     pub fn with_lengths(lengths: impl Iterator<Item = usize>) -> Self {
         let mut message_buffer = Self::default();
         let mut end = 0;
@@ -45,19 +45,19 @@ impl MessageBuffer {
         message_buffer
     }
 
-    /// Writes words into a rank's letter, a new one unless the last one is that rank's.
+    /// Appends words to the last message if that is for `rank`, else starts a new message.
     pub fn write(&mut self, rank: usize, words: impl IntoIterator<Item = u64>) {
         self.append(rank, |all| all.extend(words));
     }
 
-    /// The same for what `write` puts behind the words of all letters.
+    /// The same for the words that `write` appends to the vector that it is given.
     pub fn append(&mut self, rank: usize, write: impl FnOnce(&mut Vec<u64>)) {
         let start = self.words.len();
         write(&mut self.words);
         self.lengthen(rank, start);
     }
 
-    /// The same for so many words that are to be written in place; they are zero before.
+    /// The same for a number of words that are to be written in place; they are zero at first.
     pub fn room(&mut self, rank: usize, words: usize) -> &mut [u64] {
         let start = self.words.len();
         self.words.resize(start + words, 0);
@@ -65,7 +65,7 @@ impl MessageBuffer {
         &mut self.words[start..]
     }
 
-    /// Makes the words from `start` part of a rank's letter.
+    /// Makes the words from `start` on part of the message for `rank`.
     fn lengthen(&mut self, rank: usize, start: usize) {
         let end = self.words.len();
         match self.messages.last_mut() {
@@ -75,18 +75,18 @@ impl MessageBuffer {
         }
     }
 
-    /// The letters, each with its rank, in the order in which they were written.
+    /// The messages, each with its rank, in the order in which they were written.
     pub fn messages(&self) -> impl Iterator<Item = (usize, &[u64])> {
         (0..self.messages.len()).map(|at| (self.messages[at].rank, &self.words[self.range(at)]))
     }
 
-    /// Where the words of a letter are.
+    /// The range of a message in the words.
     fn range(&self, message: usize) -> Range<usize> {
         let start = message.checked_sub(1).map_or(0, |before| self.messages[before].end);
         start..self.messages[message].end
     }
 
-    /// The words of all letters, behind each other.
+    /// The words of all messages, contiguous.
     pub fn words(&self) -> &[u64] {
         &self.words
     }
@@ -96,14 +96,14 @@ impl MessageBuffer {
         &mut self.words
     }
 
-    /// A rank's letter, of letters in the order of the ranks; nothing if there is none.
+    /// The message of a rank, empty if it has none. The messages must be in the order of the ranks.
     pub fn of(&self, rank: usize) -> &[u64] {
         let at = self.messages.binary_search_by_key(&rank, |l| l.rank);
         at.map_or(&[], |at| &self.words[self.range(at)])
     }
 }
 
-/// Letters with their ranks; those that follow each other and are one rank's become one, empty ones none.
+/// Messages with their ranks; consecutive ones of the same rank become one, and empty ones are dropped.
 impl<W: IntoIterator<Item = u64>> FromIterator<(usize, W)> for MessageBuffer {
     fn from_iter<I: IntoIterator<Item = (usize, W)>>(messages: I) -> Self {
         let mut message_buffer = Self::default();
@@ -118,12 +118,12 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn told(message_buffer: &MessageBuffer) -> Vec<(usize, Vec<u64>)> {
+    fn contents(message_buffer: &MessageBuffer) -> Vec<(usize, Vec<u64>)> {
         message_buffer.messages().map(|(rank, words)| (rank, words.to_vec())).collect()
     }
 
     #[test]
-    fn what_is_written_for_the_last_letters_rank_lengthens_it() {
+    fn words_for_the_rank_of_the_last_message_lengthen_it() {
         let mut message_buffer = MessageBuffer::default();
         message_buffer.write(3, []);
         message_buffer.write(7, [1, 2]);
@@ -131,9 +131,9 @@ mod tests {
         message_buffer.room(7, 2)[1] = 5;
         assert!(message_buffer.room(0, 0).is_empty());
         message_buffer.room(4, 1)[0] = 9;
-        assert_eq!(told(&message_buffer), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
+        assert_eq!(contents(&message_buffer), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
         assert_eq!(message_buffer.words(), [1, 2, 0, 5, 9]);
-        assert_eq!(message_buffer, told(&message_buffer).into_iter().collect());
+        assert_eq!(message_buffer, contents(&message_buffer).into_iter().collect());
     }
 
     proptest! {
@@ -141,7 +141,7 @@ mod tests {
         fn entries_are_sorted_by_rank_and_keep_their_order(entries in prop::collection::vec((0usize..6, any::<[u64; 2]>()), 0..40)) {
             let mut want: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
             entries.iter().for_each(|(rank, words)| want.entry(*rank).or_default().extend(words));
-            prop_assert_eq!(told(&MessageBuffer::of_entries(entries)), want.into_iter().collect::<Vec<_>>());
+            prop_assert_eq!(contents(&MessageBuffer::of_entries(entries)), want.into_iter().collect::<Vec<_>>());
         }
     }
 }

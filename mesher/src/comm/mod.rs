@@ -1,11 +1,9 @@
-//! What ranks say to each other: three implementations of one small trait, so that nothing else in
-//! the mesher names MPI.
+//! Communication between ranks: one small trait with three implementations, so that no other module depends on MPI.
 //!
-//! [`Solo`] is a single rank and needs nothing installed. `Mpi` (feature `mpi`) is the real thing.
-//! [`sim::run`] runs any number of ranks in one process, one at a time, in an order drawn from a seed.
+//! [`Solo`] is a single rank and needs no library. `Mpi` (feature `mpi`) is a rank of an MPI job.
+//! [`sim::run`] simulates any number of ranks in one process, one at a time, in an order drawn from a seed.
 //!
-//! Every call is collective: all ranks make the same calls in the same order. Payloads are `u64`
-//! words.
+//! Every call that sends is collective: all ranks make the same calls in the same order. Payloads are `u64` words.
 
 pub mod matrix;
 mod message_buffer;
@@ -23,21 +21,21 @@ use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What a rank has sent so far, to others only, and how long it was at it.
+/// The messages that a rank has sent to other ranks so far, and the time in its calls.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traffic {
-    /// Messages: one per receiver, and those of a collective call as MPI libraries make it (see `Meter`).
+    /// Messages: one per receiver, and those of collective calls as MPI libraries implement them (see `Meter`).
     pub messages: u64,
-    /// Payload.
+    /// Payload, in bytes.
     pub bytes: u64,
-    /// Wall time in calls, waiting included.
+    /// Wall time in calls, waiting included, in seconds.
     pub time_wall_s: f64,
-    /// CPU time in calls.
+    /// CPU time in calls, in seconds.
     pub time_cpu_s: f64,
 }
 
-/// Letters from all ranks to all, in the order of the ranks. Ranks of one process share them: a copy for each would take
-/// memory, and time, that no real rank takes.
+/// The messages of all ranks, in the order of the ranks. Ranks in one process share one buffer: copies would take memory and time
+/// that ranks of an MPI job do not take.
 pub type Gathered = Arc<MessageBuffer>;
 
 /// A group of ranks.
@@ -48,26 +46,34 @@ pub trait Comm {
     /// Number of ranks.
     fn size(&self) -> usize;
 
-    /// Everyone's words, by rank. Collective.
+    /// The words of all ranks, by rank. Collective.
     fn all_gather(&self, mine: &[u64]) -> Gathered;
 
-    /// The sums over the ranks, modulo 2^64, of as many values on each. Collective.
+    /// The sums over the ranks, modulo 2^64; all ranks give the same number of values. Collective.
     fn sums(&self, mine: &[u64]) -> Vec<u64>;
 
-    /// Sends letters, one at most to a receiver, and returns those that were sent here, by sender, in no
-    /// particular order. Collective.
+    /// Sends messages, at most one to each receiver. Returns those sent to this rank, each with its sender, in no particular order.
+    /// Receivers do not know message sizes in advance. Collective.
     fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer;
 
-    /// Ranks that share this rank's process, itself included.
+    /// Number of ranks in this rank's process.
     fn ranks_in_process(&self) -> usize {
         1
     }
 
-    /// What this rank has sent.
+    /// The messages that this rank has sent, and the time in its calls.
     fn traffic(&self) -> Traffic;
 
-    /// What it has sent in exchanges, by receiver; collective calls are between no pair.
+    /// The messages of sparse all-to-alls that this rank has sent, by receiver.
     fn sent(&self) -> Vec<matrix::Entry>;
+
+    /// Runs `body` without counting or timing its calls: for checks, which must not change the counters.
+    fn uncounted(&self, body: &mut dyn FnMut());
+
+    /// Returns after all ranks have called it. Collective.
+    fn barrier(&self) {
+        self.sums(&[0]);
+    }
 
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
@@ -79,8 +85,7 @@ pub trait Comm {
         self.all_gather(&[v]).words().iter().copied().max().unwrap_or(v)
     }
 
-    /// Makes one rank's error every rank's: all return the error of the lowest rank that has one.
-    /// Collective.
+    /// Makes ranks agree on errors: all return the error of the lowest rank that has one. Collective.
     fn agree(&self, mine: Result<(), Error>) -> Result<(), Error> {
         let packed = match &mine {
             Ok(()) => Vec::new(),
@@ -100,7 +105,7 @@ pub fn agree<T>(comm: &dyn Comm, mine: Result<T, Error>) -> Result<T, Error> {
         Err(e) => (None, Err(e)),
     };
     comm.agree(error)?;
-    Ok(value.expect("agreed that no rank has an error"))
+    Ok(value.expect("no rank has an error"))
 }
 
 fn pack(e: &Error) -> Vec<u64> {
@@ -128,47 +133,55 @@ fn unpack(words: &[u64]) -> Error {
     }
 }
 
-/// Counts what an implementation sends, and times its calls.
+/// Counts the messages of a rank, and times its calls.
 #[derive(Debug, Default)]
 pub(crate) struct Meter {
     total: Cell<Traffic>,
+    is_paused: Cell<bool>,
     row: matrix::Row,
 }
 
 impl Meter {
     fn count(&self, messages: u64, words: u64) {
+        if self.is_paused.get() {
+            return;
+        }
         let t = self.total.get();
         let (messages, bytes) = (t.messages + messages, t.bytes + 8 * words);
         self.total.set(Traffic { messages, bytes, ..t });
     }
 
-    /// Counts a message of an exchange to another rank.
+    /// Counts a message of a sparse all-to-all to another rank.
     pub(crate) fn send(&self, to: usize, words: usize) {
         self.count(1, words as u64);
-        self.row.count(to, 8 * words as u64);
+        if !self.is_paused.get() {
+            self.row.count(to, 8 * words as u64);
+        }
     }
 
-    /// Counts a gathering of `words` by all, all ranks' together, and before it one of how many each has: a message for
-    /// every doubling of the number of ranks that have them (recursive doubling, Bruck), in which all words but
-    /// a rank's share pass on.
+    /// Counts an allgather of `words`, summed over the ranks, and the allgather of their numbers before it. Each takes one message per
+    /// doubling of the number of ranks (recursive doubling, Bruck); a rank sends as many words as all other ranks have on
+    /// average.
     pub(crate) fn gather(&self, ranks: usize, words: u64) {
         let all = words + ranks as u64;
         self.count(2 * doublings(ranks), all - all / ranks as u64);
     }
 
-    /// Counts a sum of so many words over all: by recursive doubling, all words in each message.
+    /// Counts an allreduce of `words` per rank: by recursive doubling, with all words in each message.
     pub(crate) fn sum(&self, ranks: usize, words: u64) {
         self.count(doublings(ranks), doublings(ranks) * words);
     }
 
-    /// Counts how ranks agree that all that was sent has arrived: the acknowledgement that each waits for, and a
-    /// barrier by doublings.
+    /// Counts the end of a sparse all-to-all: an acknowledgement, and a barrier by doublings.
     pub(crate) fn arrived(&self, ranks: usize) {
         self.count(1 + doublings(ranks), 0);
     }
 
     /// Runs and times a call.
     pub(crate) fn call<T>(&self, body: impl FnOnce() -> T) -> T {
+        if self.is_paused.get() {
+            return body();
+        }
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = body();
         let t = self.total.get();
@@ -180,17 +193,24 @@ impl Meter {
         result
     }
 
+    /// Runs `body` without counting or timing calls.
+    pub(crate) fn pause(&self, body: &mut dyn FnMut()) {
+        let before = self.is_paused.replace(true);
+        body();
+        self.is_paused.set(before);
+    }
+
     pub(crate) fn get(&self) -> Traffic {
         self.total.get()
     }
 
-    /// What `rank`, whose meter it is, has sent to whom.
+    /// The messages of sparse all-to-alls, by receiver; `rank` is the rank that this meter belongs to.
     pub(crate) fn sent(&self, rank: usize) -> Vec<matrix::Entry> {
         self.row.entries(rank)
     }
 }
 
-/// Doublings from one rank to all.
+/// Doublings from one rank to all ranks.
 fn doublings(ranks: usize) -> u64 {
     u64::from(ranks.next_power_of_two().ilog2())
 }
@@ -227,6 +247,10 @@ impl Comm for Solo {
     fn sent(&self) -> Vec<matrix::Entry> {
         Vec::new()
     }
+
+    fn uncounted(&self, body: &mut dyn FnMut()) {
+        body();
+    }
 }
 
 #[cfg(test)]
@@ -234,8 +258,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn collective_calls_count_as_libraries_make_them() {
-        let told = sim::run(5, 1, |c| {
+    fn uncounted_calls_change_neither_counters_nor_times() {
+        let calls = |c: &sim::Sim| {
+            c.sums(&[1]);
+            c.all_gather(&[1]);
+            c.sparse_all_to_all([(0, [1])].into_iter().collect());
+        };
+        sim::run(3, 1, |c| {
+            calls(c);
+            let counted = (c.traffic(), c.sent());
+            c.uncounted(&mut || calls(c));
+            assert_eq!((c.traffic(), c.sent()), counted);
+            calls(c);
+            assert_eq!(c.traffic().messages, 2 * counted.0.messages);
+        });
+    }
+
+    #[test]
+    fn collective_calls_are_counted_as_libraries_implement_them() {
+        let counts = sim::run(5, 1, |c| {
             c.sums(&[1, 2, 3]);
             let summed = c.traffic();
             c.all_gather(&[1, 2]);
@@ -254,13 +295,13 @@ mod tests {
                 t.bytes - gathered.bytes,
             ]
         });
-        // Three doublings to reach five ranks, with three sums in each; the same twice, with a number and two words of each of
-        // four others; an exchange sends one message, and has one acknowledged.
-        assert!(told.iter().all(|t| *t == [3, 8 * 9, 6, 8 * 3 * 4, 3 + 2, 8 * 10]), "{told:?}");
+        // Sums: three doublings for five ranks, three words in each. Allgather: the same twice, with one and two words of each of the
+        // four other ranks. Sparse all-to-all: one message, one acknowledgement, and a barrier.
+        assert!(counts.iter().all(|c| *c == [3, 8 * 9, 6, 8 * 3 * 4, 3 + 2, 8 * 10]), "{counts:?}");
     }
 
     #[test]
-    fn errors_survive_the_journey() {
+    fn errors_are_unpacked_as_they_were_packed() {
         for e in [
             Error::input("häßlich: 'x'"),
             Error::output("no space"),

@@ -1,8 +1,8 @@
 //! Ranks of a real MPI job, through `rsmpi`.
 //!
-//! Letters go point to point, and nobody tells anybody beforehand what will come: of a thousand ranks each has something
-//! to say to dozens. Measured, a dense all-to-all of mostly empty messages costs a hundred times a sparse
-//! one when ranks share cores. Messages are cut into chunks, as MPI counts in i32.
+//! A sparse all-to-all sends point-to-point messages only to the ranks that need one: of a thousand ranks each sends to dozens. A
+//! dense all-to-all of mostly empty messages was measured to take a hundred times as long when ranks share cores. Messages
+//! are sent in chunks, as MPI counts in i32.
 
 use super::{Comm, Gathered, MessageBuffer, Meter, Traffic, matrix};
 use mpi::collective::SystemOperation;
@@ -11,23 +11,23 @@ use mpi::point_to_point::{Message, Status};
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
 use std::cell::Cell;
 
-/// Words per message at most: 1 GiB, and few where the checks of debug builds are made.
+/// Greatest number of words in a chunk: 1 GiB; few in debug builds, so that tests send several chunks.
 const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
-/// Words gathered at once at most, over all ranks.
+/// Greatest number of words in one allgather, summed over the ranks.
 const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
 
 /// One rank of an MPI job.
 pub struct Mpi {
     world: mpi::topology::SimpleCommunicator,
     meter: Meter,
-    /// Whether an odd number of exchanges has been made.
+    /// Whether the number of sparse all-to-alls so far is odd.
     odd: Cell<bool>,
     /// Finalises MPI when dropped; must outlive `world`, so it comes last.
     _universe: Universe,
 }
 
 impl Mpi {
-    /// Joins the job that the launcher started; once per process.
+    /// Joins the job that the launcher started. Once per process.
     ///
     /// # Panics
     /// If MPI was initialised before.
@@ -80,11 +80,15 @@ impl Comm for Mpi {
     }
 
     fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
-        self.meter.call(|| self.exchange_untimed(&to))
+        self.meter.call(|| self.sparse_all_to_all_untimed(&to))
     }
 
     fn traffic(&self) -> Traffic {
         self.meter.get()
+    }
+
+    fn uncounted(&self, body: &mut dyn FnMut()) {
+        self.meter.pause(body);
     }
 
     fn sent(&self) -> Vec<matrix::Entry> {
@@ -97,7 +101,7 @@ impl Mpi {
         let mut counts = vec![0u64; self.size()];
         self.world.all_gather_into(&(mine.len() as u64), &mut counts[..]);
         let longest = counts.iter().copied().max().unwrap_or(0) as usize;
-        // The sum over ranks is what is counted in i32.
+        // MPI counts the sum over the ranks in i32.
         let step = (GATHERED / self.size()).max(1);
         let parts: Vec<MessageBuffer> = (0..longest)
             .step_by(step)
@@ -117,7 +121,7 @@ impl Mpi {
         }
     }
 
-    /// Gathers so many words of each rank.
+    /// Gathers the given numbers of words from the ranks.
     fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> MessageBuffer {
         let starts: Vec<i32> =
             lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
@@ -128,13 +132,13 @@ impl Mpi {
         all
     }
 
-    /// Sends to whom there is something to say, and takes what comes until all ranks know that theirs has arrived: a
-    /// synchronous send completes when it is being received, and who has sent all enters a barrier (Hoefler,
-    /// Siebert, Lumsdaine 2010, "Scalable communication protocols for dynamic sparse data exchange", NBX).
-    fn exchange_untimed(&self, to: &MessageBuffer) -> MessageBuffer {
+    /// Sends the messages and receives until all ranks know that their messages have arrived. A synchronous send completes when its
+    /// receiver has started to receive; a rank whose sends are complete enters a non-blocking barrier (NBX: Hoefler,
+    /// Siebert, Lumsdaine 2010, "Scalable communication protocols for dynamic sparse data exchange").
+    fn sparse_all_to_all_untimed(&self, to: &MessageBuffer) -> MessageBuffer {
         let me = self.rank();
-        // Who is through the barrier may be in the next exchange while others still take letters of this one; none
-        // can be two ahead.
+        // A rank that has passed the barrier may start the next sparse all-to-all while others still receive in this one. No rank can be
+        // two calls ahead, so two tags suffice.
         let tag = i32::from(self.odd.replace(!self.odd.get()));
         let mut received = MessageBuffer::default();
         mpi::request::scope(|scope| {
@@ -174,7 +178,7 @@ impl Mpi {
         received
     }
 
-    /// Receives a letter of which the first chunk is there.
+    /// Receives the message whose first chunk has been matched.
     fn receive(&self, first: (Message, Status), tag: i32, received: &mut MessageBuffer) {
         let from = first.1.source_rank();
         let mut chunk = first;
@@ -189,7 +193,7 @@ impl Mpi {
     }
 }
 
-/// A letter in full chunks and one that is not full, and may be empty: it tells that the letter ends.
+/// A message in full chunks, and a last one that is shorter and may be empty: it marks the end of the message.
 fn chunks(words: &[u64]) -> impl Iterator<Item = &[u64]> {
     let (full, last) = words.as_chunks::<CHUNK>();
     full.iter().map(|chunk| &chunk[..]).chain([last])

@@ -1,19 +1,19 @@
-//! Entries that many ranks have parts of, brought together and told to all.
+//! Allgather with reduction by key.
 //!
-//! Facets lie in a file as somebody made them, so that ranks that read slices of it have to do with the same
-//! places, dozens with each. If all told everybody, everybody would do the same sums over dozens of
-//! times the result; so some *collectors* do them first, each for its part of the keys.
+//! Slices of a file of facets overlap in space: dozens of ranks have entries with the same key. A plain allgather would bring dozens of
+//! times the result to every rank, and every rank would reduce it. Here *reducer ranks*, each for its part of the keys,
+//! reduce the entries before the allgather.
 
 use super::{Comm, MessageBuffer};
 
 /// A key and a value.
 pub type Entry = [u64; 2];
 
-/// Groups up to this size tell everybody at once: two steps would cost more than they save.
+/// Up to this number of ranks there are no reducers: the additional step would cost more than it saves.
 const SMALL: usize = 8;
 
-/// All ranks' entries in the order of their keys, each key once, with the values merged by `merge`, which
-/// must not depend on order. Collective; the same on all ranks.
+/// The entries of all ranks in the order of their keys, each key once, with values reduced by `merge`, which must be associative and
+/// commutative. Collective; the same on all ranks.
 pub fn all_gather_reduced(
     mut mine: Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64 + Copy,
@@ -30,8 +30,8 @@ pub fn all_gather_reduced(
     all_gather_from_reducers(mine, merge, comm)
 }
 
-/// The first step, as far as it needs no others: entries with the ranks that collect them; none where no step is
-/// to be taken before [`gather_collected`].
+/// The local part of the first step: reduces this rank's entries, and returns them with their reducer ranks. None if there are no
+/// reducers, and the entries go straight to [`all_gather_from_reducers`].
 pub fn split_by_reducer(
     mine: &mut Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64,
@@ -41,18 +41,18 @@ pub fn split_by_reducer(
     if comm.size() <= SMALL {
         return None;
     }
-    // As many collectors as make the two steps alike.
-    let collectors = comm.size().isqrt();
-    let apart = comm.size() / collectors;
-    let collected = |entry: &Entry| {
+    // With this many reducers the two steps take about the same time.
+    let reducers = comm.size().isqrt();
+    let stride = comm.size() / reducers;
+    let with_reducer = |entry: &Entry| {
         // The upper bits of a product depend on all bits of the key.
         let spread = entry[0].wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-        (spread as usize % collectors * apart, *entry)
+        (spread as usize % reducers * stride, *entry)
     };
-    Some(mine.iter().map(collected).collect())
+    Some(mine.iter().map(with_reducer).collect())
 }
 
-/// The second step: tells all ranks what each has collected. Collective; the same on all ranks.
+/// The second step: gathers the reduced entries of all ranks. Collective; the same on all ranks.
 pub fn all_gather_from_reducers(
     mut mine: Vec<Entry>,
     merge: impl Fn(u64, u64) -> u64 + Copy,
@@ -64,9 +64,9 @@ pub fn all_gather_from_reducers(
     all
 }
 
-/// Sorts entries and merges those of one key.
+/// Sorts entries and reduces those with the same key.
 fn combine(entries: &mut Vec<Entry>, merge: impl Fn(u64, u64) -> u64) {
-    // Stable sorts find the runs that ranks send.
+    // A stable sort takes advantage of the sorted runs that ranks send.
     entries.sort_by_key(|e| e[0]);
     entries.dedup_by(|e, before| {
         let same = e[0] == before[0];
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn all_ranks_get_the_sums_over_all() {
         for ranks in [1, 2, 8, 9, 30] {
-            let told = sim::run(ranks, 4, |c| {
+            let all = sim::run(ranks, 4, |c| {
                 let mine = (0..200u64).map(|i| [(i * i % 97) << 40, c.rank() as u64 + 1]).collect();
                 all_gather_reduced(mine, |a, b| a + b, c)
             });
@@ -93,11 +93,11 @@ mod tests {
             for key in 0..97u64 {
                 let times = (0..200u64).filter(|i| i * i % 97 == key).count() as u64;
                 let want = (times > 0).then_some(times * sum);
-                let got = told[0].iter().find(|e| e[0] == key << 40).map(|e| e[1]);
+                let got = all[0].iter().find(|e| e[0] == key << 40).map(|e| e[1]);
                 assert_eq!(got, want, "{ranks} ranks, key {key}");
             }
-            assert!(told[0].is_sorted_by(|a, b| a[0] < b[0]));
-            assert!(told.iter().all(|t| *t == told[0]));
+            assert!(all[0].is_sorted_by(|a, b| a[0] < b[0]));
+            assert!(all.iter().all(|a| *a == all[0]));
         }
     }
 }

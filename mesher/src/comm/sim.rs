@@ -1,8 +1,8 @@
-//! Many ranks in one process, for tests and projections.
+//! Simulated ranks in one process, for tests and projections.
 //!
-//! Each rank is a thread, but only the one that holds the token runs; it hands the token on when it
-//! has to wait for others. Who gets it next, and in which order messages arrive, is drawn from a seed: a
-//! failure is replayed by its seed, and a rank's CPU time is not disturbed by the others.
+//! Each rank is a thread, but only the rank with the token runs. It passes the token on when it has to wait for others. The next
+//! rank and the order in which messages arrive are drawn from a seed. So a failure can be replayed from its seed, and the CPU
+//! time of a rank is not disturbed by the others.
 
 use super::{Comm, Gathered, MessageBuffer, Meter, Traffic, matrix};
 use std::any::Any;
@@ -14,19 +14,19 @@ pub struct Sim {
     rank: usize,
     world: Arc<World>,
     meter: Meter,
-    /// Number of collective calls made, to notice ranks that do not make the same ones.
+    /// Number of collective calls so far, to detect ranks that do not make the same calls.
     calls: Cell<u64>,
 }
 
 struct World {
     size: usize,
     state: Mutex<State>,
-    /// One per rank, so that handing the token on wakes one thread and not all.
+    /// One per rank, so that passing the token wakes one thread only.
     turns: Vec<Condvar>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Doing {
+enum RankState {
     Ready,
     Waiting,
     Done,
@@ -34,51 +34,51 @@ enum Doing {
 
 struct State {
     running: usize,
-    doing: Vec<Doing>,
-    /// What each rank has put into the call under way.
+    states: Vec<RankState>,
+    /// The contribution of each rank to the current call.
     posted: Vec<Option<Post>>,
-    /// What each rank takes out of it.
-    inbox: Vec<Option<Delivery>>,
+    /// The result of the current call for each rank.
+    results: Vec<Option<Delivery>>,
     random: u64,
     broken: bool,
 }
 
 struct Post {
-    /// The call's number.
+    /// The number of the call.
     call: u64,
     words: Words,
 }
 
-/// What a rank puts into a call.
+/// The contribution of a rank to a call.
 enum Words {
-    /// For everybody.
+    /// Gathered by all ranks.
     Gather(Vec<u64>),
-    /// To be summed up.
+    /// Summed over the ranks.
     Sum(Vec<u64>),
-    /// By receiver.
-    Exchange(MessageBuffer),
+    /// Messages by receiver.
+    Send(MessageBuffer),
 }
 
-/// What it takes out.
+/// The result of a call for a rank.
 enum Delivery {
     Gathered(Gathered),
     Summed(Vec<u64>),
-    Exchanged(MessageBuffer),
+    Received(MessageBuffer),
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
 ///
 /// # Panics
-/// With the panic of the first rank that panics; the others are ended.
+/// With the panic of the lowest rank that panicked; the other ranks are stopped.
 pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> Vec<T> {
     assert!(size > 0, "a group has at least one rank");
     let world = Arc::new(World {
         size,
         state: Mutex::new(State {
             running: 0,
-            doing: vec![Doing::Ready; size],
+            states: vec![RankState::Ready; size],
             posted: (0..size).map(|_| None).collect(),
-            inbox: (0..size).map(|_| None).collect(),
+            results: (0..size).map(|_| None).collect(),
             random: seed ^ 0x9e37_79b9_7f4a_7c15,
             broken: false,
         }),
@@ -108,8 +108,9 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
             .collect();
         threads.into_iter().map(|t| t.join()).collect()
     });
-    let told = |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == ENDED);
-    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !told(p))) {
+    let is_stopped =
+        |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == STOPPED);
+    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !is_stopped(p))) {
         let panic = results.into_iter().nth(at).and_then(Result::err);
         std::panic::resume_unwind(panic.expect("position found an error"));
     }
@@ -117,17 +118,17 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Sim) -> T + Sync) -> 
 }
 
 const UNEQUAL: &str = "ranks must make the same collective calls in the same order";
-const ENDED: &str = "ended because another simulated rank panicked";
+const STOPPED: &str = "stopped because another simulated rank panicked";
 
-/// Hands the token on when a rank ends, in good order or by a panic.
+/// Passes the token on when a rank ends, normally or by a panic.
 struct Leaving<'a>(&'a Sim);
 
 impl Drop for Leaving<'_> {
     fn drop(&mut self) {
         let mut state = self.0.lock();
-        state.doing[self.0.rank] = Doing::Done;
+        state.states[self.0.rank] = RankState::Done;
         state.broken |= std::thread::panicking();
-        self.0.hand_on(&mut state);
+        self.0.pass_token(&mut state);
     }
 }
 
@@ -140,50 +141,53 @@ impl State {
         ((z ^ z >> 31) % below as u64) as usize
     }
 
-    /// Delivers the call under way once everyone has posted.
+    /// Completes the current call once all ranks have contributed.
     fn deliver(&mut self) {
         if !self.posted.iter().all(Option::is_some) {
             return;
         }
         let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
         let (ranks, call) = (posts.len(), posts[0].call);
-        let (mut gathered, mut summed, mut exchanged) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut gathered, mut summed, mut sent) = (Vec::new(), Vec::new(), Vec::new());
         for post in posts {
             assert!(post.call == call, "{UNEQUAL}");
             match post.words {
                 Words::Gather(words) => gathered.push(words),
                 Words::Sum(words) => summed.push(words),
-                Words::Exchange(message_buffer) => exchanged.push(message_buffer),
+                Words::Send(messages) => sent.push(messages),
             }
         }
-        self.inbox = match [gathered.len(), summed.len(), exchanged.len()].map(|n| n == ranks) {
+        self.results = match [gathered.len(), summed.len(), sent.len()].map(|n| n == ranks) {
             [true, false, false] => {
                 let all: Gathered =
                     gathered.into_iter().enumerate().collect::<MessageBuffer>().into();
                 (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
             }
             [false, true, false] => {
-                let sums = summed_up(&summed);
+                let sums = sums_of(&summed);
                 (0..ranks).map(|_| Some(Delivery::Summed(sums.clone()))).collect()
             }
             [false, false, true] => {
-                self.sorted(&exchanged).into_iter().map(|m| Some(Delivery::Exchanged(m))).collect()
+                self.delivered(&sent).into_iter().map(|m| Some(Delivery::Received(m))).collect()
             }
             _ => panic!("{UNEQUAL}"),
         };
-        self.doing.iter_mut().for_each(|d| *d = Doing::Ready);
+        self.states.iter_mut().for_each(|d| *d = RankState::Ready);
     }
 
-    /// Letters by receiver, in an order that is drawn, from those by sender.
-    fn sorted(&mut self, sent: &[MessageBuffer]) -> Vec<MessageBuffer> {
-        let mut inbox: Vec<Vec<(usize, &[u64])>> = vec![Vec::new(); sent.len()];
-        for (from, message_buffer) in sent.iter().enumerate() {
-            for (to, words) in message_buffer.messages() {
-                assert!(inbox[to].last().is_none_or(|l| l.0 != from), "one letter to a receiver");
-                inbox[to].push((from, words));
+    /// Messages by receiver, in an order drawn at random, from those by sender.
+    fn delivered(&mut self, sent: &[MessageBuffer]) -> Vec<MessageBuffer> {
+        let mut by_receiver: Vec<Vec<(usize, &[u64])>> = vec![Vec::new(); sent.len()];
+        for (from, messages) in sent.iter().enumerate() {
+            for (to, words) in messages.messages() {
+                assert!(
+                    by_receiver[to].last().is_none_or(|l| l.0 != from),
+                    "at most one message to a receiver"
+                );
+                by_receiver[to].push((from, words));
             }
         }
-        for messages in &mut inbox {
+        for messages in &mut by_receiver {
             for i in (1..messages.len()).rev() {
                 let j = self.draw(i + 1);
                 messages.swap(i, j);
@@ -197,12 +201,12 @@ impl State {
                 .for_each(|(from, words)| message_buffer.write(*from, words.iter().copied()));
             message_buffer
         };
-        inbox.into_iter().map(copied).collect()
+        by_receiver.into_iter().map(copied).collect()
     }
 }
 
-/// The sums of as many words on each rank.
-fn summed_up(ranks: &[Vec<u64>]) -> Vec<u64> {
+/// The sums over the ranks.
+fn sums_of(ranks: &[Vec<u64>]) -> Vec<u64> {
     let mut sums = vec![0u64; ranks[0].len()];
     for words in ranks {
         assert!(words.len() == sums.len(), "{UNEQUAL}");
@@ -213,19 +217,19 @@ fn summed_up(ranks: &[Vec<u64>]) -> Vec<u64> {
 
 impl Sim {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // A poisoned lock means that another rank panicked; `broken` tells the same.
+        // A poisoned lock means that another rank panicked, which `broken` records as well.
         self.world.state.lock().unwrap_or_else(|p| p.into_inner())
     }
 
-    /// Draws the rank that runs next.
-    fn hand_on(&self, state: &mut State) {
+    /// Draws the next rank to run.
+    fn pass_token(&self, state: &mut State) {
         let ready: Vec<usize> =
-            (0..self.world.size).filter(|&r| state.doing[r] == Doing::Ready).collect();
+            (0..self.world.size).filter(|&r| state.states[r] == RankState::Ready).collect();
         if !ready.is_empty() {
             state.running = ready[state.draw(ready.len())];
             self.world.turns[state.running].notify_one();
-        } else if state.doing.contains(&Doing::Waiting) {
-            // Some wait for a call that those who are done will never make.
+        } else if state.states.contains(&RankState::Waiting) {
+            // Some ranks wait for a call that the ranks that have ended will never make.
             state.broken = true;
         }
         if state.broken {
@@ -236,13 +240,13 @@ impl Sim {
     fn wait_for_turn(&self) {
         let mut state = self.lock();
         while !(state.broken
-            || state.running == self.rank && state.doing[self.rank] == Doing::Ready)
+            || state.running == self.rank && state.states[self.rank] == RankState::Ready)
         {
             state = self.world.turns[self.rank].wait(state).unwrap_or_else(|p| p.into_inner());
         }
         if state.broken {
             drop(state);
-            std::panic::panic_any(ENDED);
+            std::panic::panic_any(STOPPED);
         }
     }
 
@@ -250,12 +254,12 @@ impl Sim {
         let call = self.calls.replace(self.calls.get() + 1);
         let mut state = self.lock();
         state.posted[self.rank] = Some(Post { call, words });
-        state.doing[self.rank] = Doing::Waiting;
+        state.states[self.rank] = RankState::Waiting;
         state.deliver();
-        self.hand_on(&mut state);
+        self.pass_token(&mut state);
         drop(state);
         self.wait_for_turn();
-        self.lock().inbox[self.rank].take().expect("a delivered call has an inbox for every rank")
+        self.lock().results[self.rank].take().expect("a completed call has a result for every rank")
     }
 }
 
@@ -291,10 +295,10 @@ impl Comm for Sim {
             let sent = to.messages().filter(|l| l.0 != self.rank);
             sent.for_each(|l| self.meter.send(l.0, l.1.len()));
             self.meter.arrived(self.size());
-            self.call(Words::Exchange(to))
+            self.call(Words::Send(to))
         };
         match self.meter.call(counted) {
-            Delivery::Exchanged(message_buffer) => message_buffer,
+            Delivery::Received(message_buffer) => message_buffer,
             _ => unreachable!("{UNEQUAL}"),
         }
     }
@@ -307,6 +311,10 @@ impl Comm for Sim {
         self.meter.get()
     }
 
+    fn uncounted(&self, body: &mut dyn FnMut()) {
+        self.meter.pause(body);
+    }
+
     fn sent(&self) -> Vec<matrix::Entry> {
         self.meter.sent(self.rank)
     }
@@ -317,25 +325,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everyone_hears_everyone_whatever_the_seed() {
+    fn all_messages_arrive_for_every_seed() {
         for seed in 0..20 {
             let sums = run(7, seed, |c| {
                 let to = (0..c.size())
                     .filter(|r| r % 2 == 0)
                     .map(|r| (r, vec![c.rank() as u64; 2]))
                     .collect();
-                let heard: u64 = c.sparse_all_to_all(to).messages().map(|l| l.1[0]).sum();
-                (c.sum(c.rank() as u64), heard)
+                let received: u64 = c.sparse_all_to_all(to).messages().map(|l| l.1[0]).sum();
+                (c.sum(c.rank() as u64), received)
             });
-            for (rank, (sum, heard)) in sums.into_iter().enumerate() {
+            for (rank, (sum, received)) in sums.into_iter().enumerate() {
                 assert_eq!(sum, 21);
-                assert_eq!(heard, if rank % 2 == 0 { 21 } else { 0 });
+                assert_eq!(received, if rank % 2 == 0 { 21 } else { 0 });
             }
         }
     }
 
     #[test]
-    fn orders_differ_by_seed_and_repeat_by_seed() {
+    fn the_order_of_arrival_depends_on_the_seed_alone() {
         let order = |seed| {
             let senders = |message_buffer: MessageBuffer| {
                 message_buffer.messages().map(|l| l.0).collect::<Vec<_>>()
@@ -351,7 +359,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "rank two fails")]
-    fn a_panic_on_one_rank_ends_all() {
+    fn a_panic_on_one_rank_stops_all() {
         run(4, 1, |c| {
             assert!(c.rank() != 2, "rank two fails");
             c.sum(1)
@@ -360,7 +368,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "another simulated rank")]
-    fn a_rank_that_leaves_early_does_not_hang_the_rest() {
+    fn a_rank_that_ends_early_does_not_leave_the_others_waiting() {
         run(3, 1, |c| if c.rank() == 0 { 0 } else { c.sum(1) });
     }
 }

@@ -1,31 +1,47 @@
-//! Where the facets' area lies: what leaves are to be expected where.
+//! Estimates of the number of leaves, from the areas of facets and the volumes of boxes.
 //!
-//! A plane crosses cells, and a layer of cells along it holds cells, in proportion to its area times the
-//! sum of its normal's components, as cells and layers are cubes. So area is measured by that norm, in
-//! units of a finest cell's face; a facet larger than the octants asked for is split in four until it is
-//! not.
+//! The number of cells that a plane crosses, and that a layer along it holds, is proportional to its area times the sum of
+//! the components of its unit normal, as cells are cubes. So area is measured in that norm, in units of a face of a finest
+//! cell. A facet larger than the octants of interest is split in four until it is not.
 
 use crate::comm::{Comm, Entry, all_gather_reduced};
 use crate::facet::Facet;
-use crate::lattice::Rules;
-use crate::octant::{LEVEL_MAX, Level, edge};
+use crate::lattice::{ExtentBox, Rules};
+use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton};
 use crate::partition::curve::Bin;
-use crate::partition::initial::middle;
 use std::ops::Range;
 
-/// Parts of a finest cell's face: sums of integers do not depend on their order.
-pub const PARTS: u64 = 1024;
+/// Fractions of a finest cell's face that areas are counted in: sums of integers do not depend on their order.
+pub const FRACTIONS: u64 = 1024;
 
-/// Area by place.
+/// Estimated leaves of the mesh per face of a finest cell: the layers on the kept side, a third of them being coarser.
+pub fn leaves_per_surface_cell(rules: &Rules) -> u64 {
+    (u64::from(rules.layer_cells_min) + 2) * 4 / 3
+}
+
+/// The number of leaves that the boxes ask for in an octant.
+pub fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
+    if rules.boxes.is_empty() {
+        return 0;
+    }
+    let (min, h) = (corner(l, code), edge(l));
+    let leaves = |b: &ExtentBox| {
+        let span = |a: usize| (b.max[a].min(min[a] + h) - b.min[a].max(min[a])).max(0);
+        (0..3).map(|a| (span(a) as u64).div_ceil(edge(b.level) as u64)).product::<u64>()
+    };
+    rules.boxes.iter().map(leaves).max().unwrap_or(0)
+}
+
+/// The area in each octant of one level, the same on all ranks.
 #[derive(Debug, Default)]
 pub struct Areas {
     /// Level-19 codes of octants with area, ascending.
     starts: Vec<u64>,
-    /// Area in all octants before each of them, and in all at the end.
+    /// Sum of the areas of all octants before each of them; and the sum of all at the end.
     before: Vec<u64>,
 }
 
-/// The area of some facets, by the norm above, in lattice units squared.
+/// The sum of the areas of facets, in lattice units squared.
 pub fn total(facets: &[Facet]) -> f64 {
     facets.iter().map(norm).sum()
 }
@@ -35,68 +51,62 @@ fn norm(f: &Facet) -> f64 {
 }
 
 impl Areas {
-    /// Gathers the area of all ranks' facets by octants of a level. Collective.
+    /// Sums the areas of all ranks' facets by octants of a level. Collective.
     pub fn gather(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> Self {
-        let mut areas = Self::default();
-        let mine = of(facets, rules, level).into_iter().map(Entry::from).collect();
-        areas.set(&all_gather_reduced(mine, |a, b| a + b, comm));
+        let local = of(facets, rules, level).into_iter().map(Entry::from).collect();
+        let entries = all_gather_reduced(local, |a, b| a + b, comm);
+        let mut areas = Self { starts: entries.iter().map(|e| e[0]).collect(), before: vec![0] };
+        areas.before.extend(entries.iter().scan(0, |sum, e| {
+            *sum += e[1];
+            Some(*sum)
+        }));
         areas
     }
 
-    fn set(&mut self, entries: &[Entry]) {
-        self.starts = entries.iter().map(|e| e[0]).collect();
-        self.before = vec![0];
-        let sums = entries.iter().scan(0, |sum, e| {
-            *sum += e[1];
-            Some(*sum)
-        });
-        self.before.extend(sums);
-    }
-
-    /// The octants with area, by number.
-    pub fn places(&self) -> Range<usize> {
+    /// The indices of all entries.
+    pub fn all(&self) -> Range<usize> {
         0..self.starts.len()
     }
 
-    /// Those, by number, whose level-19 codes are in `span`, which are among some.
-    pub fn places_within(&self, among: &Range<usize>, span: Range<u64>) -> Range<usize> {
+    /// The indices, among some, of the entries in an interval of the curve (level-19 codes).
+    pub fn within(&self, among: &Range<usize>, span: Range<u64>) -> Range<usize> {
         let part = &self.starts[among.clone()];
         let first = part.partition_point(|s| *s < span.start);
         let count = part[first..].partition_point(|s| *s < span.end);
         among.start + first..among.start + first + count
     }
 
-    /// Finest cells' faces in some of them.
-    pub fn cells(&self, places: &Range<usize>) -> u64 {
-        // Unit weights gather nothing.
-        if places.is_empty() {
+    /// The area of some entries, in faces of a finest cell.
+    pub fn cells(&self, entries: &Range<usize>) -> u64 {
+        // Unit weights gather no areas.
+        if entries.is_empty() {
             return 0;
         }
-        (self.before[places.end] - self.before[places.start]) / PARTS
+        (self.before[entries.end] - self.before[entries.start]) / FRACTIONS
     }
 }
 
-/// Octants, a power of two, that may come in turns without being weighed anew each time: facets often come in strips.
-const IN_TURNS: usize = 8192;
+/// Octants, a power of two, whose latest bins are remembered: facets often come in strips that alternate between a few.
+const REMEMBERED: usize = 8192;
 
-/// Facets that are looked at, of many that are small.
+/// Number of facets in the sample, if there are many small ones.
 const SAMPLE: usize = 2048;
 
-/// The area of some facets by octants of a level, in `PARTS` of a finest cell's face; some octants more than once. Of many
-/// facets, each in about one octant, some stand for all.
+/// The areas of some facets by octants of a level, in [`FRACTIONS`] of a finest cell's face. An octant may have several bins. Of
+/// many facets that are smaller than such an octant, a sample is measured.
 pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     let cell = edge(rules.level_surface) as f64;
-    let (shift, scale) = (3 * (LEVEL_MAX - level), PARTS as f64 / (cell * cell));
+    let (shift, scale) = (3 * (LEVEL_MAX - level), FRACTIONS as f64 / (cell * cell));
     let mut bins: Vec<Bin> = Vec::new();
-    // The bin that an octant had last, by the last bits of its code.
-    let mut last = vec![0u32; IN_TURNS];
-    let mut add = |at: u64, area: f64| {
-        let (code, area) = (at >> shift, (area * scale) as u64);
-        let last = &mut last[code as usize % IN_TURNS];
-        match bins.get_mut(*last as usize).filter(|bin| bin.0 == code << shift) {
+    // Index of the latest bin, by the low bits of the octant's code.
+    let mut latest = vec![0u32; REMEMBERED];
+    let mut add = |start: u64, area: f64| {
+        let (code, area) = (start >> shift, (area * scale) as u64);
+        let latest = &mut latest[code as usize % REMEMBERED];
+        match bins.get_mut(*latest as usize).filter(|bin| bin.0 == code << shift) {
             Some(bin) => bin.1 += area,
             None => {
-                *last = bins.len() as u32;
+                *latest = bins.len() as u32;
                 bins.push((code << shift, area));
             }
         }
@@ -108,7 +118,7 @@ pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
             .filter(|f| is_wide(f, edge(level)))
             .for_each(|f| spread(f, edge(level), &mut add));
         if !is_wide(&some[0], edge(level)) {
-            spread(&some[0], edge(level), &mut |at, area| add(at, area * every as f64));
+            spread(&some[0], edge(level), &mut |start, area| add(start, area * every as f64));
         }
     }
     bins
@@ -120,11 +130,11 @@ fn is_wide(f: &Facet, extent: i64) -> bool {
     (0..3).any(|a| f.range(a).1 - f.range(a).0 > extent)
 }
 
-/// Tells the facet's area to `add`, in pieces whose extent is at most `extent`.
+/// Calls `add` with the position and the area of parts of a facet whose extent is at most `extent`.
 fn spread(f: &Facet, extent: i64, add: &mut impl FnMut(u64, f64)) {
     if !is_wide(f, extent) {
-        if let Some(at) = middle(f) {
-            add(at, norm(f));
+        if let Some(start) = centre(f) {
+            add(start, norm(f));
         }
         return;
     }
@@ -137,12 +147,22 @@ fn spread(f: &Facet, extent: i64, add: &mut impl FnMut(u64, f64)) {
     }
 }
 
+/// Level-19 Morton code of the centre of a facet's extent; none if that is outside the root.
+fn centre(f: &Facet) -> Option<u64> {
+    let mid: [i64; 3] = std::array::from_fn(|a| {
+        let (lo, hi) = f.range(a);
+        (lo + hi) / 2
+    });
+    let inside = mid.iter().all(|c| (0..ROOT_EDGE).contains(c));
+    inside.then(|| morton(mid.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::comm::Solo;
     use crate::lattice::{Keep, Root};
-    use crate::octant::{ROOT_EDGE, start57};
+    use crate::octant::start57;
     use crate::partition::curve;
 
     fn rules(level_surface: Level) -> Rules {
@@ -157,27 +177,27 @@ mod tests {
     }
 
     #[test]
-    fn a_large_facet_is_spread_over_the_octants_that_it_crosses() {
+    fn the_area_of_a_large_facet_is_spread_over_the_octants_that_it_crosses() {
         // Half of the face of an octant of level 1, in the plane z = 1.
         let h = (ROOT_EDGE / 2) as i32;
         let f = Facet { v: [[0, 0, 1], [h, 0, 1], [0, h, 1]] };
         let areas = Areas::gather(&[f], &rules(6), 4, &Solo);
         let cells = |l: Level, code: u64| {
             let span = start57(l, code)..start57(l, code + 1);
-            areas.cells(&areas.places_within(&areas.places(), span))
+            areas.cells(&areas.within(&areas.all(), span))
         };
         // 32 x 32 finest cells, half of them covered.
         assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
         let parts: Vec<u64> = (0..8).map(|child| cells(2, child)).collect();
         let total: u64 = parts.iter().sum();
         assert!(total.abs_diff(512) <= 4, "{parts:?}");
-        // The octant at the right angle is covered whole, its neighbours half.
+        // The octant at the right angle is fully covered, its neighbours half.
         assert!(parts[0].abs_diff(256) <= 32 && parts[1].abs_diff(128) <= 32, "{parts:?}");
     }
 
     #[test]
-    fn of_many_small_facets_some_stand_for_all_and_large_ones_are_all_counted() {
-        // A sheet of 140 x 140 squares over a quarter of a face of the root; a large facet in the quarter opposite.
+    fn small_facets_are_sampled_and_large_ones_are_all_measured() {
+        // A sheet of 140 x 140 squares over a quarter of a face of the root; one large facet in the opposite quarter.
         let (n, level) = (140, 4);
         let step = (ROOT_EDGE / 2) as i32 / n;
         let at = |i: i32, j: i32| [i * step, j * step, 1];
@@ -188,7 +208,7 @@ mod tests {
         let mut all: Vec<Facet> =
             (0..n).flat_map(|i| (0..n).flat_map(move |j| square(i, j))).collect();
         let h = (ROOT_EDGE / 2) as i32;
-        // Not the first of those that one stands for.
+        // Not the facet that the sample takes.
         all.insert(7, Facet { v: [[h, h, 1], [2 * h - 1, h, 1], [h, 2 * h - 1, 1]] });
         assert!(all.len() / SAMPLE > 10);
         let mut sampled = of(&all, &rules(9), level);
@@ -209,7 +229,7 @@ mod tests {
     fn an_oblique_facet_counts_by_the_cells_that_it_crosses() {
         let h = (ROOT_EDGE / 2) as i32;
         let oblique = Facet { v: [[h, 0, 0], [0, h, 0], [0, 0, h]] };
-        // Its shadows on the three coordinate planes together.
+        // The sum of its projections onto the three coordinate planes.
         assert_eq!(total(&[oblique]), 1.5 * f64::from(h) * f64::from(h));
     }
 }

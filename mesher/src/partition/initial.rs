@@ -1,146 +1,73 @@
-//! The partition of T0 (the paper's sections II.A and III), and the facets' journey to the ranks.
+//! The initial partition, from an estimate of the number of leaves.
 //!
-//! By default the Morton curve is cut into equal shares of the leaves to expect, wherever that is (`shares`): each rank
-//! needs to know the owners along the curve, and no more.
+//! By default the Morton curve is divided into intervals of equal weight. No rank needs to know the weight everywhere. All ranks
+//! know it in coarse octants, which gives a rough partition. Each rank then sends the weights of its facets, by fine octants, to
+//! the owners in the rough partition. So each rank knows one interval of the curve in detail, and the final boundaries
+//! follow from the sums over the intervals.
 //!
-//! The paper's way, which METIS, weights of 1 and a chosen `level_base` ask for, cuts T0 itself into *base leaves* and
-//! deals those out. For that all ranks survey T0's top: every rank marks the octants that its share of the facets
-//! asks to split; the union of the marks is the same tree for all. A base leaf that is heavier than a small part of one
-//! rank's share is split further, as no partition can divide it.
+//! METIS, weights of 1 and a given `level_base` need base leaves: see [`base_leaves`].
 
-pub(crate) mod cut;
-mod heaviest;
-mod rehearse;
-mod route;
-mod shares;
-mod survey;
-
-pub use heaviest::cells_heaviest;
-pub use route::route;
-
-use crate::comm::Comm;
+use crate::comm::{Comm, MessageBuffer, all_gather_reduced};
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::{LEVEL_MAX, Level, edge, start57};
+use crate::octant::{LEVEL_MAX, Level, edge};
+use crate::partition::area::{self, FRACTIONS};
+use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{BaseLeaf, Ownership};
-use crate::partition::{self, Partitioner, Weights, area};
-use crate::voxelise::{Start, Work};
-use cut::{Cut, Piece};
-use survey::Survey;
+use crate::partition::{Division, base_leaves};
+use crate::tree::PerLevel;
 
-/// Base leaves with children per rank that the paper's way, one level for all, aims at.
-const SPLIT_LEAVES_PER_RANK: u64 = 32;
-/// A base leaf heavier than this part of a rank's share is split where that is automatic: a partition then
-/// misses an equal share by a few percent.
-const SHARE_PARTS: u64 = 16;
-/// Parts of a share that a cut of the Morton curve keeps or gives away as one.
-const CUT_PARTS: u64 = 16;
-/// Parts of a share, about, by which all ranks know where the weight lies before the curve is cut. Coarser than
-/// shares, as what is told to everybody grows with the ranks; so one rank may cut the curve in detail for a few.
-const COARSE_PARTS: f64 = 0.25;
-/// Deepest automatic `level_base` of all base leaves alike.
+/// Fine octants per rank, about: boundaries of the curve lie between them.
+const FINE_PER_RANK: u64 = 16;
+/// Coarse octants per rank, about. Few, as all ranks gather them; the rough partition then gives several ranks' loads to some.
+const COARSE_PER_RANK: f64 = 0.25;
+/// Deepest `level_base` that is chosen automatically.
 const LEVEL_BASE_AUTO_MAX: Level = 12;
 
-/// How to divide the work. Without effect on the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Division {
-    /// Who cuts the base tree.
-    pub partitioner: Partitioner,
-    /// What a base leaf weighs.
-    pub weights: Weights,
-    /// Level at which the tree is cut into base leaves; chosen by ranks and weights if none.
-    pub level_base: Option<Level>,
-}
-
-impl Division {
-    /// Whether the Morton curve is cut wherever weights ask for it, not between base leaves made beforehand.
-    pub fn is_of_curve(&self) -> bool {
-        self.level_base.is_none()
-            && self.partitioner == Partitioner::Morton
-            && self.weights != Weights::Unit
-    }
-
-    /// Whether it is made anew when it is known what there is.
-    pub fn rebalances(&self) -> bool {
-        self.is_of_curve() && self.weights == Weights::Rebalance
-    }
-}
-
-/// The division of T0 as this rank needs to know it.
-pub struct Base {
-    /// Who owns what.
+/// The partition of T0 as one rank knows it.
+pub struct Partition {
+    /// The owner of every octant.
     pub ownership: Ownership,
-    /// This rank's base leaves as they were dealt out, in order; none where the Morton curve is cut anywhere.
-    pub dealt: Vec<BaseLeaf>,
-    /// Level of the deepest base leaves, or of the octants that the curve is cut between.
+    /// This rank's base leaves, in order; empty where boundaries may be anywhere on the curve.
+    pub base_leaves: Vec<BaseLeaf>,
+    /// Level of the deepest base leaves, or of the octants between which the boundaries of the curve lie.
     pub level_base: Level,
-    /// Work done.
-    pub work: Work,
 }
 
-/// Divides T0 among the ranks. Collective.
-pub fn build(
-    facets: &[Facet],
-    rules: &Rules,
-    division: &Division,
-    comm: &dyn Comm,
-) -> Result<Base, Error> {
-    if !division.is_of_curve() {
-        return of_leaves(facets, rules, division, comm);
+impl Partition {
+    /// The partition of a single rank.
+    pub fn solo() -> Self {
+        Self { ownership: Ownership::solo(), base_leaves: vec![BaseLeaf::ROOT], level_base: 0 }
     }
-    let rehearsed = division.weights == Weights::Rehearsal;
-    // A rehearsal tells more of smaller leaves; but as much shallower as it is coarser.
-    let coarse = if rehearsed { SHARE_PARTS as f64 } else { COARSE_PARTS };
-    let parts = [coarse, CUT_PARTS as f64];
-    let [coarse, fine] = levels_auto(facets, rules, parts, comm);
-    let (ownership, work) = if rehearsed {
-        let coarse = coarse.min(rehearse::deepest(rules));
-        let survey = Survey::new(facets, rules, coarse, true, comm);
-        let cut = by_weight(&survey, comm.size());
-        let told = rehearse::weights(facets, rules, &cut, comm);
-        (shares::by_rehearsal(facets, rules, &cut, &told, fine, comm), survey.work)
-    } else {
-        (shares::by_area(facets, rules, [coarse, fine], comm), Work::default())
-    };
-    Ok(Base { ownership, dealt: Vec::new(), level_base: fine, work })
 }
 
-/// Deals out base leaves, as the paper does. Collective.
-fn of_leaves(
+/// Partitions T0. `facets` are this rank's slice; `mark` returns the octants above a level that they and the boxes split.
+/// Collective.
+pub fn partition(
     facets: &[Facet],
     rules: &Rules,
     division: &Division,
+    mark: impl FnOnce(Level) -> PerLevel,
     comm: &dyn Comm,
-) -> Result<Base, Error> {
+) -> Result<Partition, Error> {
+    if division.is_of_curve() {
+        let levels = levels(facets, rules, [COARSE_PER_RANK, FINE_PER_RANK as f64], comm);
+        let ownership = by_area(facets, rules, levels, comm);
+        return Ok(Partition { ownership, base_leaves: Vec::new(), level_base: levels[1] });
+    }
     let level = match division.level_base {
         Some(level) => level.min(level_last(rules)),
-        None => levels_auto(facets, rules, [SHARE_PARTS as f64], comm)[0].min(LEVEL_BASE_AUTO_MAX),
+        None => {
+            let per_rank = base_leaves::SUBTREES_PER_RANK as f64;
+            levels(facets, rules, [per_rank], comm)[0].min(LEVEL_BASE_AUTO_MAX)
+        }
     };
-    let survey = Survey::new(facets, rules, level, division.weights != Weights::Unit, comm);
-    let cut = match (division.level_base, division.weights) {
-        (Some(_), _) => by_level(&survey, level),
-        (None, Weights::Unit) => by_level(&survey, level_of_pieces(&survey, comm.size())),
-        (None, _) => by_weight(&survey, comm.size()),
-    };
-    let weights = match division.weights {
-        Weights::Unit => vec![1; cut.pieces.len()],
-        Weights::Area | Weights::Rebalance => cut.weights(),
-        Weights::Rehearsal => rehearse::weights(facets, rules, &cut, comm),
-    };
-    let owners = partition::assign(&cut, &weights, division.partitioner, comm)?;
-    let dealt = cut.dealt(&owners);
-    Ok(Base {
-        ownership: Ownership::new(comm.rank(), comm.size(), &dealt),
-        dealt: dealt.into_iter().filter(|b| b.owner == comm.rank()).collect(),
-        level_base: cut.level_base(),
-        work: survey.work,
-    })
-}
-
-/// Where a rank begins to refine: the largest octants that it owns all of.
-pub fn starts(ownership: &Ownership) -> Vec<Start> {
-    ownership.octants().into_iter().map(|(level, code)| Start { level, code }).collect()
+    let mut leaves = base_leaves::partition(facets, &mark(level), rules, division, level, comm)?;
+    let ownership = Ownership::new(comm.rank(), comm.size(), &leaves);
+    let level_base = leaves.iter().map(|b| b.level).max().unwrap_or(0);
+    leaves.retain(|b| b.owner == comm.rank());
+    Ok(Partition { ownership, base_leaves: leaves, level_base })
 }
 
 /// Deepest level that base leaves may have.
@@ -148,102 +75,164 @@ fn level_last(rules: &Rules) -> Level {
     rules.level_deepest().max(1) - 1
 }
 
-/// The levels of base leaves that are small enough for such parts of a fair share even where the facets lie
-/// closest, by the facets' area and the boxes' volume. Collective.
-fn levels_auto<const N: usize>(
+/// The levels at which the octants near facets and in boxes number about `per_rank` on each rank, where the facets are densest.
+/// Collective.
+fn levels<const N: usize>(
     facets: &[Facet],
     rules: &Rules,
-    parts: [f64; N],
+    per_rank: [f64; N],
     comm: &dyn Comm,
 ) -> [Level; N] {
-    // Whole finest faces: a sum of integers is the same on all ranks.
+    // Whole faces of finest cells: a sum of integers does not depend on its order.
     let face = (edge(rules.level_surface) as f64).powi(2);
     let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
     let side = |b: &ExtentBox, a: usize| (b.max[a] - b.min[a]) as f64;
     let volumes = rules.boxes.iter().map(|b| (0..3).map(|a| side(b, a)).product::<f64>());
     let volume = volumes.fold(0.0, f64::max);
-    parts.map(|parts| {
+    per_rank.map(|per_rank| {
         // Four sheets of facets in one octant are not unusual: wings, fins.
-        let parts = comm.size() as f64 * parts * 4.0;
+        let octants = comm.size() as f64 * per_rank * 4.0;
         let small = |l: &Level| {
             let h = edge(*l) as f64;
-            h * h <= area / parts && (volume == 0.0 || h.powi(3) <= volume / parts)
+            h * h <= area / octants && (volume == 0.0 || h.powi(3) <= volume / octants)
         };
         (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
     })
 }
 
-/// The level of the paper's base leaves, all alike: enough of them for every rank.
-fn level_of_pieces(survey: &Survey, ranks: usize) -> Level {
-    let enough = SPLIT_LEAVES_PER_RANK * ranks as u64;
-    let whole = survey.level();
-    (0..whole).find(|&l| survey.split[l as usize].count() >= enough).unwrap_or(whole)
-}
-
-/// Base leaves of one level.
-fn by_level(survey: &Survey, level: Level) -> Cut {
-    Cut::root(survey).split_while(survey, |p| p.level < level)
-}
-
-/// Base leaves that are light, wherever they are.
-fn by_weight(survey: &Survey, ranks: usize) -> Cut {
-    let cut = Cut::root(survey);
-    let light = cut.pieces[0].weight / (ranks as u64 * SHARE_PARTS);
-    cut.split_while(survey, |p| p.weight > light)
-}
-
-/// Pairs of base leaves that share part of a face, each once, the lower number first.
-#[cfg_attr(not(feature = "metis"), allow(dead_code))]
-pub(crate) fn face_neighbours(
-    leaves: &[Piece],
-    leaf_at: impl Fn(u64) -> usize,
-) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    for (i, b) in leaves.iter().enumerate() {
-        for axis in 0..3 {
-            for up in [false, true] {
-                let Some(n) = crate::octant::neighbour(b.level, b.code, axis, up) else {
-                    continue;
-                };
-                let j = leaf_at(start57(b.level, n));
-                // A finer neighbour finds this one itself.
-                if leaves[j].level <= b.level {
-                    pairs.push((i.min(j), i.max(j)));
-                }
-            }
-        }
+/// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
+fn by_area(
+    facets: &[Facet],
+    rules: &Rules,
+    [coarse, fine]: [Level; 2],
+    comm: &dyn Comm,
+) -> Ownership {
+    let local = estimated(facets, rules, fine);
+    let (bins, light) = coarse_bins(&local, rules, coarse, comm);
+    let all_to_rank_0 = || vec![(0, 0)];
+    let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
+    let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
+    let entry = |(start, weight)| (rough.owner_at(start), [start, weight]);
+    let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
+    let received = comm.sparse_all_to_all(messages);
+    let mut bins: Vec<Bin> =
+        received.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
+    for interval in rough.intervals() {
+        curve::add_boxes(&mut bins, rules, fine, light, FRACTIONS, &interval);
     }
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs
+    curve::merge(&mut bins);
+    let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
+    Ownership::along(comm.rank(), comm.size(), boundaries)
 }
 
-/// Level-19 Morton code of the middle of a facet's extent, if that is in the root.
-pub(crate) fn middle(f: &Facet) -> Option<u64> {
-    let mid = std::array::from_fn(|a| {
-        let (lo, hi) = f.range(a);
-        (lo + hi) / 2
-    });
-    let inside = mid.iter().all(|c: &i64| (0..crate::octant::ROOT_EDGE).contains(c));
-    inside.then(|| {
-        crate::octant::morton(mid.map(|c| (c >> (crate::octant::ROOT_BITS - LEVEL_MAX)) as u32))
-    })
+/// Estimated leaves of the mesh near some facets, in [`FRACTIONS`], by octants of a level.
+fn estimated(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
+    let mut bins = area::of(facets, rules, level);
+    let each = area::leaves_per_surface_cell(rules);
+    bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(each));
+    curve::merge(&mut bins);
+    bins
+}
+
+/// The bins of all ranks by octants of a level, the same on all ranks, with the number of leaves that need not be resolved
+/// further. Collective.
+fn coarse_bins(local: &[Bin], rules: &Rules, level: Level, comm: &dyn Comm) -> (Vec<Bin>, u64) {
+    let shift = 3 * (LEVEL_MAX - level);
+    let coarse = local.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
+    let all = all_gather_reduced(coarse, |a, b| a + b, comm);
+    let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
+    let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
+    let light = leaves(&bins) / comm.size() as u64;
+    curve::add_boxes(&mut bins, rules, level, light, FRACTIONS, &curve::ALL);
+    curve::merge(&mut bins);
+    let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
+    (bins, light)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::octant::position;
+    use crate::comm::sim;
+    use crate::lattice::{Keep, Root};
+    use crate::octant::{ROOT_EDGE, start57};
+
+    const RANKS: usize = 9;
+    const FINE: Level = 7;
+
+    fn rules(boxes: Vec<ExtentBox>) -> Rules {
+        Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface: 9,
+            layer_cells_min: 4,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes,
+        }
+    }
+
+    /// A sheet of facets, oblique and of all sizes, denser to one side.
+    fn sheet() -> Vec<Facet> {
+        let at = |i: i32, j: i32| {
+            let (x, y) = (i * i * (1 << 15), j * (1 << 21));
+            [x, y, (1 << 24) + x / 3 + y / 2]
+        };
+        let square = |i: i32, j: i32| {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+            [Facet { v: [a, b, c] }, Facet { v: [b, d, c] }]
+        };
+        (0..50).flat_map(|i| (0..40).flat_map(move |j| square(i, j))).collect()
+    }
+
+    /// Owners of the fine octants, where rank `rank_of(i)` has facet number `i` in its slice.
+    fn owners_by(rules: &Rules, rank_of: impl Fn(usize) -> usize + Sync) -> Vec<usize> {
+        let all = sheet();
+        let known = sim::run(RANKS, 5, |comm| {
+            let on_this = |(i, f): (usize, &Facet)| (rank_of(i) == comm.rank()).then_some(*f);
+            let mine: Vec<Facet> = all.iter().enumerate().filter_map(on_this).collect();
+            let ownership = by_area(&mine, rules, [4, FINE], comm);
+            (0..1 << (3 * FINE))
+                .map(|code| ownership.owner_at(start57(FINE, code)))
+                .collect::<Vec<_>>()
+        });
+        assert!(known.iter().all(|s| *s == known[0]), "all ranks have the same partition");
+        known.into_iter().next().unwrap_or_default()
+    }
+
+    /// Estimated leaves on each rank.
+    fn weights(rules: &Rules, owners: &[usize]) -> Vec<u64> {
+        let mut bins = estimated(&sheet(), rules, FINE);
+        curve::add_boxes(&mut bins, rules, FINE, 0, FRACTIONS, &curve::ALL);
+        let mut sums = vec![0; RANKS];
+        for (start, weight) in bins {
+            sums[owners[(start / start57(FINE, 1)) as usize]] += weight;
+        }
+        sums
+    }
 
     #[test]
-    fn neighbours_of_a_uniform_base_tree() {
-        let leaves: Vec<Piece> = (0..64).map(|code| Piece::new(2, code)).collect();
-        let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
-        assert_eq!(pairs.len(), 3 * 3 * 16);
-        let apart = |a: usize, b: usize| -> i64 {
-            let (p, q) = (position(a as u64), position(b as u64));
-            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).abs()).sum()
-        };
-        assert!(pairs.iter().all(|&(a, b)| apart(a, b) == 1));
+    fn loads_are_equal_and_the_partition_does_not_depend_on_the_slices() {
+        let h = ROOT_EDGE >> 3;
+        let slab = ExtentBox { min: [h, h, 5 * h], max: [6 * h, 6 * h, 6 * h], level: 8 };
+        for boxes in [vec![], vec![slab]] {
+            let rules = rules(boxes);
+            let owners = owners_by(&rules, |i| i % RANKS);
+            for slices in [|i| i * RANKS / 4000, |_| 3] {
+                assert_eq!(owners_by(&rules, slices), owners);
+            }
+            assert!(owners.is_sorted());
+            let sums = weights(&rules, &owners);
+            let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
+            let far = |&w: &u64| (w as f64 / mean - 1.0).abs() > 0.1;
+            assert!(!sums.iter().any(far), "{sums:?}");
+        }
+    }
+
+    #[test]
+    fn without_any_facet_one_rank_owns_everything() {
+        let owners = sim::run(3, 1, |comm| {
+            let ownership = by_area(&[], &rules(vec![]), [2, 3], comm);
+            ownership.octants().len()
+        });
+        assert_eq!(owners, [1, 0, 0]);
     }
 }

@@ -1,30 +1,25 @@
 //! METIS: parts of equal weight with few faces between them.
-//!
-//! METIS bisects again and again, and complains on standard output about parts that get nothing: with
-//! hardly more leaves than ranks, the curve's cuts serve as well.
 
-use super::morton_cuts;
 use crate::error::Error;
-use crate::octant::start57;
-use crate::partition::initial::cut::Piece;
-use crate::partition::initial::face_neighbours;
+use crate::octant::{neighbour, start57};
+use crate::partition::base_leaves::{Subtree, assign_morton};
 
-/// Fewest base leaves per rank that METIS is asked to cut, of as many equal ones as they amount to.
-const LEAVES_PER_RANK_METIS: usize = 8;
+/// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
+const LEAVES_PER_RANK_MIN: usize = 8;
 
 /// The owner of each base leaf.
-pub fn cuts(leaves: &[Piece], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
-    // METIS bisects again and again, and complains on standard output about parts that get nothing:
-    // with hardly more leaves than ranks, or few that hold nearly all, the curve's cuts serve as well.
+pub fn assign(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
+    // METIS bisects recursively, and prints complaints on standard output about empty parts. With few leaves per rank, or few
+    // that have nearly all the weight, intervals of the curve are as good.
     let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
     let even: f64 = weights.iter().map(|&w| (w as f64 / total as f64).powi(2)).sum();
-    if ((LEAVES_PER_RANK_METIS * ranks) as f64) * even > 1.0 {
-        return Ok(morton_cuts(weights, ranks));
+    if ((LEAVES_PER_RANK_MIN * ranks) as f64) * even > 1.0 {
+        return Ok(assign_morton(weights, ranks));
     }
     let starts: Vec<u64> = leaves.iter().map(|b| start57(b.level, b.code)).collect();
     let pairs = face_neighbours(leaves, |s| starts.partition_point(|&t| t <= s) - 1);
     let (xadj, adjncy) = adjacency(leaves.len(), &pairs);
-    // METIS counts in i32 and puts nearly all in one part when the sum overflows, saying nothing.
+    // METIS sums weights in i32 without a check for overflow.
     let scale = |w: u64| (u128::from(w) * (1 << 30) / total.max(1 << 30)).max(1) as metis::Idx;
     let scaled: Vec<metis::Idx> = weights.iter().map(|&w| scale(w)).collect();
     let mut parts = vec![0 as metis::Idx; leaves.len()];
@@ -40,7 +35,29 @@ pub fn cuts(leaves: &[Piece], weights: &[u64], ranks: usize) -> Result<Vec<usize
     Ok(parts.into_iter().map(|p| p as usize).collect())
 }
 
-/// The graph in METIS's compressed form.
+/// Pairs of base leaves that share part of a face, each once, the lower number first.
+fn face_neighbours(leaves: &[Subtree], leaf_index: impl Fn(u64) -> usize) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (i, b) in leaves.iter().enumerate() {
+        for axis in 0..3 {
+            for up in [false, true] {
+                let Some(n) = neighbour(b.level, b.code, axis, up) else {
+                    continue;
+                };
+                let j = leaf_index(start57(b.level, n));
+                // A finer neighbour adds the pair itself.
+                if leaves[j].level <= b.level {
+                    pairs.push((i.min(j), i.max(j)));
+                }
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// The graph in the compressed form of METIS.
 fn adjacency(vertices: usize, pairs: &[(usize, usize)]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
     let mut lists = vec![Vec::new(); vertices];
     for &(a, b) in pairs {
@@ -57,16 +74,29 @@ fn adjacency(vertices: usize, pairs: &[(usize, usize)]) -> (Vec<metis::Idx>, Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::octant::{LEVEL_MAX, position};
 
     #[test]
-    fn parts_are_fair_however_heavy_the_leaves() {
-        let leaves: Vec<Piece> = (0..512).map(|code| Piece::new(3, code)).collect();
+    fn parts_are_equal_whatever_the_sum_of_weights() {
+        let leaves: Vec<Subtree> = (0..512).map(|code| Subtree::new(3, code)).collect();
         for weight in [1, 1 << 40] {
-            let owners = cuts(&leaves, &[weight; 512], 8).unwrap();
+            let owners = assign(&leaves, &[weight; 512], 8).unwrap();
             for r in 0..8 {
                 let n = owners.iter().filter(|&&o| o == r).count();
                 assert!((55..=75).contains(&n), "{n} of 64");
             }
         }
+    }
+
+    #[test]
+    fn a_uniform_base_tree_has_three_pairs_per_octant_but_for_its_faces() {
+        let leaves: Vec<Subtree> = (0..64).map(|code| Subtree::new(2, code)).collect();
+        let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
+        assert_eq!(pairs.len(), 3 * 3 * 16);
+        let apart = |a: usize, b: usize| -> i64 {
+            let (p, q) = (position(a as u64), position(b as u64));
+            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).abs()).sum()
+        };
+        assert!(pairs.iter().all(|&(a, b)| apart(a, b) == 1));
     }
 }

@@ -3,8 +3,7 @@
 use super::{Facet, Run, Small};
 use mesher::case::BoxSpec;
 use mesher::lattice::{Keep, Root};
-use mesher::partition::initial::Division;
-use mesher::partition::{Partitioner, Weights};
+use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 
 /// Runs of all kinds, on few ranks mostly.
@@ -15,7 +14,6 @@ pub fn run() -> impl Strategy<Value = Run> {
         2 => Just(Weights::Rebalance),
         1 => Just(Weights::Area),
         1 => Just(Weights::Unit),
-        1 => Just(Weights::Rehearsal),
     ];
     let level_base = prop_oneof![2 => Just(None), 1 => (0u32..6).prop_map(Some)];
     let division =

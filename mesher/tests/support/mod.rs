@@ -5,8 +5,7 @@ use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::comm::{Solo, sim};
 use mesher::ingest::Source;
 use mesher::lattice::{Keep, Root};
-use mesher::partition::initial::Division;
-use mesher::partition::{Partitioner, Weights};
+use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::Ambiguous;
 use mesher::{Options, words};
 
@@ -164,7 +163,7 @@ pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {
-    Options { division, ungraded, out: None }
+    Options { division, ungraded, out: None, check: false }
 }
 
 /// The first differing leaf, as people can read it.

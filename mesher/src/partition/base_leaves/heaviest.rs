@@ -1,30 +1,30 @@
-//! What the heaviest base leaf holds: no partition can be better balanced than that allows.
+//! The number of leaves in the heaviest base leaf, which bounds the load balance of any partition.
 
 use crate::brickset::{BrickSet, ones};
 use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::ownership::BaseLeaf;
 
-/// Leaves of the final mesh in the heaviest of a rank's base leaves, `mine`, in order; `split` is the graded
+/// Leaves of the final mesh in the heaviest of this rank's base leaves, which are in Morton order; `split` is the graded
 /// tree.
-pub fn cells_heaviest(split: &[BrickSet], deleted: &[BrickSet], mine: &[BaseLeaf]) -> u64 {
-    let starts: Vec<u64> = mine.iter().map(|b| start57(b.level, b.code)).collect();
-    // The base leaf that an octant lies in.
-    let holder = |l: Level, start: u64| {
-        let at = starts.partition_point(|&s| s <= start).checked_sub(1)?;
-        let end = starts[at] + (1 << (3 * (LEVEL_MAX - mine[at].level)));
-        (start < end && mine[at].level <= l).then_some(at)
+pub fn cells_heaviest(split: &[BrickSet], deleted: &[BrickSet], base_leaves: &[BaseLeaf]) -> u64 {
+    let starts: Vec<u64> = base_leaves.iter().map(|b| start57(b.level, b.code)).collect();
+    // The base leaf that contains an octant of level `l`.
+    let containing = |l: Level, start: u64| {
+        let i = starts.partition_point(|&s| s <= start).checked_sub(1)?;
+        let b = base_leaves[i];
+        (start < start57(b.level, b.code + 1) && b.level <= l).then_some(i)
     };
-    let mut counts = vec![1i64; mine.len()];
+    let mut counts = vec![1i64; base_leaves.len()];
     let mut add = |l: Level, set: &BrickSet, each: i64| {
         for b in set.bricks() {
-            if let Some(at) = l.checked_sub(2).and_then(|up| holder(up, start57(up, b.key))) {
-                counts[at] += each * i64::from(b.bits.count_ones());
+            if let Some(i) = l.checked_sub(2).and_then(|up| containing(up, start57(up, b.key))) {
+                counts[i] += each * i64::from(b.bits.count_ones());
                 continue;
             }
-            // A brick that spans several base leaves, or another rank's: told octant by octant.
+            // The brick spans several base leaves, or is another rank's.
             for bit in ones(b.bits) {
-                if let Some(at) = holder(l, start57(l, b.key << 6 | u64::from(bit))) {
-                    counts[at] += each;
+                if let Some(i) = containing(l, start57(l, b.key << 6 | u64::from(bit))) {
+                    counts[i] += each;
                 }
             }
         }

@@ -1,0 +1,69 @@
+//! The leaves of the finished mesh: digests, files and the manifest.
+
+use crate::Mesh;
+use crate::comm::{Comm, agree};
+use crate::digest::Digests;
+use crate::error::Error;
+use crate::record::check_interrupt;
+use crate::stream::Counts;
+use crate::write::{self, Manifest, OutDir, Written};
+
+/// Sums over all ranks.
+pub struct Totals {
+    /// Leaves by level and side.
+    pub counts: Counts,
+    /// Digests of the mesh.
+    pub digests: Digests,
+    /// For each rank the number of its leaves, and the two halves of their digest.
+    pub parts: Vec<[u64; 3]>,
+}
+
+/// Streams the leaves that this rank owns into the digest, and into its file if a directory is given. Collective.
+pub fn emit(
+    mesh: &Mesh,
+    out: Option<&OutDir>,
+    comm: &dyn Comm,
+) -> Result<(Counts, Written), Error> {
+    let work = || match out {
+        None => {
+            let mut written = Written::default();
+            let counts = mesh.leaves().emit(|words| {
+                written.leaves += words.len() as u64;
+                written.digests.add(words);
+                check_interrupt()
+            })?;
+            Ok((counts, written))
+        }
+        Some(out) => {
+            let mut part = out.part(comm.rank())?;
+            let counts = mesh.leaves().emit(|words| {
+                check_interrupt()?;
+                part.add(words)
+            })?;
+            Ok((counts, part.finish()?))
+        }
+    };
+    agree(comm, work())
+}
+
+/// Sums over the ranks, and writes the manifest if a directory is given. Collective.
+pub fn finish(
+    mesh: &Mesh,
+    counts: &Counts,
+    written: &Written,
+    out: Option<&OutDir>,
+    comm: &dyn Comm,
+) -> Result<Totals, Error> {
+    let counts = counts.gather(comm);
+    let (digests, parts) = write::gather(written, comm);
+    let publish = || match out {
+        Some(out) if comm.rank() == 0 => {
+            let ambiguous = mesh.sides.ambiguous;
+            let (rules, is_base) = (&mesh.rules, mesh.is_base);
+            out.manifest(&Manifest::new(rules, is_base, &counts, ambiguous, &digests, &parts))
+        }
+        _ => Ok(()),
+    };
+    comm.agree(publish())?;
+    Ok(Totals { counts, digests, parts })
+}

@@ -1,0 +1,234 @@
+//! The paper's partition: T0 is cut at its *base leaves*, which are assigned to ranks.
+//!
+//! All ranks need the top of T0 for it. Each rank marks the octants that its slice of the facets splits; the union of the
+//! marks is the same tree on all ranks. Base leaves tile the root, in Morton order.
+
+mod heaviest;
+
+pub use heaviest::cells_heaviest;
+
+use crate::brick::{self, Brick};
+use crate::comm::{Comm, agree, all_gather_reduced};
+use crate::error::Error;
+use crate::facet::Facet;
+use crate::lattice::Rules;
+use crate::octant::{Level, start57};
+#[cfg(feature = "metis")]
+use crate::partition::metis;
+use crate::partition::ownership::{BaseLeaf, KEY_BITS};
+use crate::partition::{Division, Partitioner, Weights, area};
+use crate::tree::{PerLevel, per_level};
+use area::Areas;
+use std::ops::Range;
+
+/// Base leaves with children per rank, at least, where all base leaves have one level.
+const SPLIT_LEAVES_PER_RANK: u64 = 32;
+/// Subtrees heavier than this fraction of a rank's mean load are split further: the load imbalance is then a few percent.
+pub const SUBTREES_PER_RANK: u64 = 16;
+
+/// The top of T0, the same on all ranks.
+struct Survey<'a> {
+    rules: &'a Rules,
+    /// Octants that split in T0, of all levels above `level`.
+    split: PerLevel,
+    areas: Areas,
+    /// Deepest level that base leaves may have.
+    level: Level,
+}
+
+impl<'a> Survey<'a> {
+    /// Gathers areas, unless weights are 1, and the octants that any rank's facets split (`marked` on this rank) above a level.
+    /// Collective.
+    fn gather(
+        facets: &[Facet],
+        marked: &PerLevel,
+        rules: &'a Rules,
+        level: Level,
+        weights: Weights,
+        comm: &dyn Comm,
+    ) -> Self {
+        let areas = match weights {
+            Weights::Unit => Areas::default(),
+            _ => Areas::gather(facets, rules, level, comm),
+        };
+        let mut split = per_level();
+        let sets = (0..u64::from(level)).zip(marked);
+        let entry = |l: u64| move |b: Brick| [l << KEY_BITS | b.key, b.bits];
+        let entries = sets.flat_map(|(l, set)| set.bricks().map(entry(l)));
+        for [key, bits] in all_gather_reduced(entries.collect(), |a, b| a | b, comm) {
+            split[(key >> KEY_BITS) as usize].push(key & ((1 << KEY_BITS) - 1), bits);
+        }
+        Self { rules, split, areas, level }
+    }
+
+    /// Estimated leaves of the mesh in an octant with these entries of the areas.
+    fn weight(&self, l: Level, code: u64, areas: &Range<usize>) -> u64 {
+        let by_area =
+            self.areas.cells(areas).saturating_mul(area::leaves_per_surface_cell(self.rules));
+        1 + by_area + area::leaves_in_boxes(l, code, self.rules)
+    }
+}
+
+/// A base leaf with the subtree of T0 below it.
+#[derive(Clone, Debug)]
+pub struct Subtree {
+    /// Level of its root.
+    pub level: Level,
+    /// Morton code of its root.
+    pub code: u64,
+    /// Whether its root is split in T0; true or false only above the survey's level.
+    is_split: bool,
+    /// Estimated leaves of the mesh in it.
+    weight: u64,
+    /// Its entries in the survey's areas.
+    areas: Range<usize>,
+}
+
+impl Subtree {
+    fn root(survey: &Survey) -> Self {
+        let areas = survey.areas.within(&survey.areas.all(), span(0, 0));
+        let weight = survey.weight(0, 0, &areas);
+        Self { level: 0, code: 0, is_split: survey.split[0].contains(0), weight, areas }
+    }
+
+    /// An octant of weight 1.
+    #[cfg(test)]
+    pub fn new(level: Level, code: u64) -> Self {
+        Self { level, code, is_split: true, weight: 1, areas: 0..0 }
+    }
+
+    fn children(self, survey: &Survey) -> [Self; 8] {
+        let level = self.level + 1;
+        let split = survey.split[level as usize].get(self.code >> 3);
+        let split = brick::byte(split, self.code & 7);
+        let mut rest = self.areas;
+        std::array::from_fn(|child| {
+            let code = self.code << 3 | child as u64;
+            let areas = survey.areas.within(&rest, span(level, code));
+            rest.start = areas.end;
+            let weight = survey.weight(level, code, &areas);
+            Self { level, code, is_split: split >> child & 1 == 1, weight, areas }
+        })
+    }
+}
+
+/// The interval of the Morton curve, in level-19 codes, that an octant fills.
+fn span(level: Level, code: u64) -> Range<u64> {
+    start57(level, code)..start57(level, code + 1)
+}
+
+/// The base leaves, in order, with their owners; the same on all ranks. No base leaf is deeper than `level`; `marked` are the
+/// octants above that level that this rank's facets split. Collective.
+pub fn partition(
+    facets: &[Facet],
+    marked: &PerLevel,
+    rules: &Rules,
+    division: &Division,
+    level: Level,
+    comm: &dyn Comm,
+) -> Result<Vec<BaseLeaf>, Error> {
+    let survey = Survey::gather(facets, marked, rules, level, division.weights, comm);
+    let ranks = comm.size() as u64;
+    let root = Subtree::root(&survey);
+    let heavy = root.weight / (ranks * SUBTREES_PER_RANK);
+    let subtrees = match (division.level_base, division.weights) {
+        (Some(_), _) => split_while(root, &survey, |_| true),
+        (None, Weights::Unit) => {
+            let enough =
+                |l: &Level| survey.split[*l as usize].count() >= SPLIT_LEAVES_PER_RANK * ranks;
+            let level = (0..level).find(enough).unwrap_or(level);
+            split_while(root, &survey, |s| s.level < level)
+        }
+        (None, _) => split_while(root, &survey, |s| s.weight > heavy),
+    };
+    let weights: Vec<u64> = match division.weights {
+        Weights::Unit => vec![1; subtrees.len()],
+        Weights::Area | Weights::Rebalance => subtrees.iter().map(|s| s.weight).collect(),
+    };
+    let owners = assign(&subtrees, &weights, division.partitioner, comm)?;
+    let leaf = |(s, owner): (Subtree, usize)| BaseLeaf { level: s.level, code: s.code, owner };
+    Ok(subtrees.into_iter().zip(owners).map(leaf).collect())
+}
+
+/// Splits subtrees whose root is split in T0, down to the survey's level at most, as long as `wanted` is true for any.
+fn split_while(root: Subtree, survey: &Survey, wanted: impl Fn(&Subtree) -> bool) -> Vec<Subtree> {
+    let mut subtrees = vec![root];
+    loop {
+        let before = subtrees.len();
+        let mut divided = Vec::with_capacity(before);
+        for s in subtrees {
+            if s.is_split && s.level < survey.level && wanted(&s) {
+                divided.extend(s.children(survey));
+            } else {
+                divided.push(s);
+            }
+        }
+        subtrees = divided;
+        if subtrees.len() == before {
+            return subtrees;
+        }
+    }
+}
+
+/// The owner of each subtree, the same on all ranks. Collective.
+fn assign(
+    subtrees: &[Subtree],
+    weights: &[u64],
+    partitioner: Partitioner,
+    comm: &dyn Comm,
+) -> Result<Vec<usize>, Error> {
+    match partitioner {
+        _ if comm.size() == 1 => Ok(vec![0; weights.len()]),
+        Partitioner::Morton => Ok(assign_morton(weights, comm.size())),
+        Partitioner::Metis => {
+            let on_rank_0 = if comm.rank() == 0 {
+                assign_metis(subtrees, weights, comm.size())
+            } else {
+                Ok(Vec::new())
+            };
+            let owners: Vec<u64> = agree(comm, on_rank_0)?.into_iter().map(|o| o as u64).collect();
+            Ok(comm.all_gather(&owners).words().iter().map(|&o| o as usize).collect())
+        }
+    }
+}
+
+/// Assigns each base leaf to the rank in whose interval of equal weight its middle lies. Weights are not all zero.
+pub fn assign_morton(weights: &[u64], ranks: usize) -> Vec<usize> {
+    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
+    let mut before = 0u128;
+    let mut owner = |w: &u64| {
+        let middle = 2 * before + u128::from(*w);
+        before += u128::from(*w);
+        ((middle * ranks as u128 / (2 * total)) as usize).min(ranks - 1)
+    };
+    weights.iter().map(&mut owner).collect()
+}
+
+#[cfg(feature = "metis")]
+fn assign_metis(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
+    metis::assign(leaves, weights, ranks)
+}
+
+#[cfg(not(feature = "metis"))]
+fn assign_metis(_: &[Subtree], _: &[u64], _: usize) -> Result<Vec<usize>, Error> {
+    Err(Error::input(
+        "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_of_the_curve_are_in_order_and_equally_heavy() {
+        let owners = assign_morton(&[1; 100], 7);
+        assert!(owners.is_sorted());
+        for r in 0..7 {
+            let n = owners.iter().filter(|&&o| o == r).count();
+            assert!((14..=15).contains(&n), "{n}");
+        }
+        assert!(assign_morton(&[1, 1], 5).iter().all(|&o| o < 5));
+        assert_eq!(assign_morton(&[1 << 63, 1 << 63, 1 << 63], 3), [0, 1, 2]);
+    }
+}

@@ -1,0 +1,136 @@
+//! Refinement: T0 down to its deepest level (the paper's section II.A), on the ranks that own its octants.
+//!
+//! Every facet is sent to the owners of the octants that its extent reaches; each rank then [voxelises](voxelise) its
+//! own octants.
+//!
+//! Invariant: a rank has every facet whose extent reaches an octant that it owns, once.
+
+use crate::comm::{Comm, MessageBuffer};
+use crate::facet::Facet;
+use crate::lattice::{ExtentBox, Rules};
+use crate::octant::{LEVEL_MAX, Level, corner, edge};
+use crate::partition::ownership::Ownership;
+use crate::tree::Tree;
+use crate::voxelise::{self, Depth, Filed, Home, Start, Work};
+
+/// Refines the octants that this rank owns around its facets, which must be all that [reach](route) them.
+pub fn refine(facets: &Filed, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
+    let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
+    let start = |(level, code)| Start { level, code };
+    let starts: Vec<Start> = ownership.octants().into_iter().map(start).collect();
+    voxelise::refine(facets, &depth, &starts)
+}
+
+/// Refines the whole root around some facets, down to a level at most.
+pub fn refine_top(facets: &[Facet], rules: &Rules, level: Level) -> (Tree, Work) {
+    let boxes = rules.boxes.iter().map(|b| ExtentBox { level: b.level.min(level), ..*b });
+    let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
+    voxelise::refine(&Filed::new(facets), &depth, &[Start { level: 0, code: 0 }])
+}
+
+/// Sends every facet to the owners of the octants that its extent reaches. Returns the facets for this rank. Collective.
+pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Facet> {
+    let mut to_rank: Vec<Vec<Facet>> = vec![Vec::new(); comm.size()];
+    // Index of the latest facet for each rank.
+    let mut latest = vec![u64::MAX; comm.size()];
+    for (i, f) in (0u64..).zip(facets) {
+        let Some(containing) = Home::of(f) else { continue };
+        let extent = std::array::from_fn(|a| f.range(a));
+        let code = containing.start() >> (3 * (LEVEL_MAX - containing.level()));
+        owners_reached(ownership, &extent, containing.level(), code, &mut |owner| {
+            if std::mem::replace(&mut latest[owner], i) != i {
+                to_rank[owner].push(*f);
+            }
+        });
+    }
+    let mut local = std::mem::take(&mut to_rank[comm.rank()]);
+    let mut messages =
+        MessageBuffer::with_capacity(5 * to_rank.iter().map(Vec::len).sum::<usize>());
+    for (owner, facets) in to_rank.into_iter().enumerate() {
+        messages.write(owner, facets.iter().flat_map(pack));
+    }
+    local.extend(comm.sparse_all_to_all(messages).words().as_chunks().0.iter().map(unpack));
+    local
+}
+
+/// Calls `found` with the owners of all octants that an extent reaches within an octant; with some more than once.
+pub(crate) fn owners_reached(
+    ownership: &Ownership,
+    extent: &[(i64, i64); 3],
+    l: Level,
+    code: u64,
+    found: &mut impl FnMut(usize),
+) {
+    if let Some(owner) = ownership.sole_owner(l, code) {
+        return found(owner);
+    }
+    let (min, half) = (corner(l, code), edge(l + 1));
+    // For each axis, whether the extent reaches the lower and the upper half; the halves are closed.
+    let halves: [[bool; 2]; 3] =
+        std::array::from_fn(|a| [extent[a].0 <= min[a] + half, extent[a].1 >= min[a] + half]);
+    for child in 0..8 {
+        if (0..3).all(|a| halves[a][child >> a & 1]) {
+            owners_reached(ownership, extent, l + 1, code << 3 | child as u64, found);
+        }
+    }
+}
+
+/// Nine coordinates in five words.
+fn pack(f: &Facet) -> [u64; 5] {
+    let c = f.v.as_flattened();
+    std::array::from_fn(|i| {
+        u64::from(c[2 * i] as u32) | u64::from(c.get(2 * i + 1).map_or(0, |v| *v as u32)) << 32
+    })
+}
+
+fn unpack(words: &[u64; 5]) -> Facet {
+    let coordinate = |i: usize| (words[i / 2] >> (32 * (i % 2))) as u32 as i32;
+    Facet { v: std::array::from_fn(|v| std::array::from_fn(|a| coordinate(3 * v + a))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::partition::ownership::BaseLeaf;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    /// The children of the root, and instead of some their children, each with an owner of its own.
+    fn two_levels(split: u8) -> Vec<BaseLeaf> {
+        let octants = (0..8u64).flat_map(|c| match split >> c & 1 {
+            0 => vec![(1, c)],
+            _ => (0..8).map(|d| (2, c << 3 | d)).collect(),
+        });
+        let leaf = |(owner, (level, code))| BaseLeaf { level, code, owner };
+        octants.enumerate().map(leaf).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn the_owners_of_all_octants_that_an_extent_reaches_are_found(
+            split in 1u8..,
+            v in prop::array::uniform3(prop::array::uniform3(-2i32..=10)),
+        ) {
+            // Vertices on the faces of octants, next to them, and outside the root.
+            let v = v.map(|p| p.map(|c| (c / 2) * (1 << 25) + c % 2));
+            let (f, leaves) = (Facet { v }, two_levels(split));
+            let ownership = Ownership::new(0, leaves.len(), &leaves);
+            let reached = |b: &BaseLeaf| (0..3).all(|a| {
+                let at = corner(b.level, b.code)[a];
+                f.range(a).0 <= at + edge(b.level) && f.range(a).1 >= at
+            });
+            // Facets outside the root have no containing octant.
+            prop_assume!(reached(&BaseLeaf { level: 0, code: 0, owner: 0 }));
+            let mut found = BTreeSet::new();
+            owners_reached(&ownership, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));
+            let want = leaves.iter().filter(|b| reached(b)).map(|b| b.owner);
+            prop_assert!(found.into_iter().eq(want));
+        }
+    }
+
+    #[test]
+    fn facets_are_unpacked_as_they_were_packed() {
+        let f = Facet { v: [[-5, 1 << 28, 0], [7, -(1 << 27), 3], [i32::MAX, i32::MIN, -1]] };
+        assert_eq!(unpack(&pack(&f)), f);
+    }
+}
