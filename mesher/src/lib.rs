@@ -240,9 +240,9 @@ fn refine(
 ) -> Result<Refined, Error> {
     let depth = voxelise::Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     if comm.size() == 1 {
-        let root = [voxelise::Start { level: 0, code: 0 }];
+        let root = [voxelise::SubtreeRoot { level: 0, code: 0 }];
         let (tree, work) = record.phase("refine", comm, || {
-            voxelise::refine(&voxelise::Filed::new(facets), &depth, &root)
+            voxelise::refine(&voxelise::BinnedFacets::new(facets), &depth, &root)
         });
         counters.voxelise(&work);
         let (ownership, dealt) = (Ownership::solo(), vec![ownership::BaseLeaf::ROOT]);
@@ -251,8 +251,9 @@ fn refine(
     let base = record.phase("base tree", comm, || base::build(facets, rules, division, comm))?;
     counters.voxelise(&base.work);
     let base::Base { mut ownership, dealt, level_base, .. } = base;
-    let filed = record
-        .phase("route", comm, || voxelise::Filed::new(&base::route(facets, &ownership, comm)));
+    let filed = record.phase("route", comm, || {
+        voxelise::BinnedFacets::new(&base::route(facets, &ownership, comm))
+    });
     let (mut tree, work) = record
         .phase("refine", comm, || voxelise::refine(&filed, &depth, &base::starts(&ownership)));
     counters.voxelise(&work);

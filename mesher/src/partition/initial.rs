@@ -25,7 +25,7 @@ use crate::lattice::{ExtentBox, Rules};
 use crate::octant::{LEVEL_MAX, Level, edge, start57};
 use crate::partition::ownership::{BaseLeaf, Ownership};
 use crate::partition::{self, Partitioner, Weights, area};
-use crate::voxelise::{Start, Work};
+use crate::voxelise::{SubtreeRoot, Work};
 use cut::{Cut, Piece};
 use survey::Survey;
 
@@ -139,8 +139,8 @@ fn of_leaves(
 }
 
 /// Where a rank begins to refine: the largest octants that it owns all of.
-pub fn starts(ownership: &Ownership) -> Vec<Start> {
-    ownership.octants().into_iter().map(|(level, code)| Start { level, code }).collect()
+pub fn starts(ownership: &Ownership) -> Vec<SubtreeRoot> {
+    ownership.octants().into_iter().map(|(level, code)| SubtreeRoot { level, code }).collect()
 }
 
 /// Deepest level that base leaves may have.

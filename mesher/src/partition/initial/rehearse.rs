@@ -14,7 +14,7 @@ use crate::partition::morton_cuts;
 use crate::partition::ownership::Ownership;
 use crate::stream::Leaves;
 use crate::tree::Tree;
-use crate::voxelise::{Depth, Filed, refine};
+use crate::voxelise::{BinnedFacets, Depth, refine};
 use crate::{grade, kept, sides};
 
 /// Levels that a rehearsal is coarser: it takes a 64th of the cells. With fewer it costs more and tells less,
@@ -84,7 +84,7 @@ fn rehearse(
 ) -> Vec<u64> {
     let owners = morton_cuts(expected, comm.size());
     let ownership = Ownership::new(comm.rank(), comm.size(), &cut.dealt(&owners));
-    let filed = Filed::new(&route(facets, &ownership, comm));
+    let filed = BinnedFacets::new(&route(facets, &ownership, comm));
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
     let (mut tree, _) = refine(&filed, &depth, &starts(&ownership));
     ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);

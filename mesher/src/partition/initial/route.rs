@@ -4,17 +4,17 @@ use crate::comm::{Comm, MessageBuffer};
 use crate::facet::Facet;
 use crate::octant::{LEVEL_MAX, Level, corner, edge};
 use crate::partition::ownership::Ownership;
-use crate::voxelise::Home;
+use crate::voxelise::ContainingOctant;
 
 /// Brings every facet to the owners of the base leaves that its extent reaches. Collective.
 pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Facet> {
     let mut packed: Vec<Vec<Facet>> = vec![Vec::new(); comm.size()];
     let mut last = vec![u64::MAX; comm.size()];
     for (i, f) in (0u64..).zip(facets) {
-        let Some(home) = Home::of(f) else { continue };
+        let Some(octant) = ContainingOctant::of(f) else { continue };
         let extent = std::array::from_fn(|a| f.range(a));
-        let code = home.start() >> (3 * (LEVEL_MAX - home.level()));
-        visit(ownership, &extent, home.level(), code, &mut |owner| {
+        let code = octant.start() >> (3 * (LEVEL_MAX - octant.level()));
+        visit(ownership, &extent, octant.level(), code, &mut |owner| {
             if std::mem::replace(&mut last[owner], i) != i {
                 packed[owner].push(*f);
             }
@@ -95,7 +95,7 @@ mod tests {
                 let at = corner(b.level, b.code)[a];
                 f.range(a).0 <= at + edge(b.level) && f.range(a).1 >= at
             });
-            // The root itself is taken to be reached; what is outside it has no home.
+            // The root itself is taken to be reached; what is outside it has no octant.
             prop_assume!(reached(&BaseLeaf { level: 0, code: 0, owner: 0 }));
             let mut found = BTreeSet::new();
             visit(&ownership, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));

@@ -11,7 +11,7 @@ use crate::partition::area::Areas;
 use crate::partition::ownership::KEY_BITS;
 use crate::partition::{boxed, thickness};
 use crate::tree::{PerLevel, per_level};
-use crate::voxelise::{Depth, Filed, Start, Work, refine};
+use crate::voxelise::{BinnedFacets, Depth, SubtreeRoot, Work, refine};
 use std::ops::Range;
 
 /// See the module.
@@ -70,7 +70,8 @@ impl<'a> Survey<'a> {
         let level = self.level;
         let boxes = rules.boxes.iter().map(|b| ExtentBox { level: b.level.min(level), ..*b });
         let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
-        let (mine, work) = refine(&Filed::new(facets), &depth, &[Start { level: 0, code: 0 }]);
+        let (mine, work) =
+            refine(&BinnedFacets::new(facets), &depth, &[SubtreeRoot { level: 0, code: 0 }]);
         self.work = work;
         let sets = (0..u64::from(level)).zip(&mine.split);
         let place = |l: u64| move |b: Brick| [l << KEY_BITS | b.key, b.bits];
