@@ -242,8 +242,8 @@ mod kernel {
         let down: i64 = n.iter().map(|v| v.min(&0)).sum();
         // In units of h, the scalar product with n ranges over octant (i, j, k) from n.(i, j, k) + down to
         // n.(i, j, k) + up, and is offset / h on the plane. Beyond 4 * (up - down) < 2^62, no octant of the
-        // brick meets the plane; so clamping the offset there changes no comparison. The lanes are at most
-        // 3 * 2^60 + 2^60 + 2^62 in magnitude.
+        // brick meets the plane; so clamping the offset there changes no comparison. The lanes stay
+        // below 3 * 2^60 + 2^60 + 2^62 = 2^63 in magnitude.
         let bound = 4 * i128::from(up - down) + 4;
         let clamp = |v: i128| v.clamp(-bound, bound) as i64;
         let floor = clamp(offset >> shift);

@@ -29,11 +29,11 @@ fn by_mesher(case: &Small) -> Firsts {
     tree.check_structure();
     let share = Ownership::solo();
     let nodes = Nodes::new(&tree, &share);
-    let mut local = components::join(&nodes, &share);
+    let mut local = components::merge(&nodes, &share);
     let faces = std::mem::take(&mut local.faces);
-    let classes = local.classes();
-    let names = global::names(&nodes, &tree, &share, faces, &classes, &Solo);
-    let found = vote::candidates(&nodes, &tree, &classes.of, &names, &share);
+    let merged = local.numbered();
+    let labels = global::labels(&nodes, &tree, &share, faces, &merged, &Solo);
+    let found = vote::candidates(&nodes, &tree, &merged.of, &labels, &share);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 
