@@ -148,7 +148,7 @@ impl Meshed {
             crossing: &self.refined.tree.crossing,
             sides: &self.sides,
             ownership: &self.refined.ownership,
-            everything: self.graded.is_none(),
+            all_leaves: self.graded.is_none(),
             rules: &self.rules,
         }
     }

@@ -94,7 +94,7 @@ impl Phases {
             crossing: &self.tree.crossing,
             sides: &self.sides,
             ownership: &self.share,
-            everything: false,
+            all_leaves: false,
             rules: &self.rules,
         }
     }

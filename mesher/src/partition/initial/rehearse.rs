@@ -97,7 +97,7 @@ fn rehearse(
         crossing: &crossing,
         sides: &sides,
         ownership: &ownership,
-        everything: false,
+        all_leaves: false,
         rules,
     };
     let starts: Vec<u64> = cut.pieces.iter().map(|p| start57(p.level, p.code)).collect();
