@@ -82,7 +82,7 @@ pub fn mesh(
 
 fn make_out(options: &Options, comm: &dyn Comm) -> Result<Option<OutDir>, Error> {
     let path = options.out.as_ref();
-    path.map(|p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) }).transpose()
+    path.map(|p| if comm.rank() == 0 { OutDir::create(p) } else { Ok(OutDir::open(p)) }).transpose()
 }
 
 fn mesh_into(
