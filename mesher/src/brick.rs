@@ -1,11 +1,11 @@
-//! Bricks: 4 x 4 x 4 octants of one level as the 64 bits of a word.
+//! Bricks: 4 x 4 x 4 octants of one level, as the 64 bits of a word.
 //!
 //! Invariants:
-//! - the brick `key` of level `l` holds the octants with Morton codes `key << 6 | bit`; so the bits
-//!   of a brick are in Morton order too, and its key is the code of an octant of level `l - 2`;
-//! - one byte of a brick is one group of eight siblings: byte `j` of brick `key` holds the children
-//!   of the octant of level `l - 1` with code `key << 3 | j`;
-//! - levels 0 and 1 have a single brick of key 0, of which 1 and 8 bits are in use.
+//! - brick `key` of level `l` holds the octants with Morton codes `key << 6 | bit`: its bits are in Morton
+//!   order, and its key is the code of the octant of level `l - 2` that it fills;
+//! - each byte of a brick is a group of eight siblings: byte `j` of brick `key` holds the children of the
+//!   octant of level `l - 1` with code `key << 3 | j`;
+//! - levels 0 and 1 have a single brick, with key 0, of which 1 and 8 bits are used.
 
 use crate::octant::{self, Level};
 use bytemuck::{Pod, Zeroable};
@@ -14,19 +14,19 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
 #[repr(C)]
 pub struct Brick {
-    /// Code of the octant of two levels up that the brick fills.
+    /// Code of the octant, two levels higher, that the brick fills.
     pub key: u64,
     /// One bit per octant, in Morton order.
     pub bits: u64,
 }
 
-/// Bits whose x position in the brick is 0, 1, 2, 3; [`Y`] and [`Z`] likewise.
+/// Masks of the octants whose x position in the brick is 0, 1, 2, 3.
 pub const X: [u64; 4] = axis_masks(0);
-/// Bits by y position.
+/// The same by y position.
 pub const Y: [u64; 4] = axis_masks(1);
-/// Bits by z position.
+/// The same by z position.
 pub const Z: [u64; 4] = axis_masks(2);
-/// The three families of masks by axis.
+/// The masks by axis.
 pub const AXES: [[u64; 4]; 3] = [X, Y, Z];
 
 const fn axis_masks(axis: u32) -> [u64; 4] {
@@ -40,7 +40,7 @@ const fn axis_masks(axis: u32) -> [u64; 4] {
     masks
 }
 
-/// The bits that octants of level `l` can have: fewer than 64 only above level 2.
+/// Mask of the bits that octants of level `l` can have: all but at levels 0 and 1.
 #[inline]
 pub const fn valid(l: Level) -> u64 {
     match l {
@@ -56,7 +56,7 @@ pub fn min_corner(l: Level, key: u64) -> [i64; 3] {
     if l < 2 { [0; 3] } else { octant::corner(l - 2, key) }
 }
 
-/// One bit per byte of `bits` that is not zero: the parents of the octants in the brick.
+/// The parents of the octants `bits` of a brick: one bit for each byte that is not zero.
 #[inline]
 pub const fn parents(bits: u64) -> u8 {
     let v = bits | bits >> 4;
@@ -65,7 +65,7 @@ pub const fn parents(bits: u64) -> u8 {
     (v.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
 }
 
-/// All children of the octants in `byte`: byte `j` of the result is 0xff where bit `j` is set.
+/// All children of the octants `byte`: byte `j` of the result is 0xff if bit `j` is set, 0 otherwise.
 #[inline]
 pub const fn children(byte: u8) -> u64 {
     let v = (byte as u64).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
@@ -79,7 +79,7 @@ pub const fn byte(bits: u64, j: u64) -> u8 {
     (bits >> (8 * j)) as u8
 }
 
-/// The neighbours inside the brick over faces of all octants in `w`, and `w` itself.
+/// The octants `w` and their face neighbours within the brick.
 #[inline]
 pub const fn spread_faces(w: u64) -> u64 {
     const fn along(w: u64, m: [u64; 4], unit: u32, gap: u32) -> u64 {
@@ -89,7 +89,7 @@ pub const fn spread_faces(w: u64) -> u64 {
     w | along(w, X, 1, 7) | along(w, Y, 2, 14) | along(w, Z, 4, 28)
 }
 
-/// The octants of `within` that are connected over faces inside the brick to those of `seed`.
+/// Flood fill: the octants of `within` that faces within `within` connect to those of `seed`.
 #[inline]
 pub const fn flood(seed: u64, within: u64) -> u64 {
     let mut w = seed & within;
@@ -115,18 +115,18 @@ pub fn components(mut open: u64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// Where the octants of `w` on the brick's face reach across it: bits of the brick next door
-/// along `axis`, up or down.
+/// The face neighbours of the octants `w` in the neighbouring brick along `axis`, in the positive direction if
+/// `up`.
 #[inline]
 pub const fn across(w: u64, axis: usize, up: bool) -> u64 {
     let shift = 9 << axis;
     if up { (w & AXES[axis][3]) >> shift } else { (w & AXES[axis][0]) << shift }
 }
 
-/// A brick's bits with x fastest, then y, then z, instead of Morton order.
+/// Reorders a brick's bits from Morton order to row order: x fastest, then y, then z.
 #[inline]
 pub const fn to_rows(w: u64) -> u64 {
-    // Index bits from the highest: z1 y1 x1 z0 y0 x0 -> z1 z0 y1 y0 x1 x0, by swaps of two of them.
+    // Swaps bits of the index, highest first, from z1 y1 x1 z0 y0 x0 to z1 z0 y1 y0 x1 x0.
     let w = swap::<3, 1>(w); // z1 y1 y0 z0 x1 x0
     let w = swap::<4, 2>(w); // z1 z0 y0 y1 x1 x0
     swap::<3, 2>(w) // z1 z0 y1 y0 x1 x0
@@ -140,7 +140,7 @@ pub const fn from_rows(w: u64) -> u64 {
     swap::<3, 1>(w)
 }
 
-/// Exchanges bits `A > B` of every bit's index.
+/// Swaps bits `A > B` in the index of every bit.
 #[inline]
 const fn swap<const A: u32, const B: u32>(w: u64) -> u64 {
     let distance = (1 << A) - (1 << B);
@@ -148,7 +148,7 @@ const fn swap<const A: u32, const B: u32>(w: u64) -> u64 {
     w ^ t ^ t << distance
 }
 
-/// The bits that [`swap`] moves up: those whose index has bit `a` clear and bit `b` set.
+/// The bits that [`swap`] moves to higher positions: those whose index has bit `a` clear and bit `b` set.
 const fn moved_up(a: u32, b: u32) -> u64 {
     let mut moved = 0;
     let mut i = 0;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_moves_to_its_row_and_back() {
+    fn row_order_and_morton_order_are_inverse_for_every_bit() {
         for bit in 0..64 {
             let [x, y, z] = position(bit);
             assert_eq!(to_rows(1 << bit), 1 << (x + 4 * y + 16 * z));
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_reach_exactly_the_six_neighbours() {
+    fn face_neighbours_are_exactly_six_for_every_octant() {
         for bit in 0..64u64 {
             let p = position(bit);
             let mut want = 1u64 << bit;
@@ -198,8 +198,8 @@ mod tests {
                     q[axis] += if up { 1 } else { -1 };
                     let inside = (0..4).contains(&q[axis]);
                     let wrapped = q.map(|v| v.rem_euclid(4) as u32);
-                    let there = if inside { 0 } else { 1 << morton(wrapped) };
-                    assert_eq!(across(1 << bit, axis, up), there);
+                    let outside = if inside { 0 } else { 1 << morton(wrapped) };
+                    assert_eq!(across(1 << bit, axis, up), outside);
                     if inside {
                         want |= 1 << morton(wrapped);
                     }
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn floods_stop_at_walls() {
+    fn flood_fill_stops_at_walls() {
         let wall = !X[1];
         assert_eq!(flood(1, wall), X[0]);
         assert_eq!(flood(1 << 63, wall), X[2] | X[3]);

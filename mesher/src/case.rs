@@ -1,4 +1,4 @@
-//! The case file: what to mesh and how fine. All programs of this workspace read the same ones.
+//! The case file: the geometry to mesh and the resolution. All programs of this workspace read the same files.
 
 use crate::error::Error;
 use crate::ingest::Source;
@@ -8,18 +8,18 @@ use geometries::Generator;
 use serde::Deserialize;
 use std::path::Path;
 
-/// A case as it was asked for. Lengths are in the unit of the geometry.
+/// A case as the user specifies it. Lengths are in the unit of the geometry.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The facets.
+    /// Source of the facets.
     pub source: Source,
     /// Cells at the surface are this size or smaller.
     pub spacing_min: f64,
     /// Minimum thickness of a layer, in cells.
     pub layer_cells_min: u32,
-    /// Which side stays.
+    /// The side that is kept.
     pub keep: Keep,
-    /// Whether crossing leaves stay.
+    /// Whether crossing leaves are kept.
     pub keep_crossing: bool,
     /// The root cube.
     pub root: RootSpec,
@@ -27,16 +27,16 @@ pub struct Case {
     pub boxes: Vec<BoxSpec>,
 }
 
-/// How the root cube is given.
+/// Specification of the root cube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RootSpec {
-    /// Its edge in longest edges of the geometry's bounding box, on which it is centred.
+    /// Edge as a multiple of the longest edge of the geometry's bounding box; centred on that box.
     Scale(f64),
-    /// Exactly.
+    /// Origin and edge.
     Exact(Root),
 }
 
-/// An extent box with the spacing that it asks for.
+/// An extent box and the spacing inside it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoxSpec {
@@ -48,9 +48,9 @@ pub struct BoxSpec {
     pub spacing: f64,
 }
 
-/// `layer_cells_min` where none is given.
+/// Default of `layer_cells_min`.
 pub const LAYER_CELLS_MIN: u32 = 4;
-/// `root_scale` where no root is given.
+/// Default of `root_scale`.
 pub const ROOT_SCALE: f64 = 10.0;
 
 #[derive(Deserialize)]
@@ -76,7 +76,10 @@ struct RootTable {
 }
 
 impl Case {
-    /// Reads a case file. The geometry's path is relative to it.
+    /// Reads a case file. The path of the geometry is relative to the file's directory.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is malformed.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let fail = |e: &dyn std::fmt::Display| Error::input(format!("{}: {e}", path.display()));
         let text = std::fs::read_to_string(path)
@@ -86,7 +89,10 @@ impl Case {
         file.into_case(folder).map_err(|e| fail(&e))
     }
 
-    /// What decides the mesh, given the bounds of the geometry.
+    /// The rules that define the mesh, given the bounds of the geometry.
+    ///
+    /// # Errors
+    /// If a parameter is out of range.
     pub fn rules(&self, bounds: &Bounds) -> Result<Rules, Error> {
         let positive = |what: &str, v: f64| {
             if v.is_finite() && v > 0.0 {
@@ -129,7 +135,7 @@ impl Case {
 }
 
 impl BoxSpec {
-    /// The box on the lattice; `number` counts from 1, for errors.
+    /// The box on the lattice; `number`, from 1, identifies it in errors.
     fn on(&self, root: &Root, number: usize) -> Result<ExtentBox, Error> {
         let ordered = (0..3).all(|a| {
             self.min[a] < self.max[a] && self.min[a].is_finite() && self.max[a].is_finite()
@@ -189,7 +195,7 @@ impl File {
     }
 }
 
-/// One sentence for a malformed case file, with the nearest known key for an unknown one.
+/// One sentence about a malformed case file. Suggests the nearest known key for an unknown one.
 fn explain(text: &str, e: &toml::de::Error) -> String {
     let line = e
         .span()
@@ -230,8 +236,8 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
-        for (text, told) in [
+    fn errors_name_the_mistake() {
+        for (text, expected) in [
             (
                 "geometry = \"a.stl\"\nspacing_mim = 0.5\n",
                 "line 2: unknown key \"spacing_mim\": did you mean \"spacing_min\"?",
@@ -254,12 +260,12 @@ mod tests {
             ("geometry = ", "line 1"),
         ] {
             let e = parse(text).unwrap_err();
-            assert!(e.contains(told), "{e}");
+            assert!(e.contains(expected), "{e}");
         }
     }
 
     #[test]
-    fn rules_refuse_what_cannot_be_meshed() {
+    fn parameters_out_of_range_are_refused() {
         let c = parse("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
         let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
         assert_eq!(c.rules(&unit).unwrap().level_surface, 5);

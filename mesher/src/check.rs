@@ -94,8 +94,8 @@ pub fn facets(slice: &[Facet], routed: &[Facet], ownership: &Ownership, comm: &d
 }
 
 /// The invariants of T0, and that it is linear and complete.
-pub fn base_tree(tree: &Tree, ownership: &Ownership, comm: &dyn Comm) {
-    tree.check_invariants();
+pub fn base_tree(tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn Comm) {
+    tree.check_invariants(rules, ownership);
     replicas(&[&tree.split, &tree.crossing], ownership, comm);
     is_complete(&tree.split, ownership, comm);
 }

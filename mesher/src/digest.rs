@@ -1,12 +1,12 @@
-//! The mesh's fingerprint: a sum over leaf words that does not depend on order or partition.
+//! The mesh's digest: a sum over leaf words that depends neither on their order nor on the partition.
 //!
-//! `mix(w) = f(w + c) * 2^64 + f(f(w + c) ^ rotl(w, 32))` with splitmix64's finaliser `f`, summed
-//! modulo 2^128. Sums of parts add up to the sum of the whole.
+//! `mix(w) = f(w + c) * 2^64 + f(f(w + c) ^ rotl(w, 32))` with the finaliser `f` of splitmix64, summed
+//! modulo 2^128. So the digest of a mesh is the sum of the digests of its parts.
 
 use crate::octant::Level;
 use crate::wide::widest;
 
-/// Level of the octants that have a digest of their own in the manifest.
+/// Level of the octants whose digests are in the manifest.
 pub const OCTANT_LEVEL: Level = 3;
 /// Number of such octants.
 pub const OCTANTS: usize = 512;
@@ -18,7 +18,7 @@ const fn finalise(x: u64) -> u64 {
     x ^ x >> 31
 }
 
-/// What one leaf word adds to the digest.
+/// Contribution of one leaf word to the digest.
 #[inline]
 pub const fn mix(w: u64) -> u128 {
     let (a, b) = halves(w);
@@ -36,11 +36,11 @@ widest! {
     pub fn digest(words: &[u64]) -> u128 = digest_lanes;
 }
 
-/// Sums with the low halves' two 32-bit parts apart, so that no carry is needed inside the loop.
+/// Sums the two 32-bit parts of the low halves separately, so that the loop needs no carry.
 #[inline(always)]
 fn digest_lanes(words: &[u64]) -> u128 {
     let mut total = 0u128;
-    // Fewer than 2^32 words at a time, so that the parts cannot overflow.
+    // Fewer than 2^32 words at a time, so that the sums of 32-bit parts cannot overflow.
     for chunk in words.chunks(1 << 30) {
         let (mut high, mut low, mut low_top) = (0u64, 0u64, 0u64);
         for &w in chunk {
@@ -57,15 +57,15 @@ fn digest_lanes(words: &[u64]) -> u128 {
     total
 }
 
-/// A digest as the manifest has it.
+/// A digest in the manifest's notation: 32 hexadecimal digits.
 pub fn hex(digest: u128) -> String {
     format!("{digest:032x}")
 }
 
-/// Digests of a stream of sorted words: of the whole and of each octant of level 3.
+/// Digests of a stream of sorted words, by octant of level 3.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Digests {
-    /// Of the words whose leaf's minimum corner is in the octant.
+    /// One digest per octant in Morton order, of the leaves whose minimum corner is in the octant.
     pub octants: Vec<u128>,
 }
 
@@ -97,7 +97,7 @@ impl Digests {
         self.octants.iter().fold(0, |s, d| s.wrapping_add(*d))
     }
 
-    /// Adds another part's digests, by octant.
+    /// Adds digests of another part, given by octant.
     pub fn merge(&mut self, other: impl IntoIterator<Item = (usize, u128)>) {
         for (octant, digest) in other {
             self.octants[octant] = self.octants[octant].wrapping_add(digest);
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_of_parts_are_the_sum_of_the_whole() {
+    fn digests_of_parts_add_up_to_the_digest_of_the_whole() {
         let mut words: Vec<u64> =
             (0..5000u64).map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
         words.sort_unstable();

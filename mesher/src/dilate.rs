@@ -1,14 +1,14 @@
-//! Chebyshev dilation of a set of octants: the paper's enlarged extent boxes, 64 octants to the word.
+//! Chebyshev dilation of a set of octants: the paper's enlarged extent boxes, 64 octants per word.
 //!
-//! The boxes of all sources together are a dilation by a cube, which is separable: along x, then y,
-//! then z, by shifts and ors. It is done in *tiles* of 32 x 32 x 32 octants, dense in memory, one
-//! machine word for a row along x: the tile's own octants are the word's middle 32 bits, which
-//! leaves a margin of 16 for what reaches into the tiles beside it. So the cost per octant is that of a few
-//! word operations, whatever the radius.
+//! The union of the enlarged boxes of all sources is a dilation by a cube. It is separable: along x, then
+//! y, then z, by shifts and ors. It works on *tiles* of 32 x 32 x 32 octants, dense in memory, with one
+//! 64-bit word for each row along x. The tile's own octants are the middle 32 bits of a word; the
+//! margin of 16 bits on either side holds what reaches the neighbouring tiles. So the cost per octant is a few
+//! word operations, almost independent of the radius.
 //!
-//! Two identities keep radii small. Dilations add up: by `a` and then by `b` is by `a + b`. And a
-//! dilation by `2k` followed by [coarsening](BrickSet::coarsen) is coarsening followed by a
-//! dilation by `k`, as both reach from octant `2p` and from `2p + 1` exactly the parents
+//! Two identities keep the radius of a pass small. Dilations compose: by `a` and then by `b` is by
+//! `a + b`. And a dilation by `2k` followed by [coarsening](BrickSet::coarsen) equals coarsening followed
+//! by a dilation by `k`, because octants `2p` and `2p + 1` both reach exactly the parents
 //! `p - k ..= p + k`.
 
 mod gathered;
@@ -22,15 +22,15 @@ pub use tile::Tile;
 
 /// Octants along a tile's edge.
 const TILE: usize = 32;
-/// Bits of a row on each side of the tile's own: the most that one pass can dilate by.
+/// Margin of a row on either side of the tile's own bits: the maximum radius of one pass.
 const MARGIN: usize = 16;
-/// Bricks along a tile's edge, as a power of two; three of these per key.
+/// log2 of the number of bricks along a tile's edge.
 const TILE_BRICKS_LOG2: u32 = 3;
 
-/// Words that were dilated: rows of tiles that sources can reach along y, in each layer that has any.
+/// Number of words dilated: rows of tiles that sources can reach along y, in each layer with sources.
 pub type Words = u64;
 
-/// What several dilations reach together: octants of one level, those outside the root left out.
+/// The union of several dilations: octants of one level inside the root.
 pub struct Reach<'t> {
     level: Level,
     tile: &'t mut Tile,
@@ -39,14 +39,14 @@ pub struct Reach<'t> {
 }
 
 impl<'t> Reach<'t> {
-    /// Nothing yet, of level `level`; an empty tile is for scratch, and left empty.
+    /// The empty union, of octants of level `level`. `tile` is scratch; it must be empty and is left empty.
     pub fn new(level: Level, tile: &'t mut Tile) -> Self {
         Self { level, tile, out: Gathered::new(level), words: 0 }
     }
 
     /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
     pub fn dilate(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
-        // Further than the root is wide, nothing more is reached.
+        // A radius greater than the root's width reaches no more than the root.
         let mut left = radius.min(1 << self.level) as usize;
         if left <= MARGIN {
             return dilate_tiles(sources, left, false, self.tile, &mut self.out, &mut self.words);
@@ -64,8 +64,8 @@ impl<'t> Reach<'t> {
         dilate_tiles(set.bricks(), left, false, self.tile, &mut self.out, &mut self.words);
     }
 
-    /// Adds the parents of all octants within `radius` of a source, which is one level deeper. Sources
-    /// come in Morton order.
+    /// Adds the parents of all octants within `radius` of a source, with sources and radius one level deeper than
+    /// the union. Sources come in Morton order.
     pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
         if radius < 2 {
             return dilate_tiles(
@@ -82,13 +82,13 @@ impl<'t> Reach<'t> {
         self.dilate(odd.into_set().bricks(), radius / 2);
     }
 
-    /// What was reached, and the work that it took.
+    /// The octants reached, and the work done.
     pub fn finish(self) -> (BrickSet, Words) {
         (self.out.into_set(), self.words)
     }
 }
 
-/// One pass over the tiles; what is given is of the next coarser level if `to_parents`.
+/// One pass over the tiles. Adds to `out` the octants reached, or their parents if `to_parents`.
 fn dilate_tiles(
     sources: impl Iterator<Item = Brick>,
     radius: usize,
@@ -103,14 +103,14 @@ fn dilate_tiles(
         let key = b.key >> (3 * TILE_BRICKS_LOG2);
         if let Some(done) = now.filter(|n| *n != key) {
             tile.dilate(words);
-            tile.give(done, to_parents, out);
+            tile.flush(done, to_parents, out);
         }
         now = Some(key);
         tile.put(b);
     }
     if let Some(done) = now {
         tile.dilate(words);
-        tile.give(done, to_parents, out);
+        tile.flush(done, to_parents, out);
     }
 }
 
@@ -146,7 +146,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
         #[test]
-        fn equals_one_box_per_octant(l in 1u32..8, seeds in prop::collection::vec(any::<u64>(), 0..12), r in 0u32..21) {
+        fn dilation_equals_one_box_per_octant(l in 1u32..8, seeds in prop::collection::vec(any::<u64>(), 0..12), r in 0u32..21) {
             let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
             let grown = naive(l, &codes, i64::from(r));
             let all = widths(|| {

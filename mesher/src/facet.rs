@@ -9,15 +9,15 @@
 //! on two coordinates only, and is the sign of an edge function at a corner of a square.
 //!
 //! # Exactness
-//! All arithmetic is on integers and none overflows. Let `h` be the octants' edge.
-//! - *Range.* The coordinates of vertices are lattice points in [-2^27, 2^28]. The brick's corner lies in
-//!   [0, 2^27], so relative to it they are in [-2^28, 2^28], and differences of two vertices are below
-//!   2^29 in magnitude. So are the coordinates, relative to a vertex, of the corner of a square at which an
-//!   edge function is evaluated.
-//! - *Edge functions.* `eu * qw - ew * qu` is a difference of two products of numbers below 2^29: below
-//!   2^59 in magnitude, which fits i64.
-//! - *Plane.* The components of the normal are differences of two such products, too, so their sum is
-//!   below 2^61. The scalar product of the normal with a vertex needs i128.
+//! All arithmetic is on integers, and no operation overflows. Let `h` be the octants' edge, at most 2^27.
+//! - *Differences.* Vertices are lattice points with coordinates in [-2^27, 2^28], so differences of two
+//!   vertices are at most 3 * 2^27 in magnitude. The brick's corner has coordinates in [0, 2^27]. So
+//!   coordinates of vertices relative to it are at most 2^28 in magnitude, and those of the corner of a
+//!   square relative to a vertex at most 3 * 2^27, too.
+//! - *Edge functions.* `eu * qw - ew * qu` is a difference of two products of such numbers: at most
+//!   18 * 2^54 < 2^59 in magnitude, which fits i64.
+//! - *Plane.* So are the three components of the normal; the sum of their magnitudes is below 2^60. The
+//!   scalar product of the normal with a vertex is computed in i128.
 //! - *Scaling.* Octant corners are `h` times small integers (i, j, k), so each test has the form
 //!   `h * m + c >= 0` with integers `m` and `c`. As `m` is an integer, this is equivalent to
 //!   `m + floor(c / h) >= 0`. Since `h` is a power of two, the floor is an arithmetic shift. Constants are
@@ -44,7 +44,7 @@ impl Facet {
         (i64::from(a.min(b).min(c)), i64::from(a.max(b).max(c)))
     }
 
-    /// Normal by the right-hand rule, of twice the facet's area; zero for a degenerate facet.
+    /// Normal by the right-hand rule. Its length is twice the facet's area: zero for a degenerate facet.
     #[inline]
     pub fn normal(&self) -> [i64; 3] {
         let d = |i: usize, a: usize| i64::from(self.v[i][a]) - i64::from(self.v[0][a]);
@@ -72,8 +72,8 @@ const fn spans(m: [u64; 4]) -> [[u64; 4]; 4] {
 
 const SPANS: [[[u64; 4]; 4]; 3] = [spans(X), spans(Y), spans(Z)];
 
-/// For each axis `a` and each half of a 4 x 4 mask over axes `a + 1` (fastest) and `a + 2`: the
-/// brick's bits over those squares, at every position along `a`.
+/// Extrudes masks of squares along an axis `a`. A mask of 4 x 4 squares over the axes `a + 1` (fastest) and
+/// `a + 2` is given as two bytes; `COLUMNS[a][half][byte]` are the brick's octants over these squares.
 static COLUMNS: [[[u64; 256]; 2]; 3] = [columns(0), columns(1), columns(2)];
 
 const fn columns(a: usize) -> [[u64; 256]; 2] {
@@ -98,7 +98,7 @@ const fn columns(a: usize) -> [[u64; 256]; 2] {
     table
 }
 
-/// The octants of level `l` that the facet crosses, in the brick whose minimum corner is `corner`
+/// Mask of the octants of level `l` that the facet crosses, in the brick with minimum corner `corner`
 /// (lattice units).
 #[inline]
 pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
@@ -116,11 +116,12 @@ pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
         mask &= SPANS[axis][first.max(0) as usize][last.min(3) as usize];
         wide += usize::from(first < last);
     }
-    // A connected set that stays in one row of octants meets each that its extent meets.
+    // A connected set within one row of octants meets each octant that its extent meets.
     if wide < 2 { mask } else { mask & kernel::separated(f, corner, shift) }
 }
 
-/// The octants of level `l` in the brick at `corner` whose interior meets the box's.
+/// Mask of the octants of level `l`, in the brick with minimum corner `corner`, whose interior meets the
+/// interior of the box.
 pub fn box_mask(b: &ExtentBox, corner: [i64; 3], l: Level) -> u64 {
     let shift = ROOT_BITS - l;
     let mut mask = u64::MAX;
@@ -135,23 +136,23 @@ pub fn box_mask(b: &ExtentBox, corner: [i64; 3], l: Level) -> u64 {
     mask & valid(l)
 }
 
-/// Plane and edge tests, in the widest vectors that the machine has.
+/// The ten tests by plane and edges, in the widest vectors that the processor supports.
 mod kernel {
     use super::{COLUMNS, Facet};
 
-    /// Octants that neither the normal nor an edge axis separates from the facet. Meaningful only
-    /// together with the box axes.
+    /// Octants that neither the normal nor a cross product separates from the facet. To be intersected with the
+    /// mask of the coordinate axes.
     #[inline]
     pub fn separated(f: &Facet, corner: [i64; 3], shift: u32) -> u64 {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: the features that the function is compiled for were just detected.
+            // SAFETY: the features that the function is compiled for have just been detected.
             return unsafe { avx512::separated(f, corner, shift) };
         }
         generic(f, corner, shift, plane_lanes, edge_lanes)
     }
 
-    /// The tests with the evaluation of lanes left open, so that all vector widths share the rest.
+    /// The tests, with the evaluation of lanes as parameters: all vector widths share the rest.
     #[inline(always)]
     pub fn generic(
         f: &Facet,
@@ -185,7 +186,8 @@ mod kernel {
         mask
     }
 
-    /// Octants whose projection along `a` reaches the left of the directed line through `from`.
+    /// Octants whose projection along `a` meets the closed half-plane left of the directed line through
+    /// `from`.
     #[inline(always)]
     fn half_plane(
         from: [i64; 3],
@@ -196,7 +198,7 @@ mod kernel {
         edge: &impl Fn(i64, i64, i64) -> [u8; 2],
     ) -> u64 {
         let (u, w) = ((a + 1) % 3, (a + 2) % 3);
-        // eu * (q_w - from_w) - ew * (q_u - from_u), at the corner of the first square where it is most.
+        // The edge function eu * (q_w - from_w) - ew * (q_u - from_u), at its greatest over the first square.
         let h = 1i64 << shift;
         let qw = if eu > 0 { h - from[w] } else { -from[w] };
         let qu = if ew < 0 { h - from[u] } else { -from[u] };
@@ -205,7 +207,8 @@ mod kernel {
         COLUMNS[a][0][low as usize] | COLUMNS[a][1][high as usize]
     }
 
-    /// A projection of no area: the octants on both sides of its line, which is its longest edge's.
+    /// Octants whose projection along `a` meets the line of a projected facet without area. The longest edge
+    /// gives the line's direction.
     #[inline(always)]
     fn degenerate_mask(
         p: &[[i64; 3]; 3],
@@ -226,7 +229,7 @@ mod kernel {
         half_plane(from, eu, ew, a, shift, edge) & half_plane(from, -eu, -ew, a, shift, edge)
     }
 
-    /// Octants that the facet's plane does not separate.
+    /// Octants that the facet's plane meets.
     #[inline(always)]
     fn plane_mask(
         p: &[[i64; 3]; 3],
@@ -234,32 +237,33 @@ mod kernel {
         shift: u32,
         plane: impl Fn([i64; 3], i64, i64) -> u64,
     ) -> u64 {
-        let at: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(p[0][a])).sum();
+        let offset: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(p[0][a])).sum();
         let up: i64 = n.iter().map(|v| v.max(&0)).sum();
         let down: i64 = n.iter().map(|v| v.min(&0)).sum();
-        // Octant (i, j, k) reaches from n.(i, j, k) + down to n.(i, j, k) + up; the plane is at / h.
-        // Beyond 4 * (up - down) every comparison is decided, so clamping there changes none; and the
-        // sums of the lanes stay below 2^63, as up - down < 2^60.
+        // In units of h, the scalar product with n ranges over octant (i, j, k) from n.(i, j, k) + down to
+        // n.(i, j, k) + up, and is offset / h on the plane. Beyond 4 * (up - down) < 2^62, no octant of the
+        // brick meets the plane; so clamping the offset there changes no comparison. The lanes stay
+        // below 3 * 2^60 + 2^60 + 2^62 = 2^63 in magnitude.
         let bound = 4 * i128::from(up - down) + 4;
         let clamp = |v: i128| v.clamp(-bound, bound) as i64;
-        let floor = clamp(at >> shift);
-        let ceil = clamp(-((-at) >> shift));
+        let floor = clamp(offset >> shift);
+        let ceil = clamp(-((-offset) >> shift));
         plane(n, up - ceil, down - floor)
     }
 
-    /// Bits of the octants (i, j, k) where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
+    /// Mask of the octants (i, j, k) where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
     #[inline(always)]
     pub fn plane_lanes(n: [i64; 3], most: i64, least: i64) -> u64 {
         let mut mask = 0;
         for bit in 0..64u32 {
-            let at = |a: u32| i64::from((bit >> a & 1) | (bit >> (a + 3) & 1) << 1);
-            let v = n[0] * at(0) + n[1] * at(1) + n[2] * at(2);
+            let index = |a: u32| i64::from((bit >> a & 1) | (bit >> (a + 3) & 1) << 1);
+            let v = n[0] * index(0) + n[1] * index(1) + n[2] * index(2);
             mask |= u64::from((v + most >= 0) & (v + least <= 0)) << bit;
         }
         mask
     }
 
-    /// Bits of the squares (i, j), i fastest, where `ci * i + cj * j + c >= 0`, in two halves.
+    /// Mask of the squares (i, j), i fastest, where `ci * i + cj * j + c >= 0`, as two bytes.
     #[inline(always)]
     pub fn edge_lanes(ci: i64, cj: i64, c: i64) -> [u8; 2] {
         let mut halves = [0; 2];
@@ -291,7 +295,7 @@ mod kernel {
         #[target_feature(enable = "avx512f,avx512dq")]
         fn plane(n: [i64; 3], most: i64, least: i64) -> u64 {
             let lane = |m: u8, v: i64| _mm512_maskz_set1_epi64(m, v);
-            // Lanes are the low bits x0, y0, z0 of the octant's index; bytes are x1, y1, z1.
+            // Lanes enumerate the low bits x0, y0, z0 of the octant's index, bytes the high bits x1, y1, z1.
             let low = _mm512_add_epi64(
                 _mm512_add_epi64(lane(0xaa, n[0]), lane(0xcc, n[1])),
                 lane(0xf0, n[2]),
@@ -303,7 +307,7 @@ mod kernel {
             let mut mask = 0;
             for byte in 0..8i64 {
                 let base = 2 * (n[0] * (byte & 1) + n[1] * (byte >> 1 & 1) + n[2] * (byte >> 2));
-                // v + most >= 0 and v + least <= 0, with the sum moved to the other side.
+                // v + most >= 0 and v + least <= 0, with the byte's part of v on the right-hand side.
                 let m = _mm512_cmpge_epi64_mask(most, _mm512_set1_epi64(-base));
                 let m = _mm512_mask_cmple_epi64_mask(m, least, _mm512_set1_epi64(-base));
                 mask |= u64::from(m) << (8 * byte);
@@ -341,10 +345,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
 
-        /// The crossed octants of a level are the parents of those of the next: the test that a
-        /// wrong sign, rounding or clamp anywhere would break.
+        /// A wrong sign, rounding or clamp in any test would break this.
         #[test]
-        fn levels_agree(v in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)], coarse in 0u32..3) {
+        fn crossed_octants_are_the_parents_of_those_one_level_deeper(v in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)]) {
             let f = Facet { v };
             let l = 17;
             let h = edge(l);
@@ -352,21 +355,19 @@ mod tests {
             for j in 0..8 {
                 let c = position(j).map(|p| 2 * h * i64::from(p));
                 let fine = crossed(&f, c, l + 1);
-                prop_assert_eq!(u64::from(crate::brick::parents(fine)), up >> (8 * j) & 0xff, "{}", coarse);
+                prop_assert_eq!(u64::from(crate::brick::parents(fine)), up >> (8 * j) & 0xff);
             }
         }
 
-        /// Moving facet and brick together changes nothing, however far from the origin.
         #[test]
-        fn far_away_is_the_same(v in [vertex(-5000..5000), vertex(-5000..5000), vertex(-5000..5000)], far in vertex(0..(1 << 26))) {
+        fn translation_of_facet_and_brick_together_changes_nothing(v in [vertex(-5000..5000), vertex(-5000..5000), vertex(-5000..5000)], far in vertex(0..(1 << 26))) {
             let f = Facet { v };
             let moved = Facet { v: v.map(|p| [0, 1, 2].map(|a| p[a] + far[a])) };
             prop_assert_eq!(crossed(&f, [0; 3], 17), crossed(&moved, far.map(i64::from), 17));
         }
 
-        /// All vector widths give the same words, on coordinates as large as they come.
         #[test]
-        fn vector_paths_agree(v in [vertex(-(1 << 27)..(1 << 28)), vertex(-(1 << 27)..(1 << 28)), vertex(-(1 << 27)..(1 << 28))], l in 2u32..21, at in 0u64..64) {
+        fn all_vector_widths_agree_on_the_whole_range_of_coordinates(v in [vertex(-(1 << 27)..(1 << 28)), vertex(-(1 << 27)..(1 << 28)), vertex(-(1 << 27)..(1 << 28))], l in 2u32..21, at in 0u64..64) {
             let f = Facet { v };
             let corner = position(at).map(|p| i64::from(p) << 25);
             let shift = ROOT_BITS - l;

@@ -1,11 +1,14 @@
-//! From user coordinates to the integer lattice on which all geometry is exact.
+//! The integer lattice on which all geometric tests are exact, and the rules that define the mesh.
+//!
+//! The root cube has 2^27 lattice units along an edge, 256 for each cell of level 19. Vertices and extent
+//! boxes are rounded to the lattice once; no later step rounds.
 
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::octant::{LEVEL_MAX, Level, ROOT_EDGE};
 use crate::wide::widest;
 
-/// The root cube, in the STL's units.
+/// The root cube, in the unit of the geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Root {
     /// Minimum corner.
@@ -14,22 +17,21 @@ pub struct Root {
     pub edge: f64,
 }
 
-/// Smallest and greatest coordinates of a set of vertices, per axis.
+/// Bounding box of a set of vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least coordinates; above `hi` while there are no vertices.
+    /// Least coordinates; greater than `hi` if there are no vertices.
     pub lo: [f64; 3],
     /// Greatest coordinates.
     pub hi: [f64; 3],
 }
 
 impl Bounds {
-    /// The bounds of nothing.
+    /// The bounds of no vertices.
     pub const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
 
-    /// Bounds of facets, whose coordinates must be finite.
+    /// Bounds of facets. Their coordinates must be finite.
     pub fn of(facets: &[geometries::Facet]) -> Self {
-        // All nine coordinates at a time.
         let (mut lo, mut hi) = ([f32::INFINITY; 9], [f32::NEG_INFINITY; 9]);
         widen(facets, &mut lo, &mut hi);
         let of = |all: [f32; 9], pick: fn(f32, f32) -> f32| {
@@ -38,7 +40,7 @@ impl Bounds {
         Self { lo: of(lo, f32::min), hi: of(hi, f32::max) }
     }
 
-    /// Bounds of the union.
+    /// Bounds of the union of both sets.
     pub fn union(self, other: Self) -> Self {
         Self {
             lo: std::array::from_fn(|a| self.lo[a].min(other.lo[a])),
@@ -48,13 +50,16 @@ impl Bounds {
 }
 
 impl Root {
-    /// The cube of `scale` longest edges of the bounds, centred on them. The order of the operations
-    /// is part of the mesh's definition.
+    /// The cube whose edge is `scale` times the longest edge of the bounds, centred on them. The order of the
+    /// floating-point operations is part of the mesh's definition.
+    ///
+    /// # Errors
+    /// If the bounds have no extent.
     pub fn around(bounds: &Bounds, scale: f64) -> Result<Self, Error> {
         let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
         if longest <= 0.0 {
             return Err(Error::input(
-                "the geometry has no extent, so root_scale gives no root: set [root] with origin and edge",
+                "the geometry has no extent, so root_scale defines no root: set [root] with origin and edge",
             ));
         }
         let edge = scale * longest;
@@ -62,30 +67,37 @@ impl Root {
         Ok(Self { origin, edge })
     }
 
-    /// Lattice coordinate, rounded to nearest with ties to even; saturates.
+    /// The nearest lattice coordinate, ties to even; saturates.
     #[inline]
     pub fn quantise(&self, axis: usize, x: f64) -> i64 {
         ((x - self.origin[axis]) * (ROOT_EDGE as f64 / self.edge)).round_ties_even() as i64
     }
 
-    /// User coordinate of a lattice point.
+    /// Coordinates of a lattice point in the unit of the geometry.
     pub fn locate(&self, q: [i64; 3]) -> [f64; 3] {
         std::array::from_fn(|a| self.origin[a] + q[a] as f64 * (self.edge / ROOT_EDGE as f64))
     }
 
-    /// The level of a spacing: the least at which cells are that size or smaller.
+    /// The level of a spacing: the shallowest whose cells are that size or smaller. `what` names the spacing in
+    /// errors.
+    ///
+    /// # Errors
+    /// If cells of level 19 are larger.
     pub fn level_of(&self, spacing: f64, what: &str) -> Result<Level, Error> {
         (0..=LEVEL_MAX).find(|&l| self.edge / f64::from(1u32 << l) <= spacing).ok_or_else(|| {
             let least = self.edge / f64::from(1u32 << LEVEL_MAX);
             Error::input(format!(
-                "{what} {spacing} is too small for a root of edge {}: level {LEVEL_MAX} has cells of {least}; enlarge it or shrink the root",
+                "{what} {spacing} is too small for a root of edge {}: level {LEVEL_MAX} has cells of {least}; choose a larger spacing or a smaller root",
                 self.edge
             ))
         })
     }
 
-    /// Facets on the lattice, in the memory that they are in. `bounds` are theirs; `first` is the number of the
-    /// first one in the whole geometry, for errors.
+    /// Rounds facets to the lattice, in place. `bounds` are their bounds; `first` is the index of the first one in the
+    /// whole geometry, for errors.
+    ///
+    /// # Errors
+    /// If a vertex is more than one root edge outside the root.
     pub fn facets(
         &self,
         mut facets: Vec<geometries::Facet>,
@@ -93,8 +105,9 @@ impl Root {
         first: u64,
     ) -> Result<Vec<Facet>, Error> {
         let (origin, scale) = (self.origin, ROOT_EDGE as f64 / self.edge);
-        let far = |c: f64, a: usize| off_middle(at(c, origin[a], scale)) > ROOT_EDGE as f64 * 1.5;
-        // What is nearest on the lattice ascends with the coordinate, so the bounds speak for all.
+        let limit = ROOT_EDGE as f64 * 1.5;
+        let far = |c: f64, a: usize| off_centre(nearest(c, origin[a], scale)) > limit;
+        // Rounding is monotonic, so no vertex is too far if the bounds are not.
         if !facets.is_empty() && (0..3).any(|a| far(bounds.lo[a], a) || far(bounds.hi[a], a)) {
             let outside = |v: &[f32; 3]| (0..3).any(|a| far(f64::from(v[a]), a));
             let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
@@ -112,14 +125,14 @@ impl Root {
     }
 }
 
-/// The lattice coordinate nearest to a coordinate.
+/// The lattice coordinate nearest to `c`.
 #[inline(always)]
-fn at(c: f64, origin: f64, scale: f64) -> f64 {
+fn nearest(c: f64, origin: f64, scale: f64) -> f64 {
     ((c - origin) * scale).round_ties_even()
 }
 
-/// The distance from the root's middle, in which the allowed range is symmetric.
-fn off_middle(c: f64) -> f64 {
+/// Distance from the root's centre: the allowed range is symmetric about it.
+fn off_centre(c: f64) -> f64 {
     (c - ROOT_EDGE as f64 * 0.5).abs()
 }
 
@@ -139,18 +152,18 @@ fn widen_lanes(facets: &[geometries::Facet], lo: &mut [f32; 9], hi: &mut [f32; 9
 }
 
 widest! {
-    /// Replaces coordinates by the bits of those on the lattice, as i32.
+    /// Replaces the coordinates by the bit patterns of their lattice coordinates, as i32.
     fn quantise(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f64) = quantise_lanes;
 }
 
 #[inline(always)]
 fn quantise_lanes(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f64) {
-    // All nine coordinates at a time: as many lanes as there are.
+    // All nine coordinates of a facet at a time, to fill the vector lanes.
     let origins: [f64; 9] = std::array::from_fn(|i| origin[i % 3]);
     for f in facets {
         let c: [f32; 9] = bytemuck::cast(*f);
         let whole: &mut [i32; 9] = bytemuck::cast_mut(f);
-        *whole = std::array::from_fn(|i| at(f64::from(c[i]), origins[i], scale) as i32);
+        *whole = std::array::from_fn(|i| nearest(f64::from(c[i]), origins[i], scale) as i32);
     }
 }
 
@@ -159,21 +172,21 @@ fn quantise_lanes(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f6
 pub struct ExtentBox {
     /// Minimum corner.
     pub min: [i64; 3],
-    /// Maximum corner; where it equals `min` on an axis the box has no interior and asks for nothing.
+    /// Maximum corner. A box for which it equals `min` on an axis has no interior and no effect.
     pub max: [i64; 3],
-    /// Least level of the leaves whose interior meets the box's.
+    /// Minimum level of the leaves whose interior meets the interior of the box.
     pub level: Level,
 }
 
 impl ExtentBox {
-    /// Whether the interiors of the box and of the cube at `corner` of edge `h` meet.
+    /// Whether the interiors of the box and of the cube with minimum corner `corner` and edge `h` meet.
     #[inline]
     pub fn meets(&self, corner: [i64; 3], h: i64) -> bool {
         (0..3).all(|a| self.min[a].max(corner[a]) < self.max[a].min(corner[a] + h))
     }
 }
 
-/// Everything that decides the mesh, besides the facets.
+/// The parameters that, with the facets, define the mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rules {
     /// The root cube.
@@ -182,15 +195,15 @@ pub struct Rules {
     pub level_surface: Level,
     /// Minimum thickness n of a layer, in cells.
     pub layer_cells_min: u32,
-    /// Which side stays.
+    /// The side that is kept.
     pub keep: Keep,
-    /// Whether crossing leaves stay in the final mesh.
+    /// Whether crossing leaves are part of the final mesh.
     pub keep_crossing: bool,
     /// The extent boxes.
     pub boxes: Vec<ExtentBox>,
 }
 
-/// Which side of the geometry the mesh keeps.
+/// The side of the geometry that the mesh keeps.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum,
 )]
@@ -205,7 +218,7 @@ pub enum Keep {
 }
 
 impl Rules {
-    /// Deepest level that a leaf can have.
+    /// Deepest level that a rule asks for.
     pub fn level_deepest(&self) -> Level {
         self.boxes
             .iter()
@@ -220,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_widths_bring_facets_to_the_same_place() {
+    fn all_vector_widths_round_facets_alike() {
         let mut random = 7u32;
         let mut draw = || {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -243,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spacing_means_that_size_or_smaller() {
+    fn cells_have_the_spacing_or_are_smaller() {
         let root = Root { origin: [0.0; 3], edge: 8.0 };
         for (s, l) in [(9.0, 0), (8.0, 0), (7.9, 1), (1.0, 3), (0.99, 4), (8.0 / 524_288.0, 19)] {
             assert_eq!(root.level_of(s, "spacing").unwrap(), l, "{s}");
@@ -254,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_round_to_even_and_far_vertices_name_their_facet() {
+    fn ties_round_to_even_and_errors_name_the_facet_that_is_too_far_out() {
         let root = Root { origin: [0.0; 3], edge: (ROOT_EDGE * 2) as f64 };
         assert_eq!([1.0, 3.0, 5.0].map(|x| root.quantise(0, x)), [0, 2, 2]);
         let near = [[0.0f32; 3]; 3];

@@ -53,7 +53,7 @@ use sides::Sides;
 use std::path::PathBuf;
 use stream::Leaves;
 use tree::PerLevel;
-use voxelise::Filed;
+use voxelise::BinnedFacets;
 use write::OutDir;
 
 /// Options that have no effect on the mesh, but for `ungraded`.
@@ -97,7 +97,7 @@ impl Mesh {
             crossing: &self.crossing,
             sides: &self.sides,
             ownership: &self.ownership,
-            everything: self.is_base,
+            all_leaves: self.is_base,
             rules: &self.rules,
         }
     }
@@ -114,7 +114,7 @@ pub fn mesh(
     record: &mut Recorder,
 ) -> Result<Report, Error> {
     let path = options.out.as_ref();
-    let open = |p| if comm.rank() == 0 { OutDir::make(p) } else { Ok(OutDir::join(p)) };
+    let open = |p| if comm.rank() == 0 { OutDir::create(p) } else { Ok(OutDir::open(p)) };
     let out = agree(comm, path.map(|p| open(p)).transpose())?;
     let result = mesh_into(out.as_ref(), case, options, comm, record);
     if let (Err(_), Some(out)) = (&result, &out) {
@@ -213,7 +213,7 @@ fn make(
         debug_check(options, comm, || check::facets(&facets, routed, &ownership, comm));
     }
     let (mut tree, work) = record.phase("refine", comm, || {
-        let binned = Filed::new(routed.as_ref().unwrap_or(&facets));
+        let binned = BinnedFacets::new(routed.as_ref().unwrap_or(&facets));
         drop(routed);
         refine::refine(&binned, &rules, &ownership)
     });
@@ -231,7 +231,7 @@ fn make(
     }
     debug_check(options, comm, || {
         check::ownership(&ownership, comm);
-        check::base_tree(&tree, &ownership, comm);
+        check::base_tree(&tree, &rules, &ownership, comm);
     });
     comm.agree(check_interrupt())?;
 

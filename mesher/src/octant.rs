@@ -1,4 +1,4 @@
-//! Octants: Morton codes, levels, sides and leaf words.
+//! Octants: levels, Morton codes, sides and leaf words.
 //!
 //! Invariants:
 //! - the octant of level `l` at integer position `(x, y, z)`, each below `2^l`, has the Morton code
@@ -6,10 +6,10 @@
 //! - the parent's code is `code >> 3`, the children's are `code << 3 | child`;
 //! - a leaf word is `morton57 << 7 | level << 2 | side`, and sorted words are in Morton order.
 
-/// Distance from the root in halvings of the edge: the root is level 0.
+/// Number of bisections from the root, which is level 0.
 pub type Level = u32;
 
-/// Deepest level a leaf may have.
+/// Deepest level of a leaf.
 pub const LEVEL_MAX: Level = 19;
 
 /// log2 of the root's edge in lattice units.
@@ -18,14 +18,14 @@ pub const ROOT_BITS: u32 = 27;
 /// The root's edge in lattice units.
 pub const ROOT_EDGE: i64 = 1 << ROOT_BITS;
 
-/// Edge of an octant of level `l`, in lattice units. Voxelisation may look at level 20, a level
-/// deeper than any leaf.
+/// Edge of an octant of level `l`, in lattice units. Voxelisation may test level 20, one level deeper than
+/// any leaf.
 #[inline]
 pub const fn edge(l: Level) -> i64 {
     1 << (ROOT_BITS - l)
 }
 
-/// Which side of the geometry a leaf is on; the number is the one of the leaf word.
+/// The side of the geometry that a leaf is on. The discriminant is the leaf word's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Side {
@@ -33,11 +33,11 @@ pub enum Side {
     Outside = 0,
     /// Inside the geometry.
     Inside = 1,
-    /// A facet touches the leaf (or touched the base-tree leaf that it comes from).
+    /// A facet crosses the leaf, or the base-tree leaf that contains it.
     Crossing = 2,
 }
 
-/// Spreads the low 21 bits of `v`, one every third bit.
+/// Spreads the low 21 bits of `v` to every third bit.
 #[inline]
 const fn spread(v: u64) -> u64 {
     let v = v & 0x1f_ffff;
@@ -65,13 +65,13 @@ pub const fn morton(p: [u32; 3]) -> u64 {
     spread(p[0] as u64) | spread(p[1] as u64) << 1 | spread(p[2] as u64) << 2
 }
 
-/// The position that a Morton code stands for.
+/// The position of a Morton code: inverse of [`morton`].
 #[inline]
 pub const fn position(code: u64) -> [u32; 3] {
     [gather(code) as u32, gather(code >> 1) as u32, gather(code >> 2) as u32]
 }
 
-/// The Morton code at level 19 of the minimum corner of an octant of level `l <= 19`.
+/// Level-19 Morton code of the minimum corner of an octant of level `l <= 19`.
 #[inline]
 pub const fn start57(l: Level, code: u64) -> u64 {
     code << (3 * (LEVEL_MAX - l))
@@ -83,8 +83,8 @@ pub fn corner(l: Level, code: u64) -> [i64; 3] {
     position(code).map(|p| i64::from(p) << (ROOT_BITS - l))
 }
 
-/// Code of the octant of the same level one step along `axis` (0, 1, 2), up or down; none outside
-/// the root.
+/// Code of the neighbour of the same level along `axis` (0, 1, 2), in the positive direction if `up`; none
+/// outside the root.
 #[inline]
 pub fn neighbour(l: Level, code: u64, axis: usize, up: bool) -> Option<u64> {
     let mut p = position(code);
@@ -96,13 +96,13 @@ pub fn neighbour(l: Level, code: u64, axis: usize, up: bool) -> Option<u64> {
     Some(morton(p))
 }
 
-/// Word of a leaf.
+/// The word of a leaf.
 #[inline]
 pub const fn word(l: Level, code: u64, side: Side) -> u64 {
     start57(l, code) << 7 | (l as u64) << 2 | side as u64
 }
 
-/// Child digits from the root, as people write an octant: `3.1.4`; the root is `root`.
+/// The path from the root in child digits, for messages: `3.1.4`; the root is `root`.
 pub fn path(l: Level, code: u64) -> String {
     if l == 0 {
         return "root".into();
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_undo_each_other_and_stop_at_the_root() {
+    fn opposite_neighbours_are_inverse_and_none_is_outside_the_root() {
         for l in 0..=3 {
             for code in 0..1u64 << (3 * l) {
                 for axis in 0..3 {
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_read_from_the_root() {
+    fn paths_start_at_the_root() {
         assert_eq!(path(0, 0), "root");
         assert_eq!(path(3, 0o314), "3.1.4");
     }

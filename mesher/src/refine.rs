@@ -11,13 +11,13 @@ use crate::lattice::{ExtentBox, Rules};
 use crate::octant::{LEVEL_MAX, Level, corner, edge};
 use crate::partition::ownership::Ownership;
 use crate::tree::Tree;
-use crate::voxelise::{self, Depth, Filed, Home, Start, Work};
+use crate::voxelise::{self, BinnedFacets, ContainingOctant, Depth, SubtreeRoot, Work};
 
 /// Refines the octants that this rank owns around its facets, which must be all that [reach](route) them.
-pub fn refine(facets: &Filed, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
+pub fn refine(facets: &BinnedFacets, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let start = |(level, code)| Start { level, code };
-    let starts: Vec<Start> = ownership.octants().into_iter().map(start).collect();
+    let start = |(level, code)| SubtreeRoot { level, code };
+    let starts: Vec<SubtreeRoot> = ownership.octants().into_iter().map(start).collect();
     voxelise::refine(facets, &depth, &starts)
 }
 
@@ -25,7 +25,7 @@ pub fn refine(facets: &Filed, rules: &Rules, ownership: &Ownership) -> (Tree, Wo
 pub fn refine_top(facets: &[Facet], rules: &Rules, level: Level) -> (Tree, Work) {
     let boxes = rules.boxes.iter().map(|b| ExtentBox { level: b.level.min(level), ..*b });
     let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
-    voxelise::refine(&Filed::new(facets), &depth, &[Start { level: 0, code: 0 }])
+    voxelise::refine(&BinnedFacets::new(facets), &depth, &[SubtreeRoot { level: 0, code: 0 }])
 }
 
 /// Sends every facet to the owners of the octants that its extent reaches. Returns the facets for this rank. Collective.
@@ -34,7 +34,7 @@ pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Fa
     // Index of the latest facet for each rank.
     let mut latest = vec![u64::MAX; comm.size()];
     for (i, f) in (0u64..).zip(facets) {
-        let Some(containing) = Home::of(f) else { continue };
+        let Some(containing) = ContainingOctant::of(f) else { continue };
         let extent = std::array::from_fn(|a| f.range(a));
         let code = containing.start() >> (3 * (LEVEL_MAX - containing.level()));
         owners_reached(ownership, &extent, containing.level(), code, &mut |owner| {

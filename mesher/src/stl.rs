@@ -1,4 +1,4 @@
-//! STL files, as they are found in the wild.
+//! STL files, binary and text, including common deviations from the format.
 
 use crate::error::Error;
 use geometries::Facet;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const HEADER: u64 = 84;
 const RECORD: u64 = 50;
 
-/// An STL file that was looked at.
+/// An open STL file of known format.
 #[derive(Debug)]
 pub struct Stl {
     path: PathBuf,
@@ -20,12 +20,16 @@ pub struct Stl {
     pub binary: Option<u64>,
 }
 
-/// Opens a file and tells whether it is binary.
+/// Opens a file and determines whether it is binary: whether its length is that of the facets which the header
+/// counts.
+///
+/// # Errors
+/// If the file cannot be read or is no STL file.
 pub fn open(path: &Path) -> Result<Stl, Error> {
     let fail = |e: std::io::Error| {
         Error::input(format!("{}: {e}: give a readable STL file", path.display()))
     };
-    // Looked at first, as opening a pipe would wait for a writer.
+    // Checked before opening, because opening a pipe would wait for a writer.
     if !std::fs::metadata(path).map_err(fail)?.is_file() {
         return Err(Error::input(format!(
             "{} is a directory, a pipe or a device: give an STL file",
@@ -63,7 +67,7 @@ impl Stl {
         Error::input(format!("{}: {what}", self.path.display()))
     }
 
-    /// Whether the file starts as text STL do and has no bytes that text has not.
+    /// Whether the file begins with "solid" and has no zero byte near its beginning.
     fn looks_like_text(&self) -> Result<bool, Error> {
         let mut head = vec![0; self.length.min(1024) as usize];
         self.file.read_exact_at(&mut head, 0).map_err(|e| self.fail(e))?;
@@ -72,6 +76,9 @@ impl Stl {
     }
 
     /// Facets `first..end` of a binary file.
+    ///
+    /// # Errors
+    /// If they cannot be read.
     pub fn read(&self, first: u64, end: u64) -> Result<Vec<Facet>, Error> {
         const CHUNK: u64 = 8192;
         let mut out = Vec::with_capacity((end - first) as usize);
@@ -87,10 +94,13 @@ impl Stl {
         Ok(out)
     }
 
-    /// All facets of all solids of a text file.
+    /// The facets of all solids of a text file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is malformed or truncated.
     pub fn read_text(mut self) -> Result<Vec<Facet>, Error> {
         if !self.looks_like_text()? {
-            return Err(self.fail("is neither a binary STL nor one in text, which begins with \"solid\": give an STL file"));
+            return Err(self.fail("is neither a binary STL nor a text STL, which begins with \"solid\": give an STL file"));
         }
         let mut bytes = Vec::new();
         self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
@@ -121,13 +131,13 @@ impl Stl {
     }
 }
 
-/// The vertices of a binary record: they follow the normal, which is not used.
+/// The vertices of a binary record. They follow the normal, which is not used.
 fn record(bytes: &[u8; RECORD as usize]) -> Facet {
     let at = |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
     std::array::from_fn(|v| std::array::from_fn(|a| at(12 + 12 * v + 4 * a)))
 }
 
-/// The solids of a text file, in the form that `stl_io` reads: lower case, line feeds, named, one each.
+/// The solids of a text file, each in the form that `stl_io` reads: lower case, with line feeds and a name.
 fn solids(bytes: &[u8]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for line in String::from_utf8_lossy(bytes).split(['\n', '\r']) {
@@ -138,7 +148,7 @@ fn solids(bytes: &[u8]) -> Vec<String> {
         match (first, out.last_mut()) {
             ("solid", _) => out.push("solid x\n".into()),
             ("endsolid", Some(s)) if open => s.push_str("endsolid x\n"),
-            // Normals are not used, and are often not numbers.
+            // Normals are not used, and often are not numbers.
             ("facet", Some(s)) => s.push_str("facet normal 0 0 0\n"),
             (_, Some(s)) => {
                 s.push_str(&line);
@@ -150,9 +160,12 @@ fn solids(bytes: &[u8]) -> Vec<String> {
     out
 }
 
-/// An error naming the first facet that has a coordinate that is not a number.
+/// Checks that all coordinates are finite; `first` is the index of the first facet, for the error.
+///
+/// # Errors
+/// Names the first facet that has another coordinate.
 pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
-    // 0 * x is not 0 exactly when x is infinite or not a number; summing keeps the loop free of branches.
+    // 0 * x is NaN if and only if x is infinite or NaN; the sum keeps the loop free of branches.
     let flat: &[f32] = facets.as_flattened().as_flattened();
     if flat.iter().map(|x| 0.0 * x).sum::<f32>() == 0.0 {
         return Ok(());
@@ -182,7 +195,7 @@ mod tests {
     const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e-1 0\nendloop\nendfacet\n";
 
     #[test]
-    fn text_is_read_however_it_is_written() {
+    fn text_is_read_with_any_case_line_ends_and_names() {
         let plain = format!("solid a b\n{FACET}{FACET}endsolid a b\n");
         let two = format!("solid\n{FACET}endsolid\nsolid z\n{FACET}endsolid z\n");
         for s in [
@@ -200,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_text_is_an_error() {
+    fn malformed_text_is_refused() {
         let plain = format!("solid a\n{FACET}endsolid a\n");
         for s in [
             "hello",
@@ -219,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn binary_is_told_by_its_length() {
+    fn a_binary_file_is_recognised_by_its_length() {
         let mut bytes = b"solid but binary".to_vec();
         bytes.resize(80, b' ');
         bytes.extend(2u32.to_le_bytes());

@@ -1,20 +1,26 @@
-//! The leaves in Morton order: what digest, counts, files and exports read.
+//! The leaf stream: the mesh's leaves in Morton order, as digest, counts, files and exports read them.
 //!
-//! A depth-first merge of the levels: each level's sets are read once, front to back, so a mesh larger
-//! than memory can be written. The unit of the walk is a group of eight siblings.
+//! A depth-first merge of the levels: each level's sets are read once in order, so a mesh larger than
+//! memory can be written. The walk proceeds by groups of eight siblings.
+//!
+//! Invariants of the stream of a rank:
+//! - it is *linear* ([`LinearCheck`]): leaf words ascend, and no leaf overlaps the one before it;
+//! - it is *complete* ([`Leaves::is_complete`]): the leaves emitted and the leaves left out (deleted, or
+//!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
-use crate::brick;
+use crate::brick::{self, Brick};
 use crate::brickset::{BrickSet, Cursor, ones};
 use crate::lattice::{Keep, Rules};
-use crate::octant::{Level, Side, start57};
+use crate::octant::{LEVEL_MAX, Level, Side, path, start57};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
-use crate::tree::LEVELS;
+use crate::tree::{LEVELS, Tree};
+use std::convert::Infallible;
 
-/// Words handed over at a time, at most.
+/// Number of words that are buffered before they are passed to the sink.
 const CHUNK: usize = 4096;
 
-/// Leaves by level and side.
+/// Number of leaves by level and side.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// `by_level[l][side]`.
@@ -22,7 +28,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// The sum over the ranks. Collective.
+    /// The sums over all ranks. Collective.
     pub fn gather(&self, comm: &dyn crate::comm::Comm) -> Self {
         let mut sum = Self::default();
         let sums = comm.sums(self.by_level.as_flattened());
@@ -30,31 +36,34 @@ impl Counts {
         sum
     }
 
-    /// All leaves.
+    /// Number of all leaves.
     pub fn total(&self) -> u64 {
         self.by_level.iter().flatten().sum()
     }
 }
 
-/// What to emit: the leaves of `split`, with the sides of the base tree's.
+/// The leaves to emit: those of `split`, with the sides of the base leaves that contain them.
 pub struct Leaves<'a> {
-    /// Split octants of the tree to emit: the graded one, or the base tree's.
+    /// Split octants of the tree to emit: of the graded tree or of the base tree.
     pub split: &'a [BrickSet],
     /// Crossing leaves of the base tree.
     pub crossing: &'a [BrickSet],
     /// Sides of the base tree's leaves.
     pub sides: &'a Sides,
-    /// Whose bricks are whose.
+    /// Ownership of the bricks.
     pub ownership: &'a Ownership,
-    /// Whether all leaves are emitted, also those that the rules delete.
-    pub everything: bool,
+    /// Whether all leaves are emitted, including those that the rules delete.
+    pub all_leaves: bool,
     /// The mesh's rules.
     pub rules: &'a Rules,
 }
 
 impl Leaves<'_> {
-    /// Calls `sink` with the words of the leaves that this rank answers for, in order, some thousands
-    /// at a time. Stops at the first error of the sink's.
+    /// Calls `sink` with the words of the leaves that this rank owns, in order, some thousands at a time.
+    /// Returns the numbers of leaves.
+    ///
+    /// # Errors
+    /// The first error of the sink, which ends the stream.
     pub fn emit<E>(&self, sink: impl FnMut(&[u64]) -> Result<(), E>) -> Result<Counts, E> {
         let levels = (0..LEVELS).map(|l| LevelCursors {
             split: self.split[l].cursor(),
@@ -74,9 +83,73 @@ impl Leaves<'_> {
         walk.flush()?;
         Ok(walk.counts)
     }
+
+    /// Whether the stream is complete: whether emitted leaves of this `volume` ([`LinearCheck::volume`]) and
+    /// the leaves that the rules leave out fill the bricks that this rank owns.
+    pub fn is_complete(&self, volume: u64) -> bool {
+        let (mut owned, mut left_out) = (0, 0);
+        for l in 0..LEVELS as Level {
+            let volume = |bits: u64| u64::from(bits.count_ones()) * volume_of(l);
+            let is_owned = |b: &Brick| self.ownership.owns(l, b.key);
+            let mut split = self.split[l as usize].cursor();
+            let existing = Tree::exists(self.split, l).filter(is_owned);
+            owned += existing.map(|b| volume(b.bits & !split.get(b.key))).sum::<u64>();
+            let deleted = self.sides.deleted[l as usize].bricks().filter(is_owned);
+            left_out += deleted.map(|b| volume(b.bits)).sum::<u64>();
+        }
+        if !self.rules.keep_crossing {
+            let Ok(_) = Self { all_leaves: true, ..*self }.emit(|words| {
+                let crossing = words.iter().filter(|w| *w & 3 == Side::Crossing as u64);
+                left_out += crossing.map(|w| volume_of(level_of(*w))).sum::<u64>();
+                Ok::<(), Infallible>(())
+            });
+        }
+        owned == volume + if self.all_leaves { 0 } else { left_out }
+    }
 }
 
-/// The sets of one level, read side by side.
+/// Checks, chunk by chunk, that a stream of leaf words is linear.
+#[derive(Debug, Default)]
+pub struct LinearCheck {
+    /// The level-19 code after the last leaf.
+    end: u64,
+    volume: u64,
+}
+
+impl LinearCheck {
+    /// Adds the next words.
+    ///
+    /// # Panics
+    /// If a leaf precedes or overlaps the leaf before it.
+    pub fn add(&mut self, words: &[u64]) {
+        for w in words {
+            let (start, l) = (w >> 7, level_of(*w));
+            if start < self.end {
+                let octant = path(l, start >> (3 * (LEVEL_MAX - l)));
+                panic!("octant {octant} of level {l} precedes or overlaps the leaf before it");
+            }
+            self.end = start + volume_of(l);
+            self.volume += volume_of(l);
+        }
+    }
+
+    /// Volume of all leaves so far, in octants of level 19.
+    pub fn volume(&self) -> u64 {
+        self.volume
+    }
+}
+
+/// Level of the leaf of a word.
+fn level_of(word: u64) -> Level {
+    (word >> 2 & 31) as Level
+}
+
+/// Volume of an octant of level `l`, in octants of level 19; 0 for the level that no leaf can have.
+fn volume_of(l: Level) -> u64 {
+    LEVEL_MAX.checked_sub(l).map_or(0, |up| 1 << (3 * up))
+}
+
+/// Cursors over the sets of one level.
 struct LevelCursors<'a> {
     split: Cursor<'a>,
     crossing: Cursor<'a>,
@@ -84,13 +157,13 @@ struct LevelCursors<'a> {
     deleted: Cursor<'a>,
 }
 
-/// A brick on the way down.
+/// A brick on the path from the root.
 struct Loaded {
     key: u64,
-    /// Octants to emit.
+    /// Leaves to emit.
     leaves: u64,
     split: u64,
-    /// Sides of the leaves, and of split ones for their descendants.
+    /// Sides of the leaves; split octants pass theirs on to their descendants.
     crossing: u64,
     inside: u64,
     placement: Placement,
@@ -105,7 +178,7 @@ struct Walk<'a, S> {
 }
 
 impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
-    /// Reads a brick of which the octants `exists` exist; `crossing` and `inside` are what they inherit.
+    /// Reads a brick whose octants `exists` exist; `crossing` and `inside` are inherited from base leaves.
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
         let (of, at) = (self.of, &mut self.levels[l as usize]);
@@ -123,7 +196,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
             Keep::All => at.inside.get(key) | inside,
         };
         let mut leaves = exists & !split;
-        if !of.everything {
+        if !of.all_leaves {
             leaves &= !deleted;
             if !of.rules.keep_crossing {
                 leaves &= !crossing;
@@ -141,7 +214,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         Loaded { key, leaves, split, crossing, inside, placement }
     }
 
-    /// Emits eight siblings and all that is below them.
+    /// Emits eight siblings and their descendants.
     fn group(&mut self, l: Level, brick: &Loaded, j: u64) -> Result<(), E> {
         let split = brick::byte(brick.split, j);
         let parent = brick.key << 3 | j;
@@ -162,7 +235,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
             if split >> o & 1 == 0 {
                 self.put(l, parent, brick, j, 1 << o);
             } else if child.split == 0 {
-                // Most bricks of the finest level: no call per group.
+                // The usual case at the finest level: saves a call per group.
                 self.put(l + 1, parent << 3 | o, &child, o, 0xff);
             } else if !remote {
                 self.group(l + 1, &child, o)?;
@@ -171,13 +244,13 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) }
     }
 
-    /// Words of the leaves among the children of octant `parent` of level `l - 1`, which are byte `j` of
-    /// a brick, as far as `within` lets them through.
+    /// Appends the words of the leaves among the children, of level `l`, of octant `parent`. The children are
+    /// byte `j` of a brick; only those in the mask `within` are considered.
     #[inline]
     fn put(&mut self, l: Level, parent: u64, brick: &Loaded, j: u64, within: u8) {
         let leaves = brick::byte(brick.leaves, j) & within;
         let (crossing, inside) = (brick::byte(brick.crossing, j), brick::byte(brick.inside, j));
-        // The lone root is not a child of anything; its code is 0 all the same.
+        // The root has no parent; its code is 0 all the same.
         let base = start57(l, parent << 3) << 7 | u64::from(l) << 2;
         let step = start57(l, 1) << 7;
         let side = |o: u32| u64::from(crossing >> o & 1) << 1 | u64::from(inside >> o & 1);
@@ -195,5 +268,50 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         let result = if self.buffer.is_empty() { Ok(()) } else { (self.sink)(&self.buffer) };
         self.buffer.clear();
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::Solo;
+    use crate::octant::word;
+    use crate::sides::decide;
+    use crate::tree::tests::{rules, small};
+
+    /// Calls `check` with the leaves of a small tree and their volume.
+    fn with_leaves(rules: &Rules, check: impl FnOnce(&mut Leaves, u64)) {
+        let (tree, ownership) = (small(), Ownership::solo());
+        let sides = decide(&tree, &ownership, &[], rules.keep, &Solo);
+        let (split, crossing) = (&tree.split, &tree.crossing);
+        let all_leaves = false;
+        let mut leaves =
+            Leaves { split, crossing, sides: &sides, ownership: &ownership, all_leaves, rules };
+        let mut linear = LinearCheck::default();
+        let Ok(_) = leaves.emit(|words| {
+            linear.add(words);
+            Ok::<(), Infallible>(())
+        });
+        check(&mut leaves, linear.volume());
+    }
+
+    #[test]
+    fn a_stream_without_its_last_leaf_is_incomplete() {
+        for (keep, keep_crossing) in
+            [(Keep::All, true), (Keep::All, false), (Keep::Inside, true), (Keep::Outside, false)]
+        {
+            with_leaves(&Rules { keep, keep_crossing, ..rules() }, |leaves, volume| {
+                assert!(leaves.is_complete(volume), "{keep:?} {keep_crossing}");
+                assert!(!leaves.is_complete(volume - volume_of(LEVEL_MAX)));
+            });
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.3 of level 2 precedes or overlaps the leaf before it")]
+    fn overlapping_leaves_are_found() {
+        let mut check = LinearCheck::default();
+        check.add(&[word(2, 2, Side::Outside)]);
+        check.add(&[word(2, 3, Side::Outside), word(2, 3, Side::Inside)]);
     }
 }

@@ -1,12 +1,17 @@
-//! Refinement around geometry and boxes: facets to the base tree T0 (the paper's section II.A).
+//! Refinement around facets and extent boxes: from facets to the base tree T0 (the paper's section II.A).
 //!
-//! Depth first from a start octant, two levels at a time: a brick's facets are tested against its 64
-//! octants at once, each crossed octant gets the list of its facets, and the level between follows
-//! by coarsening (an octant is crossed when one of its children is, both being closed).
+//! Depth first from the root of a subtree, two levels at a time. The facets of a brick are tested against
+//! its 64 octants at once, and each crossed octant receives the list of the facets that cross it. The
+//! level between follows by coarsening: as octants are closed, an octant is crossed if and only if one of
+//! its children is.
 //!
-//! A facet is filed under its *home*: the deepest octant that holds its whole extent. Inside the home
-//! it need not be tested on the way down, and facets sorted by home are found as ranges; so a facet
-//! smaller than a leaf costs a sort and a bit.
+//! Facets are binned by their *containing octant*, the smallest octant that contains the facet's extent.
+//! A facet crosses all ancestors of its containing octant, so it need not be tested on the way down to
+//! it, and the facets contained in an octant are a contiguous range. A facet smaller than a leaf therefore
+//! costs a sort and one bit. Facets that cross an octant without being contained in it are *straddling*:
+//! they are passed down in lists.
+//!
+//! Invariant of [`BinnedFacets`]: facets are sorted by containing octant, and each one meets the root.
 
 use crate::brick;
 use crate::brickset::ones;
@@ -16,12 +21,13 @@ use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton
 use crate::tree::Tree;
 use std::ops::Range;
 
-/// The octant that a facet's extent stays in.
+/// The smallest octant that contains a facet's extent: the level-19 Morton code of its minimum corner and
+/// its level. Sorts in Morton order, ancestors first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Home(u64);
+pub struct ContainingOctant(u64);
 
-impl Home {
-    /// The facet's home; none if it misses the root.
+impl ContainingOctant {
+    /// The octant that contains the facet; none if the facet misses the root. Always crossed by the facet.
     pub fn of(f: &Facet) -> Option<Self> {
         const SHIFT: u32 = ROOT_BITS - LEVEL_MAX;
         let mut differ = 0;
@@ -32,7 +38,6 @@ impl Home {
             if hi < 0 || lo > ROOT_EDGE {
                 return None;
             }
-            // What reaches beyond the root may miss octants that its clamped extent is in: its home is the root.
             sticks_out |= lo < 0 || hi > ROOT_EDGE;
             let first = ((lo - 1) >> SHIFT).max(0);
             let last = (hi >> SHIFT).min((1 << LEVEL_MAX) - 1);
@@ -40,81 +45,99 @@ impl Home {
             low[a] = first as u32;
         }
         if sticks_out {
-            // Its extent may meet the root where it does not itself; homes are taken to be crossed.
+            // Its clamped extent may meet octants, even the root, that the facet itself misses. Containing
+            // octants count as crossed, so only the root will do, and only if the facet crosses it.
             return (crossed(f, [0; 3], 0) & 1 == 1).then_some(Self(0));
         }
         let drop = 64 - differ.leading_zeros();
         Some(Self(morton(low.map(|p| p >> drop << drop)) << 5 | u64::from(LEVEL_MAX - drop)))
     }
 
-    /// Level of the home.
+    /// The octant's level.
     #[inline]
     pub fn level(self) -> Level {
         (self.0 & 31) as Level
     }
 
-    /// Level-19 Morton code of the home's minimum corner.
+    /// Level-19 Morton code of the octant's minimum corner.
     #[inline]
     pub fn start(self) -> u64 {
         self.0 >> 5
     }
 
-    /// The least home that can be in the octant or behind it: for range searches.
+    /// The first octant, in sorting order, whose minimum corner is at `start`: for range searches.
     #[inline]
     fn first_in(start: u64) -> Self {
         Self(start << 5)
     }
 }
 
-/// Facets sorted by home.
+/// Facets sorted by containing octant.
 #[derive(Debug, Default)]
-pub struct Filed {
-    homes: Vec<Home>,
+pub struct BinnedFacets {
+    containing: Vec<ContainingOctant>,
     facets: Vec<Facet>,
 }
 
-impl Filed {
-    /// Files facets; those that miss the root are dropped.
+impl BinnedFacets {
+    /// Sorts facets by containing octant; drops those that miss the root.
     pub fn new(facets: &[Facet]) -> Self {
-        let mut order: Vec<(Home, u32)> = Vec::with_capacity(facets.len());
-        order.extend(facets.iter().zip(0..).filter_map(|(f, i)| Some((Home::of(f)?, i))));
+        let mut order: Vec<(ContainingOctant, u32)> = Vec::with_capacity(facets.len());
+        order.extend(
+            facets.iter().zip(0..).filter_map(|(f, i)| Some((ContainingOctant::of(f)?, i))),
+        );
         order.sort_unstable_by_key(|o| o.0);
         Self {
-            homes: order.iter().map(|o| o.0).collect(),
+            containing: order.iter().map(|o| o.0).collect(),
             facets: order.iter().map(|o| facets[o.1 as usize]).collect(),
         }
     }
 
-    /// The facets at home in an octant (given by the range of level-19 codes) or deeper.
-    fn residents(&self, l: Level, code: u64) -> Range<usize> {
-        let at = |start| self.homes.partition_point(|h| *h < Home::first_in(start));
+    /// Positions of the facets whose containing octant is the octant `code` of level `l` or below it.
+    fn contained(&self, l: Level, code: u64) -> Range<usize> {
+        let at =
+            |start| self.containing.partition_point(|h| *h < ContainingOctant::first_in(start));
         let range = at(start57(l, code))..at(start57(l, code + 1));
-        // Coarser octants with the same corner sort first; the facets at home there are not residents.
-        let skip = self.homes[range.clone()]
+        // Ancestors with the same minimum corner sort first.
+        let skip = self.containing[range.clone()]
             .partition_point(|h| h.start() == start57(l, code) && h.level() < l);
         range.start + skip..range.end
     }
+
+    /// Checks the invariant.
+    ///
+    /// # Panics
+    /// If a facet is not where its containing octant puts it.
+    pub fn check_invariants(&self) {
+        assert!(self.containing.is_sorted(), "facets must be sorted by containing octant");
+        assert_eq!(self.containing.len(), self.facets.len(), "one containing octant per facet");
+        let found = self.facets.iter().map(ContainingOctant::of);
+        for (i, (found, octant)) in found.zip(&self.containing).enumerate() {
+            let (level, start) = (octant.level(), octant.start());
+            assert_eq!(found, Some(*octant), "facet {i}, binned at {start:#o} of level {level}");
+        }
+    }
 }
 
-/// How deep to refine.
+/// Target levels of the refinement.
 #[derive(Clone, Debug)]
 pub struct Depth {
-    /// Leaves that a facet crosses are refined to this level.
+    /// Level of the leaves that a facet crosses, unless a box asks for deeper ones.
     pub surface: Level,
-    /// Boxes with the levels they ask for.
+    /// Extent boxes with the levels that they ask for.
     pub boxes: Vec<ExtentBox>,
 }
 
-/// An octant to refine from.
+/// The root of a subtree that a rank refines.
 #[derive(Clone, Copy, Debug)]
-pub struct Start {
-    /// Its level.
+pub struct SubtreeRoot {
+    /// The octant's level.
     pub level: Level,
-    /// Its Morton code.
+    /// The octant's Morton code.
     pub code: u64,
 }
 
-/// What was done; repeats exactly.
+/// The work done on this rank; repeats exactly.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Work {
     /// Facet-brick tests.
@@ -123,12 +146,12 @@ pub struct Work {
     pub bricks_voxelised: u64,
 }
 
-/// Refines the octants of `starts`, ascending and disjoint, as far as they are in T0 at all. The tree holds them, what
-/// is below them, and of what is above them that which these octants alone ask for: united over starts
-/// that tile the root, and over all facets, it is T0.
-pub fn refine(filed: &Filed, depth: &Depth, starts: &[Start]) -> (Tree, Work) {
+/// Refines the subtrees below `roots`, which are ascending and disjoint octants. Returns the splits and the
+/// crossing leaves of T0 in these subtrees, and those splits of their ancestors that the subtrees alone
+/// ask for. The union over roots that tile the root cube, and over all facets, is T0.
+pub fn refine(binned: &BinnedFacets, depth: &Depth, roots: &[SubtreeRoot]) -> (Tree, Work) {
     let mut v = Voxeliser {
-        filed,
+        binned,
         surface: depth.surface,
         boxes: &depth.boxes,
         tree: Tree::default(),
@@ -136,44 +159,44 @@ pub fn refine(filed: &Filed, depth: &Depth, starts: &[Start]) -> (Tree, Work) {
         pairs: Vec::new(),
         work: Work::default(),
     };
-    let astray = v.straddlers(starts);
-    for (start, list) in starts.iter().zip(astray) {
-        v.start(start, list);
+    let straddling = v.straddling(roots);
+    for (root, list) in roots.iter().zip(straddling) {
+        v.subtree(root, list);
     }
     (v.tree, v.work)
 }
 
 struct Voxeliser<'a> {
-    filed: &'a Filed,
+    binned: &'a BinnedFacets,
     surface: Level,
     boxes: &'a [ExtentBox],
     tree: Tree,
-    /// Facets of the bricks on the way down, one list behind the other.
+    /// Straddling facets of the bricks on the path from the root, concatenated.
     lists: Vec<u32>,
-    /// Facets of the bricks on the way down with the octants that they cross.
+    /// Tested facets of the bricks on the path from the root, with the octants that they cross.
     pairs: Vec<(u32, u64)>,
     work: Work,
 }
 
-/// The facets of a brick: those at home in it and others that reach into it.
-struct Load {
-    residents: Range<usize>,
-    straddlers: Range<usize>,
+/// The facets of a brick: those contained in the octant that it fills, and those that straddle its boundary.
+struct BrickFacets {
+    contained: Range<usize>,
+    straddling: Range<usize>,
 }
 
 impl Voxeliser<'_> {
-    /// For each start the facets that are at home above it and may reach into it.
-    fn straddlers(&self, starts: &[Start]) -> Vec<Vec<u32>> {
-        let mut lists = vec![Vec::new(); starts.len()];
-        let begins: Vec<u64> = starts.iter().map(|s| start57(s.level, s.code)).collect();
-        for (i, home) in (0..).zip(&self.filed.homes) {
-            // Starts inside the home: none if the home is inside a start or in nobody's.
-            let end = home.start() + (1 << (3 * (LEVEL_MAX - home.level())));
-            let from = begins.partition_point(|&b| b < home.start());
+    /// For each subtree root the facets that are contained in an ancestor and whose extent meets it.
+    fn straddling(&self, roots: &[SubtreeRoot]) -> Vec<Vec<u32>> {
+        let mut lists = vec![Vec::new(); roots.len()];
+        let begins: Vec<u64> = roots.iter().map(|s| start57(s.level, s.code)).collect();
+        for (i, octant) in (0..).zip(&self.binned.containing) {
+            // The roots inside the octant; none if it lies inside a root, or in another rank's part.
+            let end = octant.start() + (1 << (3 * (LEVEL_MAX - octant.level())));
+            let from = begins.partition_point(|&b| b < octant.start());
             let inside = begins[from..].partition_point(|&b| b < end);
             for s in from..from + inside {
-                if starts[s].level > home.level()
-                    && reaches(&self.filed.facets[i as usize], &starts[s])
+                if roots[s].level > octant.level()
+                    && reaches(&self.binned.facets[i as usize], &roots[s])
                 {
                     lists[s].push(i);
                 }
@@ -182,32 +205,38 @@ impl Voxeliser<'_> {
         lists
     }
 
-    fn start(&mut self, start: &Start, straddlers: Vec<u32>) {
-        let Start { level: m, code } = *start;
-        let residents = self.filed.residents(m, code);
-        // A root that is not split has its own brick, which tells so.
-        if m > 0 && !self.way_down(start, &residents, &straddlers) {
+    fn subtree(&mut self, root: &SubtreeRoot, straddling: Vec<u32>) {
+        let SubtreeRoot { level: m, code } = *root;
+        let contained = self.binned.contained(m, code);
+        // For the root cube itself, the brick of level 0 or 1 decides whether it is split.
+        if m > 0 && !self.path_to(root, &contained, &straddling) {
             return;
         }
         let begin = self.lists.len();
-        self.lists.extend(straddlers);
-        let load = Load { residents, straddlers: begin..self.lists.len() };
-        // Tests fall on levels with the parity of the surface level, so that one falls on it.
+        self.lists.extend(straddling);
+        let facets = BrickFacets { contained, straddling: begin..self.lists.len() };
+        // The tested levels have the parity of the surface level, so that one of them is that level.
         let (l, key, allowed) = match (m, (self.surface ^ m) & 1) {
             (0, odd) => (odd, 0, brick::valid(odd)),
             (m, 0) => (m + 2, code, u64::MAX),
             (m, _) => (m + 1, code >> 3, 0xff << (8 * (code & 7))),
         };
-        self.brick(l, key, load, self.boxes, allowed);
+        self.brick(l, key, facets, self.boxes, allowed);
         self.lists.truncate(begin);
     }
 
-    /// Records what a start asks for from the root down to itself; returns whether it is split.
-    fn way_down(&mut self, start: &Start, residents: &Range<usize>, straddlers: &[u32]) -> bool {
-        let Start { level: m, code } = *start;
+    /// Records the splits that a subtree root asks for, from the root cube down to itself. Returns whether
+    /// it is split.
+    fn path_to(
+        &mut self,
+        root: &SubtreeRoot,
+        contained: &Range<usize>,
+        straddling: &[u32],
+    ) -> bool {
+        let SubtreeRoot { level: m, code } = *root;
         let at = corner(m, code);
-        let crosses = |i: &u32| crossed(&self.filed.facets[*i as usize], at, m) & 1 == 1;
-        let crossing = !residents.is_empty() || straddlers.iter().any(crosses);
+        let crosses = |i: &u32| crossed(&self.binned.facets[*i as usize], at, m) & 1 == 1;
+        let crossing = !contained.is_empty() || straddling.iter().any(crosses);
         for l in 0..=m {
             let above = code >> (3 * (m - l));
             let (key, bit) = (above >> 6, 1 << (above & 63));
@@ -217,7 +246,7 @@ impl Voxeliser<'_> {
                 self.tree.split[l as usize].push(key, bit);
                 continue;
             }
-            // A leaf of T0, the start itself or above it.
+            // A leaf of T0: the subtree root or an ancestor.
             if crossing {
                 self.tree.crossing[l as usize].push(key, bit);
             }
@@ -226,14 +255,22 @@ impl Voxeliser<'_> {
         true
     }
 
-    /// Decides the octants of level `l` in a brick, and of `l - 1` above them; goes on below.
-    fn brick(&mut self, l: Level, key: u64, load: Load, boxes: &[ExtentBox], allowed: u64) {
+    /// Decides the octants of level `l` in a brick and their parents, and continues with their descendants.
+    /// Only octants in the mask `allowed` belong to the subtree.
+    fn brick(
+        &mut self,
+        l: Level,
+        key: u64,
+        facets: BrickFacets,
+        boxes: &[ExtentBox],
+        allowed: u64,
+    ) {
         self.work.bricks_voxelised += 1;
         let at = brick::min_corner(l, key);
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
-        let crossing = (self.test(&load, l, at)
-            | self.bin_residents(&load.residents, l, at, &mut runs))
+        let crossing = (self.test(&facets, l, at)
+            | self.bin_contained(&facets.contained, l, at, &mut runs))
             & allowed;
         let near: Vec<ExtentBox> =
             boxes.iter().filter(|b| b.level >= l && box_mask(b, at, l) != 0).copied().collect();
@@ -256,15 +293,18 @@ impl Voxeliser<'_> {
                 self.pairs[first_pair..].iter().filter(|p| p.1 >> bit & 1 == 1).map(|p| p.0);
             self.lists.extend(reach);
             let (from, to) = runs[bit as usize];
-            let load =
-                Load { residents: from as usize..to as usize, straddlers: begin..self.lists.len() };
-            self.brick(l + 2, key << 6 | u64::from(bit), load, &near, u64::MAX);
+            let facets = BrickFacets {
+                contained: from as usize..to as usize,
+                straddling: begin..self.lists.len(),
+            };
+            self.brick(l + 2, key << 6 | u64::from(bit), facets, &near, u64::MAX);
             self.lists.truncate(begin);
         }
         self.pairs.truncate(first_pair);
     }
 
-    /// Records level `l - 1` above a brick; returns the octants of level `l` that exist.
+    /// Records the parents, of level `l - 1`, of a brick's octants; returns the octants of level `l` that
+    /// exist.
     fn level_above(&mut self, l: Level, key: u64, crossing: u64, asked: u64) -> u64 {
         let crossed = brick::parents(crossing);
         let split = if l - 1 < self.surface { crossed } else { 0 } | brick::parents(asked);
@@ -276,44 +316,45 @@ impl Voxeliser<'_> {
         brick::children(split)
     }
 
-    /// Tests the facets that reach in from above.
-    fn test(&mut self, load: &Load, l: Level, at: [i64; 3]) -> u64 {
+    /// Tests the straddling facets of a brick; returns the octants that they cross.
+    fn test(&mut self, facets: &BrickFacets, l: Level, at: [i64; 3]) -> u64 {
         let mut crossing = 0;
-        for i in load.straddlers.clone() {
+        for i in facets.straddling.clone() {
             let f = self.lists[i];
-            let mask = crossed(&self.filed.facets[f as usize], at, l);
+            let mask = crossed(&self.binned.facets[f as usize], at, l);
             if mask != 0 {
                 self.pairs.push((f, mask));
                 crossing |= mask;
             }
         }
-        self.work.facet_brick_tests += load.straddlers.len() as u64;
+        self.work.facet_brick_tests += facets.straddling.len() as u64;
         crossing
     }
 
-    /// Files the facets at home in the brick under its octants, and tests those at home above them.
-    fn bin_residents(
+    /// Bins the contained facets of a brick by octant, into `runs`, and tests those that no octant of the
+    /// brick contains. Returns the octants that are crossed.
+    fn bin_contained(
         &mut self,
-        residents: &Range<usize>,
+        contained: &Range<usize>,
         l: Level,
         at: [i64; 3],
         runs: &mut [(u32, u32); 64],
     ) -> u64 {
         let mut crossing = 0;
-        let mut i = residents.start;
-        while i < residents.end {
-            let home = self.filed.homes[i];
-            if home.level() < l {
-                let mask = crossed(&self.filed.facets[i], at, l);
+        let mut i = contained.start;
+        while i < contained.end {
+            let octant = self.binned.containing[i];
+            if octant.level() < l {
+                let mask = crossed(&self.binned.facets[i], at, l);
                 self.pairs.push((i as u32, mask));
                 self.work.facet_brick_tests += 1;
                 crossing |= mask;
                 i += 1;
                 continue;
             }
-            let code = home.start() >> (3 * (LEVEL_MAX - l));
-            let end = Home::first_in((code + 1) << (3 * (LEVEL_MAX - l)));
-            let run = i + run_length(&self.filed.homes[i..residents.end], end);
+            let code = octant.start() >> (3 * (LEVEL_MAX - l));
+            let end = ContainingOctant::first_in((code + 1) << (3 * (LEVEL_MAX - l)));
+            let run = i + run_length(&self.binned.containing[i..contained.end], end);
             runs[(code & 63) as usize] = (i as u32, run as u32);
             crossing |= 1 << (code & 63);
             i = run;
@@ -322,21 +363,45 @@ impl Voxeliser<'_> {
     }
 }
 
-/// Number of leading homes before `end`, by doubling steps: runs are short deep down, long high up.
-fn run_length(homes: &[Home], end: Home) -> usize {
+/// Number of leading octants before `end`, by doubling steps: runs are short deep down, long high up.
+fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
     let mut step = 1;
-    while homes.get(step).is_some_and(|h| *h < end) {
+    while containing.get(step).is_some_and(|h| *h < end) {
         step *= 2;
     }
-    let near = &homes[step / 2..homes.len().min(step + 1)];
+    let near = &containing[step / 2..containing.len().min(step + 1)];
     step / 2 + near.partition_point(|h| *h < end)
 }
 
 /// Whether the facet's extent meets the closed octant.
-fn reaches(f: &Facet, o: &Start) -> bool {
+fn reaches(f: &Facet, o: &SubtreeRoot) -> bool {
     let (at, h) = (corner(o.level, o.code), edge(o.level));
     (0..3).all(|a| {
         let (lo, hi) = f.range(a);
         lo <= at[a] + h && hi >= at[a]
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "facets must be sorted by containing octant")]
+    fn facets_out_of_order_are_found() {
+        let facet = |c: i32| Facet { v: [[c; 3]; 3] };
+        let mut binned = BinnedFacets::new(&[facet(9000), facet(100)]);
+        binned.check_invariants();
+        binned.containing.swap(0, 1);
+        binned.check_invariants();
+    }
+
+    #[test]
+    #[should_panic(expected = "facet 1, binned at")]
+    fn a_facet_in_the_wrong_bin_is_found() {
+        let facet = |c: i32| Facet { v: [[c; 3]; 3] };
+        let mut binned = BinnedFacets::new(&[facet(9000), facet(100)]);
+        binned.facets[1] = facet(20_000);
+        binned.check_invariants();
+    }
 }

@@ -1,20 +1,20 @@
-//! One source, several vector widths: the widest that the processor has is chosen at run time.
+//! One source for several vector widths; the widest that the processor supports is chosen at run time.
 //!
-//! [`widest`] compiles an `#[inline(always)]` function once for each width and calls the right one, so that
-//! all widths do the same by construction; tests run each of them all the same ([`widths`]).
+//! [`widest`] compiles an `#[inline(always)]` function once for each width and calls the right one. All widths
+//! thus compute the same by construction; tests still run each of them.
 
-/// What the compiler may use.
+/// Instruction sets that the compiler may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Width {
-    /// What every processor of the architecture has.
+    /// Those of every processor of the architecture.
     Portable,
-    /// AVX2 and the bit instructions that come with it.
+    /// AVX2 and the bit instructions of the same generation.
     Avx2,
-    /// AVX-512 F, BW, DQ, VL, and all of the above.
+    /// AVX-512 F, BW, DQ and VL, and all of the above.
     Avx512,
 }
 
-/// The widest that this processor has.
+/// The widest that this processor supports.
 #[inline]
 pub fn width() -> Width {
     #[cfg(test)]
@@ -44,8 +44,8 @@ fn detected() -> Width {
     Width::Portable
 }
 
-/// Makes a function that calls `lanes`, compiled for the widest vectors that the processor has. `lanes` must
-/// be `#[inline(always)]`.
+/// Defines a function that calls `lanes`, compiled for the widest vectors that the processor supports. `lanes`
+/// must be `#[inline(always)]`.
 macro_rules! widest {
     (
         $(#[$doc:meta])*
@@ -67,8 +67,8 @@ macro_rules! widest {
                     $lanes($($arg),*)
                 }
                 match $crate::wide::width() {
-                    // SAFETY: the only demand of the function is that the processor has the features that
-                    // it is compiled for, and `width` names a width after detecting them all.
+                    // SAFETY: the function only requires that the processor has the features that it is
+                    // compiled for, and `width` returns a width after detecting all of them.
                     $crate::wide::Width::Avx512 => return unsafe { avx512($($arg),*) },
                     // SAFETY: as above.
                     $crate::wide::Width::Avx2 => return unsafe { avx2($($arg),*) },
@@ -91,7 +91,7 @@ pub mod tests {
         pub static FORCED: Cell<Option<Width>> = const { Cell::new(None) };
     }
 
-    /// What `work` returns at every width that this processor has.
+    /// The results of `work` at every width that this processor supports.
     pub fn widths<T>(mut work: impl FnMut() -> T) -> Vec<(Width, T)> {
         let all = [Width::Portable, Width::Avx2, Width::Avx512];
         let results = all.into_iter().filter(|w| *w <= detected()).map(|w| {
@@ -104,9 +104,9 @@ pub mod tests {
     }
 
     #[test]
-    fn the_width_asked_for_is_used() {
-        for (asked, used) in widths(width) {
-            assert_eq!(asked, used);
+    fn the_forced_width_is_used() {
+        for (forced, used) in widths(width) {
+            assert_eq!(forced, used);
         }
         assert_eq!(width(), detected());
     }

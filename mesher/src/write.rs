@@ -1,7 +1,12 @@
-//! Writing a mesh: one `.npy` file of leaf words per rank, and the manifest.
+//! Mesh output: one `.npy` file of leaf words per rank, and the manifest.
 //!
-//! Nothing half-written ever has its final name: files are written beside it, synced and renamed,
-//! the manifest last. After an error nothing is left behind.
+//! Invariants of the output directory:
+//! - a file that has its final name is complete: it is written under a temporary name in the same
+//!   directory, synchronised and renamed ([`Draft`]);
+//! - the manifest is written last, so all parts that it names exist;
+//! - after an error, none of the mesh's files remains.
+
+mod draft;
 
 use crate::comm::Comm;
 use crate::digest::{Digests, hex};
@@ -17,73 +22,82 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Name of the manifest.
+pub use draft::Draft;
+
+/// File name of the manifest.
 pub const MANIFEST: &str = "mesh.json";
 
-/// Name of a rank's part.
+/// File name of a rank's part.
 pub fn part_name(rank: usize) -> String {
     format!("leaves-{rank:05}.npy")
 }
 
-/// A directory that a mesh is written to.
+/// The directory that a mesh is written to.
 #[derive(Debug)]
 pub struct OutDir {
     path: PathBuf,
-    /// Whether it was made for this mesh, and so is removed after an error.
-    made: bool,
+    /// Whether it was created for this mesh and is therefore removed after an error.
+    is_new: bool,
 }
 
 fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
     Error::output(format!(
-        "{}: {e}: nothing was written there; choose another --out or make room",
+        "{}: {e}: no mesh was written there; choose another --out or free disk space",
         path.display()
     ))
 }
 
 impl OutDir {
-    /// Makes the directory, or takes an empty one. On one rank.
-    pub fn make(path: &Path) -> Result<Self, Error> {
+    /// Creates the directory, or accepts an existing one that is empty. On one rank only.
+    ///
+    /// # Errors
+    /// If the directory cannot be created or written to, or is not empty.
+    pub fn create(path: &Path) -> Result<Self, Error> {
         match std::fs::read_dir(path) {
             Ok(mut entries) => {
                 if entries.next().is_some() {
                     return Err(output(path, &"the directory is not empty"));
                 }
-                // Found out now rather than after the meshing.
+                // Fails now rather than after the meshing, if the directory cannot be written to.
                 NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), made: false })
+                Ok(Self { path: path.to_owned(), is_new: false })
             }
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 std::fs::create_dir(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), made: true })
+                Ok(Self { path: path.to_owned(), is_new: true })
             }
             Err(e) => Err(output(path, &e)),
         }
     }
 
-    /// The same directory as another rank sees it.
-    pub fn join(path: &Path) -> Self {
-        Self { path: path.to_owned(), made: false }
+    /// The directory that another rank has created.
+    pub fn open(path: &Path) -> Self {
+        Self { path: path.to_owned(), is_new: false }
     }
 
-    /// Starts this rank's part.
+    /// Begins this rank's part.
+    ///
+    /// # Errors
+    /// If its file cannot be created.
     pub fn part(&self, rank: usize) -> Result<Part, Error> {
-        let file = NamedTempFile::new_in(&self.path).map_err(|e| output(&self.path, &e))?;
-        let (file, temporary) = file.into_parts();
-        let mut file = BufWriter::with_capacity(1 << 20, file);
-        let begin = header(u64::MAX).and_then(|room| file.write_all(&room));
-        begin.map_err(|e| output(&self.path, &e))?;
         let path = self.path.join(part_name(rank));
-        Ok(Part { path, file, temporary, digests: Digests::default(), leaves: 0 })
+        let begin = || -> io::Result<BufWriter<Draft>> {
+            let mut file = BufWriter::with_capacity(1 << 20, Draft::create(&path)?);
+            file.write_all(&header(u64::MAX)?)?;
+            Ok(file)
+        };
+        let file = begin().map_err(|e| output(&self.path, &e))?;
+        Ok(Part { path, file, digests: Digests::default(), leaves: 0 })
     }
 
-    /// Removes what was written, after an error on any rank.
+    /// Removes the mesh's files after an error on any rank.
     pub fn discard(&self, rank: usize) {
         let _ = std::fs::remove_file(self.path.join(part_name(rank)));
         if rank == 0 {
             let _ = std::fs::remove_file(self.path.join(MANIFEST));
         }
-        if self.made {
-            // The other ranks' parts may still be there; they are the mesher's too.
+        if self.is_new {
+            // Parts of other ranks may remain.
             for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
                 let name = entry.file_name();
                 let name = name.to_string_lossy();
@@ -95,38 +109,28 @@ impl OutDir {
         }
     }
 
-    /// Writes the manifest. On one rank, after all parts are finished.
+    /// Writes the manifest. On one rank only, after all ranks have finished their parts.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn manifest(&self, manifest: &Manifest) -> Result<(), Error> {
         let write = || -> io::Result<()> {
-            let mut file = NamedTempFile::new_in(&self.path)?;
-            serde_json::to_writer_pretty(&mut file, manifest)?;
-            file.write_all(b"\n")?;
-            publish(file.as_file(), || file.path().to_owned(), &self.path.join(MANIFEST))?;
-            let _ = file.into_temp_path().keep();
+            Draft::create(&self.path.join(MANIFEST))?.publish_json(manifest)?;
             File::open(&self.path)?.sync_all()
         };
         write().map_err(|e| output(&self.path, &e))
     }
 }
 
-/// Syncs a file and gives it its final name, with the permissions of a file made in the ordinary way.
-fn publish(file: &File, temporary: impl Fn() -> PathBuf, to: &Path) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    file.sync_all()?;
-    std::fs::rename(temporary(), to)
-}
-
-/// A rank's part while it is written.
+/// A rank's part while it is being written.
 pub struct Part {
     path: PathBuf,
-    file: BufWriter<File>,
-    temporary: tempfile::TempPath,
+    file: BufWriter<Draft>,
     digests: Digests,
     leaves: u64,
 }
 
-/// What a part holds.
+/// Contents of a part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
     /// Number of leaves.
@@ -137,10 +141,13 @@ pub struct Written {
 
 impl Part {
     /// Appends words.
+    ///
+    /// # Errors
+    /// If they cannot be written.
     pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
         self.digests.add(words);
         self.leaves += words.len() as u64;
-        // As they are in memory: word by word, a library's writer takes longer than the mesh.
+        // The words' bytes in memory. npyz writes word by word, which takes longer than meshing.
         let written = match cfg!(target_endian = "little") {
             true => self.file.write_all(bytemuck::cast_slice(words)),
             false => words.iter().try_for_each(|w| self.file.write_all(&w.to_le_bytes())),
@@ -148,26 +155,27 @@ impl Part {
         written.map_err(|e| output(&self.path, &e))
     }
 
-    /// Completes the file and gives it its name.
+    /// Completes the file and gives it its final name.
+    ///
+    /// # Errors
+    /// If it cannot be written.
     pub fn finish(self) -> Result<Written, Error> {
-        let Self { path, file, temporary, digests, leaves } = self;
+        let Self { path, file, digests, leaves } = self;
         let close = || -> io::Result<()> {
             let mut file = file.into_inner()?;
             file.seek(SeekFrom::Start(0))?;
             file.write_all(&header(leaves)?)?;
-            publish(&file, || temporary.to_path_buf(), &path)?;
-            let _ = temporary.keep();
-            Ok(())
+            file.publish()
         };
         close().map_err(|e| output(&path, &e))?;
         Ok(Written { leaves, digests })
     }
 }
 
-/// The head of a `.npy` file of `leaves` words, as long for any number of them, so that it can be written
-/// again when the number is known: its text is padded with spaces.
+/// The header of a `.npy` file of `leaves` words. Padded with spaces to the same length for any number, so that
+/// it can be overwritten when the number is known.
 fn header(leaves: u64) -> io::Result<Vec<u8>> {
-    /// Bytes before the text: magic, version, and the text's length in the last two (format 1.0).
+    /// Bytes before the header's text: magic, version, and the text's length in the last two (format 1.0).
     const BEFORE: usize = 10;
     let of = |leaves: u64| {
         let head = npyz::WriteOptions::<u64>::new().default_dtype().shape(&[leaves]);
@@ -181,7 +189,7 @@ fn header(leaves: u64) -> io::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// What `mesh.json` says. Lengths of the boxes are in lattice units, of the root in the geometry's.
+/// Contents of `mesh.json`. Boxes are in lattice units, the root is in the geometry's unit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Manifest {
     schema: &'static str,
@@ -235,15 +243,15 @@ struct PartEntry {
     digest: String,
 }
 
-/// One entry of a part: its leaves and the two halves of its digest.
+/// A part: its number of leaves, and the upper and the lower half of its digest.
 type PartWords = [u64; 3];
 
-/// The mesh's digests and parts, gathered from all ranks. Collective.
+/// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
 pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     let split = |d: u128| [(d >> 64) as u64, d as u64];
     let whole = split(mine.digests.whole());
     let mut words = vec![mine.leaves, whole[0], whole[1]];
-    // A rank's leaves are in few of the octants.
+    // The leaves of a rank lie in few of the octants.
     let octants = (0..).zip(&mine.digests.octants).filter(|(_, d)| **d != 0);
     words.extend(octants.flat_map(|(i, &d)| [i, split(d)[0], split(d)[1]]));
     let mut digests = Digests::default();
@@ -309,10 +317,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_read_back_whatever_their_length() {
+    fn parts_of_any_length_are_read_back() {
         let root = tempfile::tempdir().unwrap();
         for n in [0usize, 1, 9, 10, 4097, 1_000_000] {
-            let out = OutDir::make(&root.path().join(n.to_string())).unwrap();
+            let out = OutDir::create(&root.path().join(n.to_string())).unwrap();
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
             let mut part = out.part(3).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());

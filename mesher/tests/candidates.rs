@@ -9,7 +9,7 @@ use mesher::lattice::Bounds;
 use mesher::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::partition::ownership::Ownership;
 use mesher::sides::{components, global, nodes::Nodes, vote};
-use mesher::voxelise::{Depth, Filed, Start, refine};
+use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use support::{Small, config, leaky_on_rays, small, soup, thin};
@@ -24,15 +24,16 @@ fn by_mesher(case: &Small) -> Firsts {
         .facets(case.facets.clone(), &Bounds::of(&case.facets), 0)
         .expect("near the root");
     let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let (tree, _) = refine(&Filed::new(&facets), &depth, &[Start { level: 0, code: 0 }]);
+    let (tree, _) =
+        refine(&BinnedFacets::new(&facets), &depth, &[SubtreeRoot { level: 0, code: 0 }]);
     tree.check_structure();
     let share = Ownership::solo();
     let nodes = Nodes::new(&tree, &share);
-    let mut local = components::join(&nodes, &share);
+    let mut local = components::merge(&nodes, &share);
     let faces = std::mem::take(&mut local.faces);
-    let classes = local.classes();
-    let names = global::names(&nodes, &tree, &share, faces, &classes, &Solo);
-    let found = vote::candidates(&nodes, &tree, &classes.of, &names, &share);
+    let merged = local.numbered();
+    let labels = global::labels(&nodes, &tree, &share, faces, &merged, &Solo);
+    let found = vote::candidates(&nodes, &tree, &merged.of, &labels, &share);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 

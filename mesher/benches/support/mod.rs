@@ -16,7 +16,7 @@ use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Sides, decide};
 use mesher::stream::Leaves;
 use mesher::tree::{PerLevel, Tree};
-use mesher::voxelise::{Depth, Filed, Start, refine};
+use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use mesher::{Options, digest, grade, stl};
 use std::convert::Infallible;
 use std::hint::black_box;
@@ -60,7 +60,7 @@ struct Phases {
     facets: Vec<Facet>,
     rules: Rules,
     share: Ownership,
-    filed: Filed,
+    binned: BinnedFacets,
     depth: Depth,
     tree: Tree,
     sides: Sides,
@@ -77,14 +77,14 @@ impl Phases {
             .facets(given.facets.clone(), &Bounds::of(&given.facets), 0)
             .expect("near the root");
         let share = Ownership::solo();
-        let filed = Filed::new(&facets);
+        let binned = BinnedFacets::new(&facets);
         let depth = Depth { surface: rules.level_surface, boxes: vec![] };
-        let (tree, _) = refine(&filed, &depth, &[Start { level: 0, code: 0 }]);
+        let (tree, _) = refine(&binned, &depth, &[SubtreeRoot { level: 0, code: 0 }]);
         let sides = decide(&tree, &share, &facets, rules.keep, &Solo);
         let kept = Kept::new(&sides.deleted);
         let (graded, _) =
             grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &share, &Solo);
-        Self { given, facets, rules, share, filed, depth, tree, sides, graded }
+        Self { given, facets, rules, share, binned, depth, tree, sides, graded }
     }
 
     fn leaves(&self) -> Leaves<'_> {
@@ -93,7 +93,7 @@ impl Phases {
             crossing: &self.tree.crossing,
             sides: &self.sides,
             ownership: &self.share,
-            everything: false,
+            all_leaves: false,
             rules: &self.rules,
         }
     }
@@ -125,12 +125,14 @@ pub fn kernels() -> Vec<Kernel> {
     vec![
         kernel("stl_read", facets, stl_read(&p.given)),
         kernel("crossed", facets, Box::new(|| brick_masks(&p.facets))),
-        kernel("file", facets, Box::new(|| drop_counted(Filed::new(black_box(&p.facets))))),
+        kernel("file", facets, Box::new(|| drop_counted(BinnedFacets::new(black_box(&p.facets))))),
         kernel(
             "refine",
             facets,
             Box::new(|| {
-                refine(&p.filed, &p.depth, &[Start { level: 0, code: 0 }]).1.facet_brick_tests
+                refine(&p.binned, &p.depth, &[SubtreeRoot { level: 0, code: 0 }])
+                    .1
+                    .facet_brick_tests
             }),
         ),
         kernel("flood", bricks, Box::new(move || floods(p.surface(), surface))),

@@ -1,4 +1,4 @@
-//! Readers of a set: its bricks, groups of them, those of the level below, and bits by ascending keys.
+//! Readers of a set: bricks, groups of bricks, bricks of the children, and lookups by ascending keys.
 
 use super::{BrickSet, Run, high_of};
 use crate::brick::{self, Brick};
@@ -12,7 +12,7 @@ pub struct Bricks<'a> {
     /// End of the current run, and its keys' upper half.
     run_end: usize,
     high: u64,
-    /// Runs behind.
+    /// Runs after the current one.
     runs: &'a [Run],
 }
 
@@ -29,10 +29,10 @@ impl Iterator for Bricks<'_> {
     #[inline]
     fn next(&mut self) -> Option<Brick> {
         if self.at == self.run_end {
-            let (run, behind) = self.runs.split_first()?;
+            let (run, after) = self.runs.split_first()?;
             self.high = run.high;
-            self.run_end = behind.first().map_or(self.set.len(), |r| r.start);
-            self.runs = behind;
+            self.run_end = after.first().map_or(self.set.len(), |r| r.start);
+            self.runs = after;
         }
         let at = self.at;
         self.at += 1;
@@ -53,7 +53,7 @@ impl<'a> Groups<'a> {
 }
 
 impl Iterator for Groups<'_> {
-    /// The first brick's key, and the positions of all.
+    /// The first brick's key, and the positions of all bricks.
     type Item = (u64, Range<usize>);
 
     #[inline]
@@ -67,7 +67,8 @@ impl Iterator for Groups<'_> {
     }
 }
 
-/// How many elements are before the first of which `leads` is not true. A gallop: quick where that is near.
+/// Number of elements before the first one for which `leads` is false. Galloping search: fast if that one is
+/// near.
 #[inline]
 fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
     let mut step = 1;
@@ -83,7 +84,7 @@ fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
 pub struct ChildBricks<'a> {
     bricks: Bricks<'a>,
     now: Brick,
-    /// Groups of the brick that are not told yet.
+    /// Sibling groups of the brick that remain.
     left: u8,
 }
 
@@ -113,12 +114,12 @@ impl Iterator for ChildBricks<'_> {
 /// Reads a set in ascending order of keys; see [`BrickSet::cursor`].
 pub struct Cursor<'a> {
     set: &'a BrickSet,
-    /// What is left of the current run.
+    /// The rest of the current run.
     low: &'a [u32],
-    /// The run's end, and its keys' upper half; behind the last run higher than any.
+    /// The run's end, and its keys' upper half: after the last run, higher than that of any key.
     end: usize,
     high: u64,
-    /// Runs behind.
+    /// Runs after the current one.
     runs: &'a [Run],
 }
 
@@ -129,11 +130,11 @@ impl<'a> Cursor<'a> {
         cursor
     }
 
-    /// The bits of the brick `key`, which is not before any key asked for earlier.
+    /// The bits of brick `key`, 0 if the set has none. Keys of consecutive queries must not descend.
     #[inline(always)]
     pub fn get(&mut self, key: u64) -> u64 {
         if self.high == high_of(key) {
-            // Most often it is the next one.
+            // The usual case is the next brick.
             if let [low, rest @ ..] = self.low
                 && *low < key as u32
             {
@@ -148,7 +149,7 @@ impl<'a> Cursor<'a> {
         self.seek(key)
     }
 
-    /// Goes on to a brick behind the one that is next.
+    /// Continues the search after the next brick.
     fn seek(&mut self, key: u64) -> u64 {
         while self.high < high_of(key) {
             self.next_run();
@@ -157,7 +158,7 @@ impl<'a> Cursor<'a> {
             return 0;
         }
         let want = key as u32;
-        // What the reader skips (another rank's share, deleted parts) may be long.
+        // Long parts may be skipped: those of other ranks, or of the deleted region.
         self.low = &self.low[leading(self.low, |low| low < want)..];
         match self.low {
             [low, ..] if *low == want => self.set.bits[self.end - self.low.len()],
@@ -166,13 +167,13 @@ impl<'a> Cursor<'a> {
     }
 
     fn next_run(&mut self) {
-        let Some((run, behind)) = self.runs.split_first() else {
+        let Some((run, after)) = self.runs.split_first() else {
             (self.low, self.high) = (&[], u64::MAX);
             return;
         };
         self.high = run.high;
-        self.end = behind.first().map_or(self.set.len(), |r| r.start);
+        self.end = after.first().map_or(self.set.len(), |r| r.start);
         self.low = &self.set.low[run.start..self.end];
-        self.runs = behind;
+        self.runs = after;
     }
 }

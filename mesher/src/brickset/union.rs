@@ -4,20 +4,20 @@ use super::{BrickSet, Run, high_of};
 use crate::brick::Brick;
 
 impl BrickSet {
-    /// The union of two sets. In place, from the back, as sets can be a good part of all memory.
+    /// The union of two sets. Merges in place, from the back, because sets take much of the memory.
     pub fn union(self, other: Self) -> Self {
         let (mut set, rest) = if self.len() < other.len() { (other, self) } else { (self, other) };
         if rest.is_empty() {
             return set;
         }
-        let mut there = set.cursor();
-        let common = rest.bricks().filter(|b| there.get(b.key) != 0).count();
+        let mut cursor = set.cursor();
+        let common = rest.bricks().filter(|b| cursor.get(b.key) != 0).count();
         let (mut mine, mut theirs) = (Back::new(&set), Back::new(&rest));
         let mut k = set.len() + rest.len() - common;
         set.reserve_exact(k - set.len());
         set.low.resize(k, 0);
         set.bits.resize(k, 0);
-        // Runs behind those that stay as they are, from the last.
+        // New runs, in descending order; the runs before them do not change.
         let mut runs: Vec<Run> = Vec::new();
         while let Some(r) = theirs.last(&rest) {
             k -= 1;
@@ -48,11 +48,11 @@ impl BrickSet {
     }
 }
 
-/// Reads a set from the back; the set may change behind the bricks still to be read.
+/// Reads a set from the back; bricks that have been read may be overwritten.
 struct Back {
-    /// Bricks still to be read.
+    /// Number of bricks that remain.
     left: usize,
-    /// Runs that have some of them.
+    /// Number of runs that they belong to.
     runs: usize,
 }
 

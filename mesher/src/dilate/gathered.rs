@@ -1,42 +1,42 @@
-//! What overlapping tiles give, gathered and sorted.
+//! The results of overlapping tiles, combined and sorted.
 
 use crate::brick;
 use crate::brickset::BrickSet;
 use crate::octant::{Level, morton};
 use std::collections::HashMap;
 
-/// Bricks that results are gathered in together, as a power of two: 2 x 2 x 2, of which a layer fills most.
+/// log2 of the bricks in a block, in which results are gathered: 2 x 2 x 2, most of which a layer fills.
 const BLOCK_LOG2: u32 = 3;
-/// The same as a number.
+/// Number of bricks in a block.
 const BLOCK: usize = 1 << BLOCK_LOG2;
-/// Blocks that are found together, as a power of two: 4 x 4 x 4, as many as a tile has.
+/// log2 of the blocks in a page: 4 x 4 x 4, as many as a tile has.
 const PAGE_LOG2: u32 = 6;
-/// The same as a number.
+/// Number of blocks in a page.
 const PAGE: usize = 1 << PAGE_LOG2;
-/// A block that is not there.
+/// Marks a block that does not exist.
 const NONE: u32 = u32::MAX;
 
 /// Bricks gathered from overlapping tiles, block by block.
 ///
-/// Blocks are found by their *page*. A tile and its margin touch 3 x 3 x 3 pages, over and over; those are
-/// found in a table of the latest page by position modulo 4, in which neighbours do not collide.
+/// Blocks are looked up by *page*. A tile and its margin touch 3 x 3 x 3 pages, many times each; a table of the
+/// most recent page by position modulo 4, in which neighbours do not collide, finds these.
 pub struct Gathered {
     /// Blocks along the root's edge.
     extent: i64,
-    /// Bits that exist at this level, by brick of a block.
+    /// Bits that octants of this level can have, by brick of a block.
     valid: [u64; BLOCK],
     numbers: HashMap<u64, u32, Spread>,
-    /// Blocks by page, [`NONE`] where there is none.
+    /// Blocks of each page, or [`NONE`].
     pages: Vec<[u32; PAGE]>,
     words: Vec<[u64; BLOCK]>,
-    /// Keys of the latest pages, and their numbers.
+    /// Keys of the most recent pages, and their numbers.
     latest: [(u64, u32); PAGE],
 }
 
 impl Gathered {
-    /// Nothing yet, of level `l`.
+    /// No bricks, of level `l`.
     pub fn new(l: Level) -> Self {
-        // Above level 3 the root has a single brick, whose block has no other.
+        // At levels 0 to 2 the root is a single brick.
         let valid = |i: usize| if l < 3 && i > 0 { 0 } else { brick::valid(l) };
         Self {
             extent: if l < 3 { 1 } else { 1 << (l - 3) },
@@ -48,7 +48,7 @@ impl Gathered {
         }
     }
 
-    /// Ors bits into the bricks of the block at a position; outside the root they are dropped.
+    /// Combines bits with the bricks of the block at position `p` by or; drops those outside the root.
     #[inline]
     pub fn add(&mut self, p: [i64; 3], bits: &[u64; BLOCK]) {
         if p.iter().any(|c| !(0..self.extent).contains(c)) {
@@ -65,7 +65,7 @@ impl Gathered {
         words.zip(bits).zip(&self.valid).for_each(|((w, b), valid)| *w |= b & valid);
     }
 
-    /// The number of a page, a new one if need be.
+    /// The number of a page, which is created if it does not exist.
     #[inline]
     fn page(&mut self, key: u64) -> u32 {
         let latest = &mut self.latest[key as usize % PAGE];
@@ -79,7 +79,7 @@ impl Gathered {
         latest.1
     }
 
-    /// All that was gathered.
+    /// The set of all octants gathered.
     pub fn into_set(self) -> BrickSet {
         let mut order: Vec<(u64, u32)> = self.numbers.into_iter().collect();
         order.sort_unstable();
@@ -96,7 +96,7 @@ impl Gathered {
     }
 }
 
-/// Hashing of Morton codes: a multiplication spreads them well enough.
+/// Hash function for Morton codes: one multiplication spreads them well enough.
 #[derive(Clone, Copy, Default)]
 struct Spread(u64);
 

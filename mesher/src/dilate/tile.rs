@@ -1,4 +1,4 @@
-//! One tile: 32 x 32 x 32 octants and a margin, one machine word per row.
+//! One tile: 32 x 32 x 32 octants and a margin, one word per row.
 
 use super::gathered::Gathered;
 use super::{MARGIN, TILE, TILE_BRICKS_LOG2, Words};
@@ -8,34 +8,37 @@ use crate::octant::position;
 use crate::wide::widest;
 use std::ops::Range;
 
-/// A tile and its margin, one word per row. Most of a tile may be empty, above all of coarse levels; so only those rows
-/// are touched that a result can be in. What is used again and again need not be zeroed.
+/// A tile and its margin, one word per row. Tiles are mostly empty at coarse levels, so only rows that can hold a
+/// result are touched. A tile is reused, to avoid zeroing its memory.
+///
+/// Invariant between dilations: the tile is empty, so `rows` and `half` are zero.
 #[derive(Debug, Default)]
 pub struct Tile {
     radius: usize,
-    /// Rows before and behind the tile's own along y and z: the radius, up to whole parent bricks.
+    /// Rows on either side of the tile's own along y and z: the radius, rounded up to whole bricks of parents.
     margin: usize,
-    /// Rows along y and along z.
+    /// Number of rows along y, and along z.
     side: usize,
     /// All zero in an empty tile.
     rows: Vec<u64>,
-    /// Which of the tile's own positions along z have a source; and which along y may have one, at any of them and at each.
+    /// Masks of the tile's own positions: those along z that have a source; those along y that may have one, at any z
+    /// and at each z.
     layers: u32,
     columns: u32,
     columns_at: [u32; TILE],
-    /// The rows after the passes along x and y; scratch.
+    /// Scratch: the rows after the passes along x and y.
     spread: Vec<u64>,
-    /// Rows of parents; all zero but while a result is handed over.
+    /// Rows of parents; all zero except during a flush.
     half: Vec<u64>,
 }
 
-/// From the first set bit to behind the last one.
+/// The range from the first set bit to the last.
 fn span(bits: u32) -> Range<usize> {
     bits.trailing_zeros() as usize..(u32::BITS - bits.leading_zeros()) as usize
 }
 
 impl Tile {
-    /// Makes an empty tile one that dilates by `radius`.
+    /// Sets the radius of an empty tile.
     pub fn set_radius(&mut self, radius: usize) {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         self.radius = radius;
@@ -46,7 +49,7 @@ impl Tile {
         self.half.resize(self.side * self.side / 4, 0);
     }
 
-    /// The rows along y, and those along z, that results are in. The tile is not empty.
+    /// The ranges of rows, along y and along z, that can hold results. The tile must not be empty.
     fn reached(&self) -> [Range<usize>; 2] {
         [self.columns, self.layers].map(|sources| {
             let Range { start, end } = span(sources);
@@ -54,7 +57,7 @@ impl Tile {
         })
     }
 
-    /// The layers along z that have sources, and the rows in them that sources reach along y.
+    /// The positions along z that have sources, each with the range of rows that these reach along y.
     #[inline(always)]
     fn along_y(&self) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
         let (r, m) = (self.radius, self.margin);
@@ -64,7 +67,7 @@ impl Tile {
         })
     }
 
-    /// Adds a source brick, which is not empty.
+    /// Adds a source brick, which must not be empty.
     pub fn put(&mut self, b: Brick) {
         let [x, y, z] =
             position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
@@ -85,7 +88,7 @@ impl Tile {
         }
     }
 
-    /// Dilates what was put in, along x, then y, then z.
+    /// Dilates the sources along x, then y, then z.
     pub fn dilate(&mut self, words: &mut Words) {
         *words += self.along_y().map(|(_, y)| y.len() as u64).sum::<u64>();
         if self.radius > 0 {
@@ -118,9 +121,9 @@ impl Tile {
         (self.rows, self.spread) = (rows, spread);
     }
 
-    /// Hands over the result and empties the tile.
-    pub fn give(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
-        give_blocks(self, tile, to_parents, out);
+    /// Adds the result, or its parents, to `out` and empties the tile.
+    pub fn flush(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
+        flush_blocks(self, tile, to_parents, out);
         let [along_y, along_z] = self.reached();
         for z in along_z {
             self.rows[z * self.side..(z + 1) * self.side][along_y.clone()].fill(0);
@@ -129,7 +132,7 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn give_lanes(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
+    fn flush_lanes(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
         let scale = if to_parents { 2 } else { 1 };
         let side = self.side / scale;
         let reached = self.reached();
@@ -137,11 +140,11 @@ impl Tile {
             halve(&self.rows, &mut self.half, side, &reached);
         }
         let rows = if to_parents { &self.half } else { &self.rows };
-        // The first brick of the padded tile, in bricks of the result's level; even along x.
+        // The first brick of the tile with its margin, in bricks of the result's level; even along x.
         let origin = position(tile).map(|p| i64::from(p) * (TILE / scale / 4) as i64);
         let margins = [MARGIN, self.margin, self.margin].map(|m| (m / scale / 4) as i64);
         let first: [i64; 3] = std::array::from_fn(|a| origin[a] - margins[a]);
-        // Blocks of 2 x 2 x 2 bricks start at even ones.
+        // Blocks of 2 x 2 x 2 bricks start at even positions.
         let [along_y, along_z] = [1, 2].map(|a| {
             let bricks = |row: usize| first[a] + (row / scale / 4) as i64;
             let Range { start, end } = reached[a - 1];
@@ -171,13 +174,13 @@ impl Tile {
     }
 }
 
-/// Whether a bit is set; a comparison with zeros would be a call.
+/// Whether any bit is set. A comparison with an array of zeros would compile to a call.
 #[inline(always)]
 fn any(words: &[u64]) -> bool {
     words.iter().fold(0, |all, w| all | w) != 0
 }
 
-/// The 16 bricks along x, with their bits in rows, at a place along y and z, in bricks; none beside the tile.
+/// The 16 bricks along x, with bits in row order, at a position along y and z in bricks; empty outside the tile.
 #[inline(always)]
 fn bricks_along(rows: &[u64], side: usize, y: i64, z: i64) -> [u64; 16] {
     let inside = 0..(side / 4) as i64;
@@ -197,17 +200,17 @@ widest! {
 }
 
 widest! {
-    fn give_blocks(tile: &mut Tile, number: u64, to_parents: bool, out: &mut Gathered) = Tile::give_lanes;
+    fn flush_blocks(tile: &mut Tile, number: u64, to_parents: bool, out: &mut Gathered) = Tile::flush_lanes;
 }
 
-/// Where the parents of some rows along y and along z are.
+/// The ranges, along y and along z, of the parents of some rows.
 #[inline(always)]
 fn halves(rows: &[Range<usize>; 2]) -> [Range<usize>; 2] {
     [0, 1].map(|a| rows[a].start / 2..rows[a].end.div_ceil(2))
 }
 
-/// Rows of the parents, `side` by `side` of them, of those rows along y and along z that were reached: pairs along all
-/// three axes ored together.
+/// Writes the parents of the reached rows to `half`, with `side` rows along y: combines pairs along all three
+/// axes by or.
 #[inline(always)]
 fn halve(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2]) {
     let [along_y, along_z] = halves(reached);
@@ -221,7 +224,7 @@ fn halve(rows: &[u64], half: &mut [u64], side: usize, reached: &[Range<usize>; 2
     }
 }
 
-/// Makes the four bits `j` of row `i` the four bits `i` of row `j`: from 16 rows of 16 bricks to 16 bricks.
+/// Transposes a 16 x 16 matrix of nibbles: from 16 rows across 16 bricks to 16 bricks.
 #[inline(always)]
 fn transpose(rows: &mut [u64; 16]) {
     for (step, low) in [
@@ -246,10 +249,10 @@ fn or_into(to: &mut [u64], from: &[u64]) {
     }
 }
 
-/// A row with every bit spread by `r` to both sides, by doubling.
+/// Dilates a row by `r` in both directions, by doubling.
 #[inline(always)]
 fn dilate_row(row: u64, r: usize) -> u64 {
-    // Every bit starts a run that is `run` long; the margin below keeps bits from falling out.
+    // Each bit grows to a run of length `run`. The margin keeps bits from being shifted out.
     let mut wide = row >> r;
     let mut run = 1;
     while run < 2 * r + 1 {
@@ -276,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_nibble_is_transposed() {
+    fn transposition_moves_every_nibble() {
         for (i, j) in (0..16).flat_map(|i| (0..16).map(move |j| (i, j))) {
             let mut rows = [0; 16];
             rows[i] = 0b1011 << (4 * j);
@@ -290,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_spread_both_ways() {
+    fn rows_are_dilated_in_both_directions() {
         for r in 0..=16 {
             let want = (32 - r..=32 + r).fold(0u64, |w, b| w | 1 << b);
             assert_eq!(dilate_row(1 << 32, r), want);

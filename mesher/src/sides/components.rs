@@ -1,9 +1,9 @@
-//! Joins the components of bricks into those of the tree, as far as this rank sees.
+//! Merges the local components of bricks, within the bricks that this rank holds.
 //!
-//! A depth-first walk carries, for each level, the brick on the way down and its six face
-//! neighbours, so that no neighbour is searched for. Leaves of one level are joined from the lower to
-//! the higher side; a leaf and a coarser one from the finer leaf, which climbs the way until it finds the leaf
-//! that covers the octant it faces.
+//! A depth-first walk keeps, for each level, the brick on the path from the root and its six face
+//! neighbours, so that no neighbour needs a search. Two leaves of one level are merged from the lower
+//! side of their common face. Two leaves of different levels are merged from the finer one: the walk
+//! ascends the path until it finds the leaf that covers the octant across the face.
 
 use super::nodes::{Component, Family, Node, Nodes};
 use crate::brick;
@@ -11,26 +11,27 @@ use crate::brickset::ones;
 use crate::octant::{Level, neighbour};
 use crate::partition::ownership::{Ownership, Placement};
 
-/// The joined components, and the faces that another rank must look at.
-pub struct Local {
+/// A union-find over local components, and the faces whose other side only another rank sees.
+pub struct LocalMerge {
     parent: Vec<Component>,
-    /// What other ranks must be asked about: octants of theirs that a component of this rank faces, and components
-    /// in bricks that several ranks hold and another answers for.
-    pub faces: Vec<Face>,
+    /// What other ranks must merge: octants in their bricks that a component of this rank faces, and
+    /// components in replicas of bricks that another rank owns.
+    pub faces: Vec<FacedOctants>,
 }
 
-/// Joined components, numbered.
-pub struct Classes {
-    /// The class of each component.
+/// Merged components, numbered from 0 on this rank.
+pub struct MergedComponents {
+    /// The merged component of each local component.
     pub of: Vec<u32>,
-    /// How many there are.
+    /// Number of merged components.
     pub count: u32,
 }
 
-/// Octants of a brick, of leaf size or finer, that a component faces or has.
+/// Octants of a brick that belong to a component or share a face with it. They are leaves, or lie in
+/// coarser leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
-    /// The rank that answers for the brick.
+pub struct FacedOctants {
+    /// The rank that owns the brick.
     pub rank: usize,
     /// The level of the facing leaf.
     pub level: Level,
@@ -42,8 +43,8 @@ pub struct Face {
     pub bits: u64,
 }
 
-impl Local {
-    /// The component that stands for all joined with `c`.
+impl LocalMerge {
+    /// The representative of all components merged with `c`: the one with the lowest number.
     #[inline]
     pub fn find(&mut self, mut c: Component) -> Component {
         while self.parent[c as usize] != c {
@@ -54,23 +55,23 @@ impl Local {
         c
     }
 
-    /// Numbers the classes of joined components.
-    pub fn classes(self) -> Classes {
-        let mut class = self.parent;
+    /// Numbers the merged components.
+    pub fn numbered(self) -> MergedComponents {
+        let mut merged = self.parent;
         let mut count = 0;
-        for c in 0..class.len() {
-            // A parent's number is never higher than its child's, so its class is there already.
-            let up = class[c] as usize;
-            class[c] = if up == c { count } else { class[up] };
+        for c in 0..merged.len() {
+            // A parent in the union-find has a lower number than its child, so it is numbered already.
+            let up = merged[c] as usize;
+            merged[c] = if up == c { count } else { merged[up] };
             count += u32::from(up == c);
         }
-        Classes { of: class, count }
+        MergedComponents { of: merged, count }
     }
 
-    /// Joins two components; the lower number stands for both.
+    /// Merges two components.
     #[inline]
-    pub fn join(&mut self, a: Component, b: Component) {
-        // Mostly they are joined already, and know it.
+    pub fn unite(&mut self, a: Component, b: Component) {
+        // Most pairs have been merged before and have the same parent.
         if self.parent[a as usize] == self.parent[b as usize] {
             return;
         }
@@ -79,45 +80,45 @@ impl Local {
     }
 }
 
-/// What lies across a brick's face.
+/// The other side of a brick's face.
 #[derive(Clone, Copy)]
 enum Across {
     /// Outside the root.
     Nothing,
-    /// Leaves coarser than this level.
+    /// Leaves coarser than the brick's octants.
     Coarser,
-    /// Other ranks' bricks.
+    /// A brick that this rank does not hold.
     Remote,
-    /// A node of this level and which of its octants exist.
+    /// A brick of the same level: its node, and the mask of its octants that exist.
     Here(Node, u64),
 }
 
-/// A brick on the way down.
+/// A brick on the path from the root.
 #[derive(Clone, Copy)]
 struct Frame {
     key: u64,
     node: Node,
     exists: u64,
-    /// By axis, down and up.
+    /// By axis; lower side, upper side.
     across: [[Across; 2]; 3],
 }
 
-/// What lies across a brick's face, for its children to step across.
+/// The other side of a brick's face, as its children need it.
 #[derive(Clone, Copy)]
 enum Beyond {
-    /// No bricks of the children's level.
+    /// Without bricks of the children's level.
     Never(Across),
-    /// The children of a brick.
+    /// The children of the brick across the face.
     Here(Family),
 }
 
-/// Joins all components that share part of a face, as far as this rank's nodes tell.
-pub fn join(nodes: &Nodes, ownership: &Ownership) -> Local {
+/// Merges all components that share part of a face, in the bricks that this rank holds.
+pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
     let mut w = Walk {
         nodes,
         ownership,
-        local: Local { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
-        way: Vec::new(),
+        local: LocalMerge { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
+        path: Vec::new(),
     };
     let root = Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] };
     w.visit(0, &root);
@@ -127,52 +128,52 @@ pub fn join(nodes: &Nodes, ownership: &Ownership) -> Local {
 struct Walk<'a> {
     nodes: &'a Nodes,
     ownership: &'a Ownership,
-    local: Local,
-    /// The bricks on the way down, by level.
-    way: Vec<Frame>,
+    local: LocalMerge,
+    /// The bricks on the path from the root, by level.
+    path: Vec<Frame>,
 }
 
 impl Walk<'_> {
     fn visit(&mut self, l: Level, frame: &Frame) {
-        self.join_brick(l, frame);
+        self.merge_brick(l, frame);
         let nodes = self.nodes;
         let family = nodes.family(l, frame.node);
         if family.bricks() == 0 {
             return;
         }
-        // Found once for all children, each of which steps across three of them.
+        // Looked up once for all children; each of them crosses three of the faces.
         let beyond = frame.across.map(|sides| {
             sides.map(|across| match across {
                 Across::Here(n, _) => Beyond::Here(nodes.family(l, n)),
                 other => Beyond::Never(other),
             })
         });
-        self.way.push(*frame);
+        self.path.push(*frame);
         for j in ones(u64::from(family.bricks())) {
             if let Some(child) = step_down(nodes, l, frame, &family, &beyond, u64::from(j)) {
                 self.visit(l + 1, &child);
             }
         }
-        self.way.pop();
+        self.path.pop();
     }
 
-    /// Joins the components of one brick with what they face.
-    fn join_brick(&mut self, l: Level, frame: &Frame) {
+    /// Merges the components of one brick with those across its faces.
+    fn merge_brick(&mut self, l: Level, frame: &Frame) {
         let nodes = self.nodes;
-        let elsewhere = nodes.place(l, frame.node) == Placement::PartiallyReplicated
+        let is_replica = nodes.placement(l, frame.node) == Placement::PartiallyReplicated
             && !self.ownership.owns(l, frame.key);
         for (c, bits) in nodes.components(l, frame.node) {
-            if elsewhere {
-                // Whoever answers for the brick joins it with what it faces, and this rank's copy with its own.
-                self.report_status(l, frame.key, c, bits);
+            if is_replica {
+                // The owner merges the brick with its neighbours, and this replica's components with its own.
+                self.record_face(l, frame.key, c, bits);
             }
             let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
-            self.join_coarser(l, c, frame.key, inner, None);
+            self.merge_coarser(l, c, frame.key, inner, None);
             for axis in 0..3 {
                 for up in 0..2 {
                     let faced = brick::across(bits, axis, up == 1) & brick::valid(l);
                     if faced != 0 {
-                        self.join_across(l, frame, c, faced, axis, up);
+                        self.merge_across(l, frame, c, faced, axis, up);
                     }
                 }
             }
@@ -180,7 +181,7 @@ impl Walk<'_> {
     }
 
     #[inline]
-    fn join_across(
+    fn merge_across(
         &mut self,
         l: Level,
         frame: &Frame,
@@ -192,49 +193,44 @@ impl Walk<'_> {
         let nodes = self.nodes;
         match frame.across[axis][up] {
             Across::Nothing => {}
-            Across::Coarser => self.join_coarser(l, c, frame.key, faced, Some((axis, up))),
+            Across::Coarser => self.merge_coarser(l, c, frame.key, faced, Some((axis, up))),
             Across::Remote => {
-                let asks = match nodes.place(l, frame.node) {
+                let sends = match nodes.placement(l, frame.node) {
                     Placement::Local => true,
                     Placement::PartiallyReplicated => self.ownership.owns(l, frame.key),
-                    // What a top brick faces, the other rank sees itself.
+                    // The other rank holds the fully replicated brick as well.
                     Placement::FullyReplicated | Placement::Remote(_) => false,
                 };
-                if asks {
-                    let there = neighbour(l - 2, frame.key, axis, up == 1);
-                    self.report_status(
-                        l,
-                        there.expect("a brick faces one inside the root"),
-                        c,
-                        faced,
-                    );
+                if sends {
+                    let across = neighbour(l - 2, frame.key, axis, up == 1);
+                    self.record_face(l, across.expect("the neighbour lies in the root"), c, faced);
                 }
             }
             Across::Here(n, exists) => {
                 if up == 1 {
                     for (d, bits) in nodes.components(l, n) {
                         if bits & faced != 0 {
-                            self.local.join(c, d);
+                            self.local.unite(c, d);
                         }
                     }
                 }
                 if faced & !exists != 0 {
-                    self.join_coarser(l, c, frame.key, faced & !exists, Some((axis, up)));
+                    self.merge_coarser(l, c, frame.key, faced & !exists, Some((axis, up)));
                 }
             }
         }
     }
 
-    /// Has the rank that answers for a brick told which of its octants a component meets.
-    fn report_status(&mut self, level: Level, key: u64, component: Component, bits: u64) {
+    /// Records, for the owner of a brick, the octants of the brick that a component has or faces.
+    fn record_face(&mut self, level: Level, key: u64, component: Component, bits: u64) {
         let rank = self.ownership.owner(level, key);
-        self.local.faces.push(Face { rank, level, key, component, bits });
+        self.local.faces.push(FacedOctants { rank, level, key, component, bits });
     }
 
-    /// Joins a component of a brick, which has key `key`, with the leaves coarser than level `l` that cover the octants
-    /// `faced` of the brick itself (`side` none) or of its neighbour there.
+    /// Merges a component of brick `key` of level `l` with the coarser leaves that cover the octants `faced`:
+    /// octants of the brick itself if `side` is none, of its neighbour on this side otherwise.
     #[inline]
-    fn join_coarser(
+    fn merge_coarser(
         &mut self,
         l: Level,
         c: Component,
@@ -246,7 +242,8 @@ impl Walk<'_> {
         while faced != 0 && m > 0 {
             let mut group = key & 7;
             if let Some((axis, up)) = side {
-                // Beside its own group, and in the same brick if that is on the way there.
+                // The octants lie in the group next to the brick's own, in the same parent brick if that group is on
+                // the inner side.
                 if group >> axis & 1 != up as u64 {
                     side = None;
                 }
@@ -255,7 +252,7 @@ impl Walk<'_> {
             faced = u64::from(brick::parents(faced)) << (8 * group);
             key >>= 3;
             m -= 1;
-            let frame = &self.way[m as usize];
+            let frame = &self.path[m as usize];
             let (node, exists) = match side {
                 None => (frame.node, frame.exists),
                 Some((axis, up)) => match frame.across[axis][up] {
@@ -266,7 +263,7 @@ impl Walk<'_> {
             if faced & exists != 0 {
                 for (d, bits) in self.nodes.components(m, node) {
                     if bits & faced != 0 {
-                        self.local.join(c, d);
+                        self.local.unite(c, d);
                     }
                 }
                 faced &= !exists;
@@ -275,7 +272,7 @@ impl Walk<'_> {
     }
 }
 
-/// The frame of child brick `j`; none if it is another rank's.
+/// The frame of child brick `j`; none if this rank does not hold it.
 #[inline]
 fn step_down(
     nodes: &Nodes,
@@ -286,7 +283,7 @@ fn step_down(
     j: u64,
 ) -> Option<Frame> {
     let (node, exists) = family.child(j)?;
-    if let Placement::Remote(_) = nodes.place(l + 1, node) {
+    if let Placement::Remote(_) = nodes.placement(l + 1, node) {
         return None;
     }
     let mut across = [[Across::Nothing; 2]; 3];
@@ -302,7 +299,7 @@ fn step_down(
     Some(Frame { key: frame.key << 3 | j, node, exists, across })
 }
 
-/// What lies across a face of a child brick, which is to be octant group `j` there.
+/// The other side of a face of a child brick: octant group `j` of the brick across.
 #[inline]
 fn step_across(nodes: &Nodes, l: Level, beyond: &Beyond, j: u64) -> Across {
     let family = match beyond {
@@ -311,7 +308,7 @@ fn step_across(nodes: &Nodes, l: Level, beyond: &Beyond, j: u64) -> Across {
     };
     match family.child(j) {
         None => Across::Coarser,
-        Some((n, exists)) => match nodes.place(l + 1, n) {
+        Some((n, exists)) => match nodes.placement(l + 1, n) {
             Placement::Remote(_) => Across::Remote,
             _ => Across::Here(n, exists),
         },

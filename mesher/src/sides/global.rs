@@ -1,10 +1,11 @@
-//! Components across ranks: names that all ranks agree on.
+//! Components of the whole tree: labels that all ranks agree on.
 //!
-//! What reaches into top bricks, of which all hold copies, is named by them. Each rank tells its
-//! neighbours which octants of theirs its components face, and by what name; where names differ, they
-//! are joined. Only such pairs travel to everybody.
+//! Components in fully replicated bricks are labelled by these bricks, which all ranks merge alike and
+//! without messages. Then each rank sends its neighbours the octants of theirs that its components face,
+//! with the components' labels. Where labels differ across a face, the pair is an edge of a graph; only
+//! a spanning forest of each group of ranks' edges goes to all ranks.
 
-use super::components::{self, Classes, Face};
+use super::components::{self, FacedOctants, MergedComponents};
 use super::nodes::{Component, Nodes};
 use crate::comm::{Comm, MessageBuffer};
 use crate::octant::Level;
@@ -12,149 +13,156 @@ use crate::partition::ownership::{Ownership, Placement};
 use crate::tree::{LEVELS, Tree};
 use std::collections::HashMap;
 
-/// A component's name, the same on all ranks.
-pub type Name = u64;
+/// Label of a component of the tree, the same on all ranks.
+pub type Label = u64;
 
-/// Names for this rank's classes of joined components. Collective.
-pub fn names(
+/// Labels of this rank's merged components: equal labels mean one component of the whole tree. Collective.
+pub fn labels(
     nodes: &Nodes,
     tree: &Tree,
     ownership: &Ownership,
-    faces: Vec<Face>,
-    classes: &Classes,
+    faces: Vec<FacedOctants>,
+    merged: &MergedComponents,
     comm: &dyn Comm,
-) -> Vec<Name> {
-    let own = |class: u32| (comm.rank() as u64 + 1) << 40 | u64::from(class);
-    let mut names: Vec<Name> = (0..classes.count).map(own).collect();
+) -> Vec<Label> {
+    let own = |component: u32| (comm.rank() as u64 + 1) << 40 | u64::from(component);
+    let mut labels: Vec<Label> = (0..merged.count).map(own).collect();
     if comm.size() == 1 {
-        return names;
+        return labels;
     }
-    let mut pairs = name_by_top(&mut names, nodes, tree, ownership, classes);
-    pairs.extend(across_ranks(nodes, faces, classes, &names, comm));
-    let mut joined = Joined::default();
-    for &[a, b] in comm.all_gather(&summed_up(pairs, comm)).words().as_chunks().0 {
-        joined.join(a, b);
+    let mut pairs = label_replicated(&mut labels, nodes, tree, ownership, merged);
+    pairs.extend(across_ranks(nodes, faces, merged, &labels, comm));
+    let mut unions = UnionFind::default();
+    for &[a, b] in comm.all_gather(&group_forest(pairs, comm)).words().as_chunks().0 {
+        unions.unite(a, b);
     }
-    names.iter().map(|&n| joined.find(n)).collect()
+    labels.iter().map(|&n| unions.find(n)).collect()
 }
 
-/// Pairs of names, few, that join what all ranks' pairs join. Neighbours see the same from both sides, and ranks that
-/// follow each other are neighbours: so one for each group of ranks does their joining first. Collective.
-fn summed_up(pairs: Vec<[Name; 2]>, comm: &dyn Comm) -> Vec<u64> {
-    let mine: Vec<u64> = Joined::of(&pairs).pairs();
+/// A spanning forest of the pairs of all ranks in a group, on the group's first rank, and none on the others.
+/// Both sides of a face yield the same pair, and consecutive ranks are often neighbours; so a group's
+/// forest is much smaller than all its pairs. Collective.
+fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<u64> {
+    let mine: Vec<u64> = UnionFind::of(&pairs).spanning_forest();
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
-    let heard = comm.sparse_all_to_all([(first, mine)].into_iter().collect());
-    Joined::of(heard.words().as_chunks().0).pairs()
+    let received = comm.sparse_all_to_all([(first, mine)].into_iter().collect());
+    UnionFind::of(received.words().as_chunks().0).spanning_forest()
 }
 
-/// Gives the classes that a top brick has part of the name that they have for all ranks: the number of
-/// a class of what is joined within the top. Returns the pairs of such names that are one class here.
-///
-/// Everyone holds the top, and joins it in the same way; so no word of it need travel.
-fn name_by_top(
-    names: &mut [Name],
+/// Labels the merged components that have a part in a fully replicated brick by the number of this part's
+/// merged component within the fully replicated bricks alone. All ranks hold these bricks and merge them
+/// alike, so the labels need no message. Returns the pairs of such labels that belong to one merged
+/// component of this rank.
+fn label_replicated(
+    labels: &mut [Label],
     nodes: &Nodes,
     tree: &Tree,
     ownership: &Ownership,
-    classes: &Classes,
-) -> Vec<[Name; 2]> {
+    merged: &MergedComponents,
+) -> Vec<[Label; 2]> {
     let non_owning_view = ownership.non_owning_view();
-    let top = Nodes::new(&ownership.top_of(tree), &non_owning_view);
-    let of_top = components::join(&top, &non_owning_view).classes().of;
-    let here = top_components(nodes);
-    assert_eq!(here.len(), of_top.len(), "all ranks hold the same top bricks");
+    let replicated = Nodes::new(&ownership.top_of(tree), &non_owning_view);
+    let of_replicated = components::merge(&replicated, &non_owning_view).numbered().of;
+    let of_nodes = replicated_components(nodes);
+    assert_eq!(
+        of_nodes.len(),
+        of_replicated.len(),
+        "all ranks hold the same fully replicated bricks"
+    );
     let mut pairs = Vec::new();
-    let mut named = vec![false; names.len()];
-    for (c, top) in here.into_iter().zip(of_top) {
-        let class = classes.of[c as usize] as usize;
-        let (name, top) = (&mut names[class], Name::from(top));
-        if !std::mem::replace(&mut named[class], true) {
-            *name = top;
-        } else if *name != top {
-            pairs.push([*name, top]);
+    let mut labelled = vec![false; labels.len()];
+    for (c, replicated) in of_nodes.into_iter().zip(of_replicated) {
+        let component = merged.of[c as usize] as usize;
+        let (label, replicated) = (&mut labels[component], Label::from(replicated));
+        if !std::mem::replace(&mut labelled[component], true) {
+            *label = replicated;
+        } else if *label != replicated {
+            pairs.push([*label, replicated]);
         }
     }
     pairs
 }
 
-/// Pairs of names that are joined over a face between this rank's bricks and another's. Collective.
+/// Pairs of labels of components that share a face between this rank's bricks and another's. Collective.
 fn across_ranks(
     nodes: &Nodes,
-    mut faces: Vec<Face>,
-    classes: &Classes,
-    names: &[Name],
+    mut faces: Vec<FacedOctants>,
+    merged: &MergedComponents,
+    labels: &[Label],
     comm: &dyn Comm,
-) -> Vec<[Name; 2]> {
-    let name = |c: Component| names[classes.of[c as usize] as usize];
-    let place = |f: &Face| (f.rank, f.level, f.key, name(f.component));
-    faces.sort_unstable_by_key(place);
+) -> Vec<[Label; 2]> {
+    let label = |c: Component| labels[merged.of[c as usize] as usize];
+    let target = |f: &FacedOctants| (f.rank, f.level, f.key, label(f.component));
+    faces.sort_unstable_by_key(target);
     let mut out = MessageBuffer::default();
-    for run in faces.chunk_by(|a, b| place(a) == place(b)) {
+    for run in faces.chunk_by(|a, b| target(a) == target(b)) {
         let bits = run.iter().fold(0, |all, f| all | f.bits);
-        let (rank, level, key, name) = place(&run[0]);
-        out.write(rank, [u64::from(level), key, name, bits]);
+        let (rank, level, key, label) = target(&run[0]);
+        out.write(rank, [u64::from(level), key, label, bits]);
     }
     drop(faces);
     let (mut pairs, mut finder) = (Vec::new(), nodes.finder());
-    for &[level, key, theirs, bits] in comm.sparse_all_to_all(out).words().as_chunks().0 {
-        finder.meet(level as Level, key, bits, |c| {
-            let mine = name(c);
-            // Most of what faces another rank is named by the top already.
-            if theirs != mine && pairs.last() != Some(&[theirs, mine]) {
-                pairs.push([theirs, mine]);
+    for &[level, key, remote, bits] in comm.sparse_all_to_all(out).words().as_chunks().0 {
+        finder.find(level as Level, key, bits, |c| {
+            let mine = label(c);
+            // Most components on both sides have the label of a fully replicated brick already.
+            if remote != mine && pairs.last() != Some(&[remote, mine]) {
+                pairs.push([remote, mine]);
             }
         });
     }
     pairs
 }
 
-/// The components of top bricks, in an order that is the same on all ranks.
-fn top_components(nodes: &Nodes) -> Vec<Component> {
+/// The components of fully replicated bricks, in an order that is the same on all ranks.
+fn replicated_components(nodes: &Nodes) -> Vec<Component> {
     let mut out = Vec::new();
     for l in 0..LEVELS as Level {
-        for n in nodes.shared(l).filter(|&n| nodes.place(l, n) == Placement::FullyReplicated) {
+        for n in
+            nodes.with_placement(l).filter(|&n| nodes.placement(l, n) == Placement::FullyReplicated)
+        {
             out.extend(nodes.components(l, n).map(|c| c.0));
         }
     }
     out
 }
 
-/// A union-find over names, in which the least name stands for its class.
+/// A union-find over labels, in which the least label represents a set.
 #[derive(Default)]
-struct Joined {
-    up: HashMap<Name, Name>,
+struct UnionFind {
+    parent: HashMap<Label, Label>,
 }
 
-impl Joined {
-    fn of<'a>(pairs: impl IntoIterator<Item = &'a [Name; 2]>) -> Self {
-        let mut joined = Self::default();
-        pairs.into_iter().for_each(|&[a, b]| joined.join(a, b));
-        joined
+impl UnionFind {
+    fn of<'a>(pairs: impl IntoIterator<Item = &'a [Label; 2]>) -> Self {
+        let mut unions = Self::default();
+        pairs.into_iter().for_each(|&[a, b]| unions.unite(a, b));
+        unions
     }
 
-    /// Each name that is joined to a lesser one, and the least.
-    fn pairs(&self) -> Vec<u64> {
-        let mut pairs: Vec<[Name; 2]> = self.up.keys().map(|&n| [n, self.find(n)]).collect();
+    /// A spanning forest: each label with the representative of its set, if that is another one.
+    fn spanning_forest(&self) -> Vec<u64> {
+        let mut pairs: Vec<[Label; 2]> = self.parent.keys().map(|&n| [n, self.find(n)]).collect();
         pairs.sort_unstable();
         pairs.into_flattened()
     }
 
-    fn find(&self, mut n: Name) -> Name {
-        while let Some(&up) = self.up.get(&n) {
-            n = up;
+    fn find(&self, mut n: Label) -> Label {
+        while let Some(&parent) = self.parent.get(&n) {
+            n = parent;
         }
         n
     }
 
-    fn join(&mut self, a: Name, b: Name) {
+    fn unite(&mut self, a: Label, b: Label) {
         let (ra, rb) = (self.find(a), self.find(b));
         let root = ra.min(rb);
-        // Both ways are shortened, so that ways stay short.
+        // Path compression on both sides.
         for mut n in [a, b] {
             while n != root {
-                match self.up.insert(n, root) {
-                    Some(up) => n = up,
+                match self.parent.insert(n, root) {
+                    Some(parent) => n = parent,
                     None => break,
                 }
             }
@@ -167,10 +175,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_join_through_chains() {
-        let mut j = Joined::default();
+    fn labels_unite_through_chains() {
+        let mut j = UnionFind::default();
         for (a, b) in [(9, 8), (5, 6), (8, 6), (1, 2), (7, 9)] {
-            j.join(a, b);
+            j.unite(a, b);
         }
         assert!([5, 6, 7, 8, 9].iter().all(|&n| j.find(n) == 5));
         assert_eq!((j.find(2), j.find(1), j.find(3)), (1, 1, 3));

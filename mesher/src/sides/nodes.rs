@@ -1,7 +1,10 @@
-//! The base tree's bricks as a linked tree, with the components inside each brick.
+//! The base tree's bricks as a linked tree, with the local components of each brick.
 //!
-//! Invariants: nodes of a level are in Morton order; a node's children are neighbours in the next
-//! level, one per byte of `split` that is not zero; components are numbered through all levels in order.
+//! Invariants:
+//! - the nodes of a level are in Morton order;
+//! - the children of a node are contiguous in the next level, one for each non-zero byte of `split`;
+//! - components are numbered through all levels in order, and each is a non-empty set of octants that
+//!   are connected over faces within the brick.
 
 use crate::brick;
 use crate::octant::Level;
@@ -9,13 +12,13 @@ use crate::partition::ownership::{Ownership, Placement};
 use crate::tree::{LEVELS, Tree};
 use std::ops::Range;
 
-/// Number of a component inside a brick.
+/// Number of a local component: leaves of one brick that are connected over faces.
 pub type Component = u32;
 
-/// A node of a level, by number.
+/// Number of a node within its level.
 pub type Node = u32;
 
-/// All bricks that this rank holds, and stubs for the children of top bricks that it does not.
+/// All bricks that this rank holds, and placeholders for those children of its bricks that it does not hold.
 pub struct Nodes {
     levels: Vec<LevelNodes>,
     masks: Vec<u64>,
@@ -23,16 +26,16 @@ pub struct Nodes {
 
 #[derive(Default)]
 struct LevelNodes {
-    /// Empty if nothing is split at the level.
+    /// Split octants of each node; empty if no octant of the level is split.
     split: Vec<u64>,
     first_child: Vec<Node>,
-    /// First component; one more entry than nodes.
+    /// First component of each node, and the end: one entry more than nodes.
     components: Vec<Component>,
-    /// Places of the nodes; empty if all are this rank's alone.
-    places: Vec<Placement>,
+    /// Placements of the first nodes; the others are local.
+    placements: Vec<Placement>,
 }
 
-/// A brick with its leaves that do not cross.
+/// A brick and its non-crossing leaves.
 pub struct OpenBrick {
     /// Its key.
     pub key: u64,
@@ -40,11 +43,11 @@ pub struct OpenBrick {
     pub split: u64,
     /// Its non-crossing leaves.
     pub open: u64,
-    /// The rank that holds it, if this one does not; then nothing is known of it.
+    /// The owner, if this rank does not hold the brick; then no octants are known.
     pub remote: Option<usize>,
 }
 
-/// The bricks of a level, in Morton order: the nodes.
+/// The bricks of a level in Morton order: one for each node.
 pub fn open_bricks<'a>(
     tree: &'a Tree,
     ownership: &'a Ownership,
@@ -53,9 +56,9 @@ pub fn open_bricks<'a>(
     let mut split = tree.split[l as usize].cursor();
     let mut crossing = tree.crossing[l as usize].cursor();
     Tree::exists(&tree.split, l).map(move |b| {
-        let place =
+        let placement =
             if ownership.owns(l, b.key) { Placement::Local } else { ownership.placement(l, b.key) };
-        match place {
+        match placement {
             Placement::Remote(r) => OpenBrick { key: b.key, split: 0, open: 0, remote: Some(r) },
             _ => {
                 let split = split.get(b.key);
@@ -74,20 +77,20 @@ pub fn open_bricks<'a>(
 #[derive(Clone, Copy)]
 pub struct Family {
     split: u64,
-    /// One bit for each child brick.
+    /// Mask of the octant groups that have a child brick.
     bricks: u8,
     first: Node,
 }
 
 impl Family {
-    /// One bit for each octant group whose brick is a child.
+    /// Mask of the octant groups that have a child brick.
     #[inline]
     pub fn bricks(&self) -> u8 {
         self.bricks
     }
 
-    /// The child whose brick is octant group `j`, with the octants that it has; none if that group is not
-    /// split further.
+    /// The child brick below octant group `j` and the mask of its octants that exist; none if no octant of
+    /// the group is split.
     #[inline]
     pub fn child(&self, j: u64) -> Option<(Node, u64)> {
         let before = self.bricks & ((1u16 << j) - 1) as u8;
@@ -97,7 +100,7 @@ impl Family {
 }
 
 impl Nodes {
-    /// Links the bricks of a base tree.
+    /// Links the bricks of a base tree and finds their local components.
     pub fn new(tree: &Tree, ownership: &Ownership) -> Self {
         let mut nodes = Self { levels: Vec::with_capacity(LEVELS), masks: Vec::new() };
         for l in 0..LEVELS as Level {
@@ -117,9 +120,13 @@ impl Nodes {
                 out.first_child.push(children);
                 children += brick::parents(b.split).count_ones();
             }
-            if l < 2 || ownership.is_replicated(l) || b.remote.is_some() || !out.places.is_empty() {
-                out.places.resize(n, Placement::Local);
-                out.places.push(ownership.placement(l, b.key));
+            if l < 2
+                || ownership.is_replicated(l)
+                || b.remote.is_some()
+                || !out.placements.is_empty()
+            {
+                out.placements.resize(n, Placement::Local);
+                out.placements.push(ownership.placement(l, b.key));
             }
             out.components.push(self.masks.len() as Component);
             self.masks.extend(brick::components(b.open));
@@ -129,8 +136,8 @@ impl Nodes {
         out
     }
 
-    /// Forgets how bricks hang together, which is a good part of it all; components stay.
-    pub fn forget_links(&mut self) {
+    /// Frees the links between bricks, which take much of the memory; the components remain.
+    pub fn drop_links(&mut self) {
         for level in &mut self.levels {
             *level = LevelNodes {
                 components: std::mem::take(&mut level.components),
@@ -139,7 +146,7 @@ impl Nodes {
         }
     }
 
-    /// Number of components.
+    /// Number of local components.
     pub fn component_count(&self) -> Component {
         self.masks.len() as Component
     }
@@ -168,13 +175,13 @@ impl Nodes {
         }
     }
 
-    /// Whose the node's brick is.
+    /// The placement of the node's brick.
     #[inline]
-    pub fn place(&self, l: Level, n: Node) -> Placement {
-        self.levels[l as usize].places.get(n as usize).copied().unwrap_or(Placement::Local)
+    pub fn placement(&self, l: Level, n: Node) -> Placement {
+        self.levels[l as usize].placements.get(n as usize).copied().unwrap_or(Placement::Local)
     }
 
-    /// Components of a node with their octants.
+    /// The components of a node, with their octants.
     #[inline]
     pub fn components(&self, l: Level, n: Node) -> impl Iterator<Item = (Component, u64)> + '_ {
         let starts = &self.levels[l as usize].components;
@@ -182,37 +189,37 @@ impl Nodes {
         range.clone().zip(self.masks[range.start as usize..range.end as usize].iter().copied())
     }
 
-    /// The nodes of a level that may be another's too.
-    pub fn shared(&self, l: Level) -> Range<Node> {
-        0..self.levels[l as usize].places.len() as Node
+    /// The nodes of a level that other ranks may hold: all others are local.
+    pub fn with_placement(&self, l: Level) -> Range<Node> {
+        0..self.levels[l as usize].placements.len() as Node
     }
 
-    /// To find components by octants.
+    /// A finder of components by octants.
     pub fn finder(&self) -> Finder<'_> {
-        Finder { nodes: self, way: vec![(0, 0)] }
+        Finder { nodes: self, path: vec![(0, 0)] }
     }
 }
 
-/// Finds components by octants, quickly where one question is about the neighbourhood of the one before.
+/// Finds components by octants. Fast if consecutive queries are close to each other in the tree.
 pub struct Finder<'a> {
     nodes: &'a Nodes,
-    /// The latest bricks on the way down, by level: key and node.
-    way: Vec<(u64, Node)>,
+    /// The bricks on the path of the previous query, by level: key and node.
+    path: Vec<(u64, Node)>,
 }
 
 impl Finder<'_> {
-    /// Tells `found` the components that the octants `bits` of brick `key` of level `l` touch: of leaves of that
-    /// level, or of the coarser leaves that they lie in; octants that are split have none.
-    pub fn meet(&mut self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
+    /// Calls `found` with the components of the octants `bits` of brick `key` of level `l`: of the leaves of that
+    /// level, or of the coarser leaves that contain them. Octants that are split have no component.
+    pub fn find(&mut self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
         let nodes = self.nodes;
-        let on_the_way =
-            |(m, way): (Level, &(u64, Node))| m <= l && way.0 == brick_above(l, key, m);
-        let known = (0..).zip(&self.way).take_while(|&way| on_the_way(way)).count();
-        self.way.truncate(known);
-        // That a brick is there means that the octant is split which it fills, two levels above.
+        let on_path = |(m, path): (Level, &(u64, Node))| m <= l && path.0 == brick_above(l, key, m);
+        let known = (0..).zip(&self.path).take_while(|&path| on_path(path)).count();
+        self.path.truncate(known);
+        // If a brick exists, the octant that it fills is split: the search may start two levels higher.
         for m in (known as Level).saturating_sub(2)..=l {
-            let node = self.way[m as usize].1;
-            // Down to two levels above, the octants lie in one; then in those of one group; then they are told apart.
+            let node = self.path[m as usize].1;
+            // At two levels above `l` and higher, one octant contains all of `bits`; at one level above, those of
+            // one sibling group do.
             let here = match l - m {
                 0 => bits,
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
@@ -224,16 +231,16 @@ impl Finder<'_> {
             if here & split == 0 || m == l {
                 return;
             }
-            if self.way.len() == m as usize + 1 {
+            if self.path.len() == m as usize + 1 {
                 let below = brick_above(l, key, m + 1);
                 let Some((node, _)) = nodes.family(m, node).child(below & 7) else { return };
-                self.way.push((below, node));
+                self.path.push((below, node));
             }
         }
     }
 }
 
-/// The key of the brick of level `m` that a brick of level `l` lies in.
+/// The key of the brick of level `m` that contains brick `key` of level `l`.
 #[inline]
 fn brick_above(l: Level, key: u64, m: Level) -> u64 {
     key >> (3 * (l - m))
@@ -256,7 +263,7 @@ mod tests {
         )
     }
 
-    /// Some octants of the last level with all above them split; of the leaves every third crosses.
+    /// A tree with the given octants at its deepest level; every third of its leaves is crossing.
     fn tree(deepest: &[u64]) -> Tree {
         let mut tree = Tree::default();
         for l in 0..DEEPEST {
@@ -275,33 +282,34 @@ mod tests {
         tree
     }
 
-    /// The component of the leaf that an octant is or lies in, found without links; none if that crosses, or if it is split.
+    /// The component of the leaf that is or contains an octant, found without links; none if this leaf crosses,
+    /// or if the octant is split.
     fn component_of(nodes: &Nodes, tree: &Tree, l: Level, code: u64) -> Option<Component> {
         let exists =
             |m: Level| m == 0 || tree.split[m as usize - 1].contains(code >> (3 * (l - m) + 3));
         let m = (0..=l).rev().find(|&m| exists(m))?;
         let at = code >> (3 * (l - m));
         let node = Tree::exists(&tree.split, m).position(|b| b.key == at >> 6)?;
-        let mut there = nodes.components(m, node as Node);
-        there.find(|c| c.1 >> (at & 63) & 1 == 1).map(|c| c.0)
+        let mut components = nodes.components(m, node as Node);
+        components.find(|c| c.1 >> (at & 63) & 1 == 1).map(|c| c.0)
     }
 
     proptest! {
         #[test]
-        fn components_are_found_whatever_was_asked_before(
+        fn components_are_found_whatever_the_previous_query(
             deepest in prop::collection::vec(any::<u64>(), 1..20),
-            asked in prop::collection::vec((2..=DEEPEST, any::<prop::sample::Index>(), 0u64..80, any::<u64>()), 1..40),
+            queries in prop::collection::vec((2..=DEEPEST, any::<prop::sample::Index>(), 0u64..80, any::<u64>()), 1..40),
         ) {
             let tree = tree(&deepest);
             tree.check_structure();
             let nodes = Nodes::new(&tree, &Ownership::solo());
             let mut finder = nodes.finder();
-            for (l, near, beside, bits) in asked {
-                // Near a place where the tree is deep, as neighbours' octants are.
+            for (l, near, offset, bits) in queries {
+                // Near a region where the tree is deep, as queries by neighbouring ranks are.
                 let place = (near.get(&deepest) % (1 << (3 * DEEPEST))) >> (3 * (DEEPEST - l));
-                let key = (place ^ beside) >> 6;
+                let key = (place ^ offset) >> 6;
                 let mut found = BTreeSet::new();
-                finder.meet(l, key, bits, |c| _ = found.insert(c));
+                finder.find(l, key, bits, |c| _ = found.insert(c));
                 let codes = crate::brickset::ones(bits).map(|bit| key << 6 | u64::from(bit));
                 let want: BTreeSet<Component> =
                     codes.filter_map(|code| component_of(&nodes, &tree, l, code)).collect();

@@ -1,16 +1,17 @@
-//! Axis-parallel rays, counted exactly.
+//! Parities of axis-parallel rays, exact.
 //!
-//! A ray along axis `a` counts the facets whose projection along `a` contains its point, moved by
-//! +eps along `a + 1` and +eps^2 along `a + 2`: so it never meets an edge or a vertex, and facets of no
-//! projected area never count.
+//! A ray along axis `a` counts the facets whose projection along `a` contains the projection of its start
+//! point, displaced by +eps along `a + 1` and by +eps^2 along `a + 2` (symbolic perturbation). The displaced
+//! ray meets no edge and no vertex, and facets whose projection has no area never count.
 //!
-//! Exactness: as in [`crate::facet`], edge functions stay below 2^60 and plane values in i128.
+//! Exactness: as in [`crate::facet`]; edge functions are below 2^60 in magnitude, plane values are i128.
 
 use crate::facet::Facet;
 use crate::octant::{ROOT_BITS, ROOT_EDGE};
 
-/// For each point the parities of its six rays: bit `2 a + 1` is set if the ray up axis `a` meets an
-/// odd number of these facets, bit `2 a` the one down. Points are in the root and on no facet.
+/// For each point the parities of its six rays: bit `2 a + 1` is set if the ray in the positive direction of
+/// axis `a` meets an odd number of the facets, bit `2 a` if the one in the negative direction does. The
+/// points are in the root and on no facet.
 pub fn parities(facets: &[Facet], points: &[[i64; 3]]) -> Vec<u8> {
     let mut odd = vec![0; points.len()];
     let grids: [Grid; 3] = std::array::from_fn(|a| Grid::new(points, a));
@@ -21,12 +22,12 @@ pub fn parities(facets: &[Facet], points: &[[i64; 3]]) -> Vec<u8> {
     odd
 }
 
-/// Points by where they project to along an axis. There are mostly far fewer points than facets.
+/// Points binned by their projection along an axis. There are usually far fewer points than facets.
 struct Grid {
     axis: usize,
     /// Squares per side, as a power of two.
     side_log2: u32,
-    /// First entry of each square in `members`; one more than squares.
+    /// First entry of each square in `members`, and the end: one entry more than squares.
     starts: Vec<u32>,
     members: Vec<u32>,
 }
@@ -56,13 +57,13 @@ impl Grid {
         grid
     }
 
-    /// Square coordinate of a lattice coordinate, clamped to the root.
-    fn at(&self, c: i64) -> usize {
+    /// Index, along one side, of the square of a lattice coordinate, clamped to the root.
+    fn index(&self, c: i64) -> usize {
         (c.clamp(0, ROOT_EDGE - 1) >> (ROOT_BITS - self.side_log2)) as usize
     }
 
     fn square_of(&self, p: &[i64; 3]) -> usize {
-        self.at(p[(self.axis + 2) % 3]) << self.side_log2 | self.at(p[(self.axis + 1) % 3])
+        self.index(p[(self.axis + 2) % 3]) << self.side_log2 | self.index(p[(self.axis + 1) % 3])
     }
 
     /// Flips the parities of the points whose rays along the axis meet the facet.
@@ -73,9 +74,9 @@ impl Grid {
         if u1 < 0 || w1 < 0 || u0 > ROOT_EDGE || w0 > ROOT_EDGE {
             return;
         }
-        for row in self.at(w0)..=self.at(w1) {
+        for row in self.index(w0)..=self.index(w1) {
             let base = row << self.side_log2;
-            let range = self.starts[base + self.at(u0)]..self.starts[base + self.at(u1) + 1];
+            let range = self.starts[base + self.index(u0)]..self.starts[base + self.index(u1) + 1];
             for &i in &self.members[range.start as usize..range.end as usize] {
                 let p = &points[i as usize];
                 let near = (u0..=u1).contains(&p[u]) && (w0..=w1).contains(&p[w]);
@@ -87,8 +88,8 @@ impl Grid {
     }
 }
 
-/// Whether the line along `axis` through the moved point meets the facet, and then whether it does
-/// so above the point.
+/// Whether the line along `axis` through the displaced point meets the facet in the positive direction from
+/// the point; none if it does not meet the facet.
 fn meets(f: &Facet, p: &[i64; 3], axis: usize) -> Option<bool> {
     let n = f.normal();
     if n[axis] == 0 {
@@ -99,7 +100,7 @@ fn meets(f: &Facet, p: &[i64; 3], axis: usize) -> Option<bool> {
     for i in 0..3 {
         let (eu, ew) = (v(i + 1, u) - v(i, u), v(i + 1, w) - v(i, w));
         let side = eu * (p[w] - v(i, w)) - ew * (p[u] - v(i, u));
-        // Moving by (eps, eps^2) changes it by -ew eps + eu eps^2.
+        // The displacement by (eps, eps^2) changes the edge function by -ew eps + eu eps^2.
         let side = [side, -ew, eu].into_iter().find(|s| *s != 0)?;
         if (side > 0) != (n[axis] > 0) {
             return None;
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn all_six_agree_on_a_cube_even_through_diagonals_and_edges() {
+    fn all_six_rays_agree_on_a_cube_even_through_diagonals_and_edges() {
         let (lo, hi) = (1 << 20, 1 << 22);
         let facets = cube(lo, hi);
         let mut points = Vec::new();
@@ -150,7 +151,7 @@ mod tests {
                 points.extend(some.map(|z| [x, y, z]));
             }
         }
-        // On the diagonal of every face, and in the planes of faces but off them.
+        // In the planes of faces, but off the faces.
         points.extend([
             [1 << 20, 1 << 23, 1 << 21],
             [1 << 22, 1 << 19, 1 << 22],

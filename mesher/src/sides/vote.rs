@@ -1,7 +1,8 @@
-//! The vote: six rays from a component's leaves, until one leaf's agree.
+//! The vote: six rays from the centroid of a component's leaf decide the component's side if they agree.
+//! Otherwise the next leaf is tried, and after 32 leaves the majority of all rays decides.
 
 use super::Ambiguous;
-use super::global::Name;
+use super::global::Label;
 use super::nodes::Nodes;
 use super::rays::parities;
 use crate::brick::Brick;
@@ -13,7 +14,7 @@ use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, Tree};
 use std::collections::{BTreeMap, HashSet};
 
-/// Most leaves of a component that are tried before the majority decides.
+/// Maximum number of leaves of a component whose rays are cast before the majority decides.
 pub const CANDIDATES: usize = 32;
 
 /// A leaf as one number that sorts by level, then by Morton code.
@@ -32,32 +33,34 @@ impl Candidate {
     }
 }
 
-/// The first leaves of the components that this rank has part of, as far as it answers for them.
+/// The first leaves, by level and Morton code, of the components that this rank has part of, among the leaves
+/// that it owns: at most [`CANDIDATES`] each. `merged` are the merged components of the local ones, `labels`
+/// their labels.
 pub fn candidates(
     nodes: &Nodes,
     tree: &Tree,
-    class: &[u32],
-    names: &[Name],
+    merged: &[u32],
+    labels: &[Label],
     ownership: &Ownership,
-) -> Firsts {
-    let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); names.len()];
-    let mut here: Vec<(u32, u64)> = Vec::new();
+) -> FirstLeaves {
+    let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); labels.len()];
+    let mut of_brick: Vec<(u32, u64)> = Vec::new();
     for l in 0..LEVELS as Level {
         for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
             if !ownership.owns(l, key) {
                 continue;
             }
-            // Components that meet elsewhere are one: their leaves come in one order.
-            here.clear();
+            // Local components of one merged component: their leaves are interleaved in Morton order.
+            of_brick.clear();
             for (c, bits) in nodes.components(l, n) {
-                let class = class[c as usize];
-                match here.iter_mut().find(|(other, _)| *other == class) {
+                let merged = merged[c as usize];
+                match of_brick.iter_mut().find(|(other, _)| *other == merged) {
                     Some((_, all)) => *all |= bits,
-                    None => here.push((class, bits)),
+                    None => of_brick.push((merged, bits)),
                 }
             }
-            for &(class, bits) in &here {
-                let list = &mut first[class as usize];
+            for &(merged, bits) in &of_brick {
+                let list = &mut first[merged as usize];
                 let room = CANDIDATES - list.len();
                 list.extend(
                     ones(bits).take(room).map(|bit| Candidate::new(l, key << 6 | u64::from(bit))),
@@ -65,16 +68,16 @@ pub fn candidates(
             }
         }
     }
-    merged(names.iter().copied().zip(first).filter(|(_, list)| !list.is_empty()))
+    first_of_all(labels.iter().copied().zip(first).filter(|(_, list)| !list.is_empty()))
 }
 
-/// Components' first leaves, in order.
-pub type Firsts = BTreeMap<Name, Vec<Candidate>>;
+/// The first leaves of each component, in order.
+pub type FirstLeaves = BTreeMap<Label, Vec<Candidate>>;
 
-/// The first of several lists for each name.
-fn merged(lists: impl Iterator<Item = (Name, Vec<Candidate>)>) -> Firsts {
-    let mut all = Firsts::new();
-    lists.for_each(|(name, list)| all.entry(name).or_default().extend(list));
+/// The first [`CANDIDATES`] leaves for each label from several lists.
+fn first_of_all(lists: impl Iterator<Item = (Label, Vec<Candidate>)>) -> FirstLeaves {
+    let mut all = FirstLeaves::new();
+    lists.for_each(|(label, list)| all.entry(label).or_default().extend(list));
     for list in all.values_mut() {
         list.sort_unstable();
         list.truncate(CANDIDATES);
@@ -82,90 +85,90 @@ fn merged(lists: impl Iterator<Item = (Name, Vec<Candidate>)>) -> Firsts {
     all
 }
 
-/// What the vote came to.
+/// Result of the vote.
 #[derive(Default)]
 pub struct Verdict {
     /// The components that are inside.
-    pub inside: HashSet<Name>,
-    /// Those decided by majority.
+    pub inside: HashSet<Label>,
+    /// The components that were decided by majority.
     pub ambiguous: Option<Ambiguous>,
-    /// All components of the tree.
+    /// Number of components of the tree.
     pub components: u64,
-    /// Rays cast.
+    /// Number of rays cast.
     pub rays: u64,
 }
 
 /// A component that is not decided yet.
 struct Open {
-    name: Name,
-    /// Its rays so far that say inside.
+    label: Label,
+    /// Number of its rays so far that met an odd number of facets.
     votes: u32,
 }
 
-/// Casts the rays, each rank against its share of the facets; `mine` are this rank's [`candidates`]. Collective;
-/// the same on all ranks.
-pub fn decide(mine: &Firsts, facets: &[Facet], comm: &dyn Comm) -> Verdict {
+/// Decides all components. Each rank tests the rays against its own facets; `mine` are this rank's
+/// [`candidates`]. Collective; the result is the same on all ranks.
+pub fn decide(mine: &FirstLeaves, facets: &[Facet], comm: &dyn Comm) -> Verdict {
     let mut verdict = Verdict::default();
-    // Nearly always the very first leaf's rays agree: only that is told of every component.
-    let firsts = mine.iter().map(|(&name, list)| [name, list[0].0]).collect();
+    // Nearly always the rays of the first leaf agree, so only this leaf of each component is gathered.
+    let firsts = mine.iter().map(|(&label, list)| [label, list[0].0]).collect();
     let firsts = all_gather_reduced(firsts, u64::min, comm);
     verdict.components = firsts.len() as u64;
-    let ask = |asked: Vec<(Open, Candidate)>, verdict: &mut Verdict| -> Vec<Open> {
-        let points: Vec<[i64; 3]> = asked.iter().map(|(_, c)| c.centroid()).collect();
+    let cast = |queries: Vec<(Open, Candidate)>, verdict: &mut Verdict| -> Vec<Open> {
+        let points: Vec<[i64; 3]> = queries.iter().map(|(_, c)| c.centroid()).collect();
         verdict.rays += 6 * points.len() as u64;
         let odd = xor_over_ranks(parities(facets, &points), comm);
-        let told = asked.into_iter().zip(odd).filter_map(|((open, _), rays)| {
+        let undecided = queries.into_iter().zip(odd).filter_map(|((open, _), rays)| {
             if rays == 63 {
-                verdict.inside.insert(open.name);
+                verdict.inside.insert(open.label);
             }
             let votes = open.votes + rays.count_ones();
             (rays != 0 && rays != 63).then_some(Open { votes, ..open })
         });
-        told.collect()
+        undecided.collect()
     };
-    let asked = firsts.iter().map(|e| (Open { name: e[0], votes: 0 }, Candidate(e[1])));
-    let mut open = ask(asked.collect(), &mut verdict);
+    let queries = firsts.iter().map(|e| (Open { label: e[0], votes: 0 }, Candidate(e[1])));
+    let mut open = cast(queries.collect(), &mut verdict);
     if open.is_empty() {
         return verdict;
     }
-    let lists = all_of(mine, &open, comm);
-    // Those that have no more leaves to be asked.
+    let lists = gather_candidates(mine, &open, comm);
+    // The components that have no more leaves to try.
     let mut exhausted = Vec::new();
     for round in 1..CANDIDATES {
-        let (next, done) = open.into_iter().partition(|c: &Open| lists[&c.name].len() > round);
+        let (next, done) = open.into_iter().partition(|c: &Open| lists[&c.label].len() > round);
         open = next;
         exhausted.extend::<Vec<Open>>(done);
         if open.is_empty() {
             break;
         }
-        let asked = open.into_iter().map(|c| {
-            let candidate = lists[&c.name][round];
+        let queries = open.into_iter().map(|c| {
+            let candidate = lists[&c.label][round];
             (c, candidate)
         });
-        open = ask(asked.collect(), &mut verdict);
+        open = cast(queries.collect(), &mut verdict);
     }
     exhausted.extend(open);
-    let list = |c: &Open| &lists[&c.name];
+    let list = |c: &Open| &lists[&c.label];
     let first = exhausted.iter().map(|c| list(c)[0]).min();
     verdict.ambiguous =
         first.map(|c| Ambiguous { count: exhausted.len() as u64, example: c.centroid() });
     verdict
         .inside
-        .extend(exhausted.iter().filter(|c| c.votes as usize > 3 * list(c).len()).map(|c| c.name));
+        .extend(exhausted.iter().filter(|c| c.votes as usize > 3 * list(c).len()).map(|c| c.label));
     verdict
 }
 
-/// The candidates of some components, from all ranks. Collective; the same on all ranks.
-fn all_of(mine: &Firsts, open: &[Open], comm: &dyn Comm) -> Firsts {
-    let told = open.iter().filter_map(|c| Some((c.name, mine.get(&c.name)?)));
+/// The candidates of some components, from all ranks. Collective; the result is the same on all ranks.
+fn gather_candidates(mine: &FirstLeaves, open: &[Open], comm: &dyn Comm) -> FirstLeaves {
+    let lists = open.iter().filter_map(|c| Some((c.label, mine.get(&c.label)?)));
     let flat: Vec<u64> =
-        told.flat_map(|(name, list)| list.iter().flat_map(move |c| [name, c.0])).collect();
+        lists.flat_map(|(label, list)| list.iter().flat_map(move |c| [label, c.0])).collect();
     let all = comm.all_gather(&flat);
     let pairs = all.words().as_chunks().0.iter();
-    merged(pairs.map(|&[name, candidate]| (name, vec![Candidate(candidate)])))
+    first_of_all(pairs.map(|&[label, candidate]| (label, vec![Candidate(candidate)])))
 }
 
-/// Parities over all facets from those over each rank's. Collective.
+/// Parities over the facets of all ranks, from those over each rank's facets. Collective.
 fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     let pack = |bytes: &[u8]| bytes.iter().rev().fold(0u64, |w, &b| w << 8 | u64::from(b));
     let words: Vec<u64> = mine.chunks(8).map(pack).collect();

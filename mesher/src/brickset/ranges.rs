@@ -1,4 +1,4 @@
-//! Stretches of a set: by key, taken off its ends, put on, and sent.
+//! Ranges of a set's bricks: finding, removing, appending and packing them.
 
 use super::{BrickSet, LOW_BITS, Run, high_of};
 use crate::brick::Brick;
@@ -18,23 +18,23 @@ impl BrickSet {
         }
     }
 
-    /// The key of the brick that so many are before.
+    /// The key of the brick at a position.
     pub fn key_at(&self, position: usize) -> u64 {
         let run = self.runs.partition_point(|r| r.start <= position) - 1;
         self.runs[run].high | u64::from(self.low[position])
     }
 
-    /// The brick that so many are before.
+    /// The brick at a position.
     pub fn brick(&self, position: usize) -> Brick {
         Brick { key: self.key_at(position), bits: self.bits[position] }
     }
 
-    /// The first brick's key and the last one's; none if the set is empty.
+    /// The keys of the first brick and the last; none if the set is empty.
     pub fn ends(&self) -> Option<(u64, u64)> {
         (!self.is_empty()).then(|| (self.key_at(0), self.key_at(self.len() - 1)))
     }
 
-    /// Forgets all bricks but those of a range of positions.
+    /// Removes all bricks except those at a range of positions.
     pub fn keep(&mut self, range: Range<usize>) {
         if range == (0..self.len()) {
             return;
@@ -46,7 +46,7 @@ impl BrickSet {
         self.bits.drain(..range.start);
     }
 
-    /// The runs of some bricks, as if those were all.
+    /// The runs of the bricks at a range of positions, with positions relative to the range.
     fn runs_of(&self, range: &Range<usize>) -> Vec<Run> {
         if range.is_empty() {
             return Vec::new();
@@ -56,25 +56,25 @@ impl BrickSet {
         runs.map(|r| Run { start: r.start.max(range.start) - range.start, ..*r }).collect()
     }
 
-    /// Puts on bricks that are all behind those of the set.
+    /// Adds a set whose bricks all follow those of this set.
     ///
     /// # Panics
-    /// If they are not.
-    pub fn append(&mut self, behind: Self) {
-        let Some(runs) = self.runs_with(&behind) else {
+    /// If they do not.
+    pub fn append(&mut self, after: Self) {
+        let Some(runs) = self.runs_with(&after) else {
             return if self.is_empty() {
-                *self = behind
+                *self = after
             };
         };
         self.runs = runs;
-        self.low.extend_from_slice(&behind.low);
-        self.bits.extend_from_slice(&behind.bits);
+        self.low.extend_from_slice(&after.low);
+        self.bits.extend_from_slice(&after.bits);
     }
 
-    /// Puts on bricks that are all before those of the set.
+    /// Adds a set whose bricks all precede those of this set.
     ///
     /// # Panics
-    /// If they are not.
+    /// If they do not.
     pub fn prepend(&mut self, before: Self) {
         let Some(runs) = before.runs_with(self) else {
             return if self.is_empty() {
@@ -86,17 +86,17 @@ impl BrickSet {
         self.bits.splice(..0, before.bits);
     }
 
-    /// The runs of this set and one behind it; none if one of them is empty.
-    fn runs_with(&self, behind: &Self) -> Option<Vec<Run>> {
-        let ((_, last), (first, _)) = (self.ends()?, behind.ends()?);
+    /// The runs of this set and of one that follows it; none if one of them is empty.
+    fn runs_with(&self, after: &Self) -> Option<Vec<Run>> {
+        let ((_, last), (first, _)) = (self.ends()?, after.ends()?);
         assert!(last < first, "bricks must be added in Morton order");
         let same = usize::from(high_of(last) == high_of(first));
-        let theirs = behind.runs[same..].iter();
+        let theirs = after.runs[same..].iter();
         let theirs = theirs.map(|r| Run { start: r.start + self.len(), ..*r });
         Some(self.runs.iter().copied().chain(theirs).collect())
     }
 
-    /// The union of sets; quick where they follow each other, and where one is much larger than the others.
+    /// The union of sets. Fast if the sets do not overlap, or if one is much larger than the others.
     pub fn union_of(mut sets: Vec<Self>) -> Self {
         sets.retain(|s| !s.is_empty());
         sets.sort_by_key(Self::ends);
@@ -108,19 +108,19 @@ impl BrickSet {
         let Some(largest) = (0..sets.len()).max_by_key(|&i| sets[i].len()) else {
             return Self::default();
         };
-        let (more, behind) =
+        let (more, after) =
             (sets.iter().map(Self::len).sum::<usize>(), sets.split_off(largest + 1));
         let mut all = sets.pop().unwrap_or_default();
         all.reserve_exact(more - all.len());
         let mut before = Self::default();
         sets.into_iter().for_each(|set| before.append(set));
         all.prepend(before);
-        behind.into_iter().for_each(|set| all.append(set));
+        after.into_iter().for_each(|set| all.append(set));
         all
     }
 
-    /// Writes the bricks of a range of positions behind some words: how many runs and bricks, the runs, the lower halves
-    /// of the keys two to a word, the bits.
+    /// Appends the bricks at a range of positions to a message: the numbers of runs and bricks, the runs, the lower
+    /// halves of the keys in pairs, and the bits.
     pub fn pack(&self, range: Range<usize>, words: &mut Vec<u64>) {
         let runs = self.runs_of(&range);
         let (low, bits) = (&self.low[range.clone()], &self.bits[range]);
@@ -133,10 +133,11 @@ impl BrickSet {
         words.extend_from_slice(bits);
     }
 
-    /// Reads what [`pack`](Self::pack) wrote at the front of some words; returns the others, too.
+    /// Reads the bricks that [`pack`](Self::pack) has written at the front of `words`; returns them and the words
+    /// that follow.
     ///
     /// # Panics
-    /// If the words end early.
+    /// If there are too few words.
     pub fn unpack(words: &[u64]) -> (Self, &[u64]) {
         let (head, words) = words.split_at(2);
         let (runs, words) = words.split_at(2 * head[0] as usize);
