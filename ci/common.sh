@@ -1,3 +1,4 @@
+# shellcheck shell=bash disable=SC2034  # the scripts that source this file use the variables
 # Sourced by the scripts of ci/: paths, environment and messages. Sourcing it runs no program.
 
 repo="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
