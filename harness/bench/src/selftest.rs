@@ -2,13 +2,13 @@
 
 use crate::experiments::entry::{Comm, Setup};
 use crate::experiments::execute::{Failed, Runner};
-use crate::experiments::launcher::Launcher;
 use crate::experiments::sizing::Sizes;
 use crate::experiments::variant::Base;
 use check::selftest::scale::Source;
-use run::engine::mesher::{self, Files};
-use run::engine::process::{self, End, Watch};
+use run::engine::launcher::Launcher;
+use run::engine::layout::SERIAL;
 use run::engine::programs::Programs;
+use run::engine::runner::RunOptions;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -34,8 +34,13 @@ pub fn source(
     let mut made = Vec::new();
     for (name, ungraded) in [("mesh", false), ("base", true)] {
         let out = place.join(format!("{}-{name}", base.name));
-        let files = Files { case: &path, out: Some(&out), json: None, status: None, ungraded };
-        write(programs, &files, place, limit)?;
+        let options = RunOptions {
+            mesh: Some(&out),
+            report: false,
+            ungraded,
+            ..RunOptions::new(place, limit)
+        };
+        programs.mesher.run(&path, &SERIAL, &options)?;
         made.push(out);
     }
     let [mesh, base_tree] = <[PathBuf; 2]>::try_from(made).expect("two were made");
@@ -69,19 +74,4 @@ fn spacing(
         runner.run(&setup, &case, 0, true).map(|run| run.cells)
     };
     Sizes::default().spacing(cells as f64, base.coarse(), count)
-}
-
-fn write(programs: &Programs, files: &Files, place: &Path, limit: Duration) -> Result<(), Failed> {
-    let mut command = mesher::serial(programs, files).map_err(Failed::Because)?;
-    let watch = Watch { limit, logs: place, name: "mesher", status: None };
-    let finished = process::run(&mut command, &watch)
-        .map_err(|error| Failed::Because(format!("the mesher cannot be started: {error}")))?;
-    match finished.end {
-        End::Exited(0) => Ok(()),
-        End::Interrupted => Err(Failed::Interrupted),
-        end => {
-            let why = finished.first_error_line();
-            Err(Failed::Because(format!("the mesher fails: {end:?}, {why}")))
-        }
-    }
 }

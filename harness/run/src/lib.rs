@@ -1,7 +1,7 @@
-//! Programs as processes: engines and oracles, their limits and results, and verification.
+//! Runs engines and oracles as processes, and verifies the meshes that engines make.
 //!
-//! - [`engine`]: how programs are found, started, watched and read;
-//! - [`oracle`]: trimesh, open3d and pyvista, asked by Python;
+//! - [`engine`]: finds, starts, watches and judges programs, and reads their run reports;
+//! - [`oracle`]: classifies points with trimesh, open3d and pyvista, in Python;
 //! - [`verify`](mod@verify): runs engines on cases and checks the meshes.
 
 pub mod engine;

@@ -1,7 +1,9 @@
-//! Putting points to an oracle: the protocol of `harness/oracles/protocol.py`, this side of it.
+//! Oracles: Python scripts that classify points as inside or outside of a body. The protocol is that of
+//! `harness/oracles/protocol.py`.
 
-use crate::engine::process::{self, End, Watch};
-use crate::engine::programs::Programs;
+use crate::engine::failure::{End, Failure};
+use crate::engine::paths::Paths;
+use crate::engine::process::{self, ErrorLine, Watch};
 use check::oracle::vote::Answer;
 use contract::case::Facet;
 use contract::npy;
@@ -11,24 +13,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// The oracles, in the order in which they are asked.
+/// The oracles, in the order in which they run.
 pub const ORACLES: [&str; 3] = ["trimesh", "open3d", "pyvista"];
 
 /// Exit code of an oracle whose package is missing.
-const EXIT_MISSING: i32 = 3;
+const CODE_MISSING: i32 = 3;
 
-/// Why there is no answer.
-#[derive(Debug, PartialEq, Eq)]
-pub enum NoAnswer {
-    /// The oracle, or Python, is not there.
-    Missing(String),
-    /// It is there and did not answer.
-    Failed(String),
-    /// The user asked to end.
-    Interrupted,
-}
-
-/// What is asked of every oracle, as files.
+/// Points and a body, as files that every oracle reads.
 #[derive(Debug)]
 pub struct Question {
     points: PathBuf,
@@ -41,7 +32,7 @@ impl Question {
     /// Writes points and body into the directory.
     ///
     /// # Errors
-    /// Where that cannot be written.
+    /// If they cannot be written.
     pub fn write(points: &[[f64; 3]], body: &[Facet], place: &Path) -> io::Result<Self> {
         let question = Self {
             points: place.join("points.npy"),
@@ -61,40 +52,30 @@ impl Question {
         Ok(question)
     }
 
-    /// Puts it to one oracle.
+    /// Runs one oracle.
     ///
     /// # Errors
-    /// Where the oracle is missing, fails, or answers anything but one side per point.
-    pub fn ask(
-        &self,
-        oracle: &str,
-        programs: &Programs,
-        limit: Duration,
-    ) -> Result<Answer, NoAnswer> {
-        if !programs.paths.python.is_file() {
-            let python = programs.paths.python.display();
-            return Err(NoAnswer::Missing(format!("there is no {python} (ci/setup makes it)")));
+    /// [`End::Missing`] if the oracle or Python is missing; another end if the oracle fails or does not give one side
+    /// per point.
+    pub fn ask(&self, oracle: &str, paths: &Paths, limit: Duration) -> Result<Answer, Failure> {
+        let failure = |end| Failure::new(oracle, end);
+        if !paths.python.is_file() {
+            let why = format!("needs Python at {} (ci/setup makes it)", paths.python.display());
+            return Err(failure(End::Missing(why)));
         }
         let sides = self.place.join(format!("{oracle}.npy"));
-        let mut command = Command::new(&programs.paths.python);
-        command.arg("-B").arg(programs.paths.oracles.join(format!("{oracle}_sides.py")));
+        let mut command = Command::new(&paths.python);
+        command.arg("-B").arg(paths.oracles.join(format!("{oracle}_sides.py")));
         command.args([&self.points, &self.body, &sides]);
-        let watch = Watch { limit, logs: &self.place, name: oracle, status: None };
-        let failed = |why: String| NoAnswer::Failed(format!("{oracle} {why}"));
-        let done = process::run(&mut command, &watch).map_err(|error| failed(error.to_string()))?;
-        match done.end {
-            End::Exited(0) => {}
-            End::Exited(EXIT_MISSING) => return Err(NoAnswer::Missing(done.last_error_line())),
-            End::Exited(code) => {
-                return Err(failed(format!("exit {code}: {}", done.last_error_line())));
+        let watch = Watch::new(oracle, limit, &self.place);
+        let watch = Watch { error_line: ErrorLine::Last, ..watch };
+        process::run(&mut command, &watch).map_err(|other| match other.end {
+            End::Exited { code: CODE_MISSING, error } => {
+                failure(End::Missing(format!("is not installed: {error}")))
             }
-            End::Signalled(signal) => return Err(failed(format!("died of signal {signal}"))),
-            End::TimedOut => {
-                return Err(failed(format!("did not end within {} s", limit.as_secs())));
-            }
-            End::Interrupted => return Err(NoAnswer::Interrupted),
-        }
-        let inside = read_sides(&sides, self.count).map_err(failed)?;
+            _ => other,
+        })?;
+        let inside = read_sides(&sides, self.count).map_err(|why| failure(End::Unusable(why)))?;
         Ok(Answer { name: oracle.to_owned(), inside })
     }
 }
@@ -103,12 +84,12 @@ fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
     let bytes = std::fs::read(path).map_err(|error| format!("wrote no answer: {error}"))?;
     let sides: Vec<u8> = npyz::NpyFile::new(&bytes[..])
         .and_then(npyz::NpyFile::into_vec)
-        .map_err(|error| format!("wrote an answer that is no array of bytes: {error}"))?;
+        .map_err(|error| format!("wrote an answer that is not an array of bytes: {error}"))?;
     if sides.len() != count {
-        return Err(format!("answered for {} of {count} points", sides.len()));
+        return Err(format!("classified {} of {count} points", sides.len()));
     }
     match sides.iter().find(|&&side| side > 1) {
-        Some(side) => Err(format!("gave side {side}; there are 0 and 1")),
+        Some(side) => Err(format!("gave the side {side}, and the sides are 0 and 1")),
         None => Ok(sides.iter().map(|&side| side == 1).collect()),
     }
 }
@@ -122,16 +103,15 @@ mod tests {
     const POINTS: [[f64; 3]; 2] = [[0.5, -1.0, 1e300], [2.0, 3.0, 4.0]];
     const BODY: [Facet; 1] = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]];
 
-    /// Asks a shell script that plays Python; it sees the protocol's arguments as $3, $4 and $5.
-    fn ask(script: &str) -> Result<Vec<bool>, NoAnswer> {
+    /// Runs a shell script in the place of Python; it sees the protocol's arguments as $3, $4 and $5.
+    fn ask(script: &str) -> Result<Vec<bool>, Failure> {
         let place = tempfile::tempdir().unwrap();
         let python = place.path().join("python");
         fs::write(&python, format!("#!/bin/sh\n{script}\n")).unwrap();
         fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).unwrap();
-        let mut programs = Programs::find(Default::default());
-        programs.paths.python = python;
+        let paths = Paths { python, ..Paths::find() };
         let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        question.ask("trimesh", &programs, Duration::from_millis(2000)).map(|answer| answer.inside)
+        question.ask("trimesh", &paths, Duration::from_millis(2000)).map(|answer| answer.inside)
     }
 
     fn answering(bytes: &[u8]) -> String {
@@ -142,13 +122,13 @@ mod tests {
     }
 
     #[test]
-    fn question_and_answer_go_through_the_files() {
+    fn points_body_and_sides_are_exchanged_through_files() {
         let check = "[ $(wc -c < \"$3\") = 176 ] && [ $(wc -c < \"$4\") = 134 ] || exit 9";
         assert_eq!(ask(&format!("{check}\n{}", answering(&[1, 0]))), Ok(vec![true, false]));
     }
 
     #[test]
-    fn points_are_written_as_numpy_would() {
+    fn points_are_written_in_numpys_format() {
         let place = tempfile::tempdir().unwrap();
         Question::write(&POINTS, &BODY, place.path()).unwrap();
         let bytes = fs::read(place.path().join("points.npy")).unwrap();
@@ -158,29 +138,26 @@ mod tests {
     }
 
     #[test]
-    fn every_way_of_not_answering_has_its_sentence() {
-        let failed = |why: &str| Err(NoAnswer::Failed(format!("trimesh {why}")));
-        assert_eq!(ask("echo no module >&2; exit 3"), Err(NoAnswer::Missing("no module".into())));
-        assert_eq!(ask("echo bang >&2; exit 1"), failed("exit 1: bang"));
-        assert_eq!(ask("kill -11 $$"), failed("died of signal 11"));
-        assert_eq!(ask("sleep 60"), failed("did not end within 2 s"));
-        assert_eq!(ask(&answering(&[1])), failed("answered for 1 of 2 points"));
-        assert_eq!(ask(&answering(&[1, 2])), failed("gave side 2; there are 0 and 1"));
-        assert!(
-            matches!(ask("exit 0"), Err(NoAnswer::Failed(why)) if why.contains("wrote no answer"))
-        );
-        assert!(
-            matches!(ask("echo x > \"$5\""), Err(NoAnswer::Failed(why)) if why.contains("no array"))
-        );
+    fn each_failure_has_its_sentence() {
+        let sentence = |script: &str| ask(script).unwrap_err().to_string();
+        let missing = ask("echo no module >&2; exit 3").unwrap_err().end;
+        assert_eq!(missing, End::Missing("is not installed: no module".into()));
+        assert_eq!(sentence("echo bang >&2; exit 1"), "trimesh ended with code 1: bang");
+        assert_eq!(sentence("kill -11 $$"), "trimesh was killed by signal 11");
+        assert_eq!(sentence("sleep 60"), "trimesh did not end within 2 s and was killed");
+        assert_eq!(sentence(&answering(&[1])), "trimesh classified 1 of 2 points");
+        let side = "trimesh gave the side 2, and the sides are 0 and 1";
+        assert_eq!(sentence(&answering(&[1, 2])), side);
+        assert!(sentence("exit 0").contains("wrote no answer"));
+        assert!(sentence("echo x > \"$5\"").contains("not an array"));
     }
 
     #[test]
     fn without_python_the_oracle_is_missing() {
         let place = tempfile::tempdir().unwrap();
-        let mut programs = Programs::find(Default::default());
-        programs.paths.python = "/nowhere/python".into();
+        let paths = Paths { python: "/nowhere/python".into(), ..Paths::find() };
         let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        let answer = question.ask("open3d", &programs, Duration::from_secs(1)).map(drop);
-        assert!(matches!(answer, Err(NoAnswer::Missing(why)) if why.contains("/nowhere/python")));
+        let failure = question.ask("open3d", &paths, Duration::from_secs(1)).map(drop).unwrap_err();
+        assert!(matches!(failure.end, End::Missing(why) if why.contains("/nowhere/python")));
     }
 }

@@ -1,15 +1,19 @@
-//! Data for tests, here and in the crates that build on this one.
+//! Data for the tests of this crate and of those that depend on it.
 
-use crate::engine::mesher::Layout;
+use crate::engine::layout::{Layout, Ranks};
 use crate::verify::options::Options;
 use crate::verify::outcome::{Check, Outcome};
 use crate::verify::report::{CaseReport, Missing, Report, Run, SCHEMA};
 use contract::catalogue::Size;
 use std::time::Duration;
 
-/// A report with one of everything, for the tests of the output formats too.
+/// A report with one of everything, also for the tests of the output formats.
 pub fn report() -> Report {
-    let layout = Layout { ranks: 4, partitioner: "metis".into(), level_base: "auto".into() };
+    let layout = Layout {
+        partitioner: Some("metis".into()),
+        level_base: Some("auto".into()),
+        ..Layout::on(Ranks::Mpi(4))
+    };
     let run = Run {
         program: "mesher".into(),
         layout: None,
@@ -54,7 +58,7 @@ pub fn report() -> Report {
     }
 }
 
-/// Options of a verification that asks for as little as possible.
+/// Options of the smallest possible verification.
 pub fn options() -> Options {
     Options {
         cases: vec![],

@@ -11,7 +11,6 @@ pub mod entry;
 pub mod execute;
 pub mod foreign;
 pub mod group;
-pub mod launcher;
 pub mod machine;
 pub mod network;
 pub mod plan;

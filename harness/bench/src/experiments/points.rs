@@ -1,7 +1,6 @@
 //! What a study's runs are: meshes by spacing and n, divided in all the ways asked for.
 
 use super::execute::{self, Failed};
-use super::foreign;
 use super::plan::{Experiment, Layout, Study};
 use super::session::{Bench, BenchError, Point};
 use super::sizing::Sizes;
@@ -48,10 +47,7 @@ impl Bench<'_> {
 
     /// Why the engine is not run on a case, by its description.
     fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
-        let own = foreign::OWN.contains(&self.options.engine.as_str());
-        let Some(engine) = self.runner.programs.engine.as_ref().filter(|_| !own) else {
-            return Ok(None);
-        };
+        let engine = self.runner.programs.labelled(&self.options.engine);
         let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
         Ok(engine.description().declines(&case))
     }
@@ -130,7 +126,7 @@ impl Bench<'_> {
 /// The setup of every mesh that warms it up: the one whose message matrix is wanted, on most ranks where
 /// there are several; else the first.
 pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
-    let worth = |point: &Point| match execute::tells_matrix(&point.setup) {
+    let worth = |point: &Point| match execute::has_message_matrix(&point.setup) {
         true => point.setup.ranks,
         false => 0,
     };

@@ -2,10 +2,10 @@
 
 use super::entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
 use super::execute::{Failed, Runner};
-use super::launcher::Launcher;
 use super::plan::Study;
 use super::record::Record;
 use super::{machine, network, table};
+use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

@@ -2,6 +2,7 @@
 
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::{Bench, GateError};
+use run::engine::programs::Programs;
 use run::verify::options::Options;
 use run::verify::report::{CaseReport, Outcome};
 use run::verify::{VerifyError, verify};
@@ -28,9 +29,7 @@ pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     if cases.is_empty() {
         return Ok(layer);
     }
-    let mut programs = bench.programs.clone();
-    programs.paths.mesher = bench.candidate.program().to_owned();
-    programs.engine = Some(bench.candidate.clone());
+    let programs = Programs { engine: bench.candidate.clone(), ..bench.programs.clone() };
     let options = Options { limit: bench.options.limit, ..Options::of_leaves_alone(cases) };
     let report = verify(&options, &programs).map_err(|error| match error {
         VerifyError::Input(why) => GateError::Input(why),

@@ -5,8 +5,10 @@ use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, Tolerance};
 use super::subject::Baseline;
 use super::{Bench, left_out};
+use run::engine::failure::{End, Failure};
 use run::engine::interrupt;
-use run::engine::runner::{Engine, NoResult, Ranks};
+use run::engine::layout::{Layout, Ranks};
+use run::engine::runner::{Engine, RunOptions};
 
 /// A schedule like any other: counters may not depend on it, and the same one is used for both.
 const SEED: u64 = 1;
@@ -30,7 +32,9 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
                 entry.exact.clone_from(&candidate.exact);
                 against(bench, baseline, case, &candidate)
             }
-            Err(NoResult::Missing(why)) => return left_out(LayerName::Counters, why),
+            Err(why) if matches!(why.end, End::Missing(_)) => {
+                return left_out(LayerName::Counters, why.to_string());
+            }
             Err(why) => vec![Finding::told(name, "runs", Verdict::Regression, why.to_string())],
         };
         layer.findings.extend(findings);
@@ -71,34 +75,38 @@ fn against(
 }
 
 /// Counts of one program on one case. Digests of all rank counts must be the same.
-fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures, NoResult> {
-    let path = case.path.clone().map_err(NoResult::Failed)?;
-    let place = bench.enter("counters").map_err(NoResult::Failed)?;
-    let path = engine.prepare(&path, &place.join("case")).map_err(NoResult::Failed)?;
+fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures, Failure> {
+    let unusable = |why: String| engine.unusable(why);
+    let path = case.path.clone().map_err(unusable)?;
+    let place = bench.enter("counters").map_err(unusable)?;
+    let path = engine.prepare(&path, &place.join("case")).map_err(unusable)?;
     let simulated = case.rule.ranks.iter().map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
     let mut measures = CaseMeasures::default();
     for ranks in std::iter::once(Ranks::Serial).chain(simulated) {
-        let place = bench.enter("counters/run").map_err(NoResult::Failed)?;
-        let told = match engine.run(&path, ranks, &place, false) {
-            Ok((told, _)) => told,
-            // An engine without simulated ranks still has a serial run to be counted.
-            Err(NoResult::Missing(_)) if ranks != Ranks::Serial => continue,
+        let place = bench.enter("counters/run").map_err(unusable)?;
+        let options = RunOptions::new(&place, bench.options.limit);
+        let report = match engine.run(&path, &Layout::on(ranks), &options) {
+            Ok(completed) => completed.report,
+            // The counters of the serial run do not need simulated ranks.
+            Err(why) if matches!(why.end, End::Missing(_)) && ranks != Ranks::Serial => continue,
             Err(why) => return Err(why),
         };
         let prefix = match ranks {
             Ranks::Serial => String::new(),
             Ranks::Simulated { ranks, .. } | Ranks::Mpi(ranks) => format!("{ranks} ranks/"),
         };
-        if *measures.digest.get_or_insert(told.digest.clone()) != told.digest {
-            let why = format!("{ranks}: digest {}, serially it is another", told.digest);
-            return Err(NoResult::Failed(why));
+        if *measures.digest.get_or_insert(report.digest.clone()) != report.digest {
+            let digest = report.digest;
+            let why = format!("on {ranks} has the digest {digest}, serially it is another");
+            return Err(unusable(why));
         }
         if ranks == Ranks::Serial {
-            measures.exact.insert("cells".into(), told.cells);
+            measures.exact.insert("cells".into(), report.cells);
         }
-        measures
-            .exact
-            .extend(told.counters.into_iter().map(|(name, n)| (format!("{prefix}{name}"), n)));
+        let counters = report.counters.into_iter();
+        let total =
+            |(name, ranks): (String, Vec<u64>)| (format!("{prefix}{name}"), ranks.iter().sum());
+        measures.exact.extend(counters.map(total));
     }
     Ok(measures)
 }

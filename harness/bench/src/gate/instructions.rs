@@ -8,9 +8,10 @@ use super::rules::Selected;
 use super::subject::Baseline;
 use super::{Bench, left_out};
 use run::engine::interrupt;
+use run::engine::layout::SERIAL;
 use run::engine::paths::on_path;
-use run::engine::process::{self, End, Watch};
-use run::engine::runner::{Engine, Ranks, Wanted};
+use run::engine::process::{self, ErrorLine, Watch};
+use run::engine::runner::{Engine, RunOptions};
 use std::process::Command;
 
 const VALGRIND: &str = "valgrind";
@@ -105,26 +106,18 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Profile, Str
     let path = case.path.clone()?;
     let place = bench.enter("instructions")?;
     let path = engine.prepare(&path, &place.join("case"))?;
-    let mesh = place.join("mesh");
-    // Writing is the system's work; without it the count is the mesher's own.
-    let out = engine.description().run.json.is_none().then_some(mesh.as_path());
-    let wanted = Wanted { out, ..Wanted::default() };
-    let plain = engine.command(&path, Ranks::Serial, &wanted).map_err(|why| why.to_string())?;
+    // Without output files, the count is that of meshing alone.
+    let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit) };
+    let plain = engine.command(&path, &SERIAL, &options).map_err(|why| why.to_string())?;
     let file = place.join("callgrind.out");
     let mut command = Command::new(VALGRIND);
     command.args(["--tool=callgrind", "--compress-pos=no"]);
     command.arg(format!("--callgrind-out-file={}", file.display()));
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
-    let watch = Watch { limit: bench.options.limit, logs: &place, name: "valgrind", status: None };
-    let done = process::run(&mut command, &watch).map_err(|error| format!("valgrind: {error}"))?;
-    match done.end {
-        End::Exited(0) => {}
-        End::TimedOut => {
-            return Err(format!("valgrind did not end within {} s", watch.limit.as_secs()));
-        }
-        _ => return Err(format!("under valgrind: {}", done.last_error_line())),
-    }
+    let watch = Watch::new(VALGRIND, bench.options.limit, &place);
+    let watch = Watch { error_line: ErrorLine::Last, ..watch };
+    process::run(&mut command, &watch).map_err(|failure| failure.to_string())?;
     let text =
         std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
     Profile::parse(&text)

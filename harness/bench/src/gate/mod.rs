@@ -21,7 +21,6 @@ pub mod time;
 use measures::Measures;
 use report::{Layer, LayerName, Report};
 use rules::{Rules, Selected};
-use run::engine::description::Description;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
@@ -36,8 +35,6 @@ pub struct Options {
     pub baseline: Option<String>,
     /// A revision, a program, or `.` for the working tree.
     pub candidate: Option<String>,
-    /// Name or path of an engine description.
-    pub engine: String,
     /// The rules' file.
     pub rules: Option<PathBuf>,
     /// Only these cases of the rules.
@@ -88,14 +85,11 @@ pub struct Bench<'a> {
 /// Only where it could not begin; what goes wrong later is in the report.
 pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError> {
     let start = Instant::now();
-    let description =
-        Description::find(&options.engine, &programs.paths).map_err(GateError::Input)?;
     let rules =
         Rules::read(options.rules.as_deref().unwrap_or(&programs.paths.engines.join("gate.toml")))?;
     let cases = rules.select(&options.cases, programs)?;
-    let engine = Engine::new(description, &programs.paths, options.limit);
-    let baseline = Baseline::find(options, &engine, programs)?;
-    let candidate = Subject::candidate(options, &engine, &baseline, programs)?;
+    let baseline = Baseline::find(options, &programs.engine, programs)?;
+    let candidate = Subject::candidate(options, &programs.engine, &baseline, programs)?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();
     let place =
         place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;

@@ -1,12 +1,13 @@
-//! The two programs of a gate: given as files, or built from revisions and kept for the next time.
+//! The two programs of a gate: given as files, or built from revisions and kept for later gates.
 //!
-//! A revision's files are unpacked from the repository's history into a directory of their own; the
-//! repository itself, its index and its working tree are not touched.
+//! The files of a revision are unpacked into a directory of their own, so that the repository, its index and its working
+//! tree stay unchanged.
 
 use super::measures::{Measured, Measures};
 use super::{GateError, Options};
 use run::engine::description::{Build, Values, fill};
-use run::engine::process::{self, End, Watch};
+use run::engine::failure::{End, Failure};
+use run::engine::process::{self, ErrorLine, Watch};
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use std::fs;
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// A build that takes longer hangs.
+/// Time after which a build is killed.
 const BUILD_LIMIT: Duration = Duration::from_secs(3600);
 
 /// A program under comparison.
@@ -22,26 +23,26 @@ const BUILD_LIMIT: Duration = Duration::from_secs(3600);
 pub struct Subject {
     /// How it is run.
     pub engine: Engine,
-    /// How it is told of.
+    /// Its name in the report.
     pub told: Measured,
 }
 
-/// What the candidate is held against.
+/// What the candidate is compared with.
 #[derive(Clone, Debug)]
 pub enum Baseline {
     /// A program: it can be run, so times can be compared.
     Program(Box<Subject>),
-    /// What was recorded of one.
+    /// The recorded measurements of a program.
     Record(Measured, Measures),
     /// Nothing: the candidate is only recorded.
     None,
 }
 
 impl Baseline {
-    /// Finds what the options name: a file, or else a revision.
+    /// Finds the baseline that the options name: a file, or else a revision.
     ///
     /// # Errors
-    /// Where it is neither, or does not build.
+    /// If it is neither, or does not build.
     pub fn find(
         options: &Options,
         engine: &Engine,
@@ -63,7 +64,7 @@ impl Baseline {
         Ok(Self::Program(Box::new(Subject::find(named, options, engine, programs)?)))
     }
 
-    /// How it is told of.
+    /// Its name in the report.
     pub fn told(&self) -> Option<Measured> {
         match self {
             Self::Program(subject) => Some(subject.told.clone()),
@@ -74,11 +75,11 @@ impl Baseline {
 }
 
 impl Subject {
-    /// The candidate: as named; else, against a revision, the working tree, built in the same way; else
-    /// the engine's own program.
+    /// The candidate that the options name. By default it is the working tree, built in the same way, if the baseline
+    /// is a revision, and else the engine's own program.
     ///
     /// # Errors
-    /// Where it is not there or does not build.
+    /// If the program is missing or does not build.
     pub fn candidate(
         options: &Options,
         engine: &Engine,
@@ -95,7 +96,7 @@ impl Subject {
                 if !program.is_file() {
                     let program = program.display();
                     return Err(GateError::Missing(format!(
-                        "there is no {program}: build it, or say where it is"
+                        "there is no {program}: build it, or give its path"
                     )));
                 }
                 let revision = revision_of("HEAD", &programs.paths.root).ok();
@@ -183,7 +184,7 @@ fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateErro
     fs::remove_file(&archive).map_err(wrong)
 }
 
-/// Builds what is in a directory and keeps the program, so that a later build cannot change it.
+/// Builds the revision in a directory and copies its program, so that a later build cannot change it.
 fn make(
     build: &Build,
     tree: &Path,
@@ -196,29 +197,32 @@ fn make(
     let place = options.cache.join("programs").join(name);
     fs::create_dir_all(&place).map_err(wrong)?;
     let cache = fs::canonicalize(&options.cache).map_err(wrong)?;
-    // One directory for all builds: what they have in common is compiled once.
+    // All builds share a directory, so that their common dependencies are compiled once.
     let target = cache.join("build").to_string_lossy().into_owned();
     let values = Values::from([("target", target), ("root", tree.to_string_lossy().into_owned())]);
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    let told = if keep { &name[..12.min(name.len())] } else { name };
-    eprintln!("harness gate: building {told}");
+    let label = if keep { &name[..12.min(name.len())] } else { name };
+    eprintln!("harness gate: building {label}");
     let (program, arguments) =
         words.split_first().ok_or_else(|| GateError::Input("an empty build command".into()))?;
     let mut command = Command::new(program);
     command.args(arguments).current_dir(tree);
-    let watch = Watch { limit: BUILD_LIMIT, logs: &place, name: "build", status: None };
-    let done = process::run(&mut command, &watch)
-        .map_err(|error| GateError::Missing(format!("{program} cannot be started: {error}")))?;
-    if done.end != End::Exited(0) {
-        let said = done.last_error_line();
-        let log = done.stderr.display();
-        return Err(GateError::Input(format!(
-            "{told} does not build: {said} (all of it in {log})"
-        )));
-    }
-    // Copied under another name first, so that a program that is there is whole.
+    let watch = Watch::new("build", BUILD_LIMIT, &place);
+    let watch = Watch { error_line: ErrorLine::Last, ..watch };
+    process::run(&mut command, &watch).map_err(|failure| build_error(label, &failure, &place))?;
+    // Copied under another name first, so that a program under its final name is complete.
     let (half, whole) = (place.join("program.new"), place.join("program"));
     fs::copy(fill(&build.program, &values), &half).map_err(wrong)?;
     fs::rename(&half, &whole).map_err(wrong)?;
     Ok(whole)
+}
+
+fn build_error(label: &str, failure: &Failure, logs: &Path) -> GateError {
+    match failure.end {
+        End::Missing(_) => GateError::Missing(failure.to_string()),
+        _ => {
+            let log = logs.join("build.stderr");
+            GateError::Input(format!("{label}: {failure} (full output: {})", log.display()))
+        }
+    }
 }

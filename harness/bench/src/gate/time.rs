@@ -5,8 +5,11 @@ use super::rules::{Selected, TimeRules};
 use super::stats::{Comparison, Random, Round, compare};
 use super::subject::Baseline;
 use super::{Bench, left_out};
+use run::engine::failure::Failure;
 use run::engine::interrupt;
-use run::engine::runner::{Engine, NoResult, Ranks, Told};
+use run::engine::layout::SERIAL;
+use run::engine::report::PhaseReport;
+use run::engine::runner::{Completed, Engine, RunOptions};
 use std::path::Path;
 
 /// Times both sides and compares.
@@ -28,7 +31,7 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
         }
         let found = match rounds(bench, &subject.engine, case) {
             Ok(timed) => judge(bench, case, &timed),
-            Err(NoResult::Interrupted) => break,
+            Err(failure) if failure.is_interrupt() => break,
             Err(why) => {
                 Finding::told(&case.rule.name, "time", Verdict::Inconclusive, why.to_string())
             }
@@ -52,15 +55,16 @@ const BASELINE: usize = 0;
 const AGAIN: usize = 1;
 const CANDIDATE: usize = 2;
 
-fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, NoResult> {
-    let path = case.path.clone().map_err(NoResult::Failed)?;
-    let place = bench.enter("time").map_err(NoResult::Failed)?;
-    let path = baseline.prepare(&path, &place.join("case")).map_err(NoResult::Failed)?;
+fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, Failure> {
+    let unusable = |why: String| baseline.unusable(why);
+    let path = case.path.clone().map_err(unusable)?;
+    let place = bench.enter("time").map_err(unusable)?;
+    let path = baseline.prepare(&path, &place.join("case")).map_err(unusable)?;
     let engines = [baseline, baseline, &bench.candidate];
     // The first run of a program reads it and the geometry from disk.
     let first = run(bench, baseline, &path)?;
     let also = run(bench, &bench.candidate, &path)?;
-    let cpu = first.time_cpu_s.is_some() && also.time_cpu_s.is_some();
+    let cpu = first.report.time_cpu_s().is_some() && also.report.time_cpu_s().is_some();
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget_s.unwrap_or(rules.budget_s);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
@@ -69,7 +73,7 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, No
     let mut timed = Timed {
         rounds: Vec::with_capacity(count),
         what: if cpu { "CPU seconds" } else { "wall seconds" },
-        phases: first.phases_cpu_s.iter().map(|(name, _)| (name.clone(), Vec::new())).collect(),
+        phases: first.report.phases.iter().map(|phase| (phase.name.clone(), Vec::new())).collect(),
     };
     for _ in 0..count {
         let mut order = [BASELINE, AGAIN, CANDIDATE];
@@ -79,13 +83,14 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, No
             told[who] = Some(run(bench, engines[who], &path)?);
         }
         let [Some(a), Some(a_again), Some(b)] = told else { unreachable!("each was run") };
-        let time = |told: &Told| {
-            told.time_cpu_s.filter(|_| cpu).unwrap_or(told.time_process_s).max(1e-9).ln()
+        let time = |run: &Completed| {
+            run.report.time_cpu_s().filter(|_| cpu).unwrap_or(run.time_process_s).max(1e-9).ln()
         };
         timed.rounds.push(Round { a: time(&a), a_again: time(&a_again), b: time(&b) });
         for (name, ratios) in &mut timed.phases {
-            let of = |told: &Told| {
-                told.phases_cpu_s.iter().find(|(other, _)| other == name).map(|(_, t)| *t)
+            let of = |run: &Completed| {
+                let phase = run.report.phases.iter().find(|phase| phase.name == *name);
+                phase.map(PhaseReport::time_cpu_total_s)
             };
             if let (Some(a), Some(a_again), Some(b)) = (of(&a), of(&a_again), of(&b)) {
                 ratios.push((2.0 * b.max(1e-9) / (a + a_again).max(1e-9)).ln());
@@ -95,9 +100,9 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, No
     Ok(timed)
 }
 
-fn run(bench: &Bench, engine: &Engine, case: &Path) -> Result<Told, NoResult> {
-    let place = bench.enter("time/run").map_err(NoResult::Failed)?;
-    engine.run(case, Ranks::Serial, &place, false).map(|(told, _)| told)
+fn run(bench: &Bench, engine: &Engine, case: &Path) -> Result<Completed, Failure> {
+    let place = bench.enter("time/run").map_err(|why| engine.unusable(why))?;
+    engine.run(case, &SERIAL, &RunOptions::new(&place, bench.options.limit))
 }
 
 fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {

@@ -5,7 +5,7 @@ use super::probe::{Kind, Probe};
 use super::reduce::told;
 use check::diff;
 use contract::case::Case;
-use run::engine::runner::Ranks;
+use run::engine::layout::Ranks;
 use std::fs;
 use std::io;
 use std::path::Path;

@@ -1,24 +1,28 @@
-//! Whether a case fails, and how: the engine against the reference, or on ranks against itself on one.
+//! Whether a case fails, and how: the engine compared with the reference, or with its own serial run.
 
 use contract::plain::PlainCase;
-use run::engine::runner::{Engine, NoResult, Ranks, Told};
+use run::engine::failure::{End, Failure as RunFailure};
+use run::engine::layout::{Layout, Ranks};
+use run::engine::report::RunReport;
+use run::engine::runner::{Engine, RunOptions};
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tempfile::TempDir;
 
-/// A case and the number of ranks that it is run on.
+/// A case and the ranks on which it is run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// The case.
     pub case: PlainCase,
-    /// How it is run.
+    /// The ranks.
     pub ranks: Ranks,
 }
 
 /// Kinds of failures. A smaller case must fail in the same way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The mesh is not the one that was wanted.
+    /// The mesh differs from the expected one.
     Differs,
     /// The engine fails.
     Fails,
@@ -29,9 +33,9 @@ pub enum Kind {
 /// How a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// What kind.
+    /// The kind.
     pub kind: Kind,
-    /// In a sentence.
+    /// The failure in a sentence.
     pub told: String,
 }
 
@@ -41,25 +45,31 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Tries cases out.
+/// Runs trials.
 #[derive(Debug)]
 pub struct Probe {
     engine: Engine,
     truth: Engine,
     ranks: Ranks,
+    limit: Duration,
     place: TempDir,
 }
 
 impl Probe {
-    /// A serial engine is held against the reference, one on ranks against its own serial run: where
-    /// both are wrong alike, the serial case is the simpler one to look at.
+    /// A serial engine is compared with the reference, one on several ranks with its own serial run: if both runs are
+    /// wrong in the same way, the serial case is the simpler one to shrink. Each run may take `limit`.
     ///
     /// # Errors
-    /// Where there is no place for runs.
-    pub fn new(engine: Engine, reference: Engine, ranks: Ranks) -> Result<Self, String> {
+    /// If there is no directory for runs.
+    pub fn new(
+        engine: Engine,
+        reference: Engine,
+        ranks: Ranks,
+        limit: Duration,
+    ) -> Result<Self, String> {
         let truth = if ranks == Ranks::Serial { reference } else { engine.clone() };
         let place = tempfile::Builder::new().prefix("harness-shrink-").tempdir();
-        Ok(Self { engine, truth, ranks, place: place.map_err(|error| error.to_string())? })
+        Ok(Self { engine, truth, ranks, limit, place: place.map_err(|error| error.to_string())? })
     }
 
     /// The ranks of the first trial.
@@ -67,52 +77,52 @@ impl Probe {
         self.ranks
     }
 
-    /// How a trial fails, if it does. A case that the programs refuse does not fail.
+    /// How a trial fails; `None` if it does not. A case that both programs refuse does not fail.
     ///
     /// # Errors
-    /// Where nothing can be run, or there is nothing to compare with.
+    /// If the engine cannot be run, or there is no mesh to compare with.
     pub fn failure(&self, trial: &Trial) -> Result<Option<Failure>, String> {
         let case = self.write(&trial.case)?;
-        let truth = self.run(&self.truth, &case, Ranks::Serial, "truth", false);
-        let wanted = truth
-            .map_err(|why| format!("nothing to compare with: {}: {why}", self.truth_name()))?;
-        match self.run(&self.engine, &case, trial.ranks, "engine", false) {
-            Ok(told) if told.digest == wanted.digest => Ok(None),
-            Ok(told) => Ok(Some(Failure {
-                kind: Kind::Differs,
-                told: format!(
-                    "{}: {} cells, digest {}; {}: {} cells, digest {}",
-                    trial.ranks,
-                    told.cells,
-                    told.digest,
-                    self.truth_name(),
-                    wanted.cells,
-                    wanted.digest
-                ),
-            })),
-            Err(NoResult::Failed(why)) => {
-                Ok(Some(Failure { kind: Kind::Fails, told: format!("{}: {why}", trial.ranks) }))
+        let expected = self.run(&self.truth, &case, Ranks::Serial, "truth", false);
+        let expected = expected.map_err(|why| {
+            format!("there is no mesh to compare with, that of {}: {why}", self.truth_name())
+        })?;
+        let report = match self.run(&self.engine, &case, trial.ranks, "engine", false) {
+            Ok(report) if report.digest == expected.digest => return Ok(None),
+            Ok(report) => report,
+            Err(failure) => {
+                let kind = match failure.end {
+                    End::Missing(_) | End::Interrupted => return Err(failure.to_string()),
+                    End::TimedOut { .. } => Kind::Hangs,
+                    End::Exited { .. } | End::Signalled(_) | End::Unusable(_) => Kind::Fails,
+                };
+                return Ok(Some(Failure { kind, told: format!("{}: {failure}", trial.ranks) }));
             }
-            Err(NoResult::Hung(why)) => {
-                Ok(Some(Failure { kind: Kind::Hangs, told: format!("{}: {why}", trial.ranks) }))
-            }
-            Err(why) => Err(why.to_string()),
-        }
+        };
+        let mesh = |report: &RunReport| format!("{} cells, digest {}", report.cells, report.digest);
+        let told = format!(
+            "{}: {}; {}: {}",
+            trial.ranks,
+            mesh(&report),
+            self.truth_name(),
+            mesh(&expected)
+        );
+        Ok(Some(Failure { kind: Kind::Differs, told }))
     }
 
-    /// Both meshes of a trial, for `harness diff`: that of the engine, that which was wanted.
+    /// Both meshes of a trial, for `harness diff`: that of the engine, and the expected one.
     ///
     /// # Errors
-    /// Where there are not two.
+    /// If one of them cannot be made.
     pub fn meshes(&self, trial: &Trial) -> Result<[PathBuf; 2], String> {
         let case = self.write(&trial.case)?;
-        let wrong = |why: NoResult| why.to_string();
-        self.run(&self.engine, &case, trial.ranks, "engine", true).map_err(wrong)?;
-        self.run(&self.truth, &case, Ranks::Serial, "truth", true).map_err(wrong)?;
+        let why = |failure: RunFailure| failure.to_string();
+        self.run(&self.engine, &case, trial.ranks, "engine", true).map_err(why)?;
+        self.run(&self.truth, &case, Ranks::Serial, "truth", true).map_err(why)?;
         Ok(["engine", "truth"].map(|name| self.place.path().join(name).join("mesh")))
     }
 
-    /// What the engine is held against.
+    /// What the engine is compared with.
     pub fn truth_name(&self) -> &'static str {
         if self.ranks == Ranks::Serial { "the reference" } else { "its serial run" }
     }
@@ -128,10 +138,16 @@ impl Probe {
         ranks: Ranks,
         name: &str,
         write: bool,
-    ) -> Result<Told, NoResult> {
+    ) -> Result<RunReport, RunFailure> {
         let place = self.place.path().join(name);
         let _ = std::fs::remove_dir_all(&place);
-        std::fs::create_dir_all(&place).map_err(|error| NoResult::Missing(error.to_string()))?;
-        engine.run(case, ranks, &place, write).map(|(told, _)| told)
+        std::fs::create_dir_all(&place).map_err(|error| {
+            let why = format!("has no directory {}: {error}", place.display());
+            RunFailure::new(engine.name(), End::Missing(why))
+        })?;
+        let mesh = place.join("mesh");
+        let options =
+            RunOptions { mesh: write.then_some(&mesh), ..RunOptions::new(&place, self.limit) };
+        engine.run(case, &Layout::on(ranks), &options).map(|completed| completed.report)
     }
 }

@@ -5,7 +5,7 @@
 
 use super::probe::Trial;
 use contract::case::Facet;
-use run::engine::runner::Ranks;
+use run::engine::layout::Ranks;
 use toml::Value;
 
 /// Whether a trial still fails.

@@ -9,7 +9,6 @@ use bench::experiments::plan::{self, Experiment, Preset, Wishes, studies};
 use bench::experiments::session::Options;
 use bench::experiments::{bench, table};
 use clap::Args;
-use run::engine::description::Templates;
 use run::engine::programs::Programs;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
 
@@ -96,23 +95,23 @@ fn measure(arguments: &Arguments) -> Result<u8, u8> {
 
 /// Where the programs are; an exit code where the one to be measured is not.
 fn programs(arguments: &Arguments) -> Result<Programs, u8> {
-    let mut programs = Programs::find(arguments.session.programs.given());
-    if !OWN.contains(&arguments.engine.as_str()) {
-        if !arguments.weights.is_empty() || !arguments.partitioners.is_empty() {
-            eprintln!(
-                "harness: --weights and --partitioners are the mesher's: leave them out with another --engine"
-            );
-            return Err(EXIT_INPUT);
-        }
-        programs =
-            programs.and_engine(&arguments.engine, arguments.session.limit()).map_err(|why| {
-                eprintln!("harness: {why}");
-                EXIT_INPUT
-            })?;
+    let own = OWN.contains(&arguments.engine.as_str());
+    if !own && (!arguments.weights.is_empty() || !arguments.partitioners.is_empty()) {
+        eprintln!(
+            "harness: --weights and --partitioners are the mesher's: leave them out with another --engine"
+        );
+        return Err(EXIT_INPUT);
     }
+    let engine = if own { "mesher" } else { arguments.engine.as_str() };
+    let given = arguments.session.programs.given();
+    let programs = Programs::find_with_engine(engine, given).map_err(|why| {
+        eprintln!("harness: {why}");
+        EXIT_INPUT
+    })?;
+    // Our mesher chooses the spacings, also for other engines.
     match arguments.engine.as_str() {
-        "reference" => require(&programs.paths.reference)?,
-        _ => require(&programs.paths.mesher)?,
+        "reference" => require(programs.reference.program())?,
+        _ => require(programs.mesher.program())?,
     }
     Ok(programs)
 }
@@ -130,9 +129,8 @@ fn show(arguments: &Arguments) -> u8 {
 /// What is asked for, in the library's words.
 fn options(arguments: &Arguments, programs: &Programs) -> Options {
     let session = &arguments.session;
-    let does = programs.engine.as_ref().map(|engine| engine.description().run.clone());
-    let can = |has: fn(&Templates) -> bool| does.as_ref().is_none_or(has);
-    let (sim, mpi) = (can(|t| t.simulated.is_some()), can(|t| t.parallel.is_some()));
+    let templates = &programs.engine.description().run;
+    let (sim, mpi) = (templates.simulated.is_some(), templates.parallel.is_some());
     let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
     let wishes = Wishes {
         cases: arguments.cases.clone(),
@@ -147,7 +145,7 @@ fn options(arguments: &Arguments, programs: &Programs) -> Options {
         no_mpi: session.no_mpi || !session.launcher.is_found() || !mpi,
         no_sim: !sim,
         serial: arguments.engine == "reference" || !sim && !mpi,
-        no_choice: does.is_some(),
+        no_choice: !OWN.contains(&arguments.engine.as_str()),
     };
     session.options(studies(arguments.preset, &wishes), label(&arguments.engine))
 }

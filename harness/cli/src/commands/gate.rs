@@ -66,11 +66,17 @@ pub struct Arguments {
 
 /// Compares, prints, writes; the exit code.
 pub fn run(arguments: Arguments) -> u8 {
-    let programs = Programs::find(arguments.programs.given());
+    let given = arguments.programs.given();
+    let programs = match Programs::find_with_engine(&arguments.engine, given) {
+        Ok(programs) => programs,
+        Err(why) => {
+            eprintln!("harness: {why}");
+            return EXIT_INPUT;
+        }
+    };
     let options = Options {
         baseline: arguments.baseline.clone(),
         candidate: arguments.candidate.clone(),
-        engine: arguments.engine.clone(),
         rules: arguments.rules.clone(),
         cases: arguments.case.clone(),
         layers: arguments.layers.clone(),

@@ -1,7 +1,7 @@
 //! Options that say where the programs are.
 
 use clap::Args;
-use run::engine::paths::Given;
+use run::engine::programs::Given;
 use std::path::PathBuf;
 
 /// Where the programs are.

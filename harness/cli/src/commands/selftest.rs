@@ -10,10 +10,11 @@ use clap::Args;
 use contract::case::Case;
 use contract::leafset;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use run::engine::failure::End;
 use run::engine::interrupt;
-use run::engine::mesher::{self, Files};
-use run::engine::process::{self, End, Watch};
+use run::engine::layout::SERIAL;
 use run::engine::programs::Programs;
+use run::engine::runner::RunOptions;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use std::fs;
 use std::io::ErrorKind;
@@ -76,9 +77,9 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
     if !arguments.at_scale.is_empty() {
         return at_scale(arguments);
     }
-    let programs = Programs::find(arguments.programs.given());
-    if !programs.paths.reference.is_file() {
-        let path = programs.paths.reference.display();
+    let programs = find(arguments)?;
+    if !programs.reference.program().is_file() {
+        let path = programs.reference.program().display();
         return Err((
             EXIT_MISSING,
             format!("there is no reference at {path}: build it, or say where it is"),
@@ -150,9 +151,9 @@ fn source(arguments: &Arguments, path: &Path, made: &Path) -> Result<Source, Fai
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         return Ok(Source { name, mesh: path.to_owned(), base: None });
     }
-    let programs = Programs::find(arguments.programs.given());
-    if !programs.paths.mesher.is_file() {
-        let path = programs.paths.mesher.display();
+    let programs = find(arguments)?;
+    if !programs.mesher.program().is_file() {
+        let path = programs.mesher.program().display();
         return Err((
             EXIT_MISSING,
             format!("there is no mesher at {path}: build it, or say where it is"),
@@ -175,6 +176,10 @@ fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {
     SPECIMENS.into_iter().map(write).collect()
 }
 
+fn find(arguments: &Arguments) -> Result<Programs, Failure> {
+    Programs::find(arguments.programs.given()).map_err(|why| (EXIT_INPUT, why))
+}
+
 /// The reference's meshes of a case.
 fn specimen(
     programs: &Programs,
@@ -188,22 +193,18 @@ fn specimen(
         let logs = place.join(format!("{name}-logs"));
         fs::create_dir_all(&logs).map_err(|error| (EXIT_INPUT, error.to_string()))?;
         let out = place.join(name);
-        let files = Files { case: path, out: Some(&out), json: None, status: None, ungraded };
-        let watch = Watch { limit, logs: &logs, name: "reference", status: None };
-        let done = process::run(&mut mesher::reference(programs, &files), &watch)
-            .map_err(|error| (EXIT_MISSING, format!("the reference cannot be started: {error}")))?;
-        let shown = path.display();
-        match done.end {
-            End::Exited(0) => {}
-            End::Interrupted => return Err((EXIT_INTERRUPTED, "ended by the user".to_owned())),
-            End::Exited(2) => return Err((EXIT_INPUT, done.first_error_line())),
-            end => {
-                return Err((
-                    EXIT_FAILED,
-                    format!("the reference fails on {shown}: {end:?}, {}", done.first_error_line()),
-                ));
-            }
-        }
+        let options = RunOptions {
+            mesh: Some(&out),
+            report: false,
+            ungraded,
+            ..RunOptions::new(&logs, limit)
+        };
+        programs.reference.run(path, &SERIAL, &options).map_err(|failure| match &failure.end {
+            End::Missing(_) => (EXIT_MISSING, failure.to_string()),
+            End::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+            End::Exited { code: 2, error } => (EXIT_INPUT, error.clone()),
+            _ => (EXIT_FAILED, format!("{failure}, on {}", path.display())),
+        })?;
         meshes.push(leafset::read(&out).map_err(|error| (EXIT_FAILED, error.to_string()))?);
     }
     let base = meshes.pop().expect("two were made");

@@ -2,12 +2,12 @@
 
 use super::programs::ProgramArguments;
 use bench::experiments::entry::Network;
-use bench::experiments::launcher::Launcher;
 use bench::experiments::network;
 use bench::experiments::plan::Study;
 use bench::experiments::record::{self, Content};
 use bench::experiments::session::{BenchError, Options};
 use clap::Args;
+use run::engine::launcher::Launcher;
 use run::verify::report::{EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

@@ -7,9 +7,8 @@ use bench::shrink::{Budget, shrink};
 use clap::Args;
 use contract::catalogue;
 use contract::plain::PlainCase;
-use run::engine::description::Description;
+use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
-use run::engine::runner::{Engine, Ranks};
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -59,13 +58,10 @@ pub fn run(arguments: &Arguments) -> u8 {
 }
 
 fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
-    let programs = Programs::find(arguments.programs.given());
+    let given = arguments.programs.given();
+    let program = given.mesher.as_ref().map(|path| path.to_string_lossy().into_owned());
+    let programs = Programs::find_with_engine(&arguments.engine, given)?;
     let limit = Duration::from_secs(arguments.timeout);
-    let engine =
-        Engine::new(Description::find(&arguments.engine, &programs.paths)?, &programs.paths, limit);
-    let reference =
-        Engine::new(Description::find("reference", &programs.paths)?, &programs.paths, limit);
-    let reference = reference.with_program(programs.paths.reference.clone());
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
@@ -75,7 +71,7 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
         true => PathBuf::from(&arguments.case),
         false => catalogue::named(&arguments.case, &programs.paths.catalogue)?.path,
     };
-    let probe = Probe::new(engine, reference, ranks)?;
+    let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
     if arguments.check {
         let failure = probe.failure(&Trial { case: PlainCase::read(&case)?, ranks })?;
         println!("{}", failure.as_ref().map_or("it does not fail".to_owned(), ToString::to_string));
@@ -88,8 +84,6 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
     };
     let name = case.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
-    let program =
-        programs.paths.mesher_given.as_ref().map(|path| path.to_string_lossy().into_owned());
     let repeat = Repeat { engine: arguments.engine.clone(), program };
     let told = leave(&shrunk, &probe, &repeat, &out)
         .map_err(|error| format!("{}: {error}", out.display()))?;

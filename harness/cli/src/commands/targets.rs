@@ -53,8 +53,11 @@ fn read(arguments: &Arguments) -> Result<Targets, String> {
 
 fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     let session = &arguments.session;
-    let programs = Programs::find(session.programs.given());
-    require(&programs.paths.mesher)?;
+    let programs = Programs::find(session.programs.given()).map_err(|why| {
+        eprintln!("harness: {why}");
+        EXIT_INPUT
+    })?;
+    require(programs.mesher.program())?;
     let wishes = Wishes {
         repeats: session.repeat.map(usize::from),
         no_mpi: session.no_mpi,

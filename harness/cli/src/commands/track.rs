@@ -98,7 +98,7 @@ fn append(arguments: &Arguments) -> Result<(), String> {
     // A history that cannot be read is not made worse.
     history::read(&arguments.history)?;
     let repository = arguments.repository.clone();
-    let repository = repository.unwrap_or_else(|| Paths::find(Default::default()).root);
+    let repository = repository.unwrap_or_else(|| Paths::find().root);
     let mut record = Record::of_commit(&arguments.commit, &repository)?;
     for file in &arguments.add {
         let wrong = |why: String| format!("{}: {why}", file.display());

@@ -92,16 +92,14 @@ fn rank_count(text: &str) -> Result<usize, String> {
 
 /// Verifies, prints, writes; the exit code.
 pub fn run(arguments: Arguments) -> u8 {
-    let mut programs = Programs::find(arguments.programs.given());
-    if let Some(name) = &arguments.engine {
-        programs = match programs.with_engine(name, Duration::from_secs(arguments.timeout)) {
-            Ok(programs) => programs,
-            Err(why) => {
-                eprintln!("harness: {why}");
-                return EXIT_INPUT;
-            }
-        };
-    }
+    let engine = arguments.engine.as_deref().unwrap_or("mesher");
+    let programs = match Programs::find_with_engine(engine, arguments.programs.given()) {
+        Ok(programs) => programs,
+        Err(why) => {
+            eprintln!("harness: {why}");
+            return EXIT_INPUT;
+        }
+    };
     let (junit, json) = (arguments.junit.clone(), arguments.json.clone());
     let options = options(arguments);
     let report = match verify(&options, &programs) {

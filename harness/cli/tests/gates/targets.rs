@@ -11,7 +11,7 @@ while [ $# -gt 0 ]; do
     case "$1" in
     --out) cp -r "$here/right" "$2" ;;
     --json) json="$2" ;;
-    --comm) [ "$2" != sim:3 ] || { echo "mesher: no three" >&2; exit 70; } ;;
+    --comm) [ "$2" != sim:3:1 ] || { echo "mesher: no three" >&2; exit 70; } ;;
     esac
     shift
 done
@@ -81,7 +81,7 @@ fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
     let done = play.harness(&format!("{TARGETS_COMMAND} --no-mpi --report out"));
     assert_eq!(done.code, 1, "{}", done.told);
     assert!(
-        done.told.contains("FAILED: run three failed: it ended with code 70: mesher: no three"),
+        done.told.contains("FAILED: run three failed: mesher ended with code 70: mesher: no three"),
         "{}",
         done.told
     );

@@ -169,7 +169,7 @@ fn a_record_that_is_not_the_mesh_s_is_found() {
     let fixture = Fixture::new();
     fixture.play("mesher", &HOLDS.replace("\"cells\": 1", "\"cells\": 2"));
     let done = fixture.verify(&["--no-mpi"]);
-    assert_eq!((done.code, done.told.contains("--json says 2 cells")), (1, true), "{}", done.told);
+    assert_eq!((done.code, done.told.contains("reports 2 cells")), (1, true), "{}", done.told);
 }
 
 #[test]

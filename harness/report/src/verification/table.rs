@@ -47,7 +47,7 @@ pub fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let mut rows = vec![first];
     for ranks in rank_counts(case) {
         let with_ranks =
-            |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks == ranks);
+            |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks.count() == ranks);
         let runs = case.runs.iter().filter(with_ranks);
         // Layouts differ in time and not in result; the table shows what the best of them gives.
         let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));

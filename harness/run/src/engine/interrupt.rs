@@ -1,7 +1,7 @@
-//! Ctrl-C and SIGTERM: remembered here, asked for by everything that waits.
+//! Ctrl-C and SIGTERM: a flag that every loop that waits or runs programs checks.
 //!
-//! Invariant: a signal ends the harness the ordinary way, by returning, so that children are ended and
-//! temporary directories removed by their owners.
+//! Invariant: a signal makes the harness return in the ordinary way, so that child processes are ended and temporary
+//! directories removed by their owners.
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -10,17 +10,17 @@ use std::sync::{Arc, LazyLock};
 
 static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// Makes Ctrl-C, SIGTERM and SIGHUP a request to end. A second one, from an impatient user, ends at once.
+/// Turns Ctrl-C, SIGTERM and SIGHUP into a request to stop. A second signal ends the harness at once.
 pub fn install() {
     for signal in [SIGINT, SIGTERM, SIGHUP] {
-        // Without a handler a signal ends the harness without cleaning up: worse, but no reason not to run.
-        // The two run in this order, so that the first signal finds the flag down.
+        // If a handler cannot be installed, the signal ends the harness without cleaning up; that does not prevent
+        // a run. The order matters: the shutdown is conditional on a flag that the first signal must find unset.
         let _ = flag::register_conditional_shutdown(signal, 130, Arc::clone(&REQUESTED));
         let _ = flag::register(signal, Arc::clone(&REQUESTED));
     }
 }
 
-/// Whether the user has asked to end.
+/// Whether the user has asked the harness to stop.
 pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }

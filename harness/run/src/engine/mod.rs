@@ -1,14 +1,17 @@
-//! The programs under test and those they are tested against, as child processes: how they are found,
-//! started, watched and read. What their results mean is no business of this module.
+//! Programs as child processes: how they are found, started, watched and judged, and how their reports are read.
+//! This module does not interpret meshes.
 
+mod command;
 pub mod description;
+pub mod failure;
 pub mod interrupt;
-pub mod memory;
-pub mod mesher;
-pub mod mpi;
+pub mod launcher;
+pub mod layout;
+mod memory;
 pub mod p4est;
 pub mod paths;
 pub mod process;
 pub mod programs;
+pub mod report;
 pub mod runner;
 mod session;

@@ -1,17 +1,20 @@
-//! The p4est engine: balances a base tree, leaf for leaf, with code that is not ours.
+//! The p4est program, which balances a base tree independently of our code.
+//!
+//! It is not an [`Engine`](super::runner::Engine): it reads a leaf-set directory and not a case file, and it writes
+//! bare leaves without a manifest, so no key of an engine file would describe its run.
 
-use super::mpi;
+use super::launcher;
 use std::path::Path;
 use std::process::Command;
 
-/// The engine's exit code for a tree deeper than p4est goes.
+/// The exit code for a tree that is deeper than p4est supports.
 pub const EXIT_TOO_DEEP: i32 = 3;
 
-/// The engine's command: reads the leaf-set directory `tree`, writes `leaves-00000.npy` into the existing
-/// directory `out`.
-pub fn command(engine: &Path, tree: &Path, out: &Path) -> Command {
-    let mut command = Command::new(engine);
+/// The command that reads the leaf-set directory `tree` and writes `leaves-00000.npy` into the existing directory
+/// `out`.
+pub fn command(program: &Path, tree: &Path, out: &Path) -> Command {
+    let mut command = Command::new(program);
     command.arg(tree).arg(out);
-    mpi::set_environment(&mut command);
+    launcher::set_environment(&mut command);
     command
 }

@@ -1,58 +1,40 @@
-//! Where the programs are: given on the command line, or next to the harness, or on the machine.
+//! Where programs and data are on this machine.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// What the command line may say about where programs are.
-#[derive(Clone, Debug, Default)]
-pub struct Given {
-    /// `--mesher`.
-    pub mesher: Option<PathBuf>,
-    /// `--reference`.
-    pub reference: Option<PathBuf>,
-}
-
-/// Paths of the programs. A path need not exist: whoever needs the program says that it is missing.
+/// Paths of programs and data. A path need not exist: the code that needs the file reports that it is missing.
 #[derive(Clone, Debug)]
 pub struct Paths {
-    /// The mesher under test.
-    pub mesher: PathBuf,
-    /// The program that the command line gave for it, whatever engine that is of.
-    pub mesher_given: Option<PathBuf>,
-    /// The reference.
-    pub reference: PathBuf,
     /// OpenMPI's or another `mpirun`.
     pub mpirun: PathBuf,
-    /// The Python that has the oracles' packages: `HARNESS_PYTHON` or the repository's `.venv`.
+    /// A Python with the oracles' packages: `HARNESS_PYTHON`, or that of the repository's `.venv`.
     pub python: PathBuf,
-    /// The directory of the oracles' programs.
+    /// Directory of the oracles' scripts.
     pub oracles: PathBuf,
-    /// The p4est engine: `HARNESS_P4EST`, or `engines/p4est-balance` of the harness's target directory or the
-    /// repository's.
+    /// The p4est program: `HARNESS_P4EST`, or `engines/p4est-balance` in the target directory of the harness or of the
+    /// repository.
     pub p4est: PathBuf,
     /// The catalogue of cases.
     pub catalogue: PathBuf,
-    /// The directory of engine descriptions.
+    /// Directory of the engine files.
     pub engines: PathBuf,
     /// The repository.
     pub root: PathBuf,
-    /// The program itself, for the command that repeats a failure.
+    /// The harness itself.
     pub harness: PathBuf,
 }
 
 impl Paths {
-    /// Looks where programs are for a harness that was built at, or is run from, some place below the
-    /// repository. `HARNESS_ROOT` names the repository for one that is neither.
-    pub fn find(given: Given) -> Self {
+    /// Finds the repository above the running harness or above the current directory, and everything else relative to
+    /// it. `HARNESS_ROOT` overrides the search.
+    pub fn find() -> Self {
         let harness = env::current_exe().unwrap_or_else(|_| PathBuf::from("harness"));
         let beside = harness.parent().unwrap_or(Path::new(".")).to_owned();
         let root = repository(&beside);
         let from_env = |name| env::var_os(name).map(PathBuf::from);
         let target = beside.parent().unwrap_or(Path::new("..")).to_owned();
         Self {
-            mesher_given: given.mesher.clone(),
-            mesher: given.mesher.unwrap_or_else(|| beside.join("mesher")),
-            reference: given.reference.unwrap_or_else(|| beside.join("reference")),
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
             oracles: root.join("harness/oracles"),
@@ -65,23 +47,23 @@ impl Paths {
     }
 }
 
-/// The p4est engine in the harness's target directory or, for a harness that was copied, in the repository's.
+/// The p4est program in the target directory of the harness or, for a harness that was copied elsewhere, in that of
+/// the repository.
 fn p4est_below(target: &Path, root: &Path) -> PathBuf {
-    let places = [target.to_owned(), root.join("target")];
-    let mut found = places.map(|place| place.join("engines/p4est-balance")).into_iter();
-    let first = found.next().unwrap_or_default();
-    if first.is_file() { first } else { found.find(|engine| engine.is_file()).unwrap_or(first) }
+    let [first, second] =
+        [target.to_owned(), root.join("target")].map(|place| place.join("engines/p4est-balance"));
+    if !first.is_file() && second.is_file() { second } else { first }
 }
 
-/// The repository's root: the nearest directory above the harness, or above where it is run, that holds
+/// The root of the repository: the nearest directory above the harness, or above the current directory, that contains
 /// the oracles.
 fn repository(beside: &Path) -> PathBuf {
     if let Some(root) = env::var_os("HARNESS_ROOT") {
         return root.into();
     }
     let here = env::current_dir().unwrap_or_default();
-    let above = beside.ancestors().chain(here.ancestors());
-    let root = above.into_iter().find(|place| place.join("harness/oracles/protocol.py").is_file());
+    let mut above = beside.ancestors().chain(here.ancestors());
+    let root = above.find(|place| place.join("harness/oracles/protocol.py").is_file());
     root.map_or(here.clone(), Path::to_owned)
 }
 

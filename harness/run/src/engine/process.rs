@@ -1,13 +1,14 @@
-//! Child programs under a time limit, ended with everything that they started.
+//! Child programs under a time limit, ended together with everything that they started, and judged.
 //!
 //! Invariants:
-//! - a child leads a session of its own, so that its descendants can be found even when they left its
-//!   process group, as the ranks of OpenMPI's `mpirun` do;
+//! - a child leads a session of its own, so that its descendants can be found even if they left its process group, as
+//!   the ranks of OpenMPI's `mpirun` do;
 //! - when [`run`] returns, no process of that session is left, however the child ended;
-//! - what the child printed is in files, so that no pipe can fill and no output is lost with a hang.
+//! - the child's output goes to files, so that no pipe can fill and no output is lost with a hang.
 
+use super::failure::{End, Failure, describe_activity};
 use super::interrupt;
-use super::memory::Scales;
+use super::memory::MemorySampler;
 use super::session;
 use rustix::process::{Signal, kill_process, kill_process_group, setsid};
 use std::fs::{self, File};
@@ -17,141 +18,138 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How a child ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// By itself, with this code.
-    Exited(i32),
-    /// By a signal that the harness did not send.
-    Signalled(i32),
-    /// Killed by the harness at the end of its time limit.
-    TimedOut,
-    /// Killed by the harness because the user asked it to end.
-    Interrupted,
-}
-
-/// One child's run.
+/// A child that exited with code 0.
 #[derive(Debug)]
 pub struct Finished {
-    /// How it ended.
-    pub end: End,
-    /// From start to end, in seconds.
+    /// Wall time from start to end, in seconds.
     pub time_wall_s: f64,
-    /// What it printed on standard output.
+    /// File with the standard output.
     pub stdout: PathBuf,
-    /// What it printed on standard error.
-    pub stderr: PathBuf,
-    /// What each rank was last doing, in the order of ranks; filled only when the child timed out.
-    pub last_doing: Vec<(usize, String)>,
+    /// Peak memory of the child and its descendants, if it was sampled.
+    pub peak_rss_bytes: Option<u64>,
 }
 
-impl Finished {
-    /// The first line that the child printed as an error: where our own programs say what is wrong, and
-    /// `mpirun` has much to say after them.
-    pub fn first_error_line(&self) -> String {
-        self.error_lines().into_iter().next().unwrap_or_else(|| "it printed no error".to_owned())
-    }
-
-    /// The last line that the child printed as an error: where Python says what is wrong.
-    pub fn last_error_line(&self) -> String {
-        self.error_lines().pop().unwrap_or_else(|| "it printed no error".to_owned())
-    }
-
-    /// Lines with at least one letter in them, so that rulers are none.
-    fn error_lines(&self) -> Vec<String> {
-        let text = fs::read_to_string(&self.stderr).unwrap_or_default();
-        let lines = text.lines().filter(|line| line.contains(char::is_alphabetic));
-        lines.map(|line| line.trim().to_owned()).collect()
-    }
+/// Which line of the standard error describes an error. A line without a letter, such as a ruler, never does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorLine {
+    /// The first: our own programs print one line, and `mpirun` adds many after it.
+    First,
+    /// The last: Python, compilers and valgrind print the error at the end.
+    Last,
 }
 
-/// What a child is allowed, and where it leaves its traces.
-#[derive(Debug)]
+/// A child's name and limits, and where its output goes.
+#[derive(Clone, Debug)]
 pub struct Watch<'a> {
-    /// Killed after this.
-    pub limit: Duration,
-    /// Directory, existing, that receives `NAME.stdout` and `NAME.stderr`.
-    pub logs: &'a Path,
-    /// The NAME above; also what the child is called in messages.
+    /// The child's name in messages, and the `NAME` of its output files.
     pub name: &'a str,
-    /// Directory in which each rank keeps a file `rank-NNNNN.txt` with what it is doing.
+    /// Time after which it is killed.
+    pub limit: Duration,
+    /// Existing directory that receives `NAME.stdout` and `NAME.stderr`.
+    pub logs: &'a Path,
+    /// Directory in which rank N keeps its current activity in the file `rank-NNNNN.txt`.
     pub status: Option<&'a Path>,
+    /// Which line describes an error.
+    pub error_line: ErrorLine,
+    /// Sample the memory of the child and its descendants.
+    pub sample_memory: bool,
 }
 
-/// Runs the child to its end, or to its time limit, or to the user's Ctrl-C.
+impl<'a> Watch<'a> {
+    /// A child without status files and memory samples, which describes an error in its first line.
+    pub fn new(name: &'a str, limit: Duration, logs: &'a Path) -> Self {
+        let error_line = ErrorLine::First;
+        Self { name, limit, logs, status: None, error_line, sample_memory: false }
+    }
+
+    fn log(&self, stream: &str) -> PathBuf {
+        self.logs.join(format!("{}.{stream}", self.name))
+    }
+}
+
+/// Runs the child to its end, to its time limit or to the user's interrupt.
 ///
 /// # Errors
-/// Where the child could not be started or its output files not be made.
-pub fn run(command: &mut Command, watch: &Watch) -> io::Result<Finished> {
-    run_seen(command, watch, &mut |_| {})
+/// If the child cannot be started or does not exit with code 0.
+pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
+    let failure = |end| Failure::new(watch.name, end);
+    let mut sampler = watch.sample_memory.then(MemorySampler::new);
+    let (start, mut child) = start(command, watch).map_err(|error| {
+        let program = Path::new(command.get_program()).display();
+        failure(End::Missing(format!("cannot be started: {program}: {error}")))
+    })?;
+    let end = wait(&mut child, start, watch, sampler.as_mut());
+    kill_session(child.id());
+    match end {
+        Ok(None) => Ok(Finished {
+            time_wall_s: start.elapsed().as_secs_f64(),
+            stdout: watch.log("stdout"),
+            peak_rss_bytes: sampler.map(|sampler| sampler.peak_bytes()),
+        }),
+        Ok(Some(end)) => Err(failure(end)),
+        Err(error) => Err(failure(End::Unusable(format!("could not be waited for: {error}")))),
+    }
 }
 
-/// The same, with the memory of the child and of all that it starts weighed.
-///
-/// # Errors
-/// Those of [`run`].
-pub fn run_weighed(
-    command: &mut Command,
-    watch: &Watch,
-    scales: &mut Scales,
-) -> io::Result<Finished> {
-    run_seen(command, watch, &mut |leader| scales.weigh(leader))
-}
-
-/// Runs the child; while it is waited for, `look` is called with its id.
-fn run_seen(
-    command: &mut Command,
-    watch: &Watch,
-    look: &mut dyn FnMut(u32),
-) -> io::Result<Finished> {
-    let stdout = watch.logs.join(format!("{}.stdout", watch.name));
-    let stderr = watch.logs.join(format!("{}.stderr", watch.name));
-    command.stdin(Stdio::null()).stdout(File::create(&stdout)?).stderr(File::create(&stderr)?);
+fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child)> {
+    let (stdout, stderr) = (File::create(watch.log("stdout"))?, File::create(watch.log("stderr"))?);
+    command.stdin(Stdio::null()).stdout(stdout).stderr(stderr);
     // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
     unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
     let start = Instant::now();
-    let mut child = command.spawn()?;
-    let (end, last_doing) = wait(&mut child, start, watch, look)?;
-    kill_session(child.id());
-    Ok(Finished { end, time_wall_s: start.elapsed().as_secs_f64(), stdout, stderr, last_doing })
+    Ok((start, command.spawn()?))
 }
 
+/// How the child ended; `None` if it exited with code 0.
 fn wait(
     child: &mut Child,
     start: Instant,
     watch: &Watch,
-    look: &mut dyn FnMut(u32),
-) -> io::Result<(End, Vec<(usize, String)>)> {
+    mut sampler: Option<&mut MemorySampler>,
+) -> io::Result<Option<End>> {
     let mut pause = Duration::from_millis(1);
     loop {
         if let Some(status) = child.try_wait()? {
-            // A Ctrl-C in a terminal may reach a child by other ways; its end is then no result.
-            let end = if interrupt::requested() { End::Interrupted } else { end_of(status) };
-            return Ok((end, Vec::new()));
+            // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
+            let interrupted = interrupt::requested().then_some(End::Interrupted);
+            return Ok(interrupted.or_else(|| judge(status, watch)));
         }
         if interrupt::requested() {
             end_child(child)?;
-            return Ok((End::Interrupted, Vec::new()));
+            return Ok(Some(End::Interrupted));
         }
         if start.elapsed() >= watch.limit {
-            let last_doing = watch.status.map(read_status).unwrap_or_default();
+            let activity = watch.status.map(|status| describe_activity(&read_status(status)));
             end_child(child)?;
-            return Ok((End::TimedOut, last_doing));
+            return Ok(Some(End::TimedOut { limit: watch.limit, activity }));
         }
-        look(child.id());
+        if let Some(sampler) = &mut sampler {
+            sampler.sample(child.id());
+        }
         std::thread::sleep(pause);
         pause = (pause * 2).min(Duration::from_millis(20));
     }
 }
 
-fn end_of(status: ExitStatus) -> End {
+fn judge(status: ExitStatus, watch: &Watch) -> Option<End> {
     match status.code() {
-        Some(code) => End::Exited(code),
-        None => End::Signalled(status.signal().unwrap_or(0)),
+        Some(0) => None,
+        Some(code) => Some(End::Exited { code, error: error_line(watch) }),
+        None => Some(End::Signalled(status.signal().unwrap_or(0))),
     }
 }
 
-/// Asks the child to end, which lets `mpirun` end its ranks, and kills it if it does not.
+fn error_line(watch: &Watch) -> String {
+    let text = fs::read_to_string(watch.log("stderr")).unwrap_or_default();
+    let mut lines = text.lines().filter(|line| line.contains(char::is_alphabetic));
+    let line = match watch.error_line {
+        ErrorLine::First => lines.next(),
+        ErrorLine::Last => lines.next_back(),
+    };
+    line.map_or("it printed no error".to_owned(), |line| line.trim().to_owned())
+}
+
+/// Sends SIGTERM, on which `mpirun` ends its ranks, and kills the child if it does not end within a few seconds.
 fn end_child(child: &mut Child) -> io::Result<()> {
     if let Some(group) = session::pid_of(child.id()) {
         let _ = kill_process_group(group, Signal::TERM);
@@ -167,8 +165,8 @@ fn end_child(child: &mut Child) -> io::Result<()> {
     child.wait().map(drop)
 }
 
-/// Kills every process of the session that this process led. Processes of a session can be started while
-/// it is being killed, so it looks until it finds none.
+/// Kills every process of the session that `leader` led. Processes may be started while the session is being killed,
+/// so this repeats until none is found.
 fn kill_session(leader: u32) {
     for _ in 0..100 {
         let members = session::members(leader);
@@ -182,7 +180,7 @@ fn kill_session(leader: u32) {
     }
 }
 
-/// What the ranks' status files say, in the order of ranks.
+/// The activity in each rank's status file, in the order of ranks.
 fn read_status(directory: &Path) -> Vec<(usize, String)> {
     let Ok(entries) = fs::read_dir(directory) else {
         return Vec::new();
@@ -200,68 +198,87 @@ fn read_status(directory: &Path) -> Vec<(usize, String)> {
 mod tests {
     use super::*;
 
-    fn shell(script: &str, limit_ms: u64) -> (Finished, tempfile::TempDir) {
+    fn shell(script: &str, watch: &Watch) -> Result<Finished, Failure> {
+        let mut command = Command::new("sh");
+        command.arg("-c").arg(script).current_dir(watch.logs);
+        run(&mut command, watch)
+    }
+
+    fn end_of(script: &str, limit_ms: u64) -> End {
         let logs = tempfile::tempdir().unwrap();
         let limit = Duration::from_millis(limit_ms);
-        let watch = Watch { limit, logs: logs.path(), name: "child", status: Some(logs.path()) };
-        let mut command = Command::new("sh");
-        command.arg("-c").arg(script).current_dir(logs.path());
-        (run(&mut command, &watch).unwrap(), logs)
+        let watch = Watch { status: Some(logs.path()), ..Watch::new("child", limit, logs.path()) };
+        shell(script, &watch).unwrap_err().end
     }
 
     #[test]
-    fn exit_code_and_output_are_kept() {
-        let (finished, _logs) = shell(
-            "echo yes; echo ---- >&2; echo first >&2; echo last >&2; echo >&2; exit 7",
-            60_000,
-        );
-        assert_eq!(finished.end, End::Exited(7));
+    fn standard_output_is_kept_in_a_file() {
+        let logs = tempfile::tempdir().unwrap();
+        let watch = Watch::new("child", Duration::from_secs(60), logs.path());
+        let finished = shell("echo yes", &watch).unwrap();
         assert_eq!(fs::read_to_string(&finished.stdout).unwrap(), "yes\n");
-        assert_eq!(finished.first_error_line(), "first");
-        assert_eq!(finished.last_error_line(), "last");
+        assert_eq!(finished.peak_rss_bytes, None);
     }
 
     #[test]
-    fn a_signal_is_no_exit_code() {
-        assert_eq!(shell("kill -9 $$", 60_000).0.end, End::Signalled(9));
+    fn an_exit_code_comes_with_the_line_that_describes_the_error() {
+        let logs = tempfile::tempdir().unwrap();
+        let script = "echo ---- >&2; echo first >&2; echo last >&2; echo >&2; exit 7";
+        for (error_line, error) in [(ErrorLine::First, "first"), (ErrorLine::Last, "last")] {
+            let watch = Watch::new("child", Duration::from_secs(60), logs.path());
+            let failure = shell(script, &Watch { error_line, ..watch }).unwrap_err();
+            assert_eq!(failure.end, End::Exited { code: 7, error: error.to_owned() });
+        }
     }
 
     #[test]
-    fn a_hang_is_killed_with_what_the_ranks_were_doing() {
+    fn a_signal_is_not_an_exit_code() {
+        assert_eq!(end_of("kill -9 $$", 60_000), End::Signalled(9));
+    }
+
+    #[test]
+    fn a_program_that_does_not_exist_cannot_be_started() {
+        let logs = tempfile::tempdir().unwrap();
+        let watch = Watch::new("child", Duration::from_secs(60), logs.path());
+        let failure = run(&mut Command::new("/nowhere/program"), &watch).unwrap_err();
+        assert!(matches!(&failure.end, End::Missing(why) if why.contains("/nowhere/program")));
+    }
+
+    #[test]
+    fn a_hang_is_killed_and_reported_with_the_activity_of_the_ranks() {
         let script = "echo layer > rank-00001.txt; echo balance > rank-00000.txt; sleep 600";
-        let (finished, _logs) = shell(script, 300);
-        assert_eq!(finished.end, End::TimedOut);
-        assert_eq!(finished.last_doing, [(0, "balance".to_owned()), (1, "layer".to_owned())]);
-        assert!(finished.time_wall_s < 60.0);
+        let start = Instant::now();
+        let activity = Some("rank 0 was in: balance; rank 1 was in: layer".to_owned());
+        let limit = Duration::from_millis(300);
+        assert_eq!(end_of(script, 300), End::TimedOut { limit, activity });
+        assert!(start.elapsed() < Duration::from_secs(60));
     }
 
     #[test]
     fn a_child_that_ignores_sigterm_is_killed() {
-        let (finished, _logs) = shell("trap '' TERM; while :; do sleep 1; done", 200);
-        assert_eq!(finished.end, End::TimedOut);
+        let end = end_of("trap '' TERM; while :; do sleep 1; done", 200);
+        assert!(matches!(end, End::TimedOut { .. }), "{end:?}");
     }
 
     #[test]
     fn nothing_of_the_session_survives_its_leader() {
-        // The background process leaves the group, as the ranks of mpirun do, but not the session.
-        let script = "exec bash -c 'set -m; sleep 600 & echo $! > id'";
-        let (finished, logs) = shell(script, 30_000);
-        assert_eq!(finished.end, End::Exited(0));
+        let logs = tempfile::tempdir().unwrap();
+        let watch = Watch::new("child", Duration::from_secs(30), logs.path());
+        // The background process leaves the process group, as the ranks of mpirun do, but not the session.
+        shell("exec bash -c 'set -m; sleep 600 & echo $! > id'", &watch).unwrap();
         let id = fs::read_to_string(logs.path().join("id")).unwrap();
         let stat = fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
-        assert!(!session::session_and_life(&stat).is_some_and(|(_, alive)| alive), "{stat}");
+        assert!(!session::session_and_liveness(&stat).is_some_and(|(_, alive)| alive), "{stat}");
     }
 
     #[test]
-    fn a_childs_child_is_weighed() {
+    fn the_memory_of_a_grandchild_is_sampled() {
         let logs = tempfile::tempdir().unwrap();
-        let limit = Duration::from_secs(60);
-        let watch = Watch { limit, logs: logs.path(), name: "child", status: None };
-        let mut command = std::process::Command::new("sh");
+        let watch = Watch::new("child", Duration::from_secs(60), logs.path());
         // `tail` keeps the last line, which is all 30 MB of it, until its input ends.
-        command.arg("-c").arg("(head -c 30000000 /dev/zero; sleep 1) | tail -n 1 > /dev/null");
-        let mut scales = Scales::new();
-        run_weighed(&mut command, &watch, &mut scales).unwrap();
-        assert!(scales.peak_bytes() > 30_000_000, "{}", scales.peak_bytes());
+        let script = "(head -c 30000000 /dev/zero; sleep 1) | tail -n 1 > /dev/null";
+        let finished = shell(script, &Watch { sample_memory: true, ..watch }).unwrap();
+        let peak = finished.peak_rss_bytes.unwrap();
+        assert!(peak > 30_000_000, "{peak}");
     }
 }

@@ -1,44 +1,58 @@
-//! The programs of a run: their paths, and the engine in the mesher's place where there is one.
+//! The programs of a session: the engine under test, our mesher, the reference.
 
-use super::description::Description;
-use super::paths::{Given, Paths};
+use super::paths::Paths;
 use super::runner::Engine;
-use std::time::Duration;
+use std::path::PathBuf;
 
-/// The programs of a run.
+/// Programs that the command line names.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// `--mesher`: the program of the engine under test.
+    pub mesher: Option<PathBuf>,
+    /// `--reference`.
+    pub reference: Option<PathBuf>,
+}
+
+/// The programs of a session.
 #[derive(Clone, Debug)]
 pub struct Programs {
-    /// Where they are.
+    /// Where everything else is.
     pub paths: Paths,
-    /// The engine that stands in for the mesher, where one was named.
-    pub engine: Option<Engine>,
+    /// The engine under test.
+    pub engine: Engine,
+    /// The mesher of this repository. It is the engine under test unless another one was named.
+    pub mesher: Engine,
+    /// The reference of this repository.
+    pub reference: Engine,
 }
 
 impl Programs {
-    /// The programs where [`Paths::find`] finds them, and no engine in the mesher's place.
-    pub fn find(given: Given) -> Self {
-        Self { paths: Paths::find(given), engine: None }
-    }
-
-    /// The same with another engine in the mesher's place.
+    /// Finds the programs, with the mesher as the engine under test.
     ///
     /// # Errors
-    /// One sentence, where there is no such engine.
-    pub fn with_engine(self, name: &str, limit: Duration) -> Result<Self, String> {
-        let description = Description::find(name, &self.paths)?;
-        let engine = Engine::new(description, &self.paths, limit);
-        let paths = Paths { mesher: engine.program().to_owned(), ..self.paths };
-        Ok(Self { paths, engine: Some(engine) })
+    /// One sentence, if an engine file is missing or wrong.
+    pub fn find(given: Given) -> Result<Self, String> {
+        Self::find_with_engine("mesher", given)
     }
 
-    /// The same with an engine besides the mesher, which stays our own.
+    /// Finds the programs, with the engine of this name or path under test.
     ///
     /// # Errors
-    /// One sentence, where there is no such engine.
-    pub fn and_engine(self, name: &str, limit: Duration) -> Result<Self, String> {
-        let mesher = self.paths.harness.with_file_name("mesher");
-        let with_engine = self.with_engine(name, limit)?;
-        let paths = Paths { mesher, ..with_engine.paths };
-        Ok(Self { paths, ..with_engine })
+    /// One sentence, if an engine file is missing or wrong.
+    pub fn find_with_engine(name: &str, given: Given) -> Result<Self, String> {
+        let paths = Paths::find();
+        let engine = Engine::find(name, given.mesher.as_deref(), &paths)?;
+        let mesher = match name {
+            "mesher" => engine.clone(),
+            _ => Engine::find("mesher", None, &paths)?,
+        };
+        let reference = Engine::find("reference", given.reference.as_deref(), &paths)?;
+        Ok(Self { paths, engine, mesher, reference })
+    }
+
+    /// The engine that is called `label` in results: the mesher, the reference or the engine under test.
+    pub fn labelled(&self, label: &str) -> &Engine {
+        let own = [&self.mesher, &self.reference];
+        own.into_iter().find(|engine| engine.name() == label).unwrap_or(&self.engine)
     }
 }

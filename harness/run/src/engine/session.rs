@@ -1,4 +1,4 @@
-//! The processes of a session, as `/proc` shows them.
+//! The processes of a session, read from `/proc`.
 
 use rustix::process::Pid;
 use std::fs;
@@ -7,7 +7,7 @@ pub(super) fn pid_of(id: u32) -> Option<Pid> {
     i32::try_from(id).ok().and_then(Pid::from_raw)
 }
 
-/// The living processes of a session, its leader excepted once that has been waited for.
+/// The living processes of a session; without its leader once that has been waited for.
 pub(super) fn members(leader: u32) -> Vec<Pid> {
     let Ok(entries) = fs::read_dir("/proc") else {
         return Vec::new();
@@ -15,14 +15,14 @@ pub(super) fn members(leader: u32) -> Vec<Pid> {
     let ids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     let of_session = ids.filter(|&id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
-        session_and_life(&stat) == Some((leader, true))
+        session_and_liveness(&stat) == Some((leader, true))
     });
     of_session.filter_map(pid_of).collect()
 }
 
-/// Session id and whether the process lives (is no zombie), from the text of `/proc/ID/stat`.
-pub(super) fn session_and_life(stat: &str) -> Option<(u32, bool)> {
-    // The name, in parentheses, may itself hold spaces and parentheses.
+/// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.
+pub(super) fn session_and_liveness(stat: &str) -> Option<(u32, bool)> {
+    // The name, in parentheses, may itself contain spaces and parentheses.
     let (_, rest) = stat.rsplit_once(") ")?;
     let fields: Vec<&str> = rest.split(' ').collect();
     Some((fields.get(3)?.parse().ok()?, !matches!(*fields.first()?, "Z" | "X")))
@@ -33,9 +33,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn session_is_read_past_a_name_with_parentheses() {
-        assert_eq!(session_and_life("12 (a) b) S 1 12 77 0 -1"), Some((77, true)));
-        assert_eq!(session_and_life("12 (x) Z 1 12 77 0 -1"), Some((77, false)));
-        assert_eq!(session_and_life(""), None);
+    fn the_session_is_found_after_a_name_with_parentheses() {
+        assert_eq!(session_and_liveness("12 (a) b) S 1 12 77 0 -1"), Some((77, true)));
+        assert_eq!(session_and_liveness("12 (x) Z 1 12 77 0 -1"), Some((77, false)));
+        assert_eq!(session_and_liveness(""), None);
     }
 }

@@ -1,13 +1,15 @@
-//! The outside proof of balance: with n = 1 and all kept, the mesh is what p4est makes of the base tree.
+//! The independent check of balance: with n = 1 and everything kept, the mesh equals the base tree as balanced by
+//! p4est.
 
 use super::case::CaseRun;
-use super::outcome::Trouble;
 use super::report::{Check, Outcome};
-use super::run::{Order, What};
+use super::run::{Program, Request};
 use super::serial::Meshes;
+use crate::engine::failure::{End, Failure};
+use crate::engine::layout::SERIAL;
 use crate::engine::p4est::{self, EXIT_TOO_DEEP};
-use crate::engine::process::{self, End, Watch};
-use check::checks::identical;
+use crate::engine::process::{self, Watch};
+use check::checks::{CheckResult, identical};
 use contract::npy::PartFile;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,15 +18,9 @@ use toml::{Table, Value};
 const SUBJECT: &str = "p4est";
 const NAME: &str = "balance";
 
-/// Why there is nothing to compare with.
-enum NoTree {
-    TooDeep,
-    Failed(String),
-    Interrupted,
-}
-
 impl CaseRun<'_> {
-    /// Meshes the derived case, balances the base tree with p4est, compares leaf by leaf but for the sides.
+    /// Meshes the case with n = 1 and everything kept, balances the base tree with p4est, and compares the leaves
+    /// without their sides.
     pub fn verify_balance(&mut self, meshes: &Meshes) {
         if let Some(why) = self.needs.p4est.clone() {
             return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
@@ -32,71 +28,67 @@ impl CaseRun<'_> {
         self.progress.step("p4est");
         let plain = match self.mesh_plainly() {
             Ok(words) => words,
-            Err(trouble) => return self.add_trouble("p4est: n = 1, all kept", None, trouble),
+            Err(failure) => return self.add_failure("p4est: n = 1, all kept", None, &failure),
         };
-        let outcome = match self.balance_by_p4est(&meshes.base_place) {
+        let failure = match self.balance_by_p4est(&meshes.base_place) {
             Ok(words) => {
-                let compared =
-                    identical::compare(&sideless(&plain), &words, &meshes.mesh.manifest.root);
-                return self.add_results(
-                    SUBJECT,
-                    None,
-                    vec![check::checks::CheckResult { name: NAME, ..compared }],
-                );
+                let root = &meshes.mesh.manifest.root;
+                let compared = identical::compare(&sideless(&plain), &words, root);
+                let result = CheckResult { name: NAME, ..compared };
+                return self.add_results(SUBJECT, None, vec![result]);
             }
-            Err(NoTree::Interrupted) => return,
-            Err(NoTree::TooDeep) => {
+            Err(failure) => failure,
+        };
+        let outcome = match failure.end {
+            End::Interrupted => return,
+            End::Exited { code: EXIT_TOO_DEEP, .. } => {
                 Outcome::LeftOut("the base tree has leaves of level 19, p4est stops at 18".into())
             }
-            // An engine that fails says nothing about the mesh, and must not pass for having agreed.
-            Err(NoTree::Failed(why)) => Outcome::Fail(format!("the engine failed: {why}")),
+            // A failure of p4est is no evidence about the mesh, and it must not pass for agreement.
+            _ => Outcome::Fail(failure.to_string()),
         };
         self.add(Check::new(SUBJECT, NAME, outcome), None);
     }
 
-    /// The mesh of the same case with n = 1 and everything kept.
-    fn mesh_plainly(&self) -> Result<Vec<u64>, Trouble> {
-        let case = self.plain_case().map_err(Trouble::Failed)?;
-        let order =
-            Order { what: What::Serial, case: &case, name: "plain", ungraded: false, write: true };
-        Ok(self.run(&order)?.mesh.map(|mesh| mesh.words).unwrap_or_default())
+    /// The leaf words of the same case with n = 1 and everything kept.
+    fn mesh_plainly(&self) -> Result<Vec<u64>, Failure> {
+        let case =
+            self.plain_case().map_err(|why| Failure::new("the harness", End::Unusable(why)))?;
+        let meshed = self.run(&Request {
+            program: Program::Mesher,
+            layout: &SERIAL,
+            case: &case,
+            name: "plain",
+            ungraded: false,
+            write: true,
+        })?;
+        Ok(meshed.mesh.map(|mesh| mesh.words).unwrap_or_default())
     }
 
     fn plain_case(&self) -> Result<PathBuf, String> {
-        let text = fs::read_to_string(&self.selected.path).map_err(|error| error.to_string())?;
+        let wrong = |error: std::io::Error| format!("cannot write a case with n = 1: {error}");
+        let text = fs::read_to_string(&self.selected.path).map_err(wrong)?;
         let directory = self.selected.path.parent().unwrap_or(Path::new(""));
-        let directory = fs::canonicalize(directory.join(".")).map_err(|error| error.to_string())?;
+        let directory = fs::canonicalize(directory.join(".")).map_err(wrong)?;
         let path = self.place.join("plain.toml");
-        fs::write(&path, plain(&text, &directory)?).map_err(|error| error.to_string())?;
+        fs::write(&path, plain(&text, &directory)?).map_err(wrong)?;
         Ok(path)
     }
 
-    fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, NoTree> {
-        let failed = |why: String| NoTree::Failed(why);
+    fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
+        let unusable = |why: String| Failure::new("p4est", End::Unusable(why));
         let out = self.place.join("p4est");
-        fs::create_dir_all(&out).map_err(|error| failed(error.to_string()))?;
-        let watch = Watch { limit: self.options.limit, logs: &out, name: "p4est", status: None };
-        let mut command = p4est::command(&self.programs.paths.p4est, base, &out);
-        let done = process::run(&mut command, &watch).map_err(|error| failed(error.to_string()))?;
-        match done.end {
-            End::Exited(0) => {}
-            End::Exited(EXIT_TOO_DEEP) => return Err(NoTree::TooDeep),
-            End::Interrupted => return Err(NoTree::Interrupted),
-            End::TimedOut => {
-                return Err(failed(format!("did not end within {} s", watch.limit.as_secs())));
-            }
-            End::Exited(code) => {
-                return Err(failed(format!("exit {code}: {}", done.first_error_line())));
-            }
-            End::Signalled(signal) => return Err(failed(format!("died of signal {signal}"))),
-        }
-        let part = PartFile::open(&out.join("leaves-00000.npy"))
-            .map_err(|error| failed(error.to_string()))?;
-        part.read_all().map_err(|error| failed(error.to_string()))
+        fs::create_dir_all(&out)
+            .map_err(|error| unusable(format!("has no {}: {error}", out.display())))?;
+        let watch = Watch::new("p4est", self.options.limit, &out);
+        process::run(&mut p4est::command(&self.programs.paths.p4est, base, &out), &watch)?;
+        let part = PartFile::open(&out.join("leaves-00000.npy"));
+        let part = part.map_err(|error| unusable(format!("wrote no leaves: {error}")))?;
+        part.read_all().map_err(|error| unusable(format!("wrote leaves in part: {error}")))
     }
 }
 
-/// The case file's text with n = 1 and everything kept, meaning the same from any directory.
+/// The text of the case file with n = 1, everything kept and an absolute path of the geometry.
 fn plain(text: &str, directory: &Path) -> Result<String, String> {
     let mut case: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
     case.insert("layer_cells_min".into(), Value::Integer(1));
@@ -108,7 +100,7 @@ fn plain(text: &str, directory: &Path) -> Result<String, String> {
     toml::to_string(&case).map_err(|error| error.to_string())
 }
 
-/// Leaf words with side bits 0; they stay sorted, since no two leaves have one place.
+/// Leaf words with side bits 0. They stay sorted, because no two leaves have the same octant.
 fn sideless(words: &[u64]) -> Vec<u64> {
     words.iter().map(|word| word & !3).collect()
 }
@@ -118,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plain_case_differs_in_layer_and_keep_alone() {
+    fn a_plain_case_differs_only_in_layer_and_keep() {
         let text = "geometry = \"../a.stl\"\nspacing_min = 0.1\nkeep = \"inside\"\nkeep_crossing = false\n\
                     [root]\norigin = [0.1, 0.2, 0.3]\nedge = 1.5\n[[box]]\nmin = [0.0, 0.0, 0.0]\n\
                     max = [1.0, 1.0, 1.0]\nspacing = 0.25\n";
@@ -132,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_go_and_places_stay() {
+    fn sides_are_cleared_and_octants_kept() {
         assert_eq!(
             sideless(&[0b0100, 1 << 7 | 0b1001, 2 << 7 | 0b1010]),
             [4, 1 << 7 | 8, 2 << 7 | 8]

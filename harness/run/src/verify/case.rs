@@ -1,11 +1,12 @@
-//! One case, verified: the order of its steps, and what they share.
+//! The verification of one case: its steps in order, and the state that they share.
 
 use super::needs::Needs;
 use super::options::Options;
-use super::outcome::Trouble;
 use super::progress::Progress;
 use super::report::{CaseReport, Check, Outcome};
-use crate::engine::mesher::Layout;
+use super::serial::CODE_INPUT;
+use crate::engine::failure::{End, Failure};
+use crate::engine::layout::Layout;
 use crate::engine::programs::Programs;
 use check::checks::CheckResult;
 use contract::case::Case;
@@ -17,22 +18,22 @@ use std::path::Path;
 pub struct CaseRun<'a> {
     /// The case.
     pub selected: &'a Selected,
-    /// What was asked.
+    /// The options.
     pub options: &'a Options,
     /// The programs.
     pub programs: &'a Programs,
-    /// What this machine can do.
+    /// What is missing on this machine.
     pub needs: &'a Needs,
-    /// The case's own directory.
+    /// The directory of the case.
     pub place: &'a Path,
-    /// What is being done, for a terminal.
+    /// The progress line.
     pub progress: &'a Progress,
-    /// What was found so far.
+    /// The report so far.
     report: CaseReport,
 }
 
 impl<'a> CaseRun<'a> {
-    /// Nothing done yet.
+    /// A case before its first step.
     pub fn new(
         selected: &'a Selected,
         options: &'a Options,
@@ -45,13 +46,12 @@ impl<'a> CaseRun<'a> {
         Self { selected, options, programs, needs, place, progress, report }
     }
 
-    /// All steps: serial meshes and their checks, ranks, oracles, p4est. A step whose ground is missing is
-    /// left out, and so is what stands on it.
+    /// Performs all steps: serial meshes and their checks, ranks, oracles, p4est. Without serial meshes the later
+    /// steps are left out.
     pub fn verify(&mut self) {
         let Some(case) = self.read() else { return };
         self.report.facets = case.facets.len() as u64;
-        let engine = self.programs.engine.as_ref();
-        if let Some(why) = engine.and_then(|engine| engine.description().declines(&case)) {
+        if let Some(why) = self.programs.engine.description().declines(&case) {
             return self.add(Check::new("case", "engine", Outcome::LeftOut(why)), None);
         }
         let Some(meshes) = self.verify_serial(&case) else {
@@ -62,7 +62,7 @@ impl<'a> CaseRun<'a> {
         self.verify_balance(&meshes);
     }
 
-    /// The case as the harness reads it. Where it cannot, the mesher must refuse the case too.
+    /// Reads the case. If the harness cannot read it, the mesher must refuse it too.
     fn read(&mut self) -> Option<Case> {
         match Case::read(&self.selected.path) {
             Ok(case) => Some(case),
@@ -73,17 +73,17 @@ impl<'a> CaseRun<'a> {
         }
     }
 
-    /// What was found.
+    /// The report.
     pub fn into_report(self) -> CaseReport {
         self.report
     }
 
-    /// The report so far, to be written into.
+    /// The report so far, to be added to.
     pub fn report(&mut self) -> &mut CaseReport {
         &mut self.report
     }
 
-    /// Adds a check, and with the first failure the command that repeats it.
+    /// Adds a check, and with the first failed check the command that repeats it.
     pub fn add(&mut self, check: Check, layout: Option<&Layout>) {
         if check.failed() && self.report.repeat_with.is_none() {
             self.report.repeat_with = Some(self.command_for(layout));
@@ -91,7 +91,7 @@ impl<'a> CaseRun<'a> {
         self.report.checks.push(check);
     }
 
-    /// Adds checks of the checks' own modules.
+    /// Adds results of the crate `check`.
     pub fn add_results(
         &mut self,
         subject: &str,
@@ -106,70 +106,78 @@ impl<'a> CaseRun<'a> {
                 ("examined".to_owned(), result.examined),
                 ("findings".to_owned(), result.findings_total),
             ];
-            let ranks = layout.map(|layout| layout.ranks);
+            let ranks = layout.map(|layout| layout.ranks.count());
             let check = Check { ranks, figures: notes, counts: counts.into(), ..check };
             self.add(check, layout);
         }
     }
 
-    /// Adds what a run's trouble means; the user's own end means nothing.
-    pub fn add_trouble(&mut self, subject: &str, layout: Option<&Layout>, trouble: Trouble) {
-        let why = match trouble {
-            Trouble::Interrupted => return,
-            Trouble::Failed(why) | Trouble::Hung(why) => why,
-            Trouble::Input(why) => format!("it refuses the case: {why}"),
+    /// Adds the failure of a run, unless it is the user's interrupt.
+    pub fn add_failure(&mut self, subject: &str, layout: Option<&Layout>, failure: &Failure) {
+        let why = match &failure.end {
+            End::Interrupted => return,
+            End::Exited { code: CODE_INPUT, error } => format!("it refuses the case: {error}"),
+            _ => failure.to_string(),
         };
         let check = Check::new(subject, RUNS, Outcome::Fail(why));
-        self.add(Check { ranks: layout.map(|layout| layout.ranks), ..check }, layout);
+        self.add(Check { ranks: layout.map(|layout| layout.ranks.count()), ..check }, layout);
     }
 
-    /// One line that a shell takes and that repeats the run of this layout, or the serial one.
+    /// A shell command that repeats the run with this layout, or the serial one.
     fn command_for(&self, layout: Option<&Layout>) -> String {
-        let quoted = |text: &str| match text
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c))
-        {
-            true => text.to_owned(),
-            false => format!("'{}'", text.replace('\'', "'\\''")),
-        };
-        let program = quoted(&self.programs.paths.harness.to_string_lossy());
-        let case = quoted(&self.selected.argument);
-        let only = match layout {
-            None => "--no-mpi".to_owned(),
-            Some(Layout { ranks, partitioner, level_base }) => {
-                format!(
-                    "--no-oracles --no-p4est --ranks {ranks} --partitioners {partitioner} --level-bases {level_base}"
-                )
+        let paths = &self.programs.paths;
+        let mut words = vec![paths.harness.to_string_lossy().into_owned(), "verify".into()];
+        words.push(self.selected.argument.clone());
+        if self.programs.engine.name() != "mesher" {
+            words.extend(["--engine".into(), self.programs.engine.name().to_owned()]);
+        }
+        words.extend(layout.map_or(vec!["--no-mpi".to_owned()], options_of));
+        words.push("--keep".into());
+        let programs = [("mesher", &self.programs.engine), ("reference", &self.programs.reference)];
+        for (name, engine) in programs {
+            if engine.program() != paths.harness.with_file_name(name) {
+                words.push(format!("--{name}"));
+                words.push(engine.program().to_string_lossy().into_owned());
             }
-        };
-        let beside = |name: &str| self.programs.paths.harness.with_file_name(name);
-        let given = [
-            ("mesher", &self.programs.paths.mesher),
-            ("reference", &self.programs.paths.reference),
-        ];
-        let elsewhere = given.into_iter().filter(|(name, path)| beside(name) != **path);
-        let programs = elsewhere
-            .map(|(name, path)| format!(" --{name} {}", quoted(&path.to_string_lossy())))
-            .collect::<String>();
-        let engine = self.programs.engine.as_ref();
-        let engine = engine
-            .map_or(String::new(), |e| format!(" --engine {}", quoted(&e.description().name)));
-        format!("{program} verify {case}{engine} {only} --keep{programs}")
+        }
+        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
     }
 }
 
-/// Name of the check that a program runs to its end and says the truth about it.
+/// The options of `harness verify` that select this layout and nothing else.
+fn options_of(layout: &Layout) -> Vec<String> {
+    let mut words = vec!["--no-oracles".to_owned(), "--no-p4est".to_owned()];
+    let choices = [
+        ("--ranks", Some(layout.ranks.count().to_string())),
+        ("--partitioners", layout.partitioner.clone()),
+        ("--level-bases", layout.level_base.clone()),
+    ];
+    for (option, value) in choices {
+        words.extend(value.into_iter().flat_map(|value| [option.to_owned(), value]));
+    }
+    words
+}
+
+/// A word as a shell reads it back.
+fn quoted(word: &str) -> String {
+    match word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c)) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
+
+/// Name of the check that a program runs to its end and that its run report is true.
 pub const RUNS: &str = "runs";
 
 fn outcome_of(result: &CheckResult) -> Outcome {
     if result.holds() {
         return Outcome::Pass;
     }
-    let mut told: Vec<&str> =
+    let mut details: Vec<&str> =
         result.findings.iter().map(|finding| finding.detail.as_str()).collect();
     let more = format!("and {} more", result.findings_total - result.findings.len() as u64);
     if result.findings_total > result.findings.len() as u64 {
-        told.push(&more);
+        details.push(&more);
     }
-    Outcome::Fail(told.join("\n"))
+    Outcome::Fail(details.join("\n"))
 }

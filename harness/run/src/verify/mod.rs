@@ -1,8 +1,7 @@
-//! `harness verify`: every case through reference and mesher, on every layout of ranks, and every check on
-//! what comes out.
+//! `harness verify`: meshes every case with the reference and with the mesher on every layout, and checks the meshes.
 //!
-//! [`options`] is what was asked, [`needs`] what of it this machine can
-//! do; [`case`] does one case, with a file per family of checks; [`report`] is what was found.
+//! [`options`] are the user's choices, [`needs`] records what is missing on this machine, [`case`] verifies one case
+//! with a module per family of checks, and [`report`] is the result.
 
 pub mod balance;
 pub mod case;
@@ -25,13 +24,14 @@ use needs::Needs;
 use options::Options;
 use progress::Progress;
 use report::{CaseReport, Check, Outcome, Report};
+use std::path::Path;
 use std::time::Instant;
 use workplace::Workplace;
 
 /// Why a verification could not begin.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
-    /// The user's: an unknown case, a directory that is not ours to write into.
+    /// The user's input: an unknown case, or a directory that must not be overwritten.
     #[error("{0}")]
     Input(String),
     /// A program without which nothing can be verified.
@@ -39,19 +39,17 @@ pub enum VerifyError {
     Missing(String),
 }
 
-/// Verifies what the options name and reports what was found.
+/// Verifies the cases that the options select.
 ///
 /// # Errors
-/// Only where it could not begin; what goes wrong later is in the report.
+/// If the verification could not begin. Failures after that are in the report.
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyError> {
     let start = Instant::now();
-    for (program, path) in
-        [("mesher", &programs.paths.mesher), ("reference", &programs.paths.reference)]
-    {
-        if !path.is_file() {
-            let path = path.display();
+    for (program, engine) in [("mesher", &programs.engine), ("reference", &programs.reference)] {
+        if !engine.program().is_file() {
+            let path = engine.program().display();
             return Err(VerifyError::Missing(format!(
-                "there is no {program} at {path}: build it, or say where it is"
+                "there is no {program} at {path}: build it, or give its path with --{program}"
             )));
         }
     }
@@ -114,13 +112,10 @@ fn verify_case(
     Ok(report)
 }
 
-/// The case as the engine that stands in for the mesher can read it. One that cannot be read at all stays as it
-/// is: to refuse it is part of what is verified.
-fn plain(selected: &Selected, programs: &Programs, place: &std::path::Path) -> Selected {
-    let prepared = programs
-        .engine
-        .as_ref()
-        .and_then(|engine| engine.prepare(&selected.path, &place.join("plain")).ok());
-    let path = prepared.unwrap_or_else(|| selected.path.clone());
+/// The case in a form that the engine can read. A case that the harness cannot read is passed on unchanged, because
+/// refusing it is part of the verification.
+fn plain(selected: &Selected, programs: &Programs, place: &Path) -> Selected {
+    let prepared = programs.engine.prepare(&selected.path, &place.join("plain"));
+    let path = prepared.unwrap_or_else(|_| selected.path.clone());
     Selected { path, ..selected.clone() }
 }

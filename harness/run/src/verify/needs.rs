@@ -1,63 +1,64 @@
-//! What of a verification this machine can do, tried out once at its beginning.
+//! The prerequisites of a verification, each tried once before the first case.
 
 use super::options::{Need, Options};
 use super::report::Missing;
-use crate::engine::mesher::{self, Files, Layout, Record};
-use crate::engine::mpi::SharedMemory;
-use crate::engine::process::{self, End, Watch};
+use crate::engine::failure::Failure;
+use crate::engine::layout::{Layout, Ranks};
+use crate::engine::paths::Paths;
 use crate::engine::programs::Programs;
-use crate::oracle::{NoAnswer, ORACLES, Question};
+use crate::engine::runner::RunOptions;
+use crate::oracle::{ORACLES, Question};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// For each need, the reason why it is not there.
+/// Prerequisites, each with the reason if it is missing.
 #[derive(Clone, Debug, Default)]
 pub struct Needs {
-    /// MPI.
+    /// Why there is no MPI.
     pub mpi: Option<String>,
-    /// The oracles: why none can be asked.
+    /// Why no oracle can be used.
     pub oracles: Option<String>,
-    /// Oracles that can be asked.
-    pub oracles_there: Vec<&'static str>,
-    /// Oracles that cannot, each with its reason.
-    pub oracles_absent: Vec<String>,
-    /// p4est.
+    /// Oracles that can be used.
+    pub oracles_found: Vec<&'static str>,
+    /// Failures of the other oracles.
+    oracles_missing: Vec<Failure>,
+    /// Why there is no p4est.
     pub p4est: Option<String>,
-    /// Geometries that are not there.
+    /// Why geometries are missing, one reason each.
     geometries: Vec<String>,
 }
 
-/// A case for trying things out: eight cells around a cube.
+/// A case for trying programs out: eight cells around a cube.
 const PROBE: &str =
     "spacing_min = 1.0\nroot_scale = 2.0\n[generator]\nshape = \"cube\"\nfacets = 12\n";
 const PROBE_RANKS: usize = 2;
 const PROBE_LIMIT: Duration = Duration::from_secs(60);
 
 impl Needs {
-    /// Tries what the options ask for.
+    /// Tries the prerequisites of these options.
     pub fn probe(options: &Options, programs: &Programs, place: &Path) -> Self {
         let mpi = match options.mpi {
             true => probe_mpi(programs, place).err(),
             false => Some("--no-mpi was given".to_owned()),
         };
         let mut needs = Self { mpi, ..Self::default() };
-        needs.p4est = match (options.p4est, programs.paths.p4est.is_file()) {
+        let p4est = &programs.paths.p4est;
+        needs.p4est = match (options.p4est, p4est.is_file()) {
             (false, _) => Some("--no-p4est was given".to_owned()),
-            (true, false) => Some(format!(
-                "there is no {} (ci/setup compiles it)",
-                programs.paths.p4est.display()
-            )),
+            (true, false) => {
+                Some(format!("there is no {} (ci/setup compiles it)", p4est.display()))
+            }
             (true, true) => None,
         };
         match options.oracles {
-            true => needs.probe_oracles(programs, place),
+            true => needs.probe_oracles(&programs.paths, place),
             false => needs.oracles = Some("--no-oracles was given".to_owned()),
         }
         needs
     }
 
-    fn probe_oracles(&mut self, programs: &Programs, place: &Path) {
+    fn probe_oracles(&mut self, paths: &Paths, place: &Path) {
         let written = tempfile::tempdir_in(place).and_then(|probe| {
             let question = Question::write(&[[0.0; 3]], &[], probe.path())?;
             Ok((probe, question))
@@ -67,32 +68,31 @@ impl Needs {
             Err(error) => return self.oracles = Some(error.to_string()),
         };
         for oracle in ORACLES {
-            match question.ask(oracle, programs, PROBE_LIMIT) {
-                Ok(_) => self.oracles_there.push(oracle),
-                Err(NoAnswer::Missing(why) | NoAnswer::Failed(why)) => {
-                    self.oracles_absent.push(why)
-                }
-                Err(NoAnswer::Interrupted) => return,
+            match question.ask(oracle, paths, PROBE_LIMIT) {
+                Ok(_) => self.oracles_found.push(oracle),
+                Err(failure) if failure.is_interrupt() => return,
+                Err(failure) => self.oracles_missing.push(failure),
             }
         }
-        if self.oracles_there.is_empty() {
-            self.oracles = self.oracles_absent.first().cloned();
+        if self.oracles_found.is_empty() {
+            self.oracles = self.oracles_missing.first().map(Failure::to_string);
         }
     }
 
-    /// Remembers that a case's geometry is not there.
+    /// Records that the geometry of a case is missing.
     pub fn note_absent_geometry(&mut self, why: &str) {
         self.geometries.push(why.to_owned());
     }
 
     /// Everything that is missing, once each.
     pub fn missing(&self, options: &Options) -> Vec<Missing> {
-        // One oracle that is missing is a vote that is missing.
-        let oracles = self.oracles.iter().chain(&self.oracles_absent).next().cloned();
+        // The vote needs all oracles, so one that is missing counts as all.
+        let one = || self.oracles_missing.first().map(Failure::to_string);
+        let oracles = self.oracles.clone().or_else(one);
         let geometries = match self.geometries.len() {
             0 => None,
             count => Some(format!(
-                "{count} geometries are not here (ci/setup --geometries fetches what may be fetched)"
+                "{count} geometries are not here (ci/setup --geometries downloads those that may be downloaded)"
             )),
         };
         let all = [
@@ -102,49 +102,38 @@ impl Needs {
             (Need::Geometries, geometries),
         ];
         let missing = all.into_iter().filter_map(|(need, why)| {
-            Some(Missing {
-                what: need.to_string(),
-                why: why?,
-                required: options.require.contains(&need),
-            })
+            let required = options.require.contains(&need);
+            Some(Missing { what: need.to_string(), why: why?, required })
         });
         missing.collect()
     }
 }
 
-/// Whether `mpirun` starts ranks that know of each other, which a mesher built without MPI would not.
+/// Checks that `mpirun` starts ranks that communicate, which the ranks of a mesher without MPI do not.
 fn probe_mpi(programs: &Programs, place: &Path) -> Result<(), String> {
     if !programs.paths.mpirun.is_file() {
         return Err("there is no mpirun on the PATH (ci/setup installs it)".to_owned());
     }
     let probe = tempfile::tempdir_in(place).map_err(|error| error.to_string())?;
-    let (case, json) = (probe.path().join("probe.toml"), probe.path().join("probe.json"));
+    let case = probe.path().join("probe.toml");
     fs::write(&case, PROBE).map_err(|error| error.to_string())?;
-    let case = match &programs.engine {
-        Some(engine) => engine.prepare(&case, &probe.path().join("plain"))?,
-        None => case,
+    let engine = &programs.engine;
+    let case = engine.prepare(&case, &probe.path().join("plain"))?;
+    let layout = Layout {
+        partitioner: Some("morton".into()),
+        level_base: Some("auto".into()),
+        ..Layout::on(Ranks::Mpi(PROBE_RANKS))
     };
-    let files = Files { case: &case, out: None, json: Some(&json), status: None, ungraded: false };
-    let layout =
-        Layout { ranks: PROBE_RANKS, partitioner: "morton".into(), level_base: "auto".into() };
-    let shared = SharedMemory::new();
-    let mut command = mesher::parallel(programs, &files, &layout, &shared)?;
-    let watch = Watch { limit: PROBE_LIMIT, logs: probe.path(), name: "mpi", status: None };
-    let done = process::run(&mut command, &watch)
-        .map_err(|error| format!("mpirun cannot be started: {error}"))?;
-    match done.end {
-        End::Exited(0) => {}
-        End::TimedOut => {
-            return Err(format!("mpirun did not end within {} s", PROBE_LIMIT.as_secs()));
-        }
-        _ => {
-            return Err(format!("the mesher does not run on MPI: {}", done.first_error_line()));
-        }
-    }
-    match Record::read(&json)?.ranks {
-        PROBE_RANKS => Ok(()),
-        ranks => {
-            Err(format!("the mesher sees {ranks} of {PROBE_RANKS} ranks: it was built without MPI"))
-        }
+    let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), PROBE_LIMIT));
+    let ranks = completed.map_err(|failure| format!("on MPI, {failure}"))?.report.ranks;
+    match (engine.writes_report(), ranks) {
+        (false, _) => Err(format!(
+            "{} has no run report, which would show that its ranks communicate",
+            engine.name()
+        )),
+        (true, PROBE_RANKS) => Ok(()),
+        (true, ranks) => Err(format!(
+            "the mesher runs on {ranks} of {PROBE_RANKS} ranks: it was built without MPI"
+        )),
     }
 }

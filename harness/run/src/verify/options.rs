@@ -1,21 +1,21 @@
-//! What was asked of a verification.
+//! The options of a verification.
 
-use crate::engine::mesher::Layout;
+use crate::engine::layout::{Layout, Ranks};
 use contract::catalogue::Size;
 use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Something that a verification needs and a machine may lack.
+/// A prerequisite of a verification that a machine may lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Need {
     /// `mpirun`, and a mesher that was built with MPI.
     Mpi,
     /// Python with the packages of all three oracles.
     Oracles,
-    /// The p4est engine.
+    /// The p4est program.
     P4est,
-    /// The geometries that are fetched, not kept in the repository.
+    /// The geometries that are downloaded and not kept in the repository.
     Geometries,
 }
 
@@ -30,20 +30,20 @@ impl fmt::Display for Need {
     }
 }
 
-/// What was asked.
+/// The options.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Names in the catalogue or paths of case files; none means all of the catalogue's of `size`.
+    /// Names in the catalogue or paths of case files; if empty, all cases of the catalogue that have one of `sizes`.
     pub cases: Vec<String>,
-    /// Sizes of the catalogue's cases, where `cases` names none.
+    /// Sizes of the catalogue's cases, if `cases` is empty.
     pub sizes: Vec<Size>,
     /// Rank counts of the runs on MPI.
     pub ranks: Vec<usize>,
     /// Partitioners, each tried at each rank count.
     pub partitioners: Vec<String>,
-    /// Base depths, each tried with each partitioner.
+    /// Levels of the partition, each tried with each partitioner.
     pub level_bases: Vec<String>,
-    /// Directory for results and reports; a temporary one, removed at the end, if none is given.
+    /// Directory for results and reports; if `None`, a temporary one that is removed at the end.
     pub out: Option<PathBuf>,
     /// Keep every result, not only those of failing cases.
     pub keep: bool,
@@ -55,20 +55,20 @@ pub struct Options {
     pub oracles: bool,
     /// Compare with p4est.
     pub p4est: bool,
-    /// What must not be missing.
+    /// Prerequisites that must not be missing.
     pub require: Vec<Need>,
-    /// Most points that are put to the oracles on a case that is not small.
+    /// Greatest number of points that the oracles classify on a case that is not small.
     pub oracle_points: usize,
-    /// Chooses those points.
+    /// Seed for choosing those points.
     pub seed: u64,
-    /// Cases of more cells are only measured: the checks hold a mesh in memory.
+    /// Meshes with more cells are only measured, because the checks hold a mesh in memory.
     pub cells_max: u64,
-    /// The reference is run on cases of up to so many cells; beyond, it would take hours.
+    /// The greatest number of cells up to which the reference is run; beyond it, a run would take hours.
     pub reference_cells_max: u64,
 }
 
 impl Options {
-    /// A verification of leaves alone: reference and checks, neither MPI nor oracles nor p4est.
+    /// A verification by reference and checks only, without MPI, oracles and p4est.
     pub fn of_leaves_alone(cases: Vec<String>) -> Self {
         Self {
             cases,
@@ -96,8 +96,11 @@ impl Options {
         for &ranks in &self.ranks {
             for partitioner in &self.partitioners {
                 for level_base in &self.level_bases {
-                    let (partitioner, level_base) = (partitioner.clone(), level_base.clone());
-                    layouts.push(Layout { ranks, partitioner, level_base });
+                    layouts.push(Layout {
+                        partitioner: Some(partitioner.clone()),
+                        level_base: Some(level_base.clone()),
+                        ..Layout::on(Ranks::Mpi(ranks))
+                    });
                 }
             }
         }

@@ -1,9 +1,10 @@
-//! The sides of the base tree's leaves, put to the oracles.
+//! The sides of the base tree's leaves, compared with those that the oracles give.
 
 use super::case::CaseRun;
 use super::report::{Check, Outcome};
 use super::serial::Meshes;
-use crate::oracle::{NoAnswer, Question};
+use crate::engine::failure::{End, Failure};
+use crate::oracle::Question;
 use check::oracle::sample::{self, Sample};
 use check::oracle::vote::{self, Answer, Ballot};
 use check::oracle::watertight::is_watertight;
@@ -18,11 +19,11 @@ use std::time::Instant;
 const NAME: &str = "oracles";
 const SUBJECT: &str = "sides";
 
-/// On a small case every leaf is asked for; this many are still small.
+/// On a small case the oracles classify every leaf, up to this many.
 const POINTS_OF_SMALL: usize = 400_000;
 
 impl CaseRun<'_> {
-    /// Chooses points, asks, counts votes.
+    /// Chooses points, has the oracles classify them, and counts the votes.
     pub fn verify_oracles(&mut self, case: &Case, meshes: &Meshes) {
         if let Some(why) = &self.needs.oracles {
             let why = why.clone();
@@ -34,39 +35,40 @@ impl CaseRun<'_> {
             _ => self.options.oracle_points,
         };
         let sample = sample::choose(case, &meshes.base.words, most, self.options.seed);
-        let (answers, troubles) = match self.ask(case, &sample) {
+        let (answers, failures) = match self.ask(case, &sample) {
             Ok(asked) => asked,
-            Err(NoAnswer::Missing(why) | NoAnswer::Failed(why)) => {
-                return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
+            Err(failure) if failure.is_interrupt() => return,
+            Err(failure) => {
+                let outcome = Outcome::LeftOut(failure.to_string());
+                return self.add(Check::new(SUBJECT, NAME, outcome), None);
             }
-            Err(NoAnswer::Interrupted) => return,
         };
         let mut check = judge(case, &sample, &answers);
-        check.notes.extend(troubles);
+        check.notes.extend(failures.iter().map(|failure| format!("no answer: {failure}")));
         check.time_s = start.elapsed().as_secs_f64();
         self.add(check, None);
     }
 
-    /// The answers, and the sentences of those that gave none.
-    fn ask(&self, case: &Case, sample: &Sample) -> Result<(Vec<Answer>, Vec<String>), NoAnswer> {
+    /// The answers, and the failures of the oracles that gave none. At least one oracle answered.
+    fn ask(&self, case: &Case, sample: &Sample) -> Result<(Vec<Answer>, Vec<Failure>), Failure> {
         let place = self.place.join("oracles");
         let question = fs::create_dir_all(&place)
-            .and_then(|()| Question::write(&sample.points, &case.facets, &place));
-        let question = question.map_err(|error| NoAnswer::Failed(error.to_string()))?;
-        let (mut answers, mut troubles) = (Vec::new(), Vec::new());
-        for oracle in &self.needs.oracles_there {
+            .and_then(|()| Question::write(&sample.points, &case.facets, &place))
+            .map_err(|error| {
+                Failure::new("the oracles", End::Unusable(format!("have no input files: {error}")))
+            })?;
+        let (mut answers, mut failures) = (Vec::new(), Vec::new());
+        for oracle in &self.needs.oracles_found {
             self.progress.step(format!("oracle {oracle}"));
-            match question.ask(oracle, self.programs, self.options.limit) {
+            match question.ask(oracle, &self.programs.paths, self.options.limit) {
                 Ok(answer) => answers.push(answer),
-                Err(NoAnswer::Missing(why) | NoAnswer::Failed(why)) => {
-                    troubles.push(format!("no answer: {why}"))
-                }
-                Err(NoAnswer::Interrupted) => return Err(NoAnswer::Interrupted),
+                Err(failure) if failure.is_interrupt() => return Err(failure),
+                Err(failure) => failures.push(failure),
             }
         }
-        match (answers.is_empty(), troubles.first()) {
-            (true, Some(why)) => Err(NoAnswer::Failed(why.clone())),
-            _ => Ok((answers, troubles)),
+        match (answers.is_empty(), failures.first()) {
+            (true, Some(failure)) => Err(failure.clone()),
+            _ => Ok((answers, failures)),
         }
     }
 }
@@ -104,7 +106,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
         notes.insert(
             0,
             format!(
-                "{} leaves within {:.3e} of the surface were not asked for",
+                "{} leaves within {:.3e} of the surface were not given to the oracles",
                 sample.in_band, sample.band
             ),
         );
@@ -112,7 +114,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
     Check { notes, counts, ..Check::new(SUBJECT, NAME, outcome) }
 }
 
-/// What the exact rays from a leaf's centroid say; nothing where they differ.
+/// Whether a leaf's centroid is inside by all exact rays; `None` if the rays disagree.
 fn unanimous(parity: &Parity, leaf: u64) -> Option<bool> {
     let rays = parity.inside(word::octant(leaf).centre());
     rays.iter().all(|ray| *ray == rays[0]).then_some(rays[0])

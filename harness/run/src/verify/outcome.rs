@@ -1,45 +1,45 @@
-//! How checks came out, one by one and counted.
+//! The outcomes of checks, and their counts.
 
-use crate::engine::mesher::Layout;
+use crate::engine::layout::Layout;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a check came out.
+/// The outcome of a check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "outcome", content = "why")]
 pub enum Outcome {
     /// It holds.
     Pass,
-    /// It does not; why, in a sentence or more.
+    /// It does not hold, for this reason.
     Fail(String),
-    /// It was not done; because of what.
+    /// It was not done, for this reason.
     LeftOut(String),
 }
 
 /// One check of one result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Check {
-    /// What was checked: `serial`, `base tree`, `p4est` or the layout of a run on MPI.
+    /// The mesh that was checked: `serial`, `base tree`, `p4est` or the layout of a run on MPI.
     pub subject: String,
     /// Ranks of the run on MPI that was checked.
     pub ranks: Option<usize>,
     /// The check's name.
     pub name: String,
-    /// How it came out.
+    /// The outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
-    /// Time that the check itself took, in seconds.
+    /// Time of the check itself, in seconds.
     pub time_s: f64,
-    /// What it has to say even where it holds, such as where the oracles disagreed.
+    /// Remarks that matter even if the check holds, such as points on which the oracles disagree.
     pub notes: Vec<String>,
-    /// Its own figures, in its own words.
+    /// Figures of the check, as text.
     pub figures: Option<String>,
-    /// What it counted.
+    /// Counts of the check, by name.
     pub counts: BTreeMap<String, u64>,
 }
 
 impl Check {
-    /// A check that has nothing to add to its outcome.
+    /// A check with nothing but its outcome.
     pub fn new(subject: impl Into<String>, name: impl Into<String>, outcome: Outcome) -> Self {
         let (subject, name) = (subject.into(), name.into());
         Self {
@@ -56,7 +56,7 @@ impl Check {
 
     /// A check of one run on MPI.
     pub fn of_layout(layout: &Layout, name: impl Into<String>, outcome: Outcome) -> Self {
-        Self { ranks: Some(layout.ranks), ..Self::new(layout.to_string(), name, outcome) }
+        Self { ranks: Some(layout.ranks.count()), ..Self::new(layout.to_string(), name, outcome) }
     }
 
     /// Whether it failed.
@@ -88,17 +88,4 @@ impl<'a> FromIterator<&'a Check> for Tally {
         }
         tally
     }
-}
-
-/// A run that did not.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Trouble {
-    /// The program holds the user's input to be at fault; what it said.
-    Input(String),
-    /// It failed; how.
-    Failed(String),
-    /// It did not end within its time limit.
-    Hung(String),
-    /// The user asked to end.
-    Interrupted,
 }

@@ -1,15 +1,15 @@
-//! What is being done, on a terminal; silence elsewhere.
+//! The progress line, on a terminal only.
 
 use contract::catalogue::Selected;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::time::Duration;
 
-/// One line that counts cases and names the step.
+/// A line that counts cases and names the current step.
 #[derive(Debug)]
 pub struct Progress(ProgressBar);
 
 impl Progress {
-    /// Over the given cases. Draws on standard error, and only where that is a terminal.
+    /// A line for these cases. It is drawn on standard error, and only if that is a terminal.
     pub fn new(cases: &[Selected]) -> Self {
         let bar =
             ProgressBar::with_draw_target(Some(cases.len() as u64), ProgressDrawTarget::stderr());
@@ -22,7 +22,7 @@ impl Progress {
         Self(bar)
     }
 
-    /// A case begins.
+    /// Shows that a case begins.
     pub fn case(&self, name: &str) {
         if !self.0.prefix().is_empty() {
             self.0.inc(1);
@@ -30,12 +30,12 @@ impl Progress {
         self.0.set_prefix(name.to_owned());
     }
 
-    /// A step of the case begins.
+    /// Shows that a step of the case begins.
     pub fn step(&self, what: impl Into<String>) {
         self.0.set_message(what.into());
     }
 
-    /// All is done; the line goes.
+    /// Removes the line.
     pub fn finish(&self) {
         self.0.finish_and_clear();
     }

@@ -1,20 +1,20 @@
-//! The same mesh from any number of ranks, however the work is cut: leaf by leaf that of the serial run.
+//! Independence of the partition: every layout gives the mesh of the serial run, leaf by leaf.
 
 use super::case::{CaseRun, RUNS};
-use super::outcome::Trouble;
 use super::report::{Check, Outcome};
-use super::run::{Order, What};
+use super::run::{Program, Request};
 use super::serial::Meshes;
-use crate::engine::mesher::Layout;
+use crate::engine::failure::{End, Failure};
+use crate::engine::layout::Layout;
 use check::checks::{self, CheckResult, Subject};
 use contract::case::Case;
 use std::fs;
 
-/// After so many hangs the remaining layouts of a case are left out: each would cost its whole time limit.
+/// Hangs after which the remaining layouts of a case are left out: each hang costs the whole time limit.
 const HANGS_MAX: usize = 3;
 
 impl CaseRun<'_> {
-    /// Runs every layout and compares.
+    /// Runs every layout and compares its mesh with the serial one.
     pub fn verify_ranks(&mut self, case: &Case, meshes: &Meshes) {
         if let Some(why) = &self.needs.mpi {
             let ranks: Vec<String> = self.options.ranks.iter().map(usize::to_string).collect();
@@ -32,10 +32,10 @@ impl CaseRun<'_> {
             }
             match self.verify_layout(case, meshes, &layout) {
                 Ok(()) => {}
-                Err(Trouble::Interrupted) => return,
-                Err(trouble) => {
-                    hangs += usize::from(matches!(trouble, Trouble::Hung(_)));
-                    self.add_trouble(&layout.to_string(), Some(&layout), trouble);
+                Err(failure) if failure.is_interrupt() => return,
+                Err(failure) => {
+                    hangs += usize::from(matches!(failure.end, End::TimedOut { .. }));
+                    self.add_failure(&layout.to_string(), Some(&layout), &failure);
                 }
             }
         }
@@ -46,25 +46,34 @@ impl CaseRun<'_> {
         case: &Case,
         meshes: &Meshes,
         layout: &Layout,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Failure> {
         self.progress.step(layout.to_string());
-        let name = format!("ranks-{}-{}-{}", layout.ranks, layout.partitioner, layout.level_base);
-        let what = What::Ranks(layout);
-        let order =
-            Order { what, case: &self.selected.path, name: &name, ungraded: false, write: true };
-        let done = self.run(&order)?;
-        self.report().runs.push(done.run);
+        let meshed = self.run(&Request {
+            program: Program::Mesher,
+            layout,
+            case: &self.selected.path,
+            name: &directory_name(layout),
+            ungraded: false,
+            write: true,
+        })?;
+        self.report().runs.push(meshed.run);
         self.add(Check::of_layout(layout, RUNS, Outcome::Pass), Some(layout));
-        let Some(mesh) = done.mesh else { return Ok(()) };
+        let Some(mesh) = meshed.mesh else { return Ok(()) };
         let subject = Subject::new(case, &mesh).with_reference(&meshes.mesh);
         let mut results = vec![checks::manifest::check(&subject), checks::linear::check(&subject)];
         results.extend(checks::identical::check(&subject));
         let holds = results.iter().all(CheckResult::holds);
         self.add_results(&layout.to_string(), Some(layout), results);
         if holds && !self.options.keep {
-            // 36 copies of one mesh help nobody.
-            let _ = fs::remove_dir_all(done.place);
+            // A correct mesh equals the serial one, and one copy of it suffices.
+            let _ = fs::remove_dir_all(meshed.place);
         }
         Ok(())
     }
+}
+
+fn directory_name(layout: &Layout) -> String {
+    let choices = [&layout.partitioner, &layout.level_base].map(|choice| choice.as_deref());
+    let words = choices.into_iter().flatten();
+    words.fold(format!("ranks-{}", layout.ranks.count()), |name, word| format!("{name}-{word}"))
 }

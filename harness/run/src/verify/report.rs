@@ -1,13 +1,12 @@
-//! What a verification found: the one model that every output format prints.
+//! The result of a verification: the one model that every output format prints.
 //!
-//! Invariant: everything asked for appears in it. What was not done is a check that was left out, with
-//! the reason; nothing is silently absent.
+//! Invariant: every check that was requested appears in it, if need be as left out with the reason.
 
 pub use super::outcome::{Check, Outcome, Tally};
-use crate::engine::mesher::Layout;
+use crate::engine::layout::Layout;
 use serde::{Deserialize, Serialize};
 
-/// Version of the JSON form; changes when a field's meaning does or a field goes.
+/// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
 pub const SCHEMA: &str = "octree-verify/1";
 
 /// The paper's speed on one core, in cells per second.
@@ -18,13 +17,13 @@ pub const PAPER_CELLS_PER_S: f64 = 38_000.0;
 pub struct Run {
     /// `mesher` or `reference`.
     pub program: String,
-    /// How it was spread over ranks; none for a serial run.
+    /// The layout of a run on MPI; `None` for a serial run.
     pub layout: Option<Layout>,
     /// Cells of the final mesh.
     pub cells: u64,
-    /// By the program's own clock, in seconds, without writing files where that was measured apart.
+    /// Wall time by the program's own clock, in seconds; without writing files if that is measured separately.
     pub time_wall_s: f64,
-    /// By the harness's clock, start and end of the processes included.
+    /// Wall time by the harness's clock, in seconds, including the start and end of the processes.
     pub time_process_s: f64,
     /// Peak resident memory of all ranks together.
     pub peak_rss_bytes: u64,
@@ -41,7 +40,7 @@ impl Run {
         self.peak_rss_bytes as f64 / (self.cells.max(1)) as f64
     }
 
-    /// How many times faster than the paper's one core.
+    /// Speed relative to the paper's on one core.
     pub fn speedup_over_paper(&self) -> f64 {
         self.cells_per_s() / PAPER_CELLS_PER_S
     }
@@ -58,13 +57,13 @@ pub struct CaseReport {
     pub leaves_base: u64,
     /// Cells of the final mesh.
     pub cells: u64,
-    /// The runs whose time and memory are of interest.
+    /// The runs whose time and memory are reported.
     pub runs: Vec<Run>,
     /// All checks.
     pub checks: Vec<Check>,
-    /// The user's input is at fault: the sentence that the programs said.
+    /// The mesher's error message, if the case is at fault.
     pub input_error: Option<String>,
-    /// Where the results are, if they were kept.
+    /// Directory of the results, if they were kept.
     pub kept: Option<String>,
     /// A command that repeats the first failure.
     pub repeat_with: Option<String>,
@@ -73,7 +72,7 @@ pub struct CaseReport {
 }
 
 impl CaseReport {
-    /// All its checks, counted.
+    /// Numbers of its checks by outcome.
     pub fn tally(&self) -> Tally {
         self.checks.iter().collect()
     }
@@ -84,7 +83,7 @@ impl CaseReport {
     }
 }
 
-/// Something that was asked for by `--require` or by name, and is not there.
+/// A prerequisite that this machine lacks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Missing {
     /// `mpi`, `oracles`, `p4est` or `geometries`.
@@ -102,13 +101,13 @@ pub struct Report {
     pub schema: String,
     /// Name and version of the harness.
     pub program: String,
-    /// Cores of the machine it ran on.
+    /// Cores of the machine.
     pub cores: usize,
-    /// What was not there, and so was left out of every case.
+    /// Missing prerequisites, whose checks were left out of every case.
     pub missing: Vec<Missing>,
     /// One report for each case.
     pub cases: Vec<CaseReport>,
-    /// The user ended it before its end.
+    /// Whether the user interrupted it.
     pub interrupted: bool,
     /// Wall time, in seconds.
     pub time_s: f64,
@@ -120,13 +119,13 @@ pub const EXIT_HOLDS: u8 = 0;
 pub const EXIT_FAILED: u8 = 1;
 /// Exit code: the user's input is at fault.
 pub const EXIT_INPUT: u8 = 2;
-/// Exit code: something that was asked for is missing.
+/// Exit code: a required prerequisite is missing.
 pub const EXIT_MISSING: u8 = 3;
-/// Exit code: ended by the user.
+/// Exit code: interrupted by the user.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
 impl Report {
-    /// The exit code: the user's end before all, then a failed check, the user's input, what is missing.
+    /// The exit code. An interrupt takes precedence, then a failed check, an input error, a missing prerequisite.
     pub fn exit_code(&self) -> u8 {
         if self.interrupted {
             EXIT_INTERRUPTED
@@ -141,7 +140,7 @@ impl Report {
         }
     }
 
-    /// One sentence on the whole.
+    /// A one-line summary.
     pub fn verdict(&self) -> String {
         let all = self.cases.iter().flat_map(|case| &case.checks);
         let Tally { pass, fail, left_out } = all.collect();
@@ -164,7 +163,7 @@ mod tests {
     use crate::testing::report;
 
     #[test]
-    fn exit_codes_in_order_of_weight() {
+    fn exit_codes_have_an_order_of_precedence() {
         let mut report = crate::testing::report();
         assert_eq!(report.exit_code(), EXIT_FAILED);
         report.cases[0].checks.remove(1);
@@ -178,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn speeds_are_those_of_the_paper_s_table() {
+    fn speeds_are_computed_as_in_the_papers_table() {
         let run = &report().cases[0].runs[0];
         assert_eq!((run.cells_per_s(), run.bytes_per_cell()), (76_000.0, 10.0));
         assert_eq!(run.speedup_over_paper(), 2.0);

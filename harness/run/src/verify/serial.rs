@@ -1,15 +1,19 @@
-//! The serial meshes, which every other is held against: mesher and reference, base tree and final mesh.
+//! The serial meshes, with which all others are compared: base tree and final mesh, of mesher and reference.
 
 use super::case::{CaseRun, RUNS};
-use super::outcome::Trouble;
 use super::report::{Check, Outcome};
-use super::run::{Done, Order, What};
+use super::run::{Meshed, Program, Request};
+use crate::engine::failure::End;
+use crate::engine::layout::SERIAL;
 use check::checks::{self, Subject, identical};
 use contract::case::Case;
 use contract::leafset::LeafSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// What later steps stand on.
+/// Exit code of mesher and reference for an error in the user's input.
+pub const CODE_INPUT: i32 = 2;
+
+/// Meshes that later steps use.
 #[derive(Debug)]
 pub struct Meshes {
     /// The mesher's final mesh.
@@ -20,23 +24,27 @@ pub struct Meshes {
     pub base_place: PathBuf,
 }
 
+/// A serial run that writes the final mesh.
+fn serial<'a>(program: Program, case: &'a Path, name: &'a str) -> Request<'a> {
+    Request { program, layout: &SERIAL, case, name, ungraded: false, write: true }
+}
+
 impl CaseRun<'_> {
-    /// Makes the serial meshes and checks them; nothing where the mesher made none.
+    /// Makes the serial meshes and checks them. `None` if the mesher made none, or they are too large to check.
     pub fn verify_serial(&mut self, case: &Case) -> Option<Meshes> {
-        let (cells, most) = (self.measure()?, self.options.cells_max);
-        if cells > most {
-            let why = format!("{cells} cells are more than the {most} that are held in memory");
+        let (cells, limit) = (self.measure()?, self.options.cells_max);
+        if cells > limit {
+            let why = format!("{cells} cells exceed the {limit} that are checked in memory");
             self.add(Check::new("serial", "checks", Outcome::LeftOut(why)), None);
             return None;
         }
-        let final_mesh = self.make("serial", What::Serial, "serial", false)?;
-        // An engine that cannot stop at the base tree is checked against the reference's.
-        let stops =
-            self.programs.engine.as_ref().is_none_or(|e| e.description().run.ungraded.is_some());
-        let base = if stops { What::Serial } else { What::Reference };
-        let base = self.make("base tree", base, "base", true)?;
+        let mesh = self.make("serial", Program::Mesher, "serial", false)?;
+        // The mesh of an engine that cannot stop at the base tree is checked against the reference's base tree.
+        let stops = self.programs.engine.description().run.ungraded.is_some();
+        let program = if stops { Program::Mesher } else { Program::Reference };
+        let base = self.make("base tree", program, "base", true)?;
         let base_place = base.place.join("mesh");
-        let meshes = Meshes { mesh: final_mesh.mesh?, base: base.mesh?, base_place };
+        let meshes = Meshes { mesh: mesh.mesh?, base: base.mesh?, base_place };
         self.report().leaves_base = meshes.base.words.len() as u64;
         let reference = self.reference(case, &meshes);
         self.progress.step("checks");
@@ -49,81 +57,75 @@ impl CaseRun<'_> {
         Some(meshes)
     }
 
-    /// One run whose failure ends the case.
-    fn make(&mut self, subject: &str, what: What, name: &str, ungraded: bool) -> Option<Done> {
+    /// One run, whose failure ends the case.
+    fn make(
+        &mut self,
+        subject: &str,
+        program: Program,
+        name: &str,
+        ungraded: bool,
+    ) -> Option<Meshed> {
         self.progress.step(format!("{name}: {}", if ungraded { "base tree" } else { "mesh" }));
-        let order = Order { what, case: &self.selected.path, name, ungraded, write: true };
-        match self.run(&order) {
-            Ok(done) => {
+        let request = Request { ungraded, ..serial(program, &self.selected.path, name) };
+        match self.run(&request) {
+            Ok(meshed) => {
                 self.add(Check::new(subject, RUNS, Outcome::Pass), None);
-                Some(done)
+                Some(meshed)
             }
-            // The harness has read the case without complaint, so this is one program's opinion.
-            Err(trouble) => {
-                self.add_trouble(subject, None, trouble);
+            // The harness has read the case without an error, so an input error is this program's opinion only.
+            Err(failure) => {
+                self.add_failure(subject, None, &failure);
                 None
             }
         }
     }
 
-    /// A run without files, for time and memory; the number of cells.
+    /// A run that writes no mesh, for time and memory; returns the number of cells.
     fn measure(&mut self) -> Option<u64> {
         self.progress.step("serial, timed");
-        let order = Order {
-            what: What::Serial,
-            case: &self.selected.path,
-            name: "timed",
-            ungraded: false,
-            write: false,
-        };
-        match self.run(&order) {
-            Ok(done) => {
-                let cells = done.run.cells;
+        let request =
+            Request { write: false, ..serial(Program::Mesher, &self.selected.path, "timed") };
+        match self.run(&request) {
+            Ok(meshed) => {
+                let cells = meshed.run.cells;
                 self.report().cells = cells;
-                self.report().runs.push(done.run);
+                self.report().runs.push(meshed.run);
                 Some(cells)
             }
-            Err(trouble) => {
-                self.add_trouble("serial", None, trouble);
+            Err(failure) => {
+                self.add_failure("serial", None, &failure);
                 None
             }
         }
     }
 
-    /// The reference's final mesh, its base tree compared on the way.
+    /// The reference's final mesh; its base tree is compared with the mesher's.
     fn reference(&mut self, case: &Case, meshes: &Meshes) -> Option<LeafSet> {
-        let (cells, most) = (meshes.mesh.words.len() as u64, self.options.reference_cells_max);
-        if cells > most {
-            let why =
-                format!("{cells} cells are more than the {most} up to which the reference is run");
+        let (cells, limit) = (meshes.mesh.words.len() as u64, self.options.reference_cells_max);
+        if cells > limit {
+            let why = format!("{cells} cells exceed the {limit} up to which the reference is run");
             self.add(Check::new("reference", "identical", Outcome::LeftOut(why)), None);
             return None;
         }
-        let done = self.make("reference", What::Reference, "reference", false)?;
-        self.report().runs.push(done.run);
-        let base = self.make("reference base tree", What::Reference, "reference-base", true)?;
+        let meshed = self.make("reference", Program::Reference, "reference", false)?;
+        self.report().runs.push(meshed.run);
+        let base = self.make("reference base tree", Program::Reference, "reference-base", true)?;
         let compared = identical::compare(&meshes.base.words, &base.mesh?.words, &case.root);
         self.add_results("base tree", None, vec![compared]);
-        done.mesh
+        meshed.mesh
     }
 
-    /// A case that the harness refuses: the user's input is at fault if the mesher says so too.
+    /// A case that the harness refuses: it is an input error if the mesher refuses it too, else a failed check.
     pub fn verify_refusal(&mut self, why: &str) {
-        let order = Order {
-            what: What::Serial,
-            case: &self.selected.path,
-            name: "serial",
-            ungraded: false,
-            write: true,
-        };
-        match self.run(&order) {
-            Err(Trouble::Input(said)) => self.report().input_error = Some(said),
+        match self.run(&serial(Program::Mesher, &self.selected.path, "serial")) {
             Ok(_) => {
-                let fail =
-                    Outcome::Fail(format!("the mesher takes a case that is at fault: {why}"));
-                self.add(Check::new("serial", RUNS, fail), None);
+                let why = format!("the mesher takes a case that is at fault: {why}");
+                self.add(Check::new("serial", RUNS, Outcome::Fail(why)), None);
             }
-            Err(trouble) => self.add_trouble("serial", None, trouble),
+            Err(failure) => match failure.end {
+                End::Exited { code: CODE_INPUT, error } => self.report().input_error = Some(error),
+                _ => self.add_failure("serial", None, &failure),
+            },
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Where results are while they are being checked, and which of them stay.
+//! The directories of results: where they are, and which of them are kept.
 //!
-//! Invariants: nothing is removed that a verification did not make, which a marker file proves; without
-//! `--out` and `--keep` nothing stays but the directories of failing cases.
+//! Invariants: only directories that a verification made are removed, which a marker file proves; without `--out` and
+//! `--keep`, only the directories of failed cases are kept.
 
 use super::VerifyError;
 use super::options::Options;
@@ -10,7 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// Marks a directory as a case's.
+/// The file that marks the directory of a case.
 const MARKER: &str = "made-by-harness-verify";
 
 /// The directory of all cases.
@@ -22,13 +22,14 @@ pub struct Workplace {
 }
 
 impl Workplace {
-    /// The directory that was asked for, or a temporary one.
+    /// The directory given by the options, or a temporary one.
     ///
     /// # Errors
-    /// Where it cannot be made.
+    /// If it cannot be made.
     pub fn new(options: &Options) -> Result<Self, VerifyError> {
-        let wrong =
-            |error: io::Error| VerifyError::Input(format!("no directory for results: {error}"));
+        let wrong = |error: io::Error| {
+            VerifyError::Input(format!("the directory for results cannot be made: {error}"))
+        };
         if let Some(out) = &options.out {
             fs::create_dir_all(out).map_err(wrong)?;
             let root = fs::canonicalize(out).map_err(wrong)?;
@@ -44,10 +45,10 @@ impl Workplace {
         &self.root
     }
 
-    /// Makes a case's own directory, in place of one that an earlier verification left.
+    /// Makes the directory of a case, and replaces one that an earlier verification left.
     ///
     /// # Errors
-    /// Where something else is there, or it cannot be made.
+    /// If something else has that name, or the directory cannot be made.
     pub fn enter(&self, case: &str) -> Result<PathBuf, VerifyError> {
         let place = self.root.join(case);
         let shown = place.display();
@@ -61,18 +62,18 @@ impl Workplace {
         Ok(place)
     }
 
-    /// Removes a case's directory or keeps it; where it is, if it was kept.
+    /// Removes the directory of a case, or keeps and returns it.
     pub fn leave(&mut self, place: &Path, keep: bool) -> Option<PathBuf> {
         if keep {
             self.kept = true;
             return Some(place.to_owned());
         }
-        // A directory that cannot be removed is a nuisance and no reason to lose the report.
+        // Failing to remove a directory is no reason to lose the report.
         let _ = fs::remove_dir_all(place);
         None
     }
 
-    /// Ends it: a temporary directory stays only for the cases that were kept in it.
+    /// Closes it. A temporary directory is kept only for the cases that were kept in it.
     pub fn close(self, remove_all: bool) {
         if let Some(temporary) = self.temporary
             && self.kept
@@ -89,7 +90,7 @@ mod tests {
     use crate::testing::options;
 
     #[test]
-    fn a_temporary_one_stays_for_what_was_kept_and_only_then() {
+    fn a_temporary_directory_is_kept_only_if_a_case_is_kept() {
         for keep in [false, true] {
             let mut workplace = Workplace::new(&options()).unwrap();
             let root = workplace.root().to_owned();
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_result_is_replaced_and_anything_else_is_not() {
+    fn only_an_earlier_result_is_replaced() {
         let out = tempfile::tempdir().unwrap();
         let options = Options { out: Some(out.path().to_owned()), ..options() };
         let workplace = Workplace::new(&options).unwrap();

@@ -1,0 +1,116 @@
+//! Why a program gave no result, and the one sentence for it.
+
+use std::fmt;
+use std::time::Duration;
+
+/// How a program failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// It cannot be run; why, as in "cannot be started: ...".
+    Missing(String),
+    /// It exited with a code other than 0, and this line of its standard error describes the error.
+    Exited {
+        /// The exit code.
+        code: i32,
+        /// The line.
+        error: String,
+    },
+    /// It was killed by a signal that the harness did not send.
+    Signalled(i32),
+    /// The harness killed it at its time limit.
+    TimedOut {
+        /// The limit.
+        limit: Duration,
+        /// What its ranks were doing, if they were asked to report that.
+        activity: Option<String>,
+    },
+    /// The user interrupted the harness.
+    Interrupted,
+    /// It ended well, but its output cannot be used; why, as in "wrote no mesh".
+    Unusable(String),
+}
+
+/// A program without a result.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// The program's name.
+    pub program: String,
+    /// How it failed.
+    pub end: End,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} ", self.program)?;
+        match &self.end {
+            End::Missing(why) | End::Unusable(why) => f.write_str(why),
+            End::Exited { code, error } => write!(f, "ended with code {code}: {error}"),
+            End::Signalled(signal) => write!(f, "was killed by signal {signal}"),
+            End::TimedOut { limit, activity } => {
+                write!(f, "did not end within {} s and was killed", limit.as_secs())?;
+                activity.iter().try_for_each(|activity| write!(f, "; {activity}"))
+            }
+            End::Interrupted => f.write_str("was interrupted"),
+        }
+    }
+}
+
+impl Failure {
+    /// A failure of the named program.
+    pub fn new(program: impl Into<String>, end: End) -> Self {
+        Self { program: program.into(), end }
+    }
+
+    /// Whether the user interrupted the harness, so that there is nothing to report about the program.
+    pub fn is_interrupt(&self) -> bool {
+        self.end == End::Interrupted
+    }
+}
+
+/// What each rank was doing, with ranks that did the same in one clause.
+pub(super) fn describe_activity(status: &[(usize, String)]) -> String {
+    let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
+    for (rank, activity) in status {
+        match groups.iter_mut().find(|(other, _)| other == activity) {
+            Some((_, ranks)) => ranks.push(rank.to_string()),
+            None => groups.push((activity, vec![rank.to_string()])),
+        }
+    }
+    if groups.is_empty() {
+        return "no rank had reported its phase".to_owned();
+    }
+    let clause = |(activity, ranks): (&str, Vec<String>)| match ranks.len() {
+        1 => format!("rank {} was in: {activity}", ranks[0]),
+        _ => format!("ranks {} were in: {activity}", ranks.join(", ")),
+    };
+    groups.into_iter().map(clause).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_end_has_its_sentence() {
+        let sentence = |end| Failure::new("mesher", end).to_string();
+        let error = "no memory".to_owned();
+        assert_eq!(sentence(End::Exited { code: 7, error }), "mesher ended with code 7: no memory");
+        assert_eq!(sentence(End::Signalled(9)), "mesher was killed by signal 9");
+        let limit = Duration::from_secs(5);
+        let hang = "mesher did not end within 5 s and was killed";
+        assert_eq!(sentence(End::TimedOut { limit, activity: None }), hang);
+        let activity = Some(describe_activity(&[(0, "balance".to_owned())]));
+        let with_activity = format!("{hang}; rank 0 was in: balance");
+        assert_eq!(sentence(End::TimedOut { limit, activity }), with_activity);
+        assert_eq!(sentence(End::Missing("cannot be started".into())), "mesher cannot be started");
+    }
+
+    #[test]
+    fn ranks_with_the_same_activity_share_a_clause() {
+        let status =
+            [(0, "layer 7".to_owned()), (1, "balance".to_owned()), (2, "layer 7".to_owned())];
+        let expected = "ranks 0, 2 were in: layer 7; rank 1 was in: balance";
+        assert_eq!(describe_activity(&status), expected);
+        assert_eq!(describe_activity(&[]), "no rank had reported its phase");
+    }
+}

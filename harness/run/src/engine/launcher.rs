@@ -1,0 +1,122 @@
+//! How ranks on MPI are started: a command template, so that the same run works on a workstation and on a cluster.
+//!
+//! Invariant: the shared memory of a run on one machine lies in a directory of its own, so that cleaning up after a
+//! killed run cannot affect another run.
+
+use super::paths::on_path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// The placeholder for the number of ranks.
+const RANKS: &str = "{ranks}";
+
+/// A launcher's command template, such as `srun -n {ranks} --cpu-bind=cores`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Launcher {
+    words: Vec<String>,
+}
+
+impl Launcher {
+    /// Parses a template: words separated by blanks, with `{ranks}` at least once.
+    ///
+    /// # Errors
+    /// One sentence, if `{ranks}` is missing.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+        match words.iter().any(|word| word.contains(RANKS)) {
+            true => Ok(Self { words }),
+            false => Err(format!(
+                "the launcher `{text}` has no place for the number of ranks: write {RANKS} there"
+            )),
+        }
+    }
+
+    /// `mpirun -n {ranks}`, with the program at this path.
+    pub fn mpirun(program: &Path) -> Self {
+        Self { words: vec![program.to_string_lossy().into_owned(), "-n".into(), RANKS.into()] }
+    }
+
+    /// The launcher's own program.
+    pub fn program(&self) -> PathBuf {
+        PathBuf::from(&self.words[0])
+    }
+
+    /// Whether that program exists, at its path or on the `PATH`.
+    pub fn is_found(&self) -> bool {
+        match self.program().components().count() {
+            1 => on_path(&self.words[0]).is_some(),
+            _ => self.program().is_file(),
+        }
+    }
+
+    /// The words that start a program on `ranks` ranks.
+    pub fn words(&self, ranks: usize) -> impl Iterator<Item = String> {
+        self.words.iter().map(move |word| word.replace(RANKS, &ranks.to_string()))
+    }
+
+    /// The command that runs `program` on `ranks` ranks; the caller adds the arguments.
+    pub fn command(&self, ranks: usize, program: impl AsRef<OsStr>) -> Command {
+        let mut words = self.words(ranks);
+        let mut command = Command::new(words.next().expect("a template has a word with {ranks}"));
+        command.args(words).arg(program);
+        set_environment(&mut command);
+        command
+    }
+
+    /// A directory for the run's shared memory. `None` if the launcher may start ranks on other machines, where the
+    /// directory would not exist, or if this machine has no `/dev/shm`; OpenMPI then uses its own default.
+    pub fn shared_memory(&self) -> Option<SharedMemory> {
+        let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
+        let local = is_mpirun && self.words[1..] == ["-n", RANKS];
+        let directory = || tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok();
+        local.then(directory).flatten().map(SharedMemory)
+    }
+}
+
+/// A run's directory in shared memory, removed on drop with everything that was left in it.
+#[derive(Debug)]
+pub struct SharedMemory(TempDir);
+
+impl SharedMemory {
+    /// Makes OpenMPI use the directory.
+    pub fn add_to(&self, command: &mut Command) {
+        command.env("OMPI_MCA_btl_vader_backing_directory", self.0.path());
+        command.env("OMPI_MCA_orte_tmpdir_base", self.0.path());
+    }
+}
+
+/// Sets the environment that OpenMPI needs to run as root and with more ranks than cores, also for a program that
+/// initialises MPI without `mpirun`.
+pub fn set_environment(command: &mut Command) {
+    command
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        // On a shared machine, other work may occupy the cores that ranks would be bound to.
+        .env("OMPI_MCA_hwloc_base_binding_policy", "none");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_template_is_filled_in() {
+        let launcher = Launcher::parse("srun -n {ranks} --tasks={ranks}").unwrap();
+        let command = launcher.command(16, "mesher");
+        let words: Vec<_> = command.get_args().map(|w| w.to_string_lossy().into_owned()).collect();
+        assert_eq!(words, ["-n", "16", "--tasks=16", "mesher"]);
+        assert_eq!(command.get_program(), "srun");
+        assert!(Launcher::parse("mpirun -n 4").unwrap_err().contains("{ranks}"));
+    }
+
+    #[test]
+    fn only_a_run_on_this_machine_has_its_own_shared_memory() {
+        let cluster = Launcher::parse("mpirun --hostfile hosts -n {ranks}").unwrap();
+        assert!(cluster.shared_memory().is_none());
+        let local = Launcher::mpirun(Path::new("/usr/bin/mpirun"));
+        assert_eq!(local.shared_memory().is_some(), Path::new("/dev/shm").is_dir());
+    }
+}

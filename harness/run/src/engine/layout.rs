@@ -1,0 +1,113 @@
+//! How a run is distributed over ranks. The mesh does not depend on it, which is what a verification shows.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// The number of ranks and their kind.
+///
+/// The JSON form is the number alone: only runs on MPI are recorded with their layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "usize", from = "usize")]
+pub enum Ranks {
+    /// One rank, without messages.
+    Serial,
+    /// Ranks within one process, scheduled in an order that the seed determines.
+    Simulated {
+        /// Number of ranks.
+        ranks: usize,
+        /// Seed of the schedule.
+        seed: u64,
+    },
+    /// Processes on MPI.
+    Mpi(usize),
+}
+
+impl Ranks {
+    /// Number of ranks.
+    pub fn count(self) -> usize {
+        match self {
+            Self::Serial => 1,
+            Self::Simulated { ranks, .. } | Self::Mpi(ranks) => ranks,
+        }
+    }
+}
+
+impl From<Ranks> for usize {
+    fn from(ranks: Ranks) -> Self {
+        ranks.count()
+    }
+}
+
+impl From<usize> for Ranks {
+    fn from(ranks: usize) -> Self {
+        Self::Mpi(ranks)
+    }
+}
+
+impl fmt::Display for Ranks {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Serial => f.write_str("serial"),
+            Self::Simulated { ranks, seed } => write!(f, "{ranks} simulated ranks, seed {seed}"),
+            Self::Mpi(1) => f.write_str("1 rank"),
+            Self::Mpi(ranks) => write!(f, "{ranks} ranks"),
+        }
+    }
+}
+
+/// Ranks, and the choices that determine which rank owns which part of the mesh. A choice that is `None` is left to
+/// the engine, and an engine that does not offer a choice ignores it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Layout {
+    /// The ranks.
+    pub ranks: Ranks,
+    /// `metis` or `morton`.
+    pub partitioner: Option<String>,
+    /// `auto` or the level of the partition.
+    pub level_base: Option<String>,
+    /// The weights of base leaves in the partition.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
+}
+
+impl Layout {
+    /// These ranks, with every choice left to the engine.
+    pub const fn on(ranks: Ranks) -> Self {
+        Self { ranks, partitioner: None, level_base: None, weights: None }
+    }
+}
+
+/// The layout of a serial run.
+pub static SERIAL: Layout = Layout::on(Ranks::Serial);
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}", self.ranks)?;
+        let choices =
+            [("", &self.partitioner), ("base ", &self.level_base), ("weights ", &self.weights)];
+        for (label, choice) in choices {
+            if let Some(choice) = choice {
+                write!(f, ", {label}{choice}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_layout_on_mpi_has_a_label_and_a_json_form() {
+        let layout = Layout {
+            partitioner: Some("metis".into()),
+            level_base: Some("auto".into()),
+            ..Layout::on(Ranks::Mpi(3))
+        };
+        assert_eq!(layout.to_string(), "3 ranks, metis, base auto");
+        let json = serde_json::to_string(&layout).unwrap();
+        assert_eq!(json, r#"{"ranks":3,"partitioner":"metis","level_base":"auto"}"#);
+        assert_eq!(serde_json::from_str::<Layout>(&json).unwrap(), layout);
+    }
+}

@@ -1,0 +1,157 @@
+//! The run report: the JSON file in which a program describes its run.
+//!
+//! `cells` and `digest` are required. Everything else may be missing, and then
+//! - `ranks` is 1 and `facets` is 0;
+//! - `time_wall_s` is the wall time of the process, and `peak_rss_bytes` is what was sampled from outside, or empty;
+//! - phases, counters and the message matrix are empty, and so is every list that is missing from a phase.
+//!
+//! An engine without a run report is described by the manifest of its mesh, which has cells and digest only.
+
+use contract::manifest::Manifest;
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A run report. Lists have one entry per rank.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct RunReport {
+    /// Cells of the final mesh, or leaves of the base tree.
+    pub cells: u64,
+    /// The digest of the mesh: 32 hexadecimal digits.
+    pub digest: String,
+    /// Number of ranks.
+    #[serde(default = "one")]
+    pub ranks: usize,
+    /// Number of facets.
+    #[serde(default)]
+    pub facets: u64,
+    /// Wall time by the program's own clock, in seconds.
+    #[serde(default)]
+    pub time_wall_s: Option<f64>,
+    /// Peak resident memory, per rank or of the whole program.
+    #[serde(default, deserialize_with = "one_or_many")]
+    pub peak_rss_bytes: Vec<u64>,
+    /// Phases in the order in which they ran.
+    #[serde(default)]
+    pub phases: Vec<PhaseReport>,
+    /// Counters by name.
+    #[serde(default)]
+    pub counters: BTreeMap<String, Vec<u64>>,
+    /// Sender, receiver, messages and bytes of every pair of ranks that communicated.
+    #[serde(default)]
+    pub message_matrix: Vec<[u64; 4]>,
+}
+
+/// A phase of a run.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct PhaseReport {
+    /// The program's name for it.
+    pub name: String,
+    /// Wall time, in seconds.
+    pub time_wall_s: Vec<f64>,
+    /// CPU time, in seconds.
+    pub time_cpu_s: Vec<f64>,
+    /// Wall time in calls to other ranks, in seconds.
+    pub time_comm_wall_s: Vec<f64>,
+    /// CPU time in calls to other ranks, in seconds.
+    pub time_comm_cpu_s: Vec<f64>,
+    /// Messages sent.
+    pub messages: Vec<u64>,
+    /// Bytes sent.
+    pub message_bytes: Vec<u64>,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum OneOrMany {
+        One(u64),
+        Many(Vec<u64>),
+    }
+    Ok(match OneOrMany::deserialize(input)? {
+        OneOrMany::One(value) => vec![value],
+        OneOrMany::Many(values) => values,
+    })
+}
+
+impl RunReport {
+    /// Reads a run report.
+    ///
+    /// # Errors
+    /// One sentence, if the file cannot be read or does not have the fields that are required.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let wrong = |why: String| format!("the run report {} is unusable: {why}", path.display());
+        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))
+    }
+
+    /// The report of a run that wrote a mesh and no run report.
+    pub fn of_mesh(manifest: &Manifest) -> Self {
+        let digest = manifest.digest.to_string();
+        Self { cells: manifest.leaves, digest, ranks: 1, ..Self::default() }
+    }
+
+    /// Peak memory of all ranks together.
+    pub fn peak_rss_bytes_total(&self) -> u64 {
+        self.peak_rss_bytes.iter().sum()
+    }
+
+    /// CPU time of all phases and ranks, in seconds; `None` if no phase reports any.
+    pub fn time_cpu_s(&self) -> Option<f64> {
+        let total: f64 = self.phases.iter().map(PhaseReport::time_cpu_total_s).sum();
+        (total > 0.0).then_some(total)
+    }
+}
+
+impl PhaseReport {
+    /// CPU time of all ranks, in seconds.
+    pub fn time_cpu_total_s(&self) -> f64 {
+        self.time_cpu_s.iter().sum()
+    }
+
+    /// CPU time outside calls to other ranks, per rank, in seconds. The resolution of the clocks may make a
+    /// difference negative; it is then 0.
+    pub fn time_useful_s(&self) -> Vec<f64> {
+        let comm = self.time_comm_cpu_s.iter().copied().chain(std::iter::repeat(0.0));
+        self.time_cpu_s.iter().zip(comm).map(|(all, comm)| (all - comm).max(0.0)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> RunReport {
+        serde_json::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn reports_of_mesher_and_reference_are_read() {
+        let mesher = parse(
+            r#"{"schema": "octree-mesher-run/1", "cells": 8, "digest": "00", "ranks": 2, "time_wall_s": 0.5,
+                "peak_rss_bytes": [3, 4], "counters": {"leaves": [3, 5]}, "message_matrix": [[0, 1, 3, 96]],
+                "phases": [{"name": "read", "time_cpu_s": [2.0, 1.0], "time_comm_cpu_s": [0.5, 1.5]}]}"#,
+        );
+        assert_eq!((mesher.ranks, mesher.peak_rss_bytes_total()), (2, 7));
+        assert_eq!((mesher.time_cpu_s(), &mesher.counters["leaves"]), (Some(3.0), &vec![3, 5]));
+        assert_eq!(mesher.phases[0].time_useful_s(), [1.5, 0.0]);
+        assert_eq!(mesher.message_matrix, [[0, 1, 3, 96]]);
+        let reference =
+            parse(r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#);
+        assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (1, 9));
+    }
+
+    #[test]
+    fn cells_and_digest_are_all_that_is_required() {
+        let least = parse(r#"{"cells": 8, "digest": "00"}"#);
+        assert_eq!((least.ranks, least.time_wall_s, least.time_cpu_s()), (1, None, None));
+        assert!(least.peak_rss_bytes.is_empty() && least.counters.is_empty());
+        let error = serde_json::from_str::<RunReport>(r#"{"cells": 8}"#).unwrap_err();
+        assert!(error.to_string().contains("digest"), "{error}");
+    }
+}
