@@ -122,7 +122,7 @@ proptest! {
 }
 
 #[test]
-#[should_panic(expected = "brick 0x3 must come before Some(")]
+#[should_panic(expected = "brick 0x1 must precede brick 0x3")]
 fn keys_out_of_order_are_found() {
     let mut s = set(&[64, 3 * 64]);
     s.low.swap(0, 1);
