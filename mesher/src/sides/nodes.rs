@@ -233,15 +233,15 @@ impl Finder<'_> {
             let node = self.path[m as usize].1;
             // At two levels above `l` and higher, one octant contains all of `bits`; at one level above, those of
             // one sibling group do.
-            let here = match l - m {
+            let octants = match l - m {
                 0 => bits,
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
                 up => 1 << (key >> (3 * (up - 2)) & 63),
             };
             let split = nodes.split(m, node);
-            let leaves = here & !split;
+            let leaves = octants & !split;
             nodes.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
-            if here & split == 0 || m == l {
+            if octants & split == 0 || m == l {
                 return;
             }
             if self.path.len() == m as usize + 1 {
@@ -267,7 +267,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    /// Deepest level of the trees here.
+    /// Deepest level of the trees octants.
     const DEEPEST: Level = 6;
 
     fn of_codes(codes: &BTreeSet<u64>) -> BrickSet {
