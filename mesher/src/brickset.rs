@@ -11,7 +11,7 @@
 mod ranges;
 mod read;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod union;
 
 pub use read::{Bricks, ChildBricks, Cursor, Groups};

@@ -31,9 +31,7 @@ fn lambda(all: &[u64]) -> f64 {
 fn mesh(workspace: &Workspace, args: &[&str]) -> Value {
     run(workspace.mesher(&[&["case.toml", "--quiet", "--json", "run.json"], args].concat()))
         .succeeds();
-    let text =
-        std::fs::read_to_string(workspace.path().join("run.json")).expect("a report was written");
-    serde_json::from_str(&text).expect("the report is JSON")
+    workspace.json("run.json")
 }
 
 #[test]

@@ -17,11 +17,6 @@ const CASE: &str = "spacing_min = 0.07\nlayer_cells_min = 2\nkeep = \"inside\"\n
 [[box]]\nmin = [-9.0, 0.0, 0.1]\nmax = [0.25, 0.5, 0.4]\nspacing = 0.03\n
 [[box]]\nmin = [-0.3, -0.3, -0.3]\nmax = [0.3, 0.3, 0.3]\nspacing = 0.2\n";
 
-fn read_json(path: &Path) -> Value {
-    let text = std::fs::read_to_string(path).expect("the file was written");
-    serde_json::from_str(&text).expect("it is JSON")
-}
-
 /// The words of a part. Asserts that it has the format that all programs expect: one dimension of
 /// little-endian u64.
 fn read_part(path: &Path) -> Vec<u64> {
@@ -61,7 +56,7 @@ fn assert_counts(report: &Value, words: &[u64], [total, by_level]: [&str; 2]) {
 }
 
 fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
-    let manifest = read_json(&folder.join("mesh.json"));
+    let manifest = process::read_json(&folder.join("mesh.json"));
     assert_eq!(manifest["schema"], "octree-leaf-set/1");
     assert_eq!(manifest["program"], concat!("mesher ", env!("CARGO_PKG_VERSION")));
     assert_eq!(manifest["tree"], if ungraded { "base" } else { "final" });
@@ -131,7 +126,7 @@ fn written_meshes_are_read_back() {
             run(workspace.mesher(&args)).succeeds();
             let folder = workspace.path().join("mesh");
             assert_manifest(&folder, &words, ungraded, ranks);
-            assert_report(&read_json(&workspace.path().join("run.json")), &words, ranks);
+            assert_report(&workspace.json("run.json"), &words, ranks);
             std::fs::remove_dir_all(folder).expect("the mesh exists");
         }
     }
@@ -181,7 +176,7 @@ fn counters_do_not_depend_on_the_order_of_messages() {
     for seed in [1, 2, 2] {
         let comm = format!("--comm=sim:4:{seed}");
         run(workspace.mesher(&["case.toml", "--json", "run.json", "--quiet", &comm])).succeeds();
-        counted.push(read_json(&workspace.path().join("run.json"))["counters"].clone());
+        counted.push(workspace.json("run.json")["counters"].clone());
     }
     assert_eq!(counted[0], counted[1]);
     assert_eq!(counted[1], counted[2]);
@@ -208,7 +203,7 @@ fn standard_output_agrees_with_the_json_report() {
     workspace.write("case.toml", CASE);
     let finished = run(workspace.mesher(&["case.toml", "--json", "run.json"]));
     finished.succeeds();
-    let report = read_json(&workspace.path().join("run.json"));
+    let report = workspace.json("run.json");
     let digest = report["digest"].as_str().expect("text");
     assert!(finished.stdout.contains(digest), "{finished:?}");
     for word in ["facets", "cells", "level  6", "time", "peak memory", "max/mean"] {
@@ -233,7 +228,7 @@ fn options_and_a_case_file_with_the_same_parameters_give_the_same_mesh() {
     ];
     let digest = |args: &[&str]| {
         run(workspace.mesher(&[args, &["--json", "run.json", "--quiet"]].concat())).succeeds();
-        read_json(&workspace.path().join("run.json"))["digest"].clone()
+        workspace.json("run.json")["digest"].clone()
     };
     workspace.write("scaled.toml", format!("{text}root_scale = 3.0\n{boxed}"));
     workspace.write("exact.toml", format!("{text}{exact}{boxed}"));

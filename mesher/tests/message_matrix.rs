@@ -10,11 +10,6 @@ use serde_json::Value;
 const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\n
 [generator]\nshape = \"torus\"\nfacets = 640\n";
 
-fn json(workspace: &Workspace, name: &str) -> Value {
-    let text = std::fs::read_to_string(workspace.path().join(name)).expect("a report was written");
-    serde_json::from_str(&text).expect("the report is JSON")
-}
-
 fn matrix(report: &Value) -> Vec<[u64; 4]> {
     serde_json::from_value(report["message_matrix"].clone()).expect("entries of four numbers")
 }
@@ -25,10 +20,10 @@ fn the_matrix_is_included_on_request_and_does_not_exceed_the_traffic() {
     workspace.write("case.toml", CASE);
     let args = ["case.toml", "--quiet", "--comm", "sim:4", "--json", "run.json"];
     run(workspace.mesher(&args)).succeeds();
-    let without = json(&workspace, "run.json");
+    let without = workspace.json("run.json");
     assert_eq!(without.get("message_matrix"), None);
     run(workspace.mesher(&[&args[..], &["--message-matrix"]].concat())).succeeds();
-    let with = json(&workspace, "run.json");
+    let with = workspace.json("run.json");
     assert_eq!(with["counters"], without["counters"], "gathering the matrix must not be counted");
     let entries = matrix(&with);
     assert!(
@@ -49,7 +44,7 @@ fn a_single_rank_has_an_empty_matrix_and_the_option_needs_a_report() {
     let args = ["case.toml", "--quiet", "--comm", "solo", "--message-matrix"];
     run(workspace.mesher(&args)).refuses(2, &["--json"]);
     run(workspace.mesher(&[&args[..], &["--json", "run.json"]].concat())).succeeds();
-    assert!(matrix(&json(&workspace, "run.json")).is_empty());
+    assert!(matrix(&workspace.json("run.json")).is_empty());
 }
 
 #[test]
@@ -60,5 +55,5 @@ fn real_ranks_send_the_same_messages_as_simulated_ones() {
     let args = ["case.toml", "--quiet", "--message-matrix", "--json"];
     run(workspace.mesher(&[&args[..], &["sim.json", "--comm", "sim:3"]].concat())).succeeds();
     run(workspace.mpirun(3, &[&args[..], &["mpi.json"]].concat())).succeeds();
-    assert_eq!(matrix(&json(&workspace, "mpi.json")), matrix(&json(&workspace, "sim.json")));
+    assert_eq!(matrix(&workspace.json("mpi.json")), matrix(&workspace.json("sim.json")));
 }

@@ -6,7 +6,6 @@
 mod process;
 
 use process::{Workspace, run, start};
-use serde_json::Value;
 use std::process::Command;
 use std::time::Duration;
 
@@ -14,18 +13,13 @@ const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"torus\"\nfacets = 640\n
 [[box]]\nmin = [0.2, 0.2, 0.2]\nmax = [0.6, 0.5, 0.4]\nspacing = 0.02\n";
 
-fn json(workspace: &Workspace, name: &str) -> Value {
-    let text = std::fs::read_to_string(workspace.path().join(name)).expect("a report was written");
-    serde_json::from_str(&text).expect("the report is JSON")
-}
-
 #[test]
 #[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
 fn the_mesh_is_the_serial_one() {
     let workspace = Workspace::new();
     workspace.write("case.toml", CASE);
     run(workspace.mesher(&["case.toml", "--quiet", "--json", "serial.json"])).succeeds();
-    let serial = json(&workspace, "serial.json");
+    let serial = workspace.json("serial.json");
     assert!(serial["cells"].as_u64() > Some(10_000));
     for (ranks, partitioner, level_base) in [
         (1, "metis", "auto"),
@@ -37,15 +31,12 @@ fn the_mesh_is_the_serial_one() {
         let args = ["case.toml", "--quiet", "--json", "run.json", "--out", "mesh"];
         let division = ["--partitioner", partitioner, "--level-base", level_base];
         run(workspace.mpirun(ranks, &[&args[..], &division].concat())).succeeds();
-        let report = json(&workspace, "run.json");
+        let report = workspace.json("run.json");
         for same in ["cells", "digest", "cells_by_level", "cells_by_side", "components"] {
             assert_eq!(report[same], serial[same], "{same} on {ranks} ranks");
         }
         assert_eq!(report["ranks"], ranks);
-        assert_eq!(
-            json(&workspace, "mesh/mesh.json")["parts"].as_array().map(Vec::len),
-            Some(ranks)
-        );
+        assert_eq!(workspace.json("mesh/mesh.json")["parts"].as_array().map(Vec::len), Some(ranks));
         std::fs::remove_dir_all(workspace.path().join("mesh")).expect("the mesh exists");
     }
 }

@@ -1,6 +1,7 @@
 //! Runs the mesher's program in a temporary directory, within a time limit, and inspects output and files.
 #![allow(dead_code, missing_docs)]
 
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -79,6 +80,11 @@ impl Workspace {
         command
     }
 
+    /// A JSON file in the directory.
+    pub fn json(&self, name: &str) -> Value {
+        read_json(&self.path().join(name))
+    }
+
     /// The paths in the directory, with the contents of files and none for directories.
     pub fn contents(&self) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
         let mut found = BTreeMap::new();
@@ -97,6 +103,12 @@ impl Workspace {
         }
         found
     }
+}
+
+/// Reads a JSON file.
+pub fn read_json(path: &Path) -> Value {
+    let text = std::fs::read_to_string(path).expect("the file exists");
+    serde_json::from_str(&text).expect("the file is JSON")
 }
 
 /// Starts a command and captures its output.
