@@ -1,9 +1,8 @@
-//! Instructions per kernel, which repeat where seconds do not: `cargo bench -p mesher --bench
-//! instructions [-- NAME...]`. Needs valgrind; without it, says so and succeeds.
+//! Instructions per kernel: `cargo bench -p mesher --bench instructions [-- NAME...]`. Counts repeat exactly,
+//! unlike times. Without valgrind the bench prints that and succeeds.
 //!
-//! Each kernel runs once, warm, in a process of its own under callgrind, which counts what
-//! [`counted`] does and nothing before it. Valgrind has no AVX-512, so the portable code paths are what
-//! is counted, on every machine.
+//! Each kernel runs once, after a warm-up, in a process of its own under callgrind, which counts only what
+//! [`counted`] does. Valgrind does not support AVX-512, so other code paths than on most machines are counted.
 #![allow(missing_docs)]
 
 mod support;
@@ -22,14 +21,14 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     if Command::new("valgrind").arg("--version").output().is_err() {
-        println!("left out, because there is no valgrind");
+        println!("skipped: valgrind is not installed");
         return ExitCode::SUCCESS;
     }
-    // What cargo adds to the command line begins with a dash.
-    let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    // Arguments that begin with a dash are cargo's.
+    let names: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     println!("{:<12}{:>16}{:>12}{:>20}", "kernel", "instructions", "elements", "per element");
     for k in support::kernels() {
-        if !asked.is_empty() && !asked.iter().any(|a| k.name.contains(a.as_str())) {
+        if !names.is_empty() && !names.iter().any(|a| k.name.contains(a.as_str())) {
             continue;
         }
         match count(k.name) {
@@ -55,7 +54,7 @@ fn counted(run: &mut dyn FnMut() -> u64) -> u64 {
     std::hint::black_box(run())
 }
 
-/// Instructions of one kernel.
+/// Number of instructions of one kernel.
 fn count(name: &str) -> Result<u64, String> {
     let me = std::env::current_exe().map_err(|e| e.to_string())?;
     let ended = Command::new("valgrind")
@@ -68,8 +67,8 @@ fn count(name: &str) -> Result<u64, String> {
         .env(ONE, name)
         .output()
         .map_err(|e| e.to_string())?;
-    let told = String::from_utf8_lossy(&ended.stderr);
-    let line = told.lines().find_map(|l| l.split_once("Collected :"));
+    let output = String::from_utf8_lossy(&ended.stderr);
+    let line = output.lines().find_map(|l| l.split_once("Collected :"));
     let number = line.and_then(|(_, n)| n.trim().parse().ok());
-    number.filter(|n| *n > 0).ok_or_else(|| format!("callgrind counted nothing:\n{told}"))
+    number.filter(|n| *n > 0).ok_or_else(|| format!("callgrind counted nothing:\n{output}"))
 }

@@ -33,8 +33,8 @@ const fn axis_masks(axis: u32) -> [u64; 4] {
     let mut masks = [0; 4];
     let mut bit = 0;
     while bit < 64u32 {
-        let at = (bit >> axis & 1) | (bit >> (axis + 3) & 1) << 1;
-        masks[at as usize] |= 1 << bit;
+        let index = (bit >> axis & 1) | (bit >> (axis + 3) & 1) << 1;
+        masks[index as usize] |= 1 << bit;
         bit += 1;
     }
     masks

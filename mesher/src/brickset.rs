@@ -11,7 +11,7 @@
 mod ranges;
 mod read;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod union;
 
 pub use read::{Bricks, ChildBricks, Cursor, Groups};
@@ -216,11 +216,11 @@ impl BrickSet {
         }
         let last = self.runs.last().map_or(0, |r| r.start + 1);
         assert!(last <= self.len(), "the last run must have a brick");
-        let mut before = None;
         for b in self.bricks() {
-            assert!(before < Some(b.key), "brick {:#x} must come before {before:#x?}", b.key);
             assert!(b.bits != 0, "brick {:#x} must not be empty", b.key);
-            before = Some(b.key);
+        }
+        for (a, b) in self.bricks().zip(self.bricks().skip(1)) {
+            assert!(a.key < b.key, "brick {:#x} must precede brick {:#x}", b.key, a.key);
         }
     }
 }

@@ -151,9 +151,10 @@ impl BoxSpec {
                 self.spacing
             )));
         }
-        let at = |p: [f64; 3]| std::array::from_fn(|a| root.quantise(a, p[a]).clamp(0, ROOT_EDGE));
+        let on_lattice =
+            |p: [f64; 3]| std::array::from_fn(|a| root.quantise(a, p[a]).clamp(0, ROOT_EDGE));
         let level = root.level_of(self.spacing, &format!("box {number}: spacing"))?;
-        Ok(ExtentBox { min: at(self.min), max: at(self.max), level })
+        Ok(ExtentBox { min: on_lattice(self.min), max: on_lattice(self.max), level })
     }
 }
 

@@ -117,16 +117,11 @@ fn dilate_tiles(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brickset::tests::set;
     use crate::octant::{morton, position};
     use crate::wide::tests::widths;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
-
-    fn set(codes: &BTreeSet<u64>) -> BrickSet {
-        BrickSet::from_unsorted(
-            codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect(),
-        )
-    }
 
     fn naive(l: Level, codes: &BTreeSet<u64>, r: i64) -> BTreeSet<u64> {
         let n = 1i64 << l;

@@ -270,9 +270,10 @@ impl Gradation<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brickset::tests::set;
     use crate::comm::Solo;
     use crate::tree::per_level;
-    use crate::tree::tests::{rules, set, small};
+    use crate::tree::tests::{rules, small};
 
     fn graded() -> (Tree, PerLevel) {
         let (tree, nothing) = (small(), per_level());

@@ -66,8 +66,9 @@ impl<'a> Kept<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brickset::tests::set;
     use crate::tree::per_level;
-    use crate::tree::tests::{set, small};
+    use crate::tree::tests::small;
 
     #[test]
     #[should_panic(expected = "octant 0.0 of level 2 is deleted, but no leaf off the surface")]

@@ -133,8 +133,9 @@ impl Stl {
 
 /// The vertices of a binary record. They follow the normal, which is not used.
 fn record(bytes: &[u8; RECORD as usize]) -> Facet {
-    let at = |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
-    std::array::from_fn(|v| std::array::from_fn(|a| at(12 + 12 * v + 4 * a)))
+    let coordinate =
+        |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
+    std::array::from_fn(|v| std::array::from_fn(|a| coordinate(12 + 12 * v + 4 * a)))
 }
 
 /// The solids of a text file, each in the form that `stl_io` reads: lower case, with line feeds and a name.

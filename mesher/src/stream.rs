@@ -181,19 +181,19 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     /// Reads a brick whose octants `exists` exist; `crossing` and `inside` are inherited from base leaves.
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
-        let (of, at) = (self.of, &mut self.levels[l as usize]);
+        let (of, cursors) = (self.of, &mut self.levels[l as usize]);
         let placement = if of.ownership.owns(l, key) {
             Placement::Local
         } else {
             of.ownership.placement(l, key)
         };
-        let split = at.split.get(key) & exists;
-        let crossing = at.crossing.get(key) | crossing;
-        let deleted = at.deleted.get(key);
+        let split = cursors.split.get(key) & exists;
+        let crossing = cursors.crossing.get(key) | crossing;
+        let deleted = cursors.deleted.get(key);
         let inside = match of.rules.keep {
             Keep::Outside => deleted,
             Keep::Inside => !deleted,
-            Keep::All => at.inside.get(key) | inside,
+            Keep::All => cursors.inside.get(key) | inside,
         };
         let mut leaves = exists & !split;
         if !of.all_leaves {
@@ -207,10 +207,10 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         }
         let inside = inside & !crossing;
         let counts = &mut self.counts.by_level[l as usize];
-        let of = |side: u64| u64::from((leaves & side).count_ones());
-        counts[Side::Crossing as usize] += of(crossing);
-        counts[Side::Inside as usize] += of(inside);
-        counts[Side::Outside as usize] += of(!(crossing | inside));
+        let count = |side: u64| u64::from((leaves & side).count_ones());
+        counts[Side::Crossing as usize] += count(crossing);
+        counts[Side::Inside as usize] += count(inside);
+        counts[Side::Outside as usize] += count(!(crossing | inside));
         Loaded { key, leaves, split, crossing, inside, placement }
     }
 

@@ -156,13 +156,8 @@ pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::brickset::tests::set;
     use crate::lattice::{ExtentBox, Keep, Root};
-
-    /// Some octants of one level.
-    pub fn set(codes: &[u64]) -> BrickSet {
-        let brick = |c: &u64| Brick { key: c >> 6, bits: 1 << (c & 63) };
-        BrickSet::from_unsorted(codes.iter().map(brick).collect())
-    }
 
     /// Rules with surface level 3 that keep everything.
     pub fn rules() -> Rules {

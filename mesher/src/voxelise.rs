@@ -95,9 +95,9 @@ impl BinnedFacets {
 
     /// Positions of the facets whose containing octant is the octant `code` of level `l` or below it.
     fn contained(&self, l: Level, code: u64) -> Range<usize> {
-        let at =
+        let position =
             |start| self.containing.partition_point(|h| *h < ContainingOctant::first_in(start));
-        let range = at(start57(l, code))..at(start57(l, code + 1));
+        let range = position(start57(l, code))..position(start57(l, code + 1));
         // Ancestors with the same minimum corner sort first.
         let skip = self.containing[range.clone()]
             .partition_point(|h| h.start() == start57(l, code) && h.level() < l);
@@ -234,8 +234,8 @@ impl Voxeliser<'_> {
         straddling: &[u32],
     ) -> bool {
         let SubtreeRoot { level: m, code } = *root;
-        let at = corner(m, code);
-        let crosses = |i: &u32| crossed(&self.binned.facets[*i as usize], at, m) & 1 == 1;
+        let min_corner = corner(m, code);
+        let crosses = |i: &u32| crossed(&self.binned.facets[*i as usize], min_corner, m) & 1 == 1;
         let crossing = !contained.is_empty() || straddling.iter().any(crosses);
         for l in 0..=m {
             let above = code >> (3 * (m - l));
@@ -266,18 +266,21 @@ impl Voxeliser<'_> {
         allowed: u64,
     ) {
         self.work.bricks_voxelised += 1;
-        let at = brick::min_corner(l, key);
+        let min_corner = brick::min_corner(l, key);
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
-        let crossing = (self.test(&facets, l, at)
-            | self.bin_contained(&facets.contained, l, at, &mut runs))
+        let crossing = (self.test(&facets, l, min_corner)
+            | self.bin_contained(&facets.contained, l, min_corner, &mut runs))
             & allowed;
-        let near: Vec<ExtentBox> =
-            boxes.iter().filter(|b| b.level >= l && box_mask(b, at, l) != 0).copied().collect();
+        let near: Vec<ExtentBox> = boxes
+            .iter()
+            .filter(|b| b.level >= l && box_mask(b, min_corner, l) != 0)
+            .copied()
+            .collect();
         let asked = |least: Level| {
             near.iter()
                 .filter(|b| b.level > least)
-                .map(|b| box_mask(b, at, l))
+                .map(|b| box_mask(b, min_corner, l))
                 .fold(0, |m, b| m | b)
                 & allowed
         };
@@ -317,11 +320,11 @@ impl Voxeliser<'_> {
     }
 
     /// Tests the straddling facets of a brick; returns the octants that they cross.
-    fn test(&mut self, facets: &BrickFacets, l: Level, at: [i64; 3]) -> u64 {
+    fn test(&mut self, facets: &BrickFacets, l: Level, min_corner: [i64; 3]) -> u64 {
         let mut crossing = 0;
         for i in facets.straddling.clone() {
             let f = self.lists[i];
-            let mask = crossed(&self.binned.facets[f as usize], at, l);
+            let mask = crossed(&self.binned.facets[f as usize], min_corner, l);
             if mask != 0 {
                 self.pairs.push((f, mask));
                 crossing |= mask;
@@ -337,7 +340,7 @@ impl Voxeliser<'_> {
         &mut self,
         contained: &Range<usize>,
         l: Level,
-        at: [i64; 3],
+        min_corner: [i64; 3],
         runs: &mut [(u32, u32); 64],
     ) -> u64 {
         let mut crossing = 0;
@@ -345,7 +348,7 @@ impl Voxeliser<'_> {
         while i < contained.end {
             let octant = self.binned.containing[i];
             if octant.level() < l {
-                let mask = crossed(&self.binned.facets[i], at, l);
+                let mask = crossed(&self.binned.facets[i], min_corner, l);
                 self.pairs.push((i as u32, mask));
                 self.work.facet_brick_tests += 1;
                 crossing |= mask;
@@ -375,10 +378,10 @@ fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
 
 /// Whether the facet's extent meets the closed octant.
 fn reaches(f: &Facet, o: &SubtreeRoot) -> bool {
-    let (at, h) = (corner(o.level, o.code), edge(o.level));
+    let (min_corner, h) = (corner(o.level, o.code), edge(o.level));
     (0..3).all(|a| {
         let (lo, hi) = f.range(a);
-        lo <= at[a] + h && hi >= at[a]
+        lo <= min_corner[a] + h && hi >= min_corner[a]
     })
 }
 

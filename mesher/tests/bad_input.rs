@@ -1,69 +1,71 @@
-//! Bad input: one sentence, the documented exit code, nothing left behind; on one rank and on several.
+//! Bad input ends with one sentence, the documented exit code and no files, on one rank and on several.
 #![allow(missing_docs)]
 
 #[path = "support/process.rs"]
 mod process;
 
-use process::{COMMS, INPUT, Place, binary_stl, refused, run, tetrahedron};
+use process::{COMMS, INPUT, Workspace, binary_stl, refused, run, tetrahedron};
 use std::path::Path;
 use std::process::Command;
 
 #[track_caller]
 fn refused_case(text: &str, words: &[&str]) {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
-    place.put("case.toml", text);
-    refused(&place, &["case.toml"], INPUT, &[&["case.toml"], words].concat());
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    workspace.write("case.toml", text);
+    refused(&workspace, &["case.toml"], INPUT, &[&["case.toml"], words].concat());
 }
 
-/// What the rules, not the case file, are wrong about: the file is not named.
+/// For errors found when the rules are derived, after reading: these do not name the case file.
 #[track_caller]
 fn refused_rules(text: &str, words: &[&str]) {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
-    place.put("case.toml", format!("geometry = \"body.stl\"\n{text}"));
-    refused(&place, &["case.toml"], INPUT, words);
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    workspace.write("case.toml", format!("geometry = \"body.stl\"\n{text}"));
+    refused(&workspace, &["case.toml"], INPUT, words);
 }
 
 #[test]
-fn good_input_is_meshed_and_tells_so_unless_quiet() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
+fn good_input_is_meshed_and_reported_unless_quiet() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
     for comm in COMMS {
-        let told = run(place.mesher(&["body.stl", "--spacing-min", "0.5", comm]));
-        told.succeeds();
-        assert!(told.stdout.contains("cells"), "{told:?}");
-        let told = run(place.mesher(&["body.stl", "--spacing-min", "0.5", "--quiet", comm]));
-        told.succeeds();
-        assert_eq!(told.stdout, "");
+        let finished = run(workspace.mesher(&["body.stl", "--spacing-min", "0.5", comm]));
+        finished.succeeds();
+        assert!(finished.stdout.contains("cells"), "{finished:?}");
+        let finished =
+            run(workspace.mesher(&["body.stl", "--spacing-min", "0.5", "--quiet", comm]));
+        finished.succeeds();
+        assert_eq!(finished.stdout, "");
     }
 }
 
-/// METIS speaks up on standard output when it is asked for parts that cannot be.
+/// METIS prints to standard output when it cannot make as many parts as requested.
 #[test]
-fn nothing_but_the_mesher_is_heard() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
+fn libraries_print_nothing() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
     for comm in ["--comm=sim:2", "--comm=sim:5", "--comm=sim:16", "--comm=sim:40"] {
         for level_base in ["auto", "1", "3"] {
             let args = ["body.stl", "--spacing-min=0.1", "--partitioner=metis", "--quiet", comm];
-            let told = run(place.mesher(&[&args[..], &["--level-base", level_base]].concat()));
-            told.succeeds();
-            assert_eq!(told.stdout, "", "{comm} {level_base}");
+            let finished =
+                run(workspace.mesher(&[&args[..], &["--level-base", level_base]].concat()));
+            finished.succeeds();
+            assert_eq!(finished.stdout, "", "{comm} {level_base}");
         }
     }
 }
 
 #[test]
-fn files_that_are_no_stl() {
+fn files_that_are_not_stl_are_refused() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/bad");
-    let place = Place::new();
+    let workspace = Workspace::new();
     let mut count = 0;
     for entry in std::fs::read_dir(&folder).expect("the catalogue of bad files") {
         let path = entry.expect("a readable entry").path();
         if path.extension().is_some_and(|e| e == "stl") {
             let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-            std::fs::copy(&path, place.path().join(&name)).expect("a copy");
+            std::fs::copy(&path, workspace.path().join(&name)).expect("a copy");
             let what: &[&str] = match name.as_str() {
                 "empty.stl" => &["empty"],
                 "nan.stl" | "infinite.stl" => &["facet 6", "not finite"],
@@ -73,7 +75,7 @@ fn files_that_are_no_stl() {
                 "count_too_large.stl" => &["promises 4294967295 facets", "484"],
                 _ => &[&name],
             };
-            refused(&place, &[&name, "--spacing-min", "0.1"], INPUT, what);
+            refused(&workspace, &[&name, "--spacing-min", "0.1"], INPUT, what);
             count += 1;
         }
     }
@@ -81,35 +83,35 @@ fn files_that_are_no_stl() {
 }
 
 #[test]
-fn files_that_cannot_be_read() {
-    let place = Place::new();
+fn files_that_cannot_be_read_are_refused() {
+    let workspace = Workspace::new();
     let spacing = ["--spacing-min", "0.1"];
     let with = |name| [&[name][..], &spacing].concat();
-    refused(&place, &with("absent.stl"), INPUT, &["absent.stl", "No such file"]);
-    refused(&place, &["absent.toml"], INPUT, &["absent.toml", "No such file"]);
-    std::fs::create_dir(place.path().join("folder.stl")).expect("a directory");
-    refused(&place, &with("folder.stl"), INPUT, &["folder.stl"]);
-    std::fs::create_dir(place.path().join("folder.toml")).expect("a directory");
-    refused(&place, &["folder.toml"], INPUT, &["folder.toml"]);
-    refused(&place, &with("/dev/null"), INPUT, &["/dev/null"]);
-    // Opening one waits for a writer that never comes.
-    let made = Command::new("mkfifo").arg(place.path().join("pipe.stl")).status();
-    assert!(made.expect("mkfifo is there").success());
-    refused(&place, &with("pipe.stl"), INPUT, &["pipe.stl"]);
+    refused(&workspace, &with("absent.stl"), INPUT, &["absent.stl", "No such file"]);
+    refused(&workspace, &["absent.toml"], INPUT, &["absent.toml", "No such file"]);
+    std::fs::create_dir(workspace.path().join("folder.stl")).expect("a directory");
+    refused(&workspace, &with("folder.stl"), INPUT, &["folder.stl"]);
+    std::fs::create_dir(workspace.path().join("folder.toml")).expect("a directory");
+    refused(&workspace, &["folder.toml"], INPUT, &["folder.toml"]);
+    refused(&workspace, &with("/dev/null"), INPUT, &["/dev/null"]);
+    // Opening a pipe would wait for a writer for ever.
+    let made = Command::new("mkfifo").arg(workspace.path().join("pipe.stl")).status();
+    assert!(made.expect("mkfifo is installed").success());
+    refused(&workspace, &with("pipe.stl"), INPUT, &["pipe.stl"]);
 }
 
 #[test]
-fn every_truncation_of_a_body() {
+fn truncated_files_are_refused() {
     let whole = tetrahedron();
     for length in [1, 40, 83, 84, 85, 133, 134, whole.len() - 50, whole.len() - 1] {
-        let place = Place::new();
-        place.put("cut.stl", &whole[..length]);
-        refused(&place, &["cut.stl", "--spacing-min", "0.1"], INPUT, &["cut.stl"]);
+        let workspace = Workspace::new();
+        workspace.write("cut.stl", &whole[..length]);
+        refused(&workspace, &["cut.stl", "--spacing-min", "0.1"], INPUT, &["cut.stl"]);
     }
 }
 
 #[test]
-fn spacings_and_layers_that_cannot_be() {
+fn spacings_and_layers_out_of_range_are_refused() {
     for (value, words) in [
         ("0", &["spacing_min is 0", "positive"][..]),
         ("0.0", &["spacing_min is 0", "positive"]),
@@ -120,25 +122,25 @@ fn spacings_and_layers_that_cannot_be() {
         ("5e-324", &["spacing_min", "too small", "level 19"]),
     ] {
         refused_rules(&format!("spacing_min = {value}\n"), words);
-        let place = Place::new();
-        place.put("body.stl", tetrahedron());
-        refused(&place, &["body.stl", "--spacing-min", value], INPUT, words);
+        let workspace = Workspace::new();
+        workspace.write("body.stl", tetrahedron());
+        refused(&workspace, &["body.stl", "--spacing-min", value], INPUT, words);
     }
     refused_rules(
         "spacing_min = 0.5\nlayer_cells_min = 0\n",
         &["layer_cells_min is 0", "at least 1"],
     );
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
     let layers = |n| ["body.stl", "--spacing-min=0.5", "--layer-cells-min", n];
-    refused(&place, &layers("0"), INPUT, &["layer_cells_min is 0", "at least 1"]);
-    refused(&place, &layers("-1"), INPUT, &["--layer-cells-min"]);
-    refused(&place, &layers("2.5"), INPUT, &["--layer-cells-min"]);
-    refused(&place, &["body.stl"], INPUT, &["--spacing-min"]);
+    refused(&workspace, &layers("0"), INPUT, &["layer_cells_min is 0", "at least 1"]);
+    refused(&workspace, &layers("-1"), INPUT, &["--layer-cells-min"]);
+    refused(&workspace, &layers("2.5"), INPUT, &["--layer-cells-min"]);
+    refused(&workspace, &["body.stl"], INPUT, &["--spacing-min"]);
 }
 
 #[test]
-fn roots_and_boxes_that_cannot_be() {
+fn roots_and_boxes_out_of_range_are_refused() {
     let root = |origin: &str, edge: &str| {
         format!("spacing_min = 0.5\n[root]\norigin = [{origin}]\nedge = {edge}\n")
     };
@@ -146,7 +148,7 @@ fn roots_and_boxes_that_cannot_be() {
         refused_rules(&root("0.0, 0.0, 0.0", edge), &["edge", "positive"]);
     }
     refused_rules(&root("0.0, nan, 0.0", "8.0"), &["origin", "not finite"]);
-    // Facet 1 is the first that has the vertex (1, 0, 0); one root edge outside is allowed, no more.
+    // One root edge outside the root is allowed, no more.
     refused_rules(&root("-100.0, 0.0, 0.0", "8.0"), &["facet 0", "outside the root"]);
     refused_rules(&root("-16.5, 0.0, 0.0", "8.0"), &["facet 0", "outside the root"]);
     refused_rules("spacing_min = 0.5\nroot_scale = 0.0\n", &["root_scale is 0", "positive"]);
@@ -163,16 +165,16 @@ fn roots_and_boxes_that_cannot_be() {
         refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", spacing), &["box 2", "positive"]);
     }
     refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", "1e-9"), &["box 2", "too small"]);
-    let place = Place::new();
-    place.put("none.stl", binary_stl(&[]));
-    place.put("point.stl", binary_stl(&[[[0.25; 3]; 3]]));
+    let workspace = Workspace::new();
+    workspace.write("none.stl", binary_stl(&[]));
+    workspace.write("point.stl", binary_stl(&[[[0.25; 3]; 3]]));
     for name in ["none.stl", "point.stl"] {
-        refused(&place, &[name, "--spacing-min=0.5"], INPUT, &["no extent", "[root]"]);
+        refused(&workspace, &[name, "--spacing-min=0.5"], INPUT, &["no extent", "[root]"]);
     }
 }
 
 #[test]
-fn case_files_with_mistakes() {
+fn case_files_with_mistakes_are_refused() {
     const GOOD: &str = "geometry = \"body.stl\"\nspacing_min = 0.5\n";
     for (text, words) in [
         (
@@ -208,37 +210,37 @@ fn case_files_with_mistakes() {
         ("\u{0}\u{1}\u{2}", &["line 1"]),
     ] {
         if text.contains("facets = 0") {
-            // The generator is asked only when it is its turn.
-            let place = Place::new();
-            place.put("case.toml", text);
-            refused(&place, &["case.toml"], INPUT, words);
+            // Found when the facets are generated, so the case file is not named.
+            let workspace = Workspace::new();
+            workspace.write("case.toml", text);
+            refused(&workspace, &["case.toml"], INPUT, words);
         } else {
             refused_case(text, words);
         }
     }
-    let place = Place::new();
-    place.put("case.toml", b"geometry = \"\xff\xfe.stl\"\n");
-    refused(&place, &["case.toml"], INPUT, &["case.toml", "UTF-8"]);
-    place.put("case.toml", "geometry = \"nowhere/body.stl\"\nspacing_min = 0.5\n");
-    refused(&place, &["case.toml"], INPUT, &["nowhere/body.stl", "No such file"]);
+    let workspace = Workspace::new();
+    workspace.write("case.toml", b"geometry = \"\xff\xfe.stl\"\n");
+    refused(&workspace, &["case.toml"], INPUT, &["case.toml", "UTF-8"]);
+    workspace.write("case.toml", "geometry = \"nowhere/body.stl\"\nspacing_min = 0.5\n");
+    refused(&workspace, &["case.toml"], INPUT, &["nowhere/body.stl", "No such file"]);
 }
 
 #[test]
-fn options_with_mistakes() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
-    place.put("case.toml", "geometry = \"body.stl\"\nspacing_min = 0.5\n");
+fn options_with_mistakes_are_refused() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    workspace.write("case.toml", "geometry = \"body.stl\"\nspacing_min = 0.5\n");
     let with = |more: &[&'static str]| [&["body.stl", "--spacing-min=0.5"], more].concat();
-    refused(&place, &with(&["--keep", "some"]), INPUT, &["--keep"]);
-    refused(&place, &with(&["--keap", "all"]), INPUT, &["--keap", "--keep"]);
-    refused(&place, &with(&["--root", "0,0,0"]), INPUT, &["--root", "4 numbers"]);
-    refused(&place, &with(&["--box", "0,0,0,1,1,1,x"]), INPUT, &["--box", "7 numbers"]);
-    refused(&place, &with(&["--box", "0,0,0,1,-1,1,1"]), INPUT, &["box 1", "below max"]);
-    refused(&place, &with(&["--root-scale", "-2"]), INPUT, &["root_scale is -2"]);
-    refused(&place, &with(&["--level-base", "20"]), INPUT, &["--level-base"]);
-    refused(&place, &["case.toml", "--spacing-min", "1"], INPUT, &["case.toml is a case file"]);
+    refused(&workspace, &with(&["--keep", "some"]), INPUT, &["--keep"]);
+    refused(&workspace, &with(&["--keap", "all"]), INPUT, &["--keap", "--keep"]);
+    refused(&workspace, &with(&["--root", "0,0,0"]), INPUT, &["--root", "4 numbers"]);
+    refused(&workspace, &with(&["--box", "0,0,0,1,1,1,x"]), INPUT, &["--box", "7 numbers"]);
+    refused(&workspace, &with(&["--box", "0,0,0,1,-1,1,1"]), INPUT, &["box 1", "below max"]);
+    refused(&workspace, &with(&["--root-scale", "-2"]), INPUT, &["root_scale is -2"]);
+    refused(&workspace, &with(&["--level-base", "20"]), INPUT, &["--level-base"]);
+    refused(&workspace, &["case.toml", "--spacing-min", "1"], INPUT, &["case.toml is a case file"]);
     for comm in ["sim:0", "sim", "sim:x", "sim:2:3:4", "sim:4097", "tcp"] {
-        run(place.mesher(&["body.stl", "--comm", comm])).refuses(INPUT, &["--comm"]);
+        run(workspace.mesher(&["body.stl", "--comm", comm])).refuses(INPUT, &["--comm"]);
     }
-    run(place.mesher(&[])).refuses(INPUT, &["INPUT"]);
+    run(workspace.mesher(&[])).refuses(INPUT, &["INPUT"]);
 }

@@ -1,26 +1,26 @@
-//! How the work is divided, by counters, which repeat exactly: dealing out anew balances the leaves on any number of
-//! ranks, and nothing is counted twice or left out.
+//! Load balance by counters, which repeat exactly: repartitioning balances the leaves on any number of ranks, and no
+//! split is counted twice or missed.
 #![allow(missing_docs)]
 
 #[path = "support/process.rs"]
 mod process;
 
-use process::{Place, run};
+use process::{Workspace, run};
 use serde_json::Value;
 
-/// A ring, and a plane box beside it whose layers lie in other ranks' parts; `{n}` cells per layer.
+/// A torus, and an extent box next to it whose layers reach into other ranks' parts; `{n}` cells per layer.
 const CASE: &str =
     "spacing_min = 0.012\nroot_scale = 4.0\nlayer_cells_min = {n}\nkeep_crossing = {c}\n
 [generator]\nshape = \"torus\"\nfacets = 6400\n
 [[box]]\nmin = [1.5, 0.1, -0.3]\nmax = [1.9, 0.9, 1.1]\nspacing = 0.02\n";
 
-/// A counter by rank.
-fn counter(told: &Value, name: &str) -> Vec<u64> {
-    serde_json::from_value(told["counters"][name].clone()).expect("a number per rank")
+/// A counter, by rank.
+fn counter(report: &Value, name: &str) -> Vec<u64> {
+    serde_json::from_value(report["counters"][name].clone()).expect("a number per rank")
 }
 
-fn sum(told: &Value, name: &str) -> u64 {
-    counter(told, name).iter().sum()
+fn sum(report: &Value, name: &str) -> u64 {
+    counter(report, name).iter().sum()
 }
 
 fn lambda(all: &[u64]) -> f64 {
@@ -28,55 +28,57 @@ fn lambda(all: &[u64]) -> f64 {
     *most as f64 * all.len() as f64 / sum as f64
 }
 
-fn told(place: &Place, args: &[&str]) -> Value {
-    run(place.mesher(&[&["case.toml", "--quiet", "--json", "run.json"], args].concat())).succeeds();
-    let text =
-        std::fs::read_to_string(place.path().join("run.json")).expect("a report was written");
-    serde_json::from_str(&text).expect("the report is JSON")
+fn mesh(workspace: &Workspace, args: &[&str]) -> Value {
+    run(workspace.mesher(&[&["case.toml", "--quiet", "--json", "run.json"], args].concat()))
+        .succeeds();
+    workspace.json("run.json")
 }
 
 #[test]
-fn leaves_dealt_out_anew_are_balanced() {
+fn repartitioning_balances_the_leaves() {
     for (n, crossing) in [("1", "false"), ("4", "true")] {
-        let place = Place::new();
-        place.put("case.toml", CASE.replace("{n}", n).replace("{c}", crossing));
-        let solo = told(&place, &["--comm", "solo"]);
+        let workspace = Workspace::new();
+        workspace.write("case.toml", CASE.replace("{n}", n).replace("{c}", crossing));
+        let solo = mesh(&workspace, &["--comm", "solo"]);
         for ranks in [2, 7, 40] {
             let comm = format!("sim:{ranks}");
-            let anew = told(&place, &["--comm", &comm]);
-            assert_eq!(anew["digest"], solo["digest"]);
-            let leaves = counter(&anew, "leaves");
-            let heaviest = *counter(&anew, "base_leaf_cells_max").iter().max().unwrap();
-            let share = leaves.iter().sum::<u64>() / ranks;
-            // Shares may differ by a twentieth; the curve is cut between octants, each of which may be on the wrong side by its
-            // half, on both sides; leaves of crossing ones that are left out are counted by what they were before gradation.
-            let bound = share + share / 20 + heaviest + share / 50;
+            let balanced = mesh(&workspace, &["--comm", &comm]);
+            assert_eq!(balanced["digest"], solo["digest"]);
+            let leaves = counter(&balanced, "leaves");
+            let heaviest = *counter(&balanced, "base_leaf_cells_max").iter().max().unwrap();
+            let mean = leaves.iter().sum::<u64>() / ranks;
+            // The tolerated imbalance is a twentieth. A partition boundary lies between octants, so either end of a part may be
+            // off by half of one. Crossing leaves that are left out are estimated by their number before gradation.
+            let bound = mean + mean / 20 + heaviest + mean / 50;
             assert!(leaves.iter().all(|&l| l <= bound), "{ranks} ranks: {leaves:?}, {heaviest}");
-            assert!(heaviest < share / 2, "{ranks} ranks: octants of {heaviest} in {share}");
-            let kept = told(&place, &["--comm", &comm, "--weights", "area"]);
+            assert!(heaviest < mean / 2, "{ranks} ranks: octants of {heaviest} in {mean}");
+            let kept = mesh(&workspace, &["--comm", &comm, "--weights", "area"]);
             assert_eq!(kept["digest"], solo["digest"]);
             let (new, old) = (lambda(&leaves), lambda(&counter(&kept, "leaves")));
-            // What is balanced well enough stays where it is.
+            // A partition that is balanced well enough does not change.
             assert!(new < old || old < 1.05, "{ranks} ranks: lambda {new} is not below {old}");
-            assert!(ranks == 2 || old > 1.1, "{ranks} ranks: lambda {old} leaves nothing to gain");
+            assert!(
+                ranks == 2 || old > 1.1,
+                "{ranks} ranks: lambda {old} leaves no room for improvement"
+            );
         }
     }
 }
 
 #[test]
-fn what_gradation_splits_is_counted_once() {
-    let place = Place::new();
-    place.put("case.toml", CASE.replace("{n}", "3").replace("{c}", "true"));
-    let solo = told(&place, &["--comm", "solo"]);
+fn splits_of_gradation_are_counted_once() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE.replace("{n}", "3").replace("{c}", "true"));
+    let solo = mesh(&workspace, &["--comm", "solo"]);
     let split = sum(&solo, "octants_split_graded");
-    // Each split makes eight leaves of one, from those of the base tree, of which some are deleted.
-    let base = told(&place, &["--comm", "solo", "--ungraded"]);
+    // Each split replaces one leaf by eight, beginning with the leaves of the base tree, some of which are deleted.
+    let base = mesh(&workspace, &["--comm", "solo", "--ungraded"]);
     assert!(
         split * 7 < sum(&solo, "leaves") && split * 7 + sum(&base, "leaves") > sum(&solo, "leaves")
     );
     for weights in ["unit", "area", "rebalance"] {
         for comm in ["sim:3", "sim:13", "sim:64"] {
-            let ranks = told(&place, &["--comm", comm, "--weights", weights]);
+            let ranks = mesh(&workspace, &["--comm", comm, "--weights", weights]);
             assert_eq!(sum(&ranks, "octants_split_graded"), split, "{weights} {comm}");
         }
     }

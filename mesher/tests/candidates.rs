@@ -1,18 +1,18 @@
-//! The leaves that a component's vote asks are its first: coarsest, then by key, wherever its bricks
-//! are cut. Components are found once more here, leaf by leaf.
+//! The candidates of a component's vote are its first leaves, by level and Morton code. This test finds the
+//! components independently, leaf by leaf.
 #![allow(missing_docs)]
 
 mod support;
 
 use mesher::comm::Solo;
-use mesher::lattice::Bounds;
+use mesher::lattice::{Bounds, Keep, Root};
 use mesher::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::partition::ownership::Ownership;
 use mesher::sides::{components, global, nodes::Nodes, vote};
 use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use support::{Small, config, leaky_on_rays, small, soup, thin};
+use support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
 
 /// Centroids of the first leaves of each component.
 type Firsts = BTreeSet<Vec<[i64; 3]>>;
@@ -27,13 +27,13 @@ fn by_mesher(case: &Small) -> Firsts {
     let (tree, _) =
         refine(&BinnedFacets::new(&facets), &depth, &[SubtreeRoot { level: 0, code: 0 }]);
     tree.check_structure();
-    let share = Ownership::solo();
-    let nodes = Nodes::new(&tree, &share);
-    let mut local = components::merge(&nodes, &share);
+    let ownership = Ownership::solo();
+    let nodes = Nodes::new(&tree, &ownership);
+    let mut local = components::merge(&nodes, &ownership);
     let faces = std::mem::take(&mut local.faces);
     let merged = local.numbered();
-    let labels = global::labels(&nodes, &tree, &share, faces, &merged, &Solo);
-    let found = vote::candidates(&nodes, &tree, &merged.of, &labels, &share);
+    let labels = global::labels(&nodes, &tree, &ownership, faces, &merged, &Solo);
+    let found = vote::candidates(&nodes, &tree, &merged.of, &labels, &ownership);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 
@@ -46,7 +46,7 @@ fn leaf_by_leaf(case: &Small) -> Firsts {
         let below = 3 * (LEVEL_MAX - l);
         for side in 0..6 {
             let Some(n) = neighbour(l, w >> 7 >> below, side / 2, side % 2 == 1) else { continue };
-            // The leaf that holds the neighbour's minimum corner; a finer one finds this leaf itself.
+            // The leaf that contains the neighbour's minimum corner. If it is finer, it will find this leaf.
             let j = words.partition_point(|v| v >> 7 <= n << below) - 1;
             if words[j] & 3 != 2 && level(words[j]) <= l {
                 let (a, b) = (root_of(&up, i), root_of(&up, j));
@@ -61,7 +61,7 @@ fn leaf_by_leaf(case: &Small) -> Firsts {
     }
     let firsts = |mut list: Vec<(u32, u64)>| {
         list.sort_unstable();
-        list.truncate(vote::CANDIDATES);
+        list.truncate(32);
         list.into_iter().map(|(l, code)| corner(l, code).map(|c| c + edge(l) / 2)).collect()
     };
     lists.into_values().map(firsts).collect()
@@ -78,15 +78,27 @@ proptest! {
     #![proptest_config(config(150))]
 
     #[test]
-    fn are_the_first_of_each_component(
+    fn candidates_are_the_first_leaves_of_each_component(
         case in prop_oneof![small(soup()), thin(), leaky_on_rays()],
     ) {
         prop_assert_eq!(by_mesher(&case), leaf_by_leaf(&case));
     }
 }
 
-/// There are as many as the definition says.
+/// The definition gives a component 32 candidates. Here the component outside the box has more leaves.
 #[test]
-fn are_thirty_two() {
-    assert_eq!(vote::CANDIDATES, 32);
+fn a_large_component_has_thirty_two_candidates() {
+    let case = Small {
+        facets: cuboid([24.0; 3], [40.0; 3]),
+        root: Root { origin: [0.0; 3], edge: 64.0 },
+        spacing_min: 4.0,
+        layer_cells_min: 1,
+        keep: Keep::All,
+        keep_crossing: true,
+        boxes: vec![],
+    };
+    let outside = case.solo(true).iter().filter(|w| *w & 3 == 0).count();
+    assert!(outside > 32, "{outside} leaves");
+    let most = by_mesher(&case).iter().map(Vec::len).max();
+    assert_eq!(most, Some(32));
 }

@@ -1,4 +1,4 @@
-//! The test vectors that all programs share: digests, leaf words, levels, roots, lattice points, boxes.
+//! The test vectors shared by all programs: digests, leaf words, levels, roots, lattice points, boxes.
 #![allow(missing_docs)]
 
 use mesher::case::{BoxSpec, Case, RootSpec};
@@ -21,7 +21,7 @@ fn hexadecimal(text: &Value) -> u64 {
     u64::from_str_radix(text.as_str().expect("text"), 16).expect("hexadecimal digits")
 }
 
-/// Numbers are text, so that no JSON reader rounds them.
+/// Numbers are strings, so that no JSON reader rounds them.
 fn number(text: &Value) -> f64 {
     text.as_str().expect("text").parse().expect("a number")
 }
@@ -38,15 +38,15 @@ fn root(v: &Value) -> Root {
     Root { origin: point(&v["origin"]), edge: number(&v["edge"]) }
 }
 
-/// A vertex as STL have it. The vectors hold what f32 can hold.
+/// A vertex in STL's precision. The vectors hold values that f32 represents exactly.
 fn narrow(p: [f64; 3]) -> [f32; 3] {
     let q = p.map(|c| c as f32);
-    assert_eq!(q.map(f64::from), p, "a vertex is of f32");
+    assert_eq!(q.map(f64::from), p, "f32 must represent a vertex exactly");
     q
 }
 
 #[test]
-fn mixes_and_digests() {
+fn mixes_and_digests_equal_the_vectors() {
     for v in vectors("mix") {
         assert_eq!(hex(mix(hexadecimal(&v["word"]))), v["mix"]);
     }
@@ -55,16 +55,16 @@ fn mixes_and_digests() {
         let mut words: Vec<u64> = given.iter().map(hexadecimal).collect();
         assert_eq!(hex(digest(&words)), v["digest"]);
         words.reverse();
-        assert_eq!(hex(digest(&words)), v["digest"], "whatever the order");
+        assert_eq!(hex(digest(&words)), v["digest"], "the order must not matter");
         words.sort_unstable();
         let mut whole = Digests::default();
         whole.add(&words);
-        assert_eq!(hex(whole.whole()), v["digest"], "octants add up");
+        assert_eq!(hex(whole.whole()), v["digest"], "the octants' digests must add up");
     }
 }
 
 #[test]
-fn leaf_words() {
+fn leaf_words_equal_the_vectors() {
     for v in vectors("words") {
         let level = v["level"].as_u64().expect("a level") as u32;
         let side = match v["side"].as_str() {
@@ -86,7 +86,7 @@ fn leaf_words() {
 }
 
 #[test]
-fn levels_of_spacings() {
+fn levels_of_spacings_equal_the_vectors() {
     for v in vectors("levels") {
         let root = Root { origin: [0.0; 3], edge: number(&v["edge"]) };
         let found = root.level_of(number(&v["spacing"]), "spacing_min").ok().map(u64::from);
@@ -95,7 +95,7 @@ fn levels_of_spacings() {
 }
 
 #[test]
-fn roots_around_bodies() {
+fn roots_around_bodies_equal_the_vectors() {
     for v in vectors("roots") {
         let facet = std::array::from_fn(|i| narrow(point(&v["vertices"][i])));
         let found = Root::around(&Bounds::of(&[facet]), number(&v["root_scale"])).ok();
@@ -104,24 +104,27 @@ fn roots_around_bodies() {
 }
 
 #[test]
-fn lattice_points() {
+fn lattice_points_equal_the_vectors() {
     for v in vectors("quantised") {
         let (root, vertex) = (root(&v), point(&v["vertex"]));
         let at: [i64; 3] = std::array::from_fn(|a| root.quantise(a, vertex[a]));
         let near = vertex.map(|c| c as f32);
         if v["lattice"].is_null() {
-            // The vertex that f32 has nearest, and a root moved by as much.
+            // The nearest vertex in f32, with the root translated by the difference.
             let by = |a: usize| f64::from(near[a]) - vertex[a];
             let moved = Root { origin: std::array::from_fn(|a| root.origin[a] + by(a)), ..root };
-            let told = moved
+            let message = moved
                 .facets(vec![[near; 3]], &Bounds::of(&[[near; 3]]), 0)
                 .expect_err("too far outside")
                 .to_string();
-            assert!(told.contains("facet 0") && told.contains("outside the root"), "{told}");
+            assert!(
+                message.contains("facet 0") && message.contains("outside the root"),
+                "{message}"
+            );
             continue;
         }
         assert_eq!(at, integers(&v["lattice"]), "{v}");
-        // A vertex that f32 cannot hold is none that an STL can have; boxes may have it.
+        // Only extent boxes can have coordinates that f32 does not represent.
         if near.map(f64::from) == vertex {
             let found =
                 root.facets(vec![[near; 3]], &Bounds::of(&[[near; 3]]), 0).expect("near the root");
@@ -131,7 +134,7 @@ fn lattice_points() {
 }
 
 #[test]
-fn boxes_on_the_lattice() {
+fn boxes_on_the_lattice_equal_the_vectors() {
     for v in vectors("boxes") {
         let root = root(&v);
         let spec = BoxSpec { min: point(&v["min"]), max: point(&v["max"]), spacing: root.edge };

@@ -1,4 +1,4 @@
-//! The mesher gives the reference's leaves, on whatever facets and however many ranks.
+//! The mesher's leaves equal the reference's, for any facets and any number of ranks.
 #![allow(missing_docs)]
 
 mod support;
@@ -14,24 +14,24 @@ proptest! {
     #![proptest_config(config(300))]
 
     #[test]
-    fn on_one_rank(case in small(soup())) {
+    fn one_rank_equals_the_reference(case in small(soup())) {
         assert_reference(&case, &Run::SOLO)?;
     }
 
     #[test]
-    fn on_many_ranks(case in small(soup()), run in run()) {
+    fn many_ranks_equal_the_reference(case in small(soup()), run in run()) {
         assert_reference(&case, &run)?;
     }
 
-    /// What is kept looks at itself across what is deleted, and must not see it.
+    /// Layers must not act through the deleted region, which is thin here.
     #[test]
-    fn thin_bodies_in_fine_boxes(case in thin(), run in run()) {
+    fn thin_bodies_in_fine_boxes_equal_the_reference(case in thin(), run in run()) {
         assert_reference(&case, &run)?;
     }
 
-    /// Rays that meet edges and vertices must be moved as the definition says, or leaks are decided otherwise.
+    /// Rays that meet edges and vertices must be displaced as defined; otherwise leaks are decided differently.
     #[test]
-    fn leaks_on_rays(case in leaky_on_rays(), run in run()) {
+    fn open_soups_with_edges_on_rays_equal_the_reference(case in leaky_on_rays(), run in run()) {
         assert_reference(&case, &run)?;
     }
 }
@@ -45,9 +45,9 @@ fn assert_reference(case: &Small, run: &Run) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// A facet that passes by an edge of the root at a lattice unit: its extent meets the root, it does not.
+/// The facet misses an edge of the root by a lattice unit, although its extent meets the root.
 #[test]
-fn a_facet_beside_the_root() {
+fn a_facet_outside_the_root_crosses_nothing() {
     let unit = 64.0 / (1 << 27) as f32;
     for level in 0..=3 {
         let case = Small {

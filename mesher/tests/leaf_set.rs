@@ -1,4 +1,4 @@
-//! What is written is what was meshed: parts, manifest and report, read back by other means.
+//! Output: parts, manifest and report, read back by other code, agree with the mesh.
 #![allow(missing_docs)]
 
 #[path = "support/process.rs"]
@@ -7,7 +7,7 @@ mod support;
 
 use mesher::comm::Solo;
 use mesher::digest::{Digests, hex, mix};
-use process::{Place, run};
+use process::{Workspace, run};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -17,12 +17,8 @@ const CASE: &str = "spacing_min = 0.07\nlayer_cells_min = 2\nkeep = \"inside\"\n
 [[box]]\nmin = [-9.0, 0.0, 0.1]\nmax = [0.25, 0.5, 0.4]\nspacing = 0.03\n
 [[box]]\nmin = [-0.3, -0.3, -0.3]\nmax = [0.3, 0.3, 0.3]\nspacing = 0.2\n";
 
-fn read_json(path: &Path) -> Value {
-    let text = std::fs::read_to_string(path).expect("the file was written");
-    serde_json::from_str(&text).expect("it is JSON")
-}
-
-/// A part's words, and that it is what all programs expect: one dimension of little-endian u64.
+/// The words of a part. Asserts that it has the format that all programs expect: one dimension of
+/// little-endian u64.
 fn read_part(path: &Path) -> Vec<u64> {
     let bytes = std::fs::read(path).expect("the part was written");
     let file = npyz::NpyFile::new(&bytes[..]).expect("it is an .npy file");
@@ -35,9 +31,9 @@ fn read_part(path: &Path) -> Vec<u64> {
     words
 }
 
-/// The mesh's words by the library, which the property tests hold to the reference.
-fn meshed(place: &Place, ungraded: bool) -> Vec<u64> {
-    let case = mesher::case::Case::read(&place.path().join("case.toml")).expect("a good case");
+/// The mesh's words by the library, which the property tests compare with the reference.
+fn meshed(workspace: &Workspace, ungraded: bool) -> Vec<u64> {
+    let case = mesher::case::Case::read(&workspace.path().join("case.toml")).expect("a good case");
     let options = support::options(support::Run::SOLO.division, ungraded);
     mesher::words(&case, &options, &Solo).expect("a good case").0
 }
@@ -50,25 +46,25 @@ fn sum(words: &[u64]) -> u128 {
     words.iter().fold(0, |s, &w| s.wrapping_add(mix(w)))
 }
 
-/// Counts and digests that a manifest or a report must have, from the words themselves.
-fn assert_counts(told: &Value, words: &[u64], [total, by_level]: [&str; 2]) {
-    assert_eq!(told[total], words.len());
+/// Asserts the counts and the digest of a manifest or a report, computed from the words.
+fn assert_counts(report: &Value, words: &[u64], [total, by_level]: [&str; 2]) {
+    assert_eq!(report[total], words.len());
     let mut levels = [0u64; 20];
     words.iter().for_each(|&w| levels[level_of(w)] += 1);
-    assert_eq!(told[by_level], json!(levels));
-    assert_eq!(told["digest"], hex(sum(words)));
+    assert_eq!(report[by_level], json!(levels));
+    assert_eq!(report["digest"], hex(sum(words)));
 }
 
 fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
-    let told = read_json(&folder.join("mesh.json"));
-    assert_eq!(told["schema"], "octree-leaf-set/1");
-    assert_eq!(told["program"], concat!("mesher ", env!("CARGO_PKG_VERSION")));
-    assert_eq!(told["tree"], if ungraded { "base" } else { "final" });
-    assert_eq!(told["root"], json!({"origin": [-1.0, -1.25, -1.5], "edge": 3.0}));
+    let manifest = process::read_json(&folder.join("mesh.json"));
+    assert_eq!(manifest["schema"], "octree-leaf-set/1");
+    assert_eq!(manifest["program"], concat!("mesher ", env!("CARGO_PKG_VERSION")));
+    assert_eq!(manifest["tree"], if ungraded { "base" } else { "final" });
+    assert_eq!(manifest["root"], json!({"origin": [-1.0, -1.25, -1.5], "edge": 3.0}));
     // 3 / 2^6 is the first at or below 0.07; 3 / 2^7 at or below 0.03; 3 / 2^4 at or below 0.2.
-    assert_eq!(told["level_surface"], 6);
-    assert_eq!(told["layer_cells_min"], 2);
-    assert_eq!((&told["keep"], &told["keep_crossing"]), (&json!("inside"), &json!(true)));
+    assert_eq!(manifest["level_surface"], 6);
+    assert_eq!(manifest["layer_cells_min"], 2);
+    assert_eq!((&manifest["keep"], &manifest["keep_crossing"]), (&json!("inside"), &json!(true)));
     let at = |x: f64, origin: f64| {
         (((x - origin) * (134_217_728.0 / 3.0)).round_ties_even() as i64).clamp(0, 1 << 27)
     };
@@ -77,25 +73,25 @@ fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
         {"min": corner([-9.0, 0.0, 0.1]), "max": corner([0.25, 0.5, 0.4]), "level": 7},
         {"min": corner([-0.3; 3]), "max": corner([0.3; 3]), "level": 4},
     ]);
-    assert_eq!(told["boxes"], boxes);
-    assert_counts(&told, words, ["leaves", "leaves_by_level"]);
+    assert_eq!(manifest["boxes"], boxes);
+    assert_counts(&manifest, words, ["leaves", "leaves_by_level"]);
     let side = |s: u64| words.iter().filter(|w| *w & 3 == s).count();
     let sides = json!({"outside": side(0), "inside": side(1), "crossing": side(2)});
-    assert_eq!(told["leaves_by_side"], sides);
-    assert_eq!(told["components_ambiguous"], json!({"count": 0, "example": null}));
+    assert_eq!(manifest["leaves_by_side"], sides);
+    assert_eq!(manifest["components_ambiguous"], json!({"count": 0, "example": null}));
     let octants: Vec<String> = (0..512u64)
         .map(|o| words.iter().copied().filter(|w| w >> 55 == o).collect::<Vec<u64>>())
         .map(|words| hex(sum(&words)))
         .collect();
-    assert_eq!(told["octant_digests"], json!(octants));
-    assert_parts(folder, &told, words, ranks);
-    let fields = told.as_object().expect("an object").len();
-    assert_eq!(fields, 16, "a field that no test knows, or one too few");
+    assert_eq!(manifest["octant_digests"], json!(octants));
+    assert_parts(folder, &manifest, words, ranks);
+    let fields = manifest.as_object().expect("an object").len();
+    assert_eq!(fields, 16, "a field is untested, or missing");
 }
 
-fn assert_parts(folder: &Path, told: &Value, words: &[u64], ranks: usize) {
+fn assert_parts(folder: &Path, manifest: &Value, words: &[u64], ranks: usize) {
     let mut all = Vec::new();
-    for (r, part) in told["parts"].as_array().expect("a list").iter().enumerate() {
+    for (r, part) in manifest["parts"].as_array().expect("a list").iter().enumerate() {
         let name = format!("leaves-{r:05}.npy");
         let words = read_part(&folder.join(&name));
         let want = json!({"file": name, "leaves": words.len(), "digest": hex(sum(&words))});
@@ -105,17 +101,17 @@ fn assert_parts(folder: &Path, told: &Value, words: &[u64], ranks: usize) {
     all.sort_unstable();
     assert!(all == words, "{}", support::first_difference(&all, words));
     let files = std::fs::read_dir(folder).expect("a directory").count();
-    assert_eq!(files, ranks + 1, "the parts and the manifest are all there is");
+    assert_eq!(files, ranks + 1, "the parts and the manifest must be the only files");
 }
 
 #[test]
-fn directories_are_read_back() {
-    let place = Place::new();
-    place.put("case.toml", CASE);
+fn written_meshes_are_read_back() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
     for ungraded in [false, true] {
-        let words = meshed(&place, ungraded);
+        let words = meshed(&workspace, ungraded);
         assert!(words.len() > 1000);
-        // More ranks than base leaves have anything to write: empty parts are parts.
+        // With base level 0 all ranks but one have no leaves, and write empty parts.
         for (ranks, more) in [
             (1, &[][..]),
             (5, &["--partitioner=metis"]),
@@ -127,30 +123,30 @@ fn directories_are_read_back() {
                 vec!["case.toml", "--out", "mesh", "--json", "run.json", "--quiet", &comm];
             args.extend(more);
             args.extend(ungraded.then_some("--ungraded"));
-            run(place.mesher(&args)).succeeds();
-            let folder = place.path().join("mesh");
+            run(workspace.mesher(&args)).succeeds();
+            let folder = workspace.path().join("mesh");
             assert_manifest(&folder, &words, ungraded, ranks);
-            assert_report(&read_json(&place.path().join("run.json")), &words, ranks);
-            std::fs::remove_dir_all(folder).expect("the mesh is there");
+            assert_report(&workspace.json("run.json"), &words, ranks);
+            std::fs::remove_dir_all(folder).expect("the mesh exists");
         }
     }
 }
 
-/// The report's fields, as its schema has them.
-fn assert_report(told: &Value, words: &[u64], ranks: usize) {
-    assert_eq!(told["schema"], "octree-mesher-run/1");
-    assert_counts(told, words, ["cells", "cells_by_level"]);
-    assert_eq!(told["ranks"], ranks);
-    assert_eq!(told["facets"].as_u64(), Some(320));
-    assert_eq!(told["level_surface"], 6);
-    assert!(told["time_wall_s"].as_f64() > Some(0.0));
+/// Asserts the fields of the report.
+fn assert_report(report: &Value, words: &[u64], ranks: usize) {
+    assert_eq!(report["schema"], "octree-mesher-run/1");
+    assert_counts(report, words, ["cells", "cells_by_level"]);
+    assert_eq!(report["ranks"], ranks);
+    assert_eq!(report["facets"].as_u64(), Some(320));
+    assert_eq!(report["level_surface"], 6);
+    assert!(report["time_wall_s"].as_f64() > Some(0.0));
     let per_rank = |v: &Value| -> Vec<f64> {
         let list = v.as_array().unwrap_or_else(|| panic!("{v} is not a list"));
         assert_eq!(list.len(), ranks, "one value per rank");
         list.iter().map(|v| v.as_f64().expect("a number")).collect()
     };
-    assert!(per_rank(&told["peak_rss_bytes"]).iter().all(|&b| b > 1e5));
-    let phases = told["phases"].as_array().expect("a list");
+    assert!(per_rank(&report["peak_rss_bytes"]).iter().all(|&b| b > 1e5));
+    let phases = report["phases"].as_array().expect("a list");
     let names: Vec<&str> = phases.iter().filter_map(|p| p["name"].as_str()).collect();
     assert!(["read", "refine", "sides", "leaves"].iter().all(|n| names.contains(n)), "{names:?}");
     for p in phases {
@@ -160,7 +156,7 @@ fn assert_report(told: &Value, words: &[u64], ranks: usize) {
         assert!(per_rank(&p["messages"]).iter().all(|&n| (n > 0.0) == (n != 0.0)));
         per_rank(&p["message_bytes"]);
     }
-    for (name, values) in told["counters"].as_object().expect("an object") {
+    for (name, values) in report["counters"].as_object().expect("an object") {
         let total: f64 = per_rank(values).iter().sum();
         if name == "leaves" {
             assert_eq!(total as usize, words.len());
@@ -171,27 +167,26 @@ fn assert_report(told: &Value, words: &[u64], ranks: usize) {
     }
 }
 
-/// Counters repeat exactly, whatever the order of messages; they may gate.
+/// The gate relies on this.
 #[test]
-fn counters_repeat() {
-    let place = Place::new();
-    place.put("case.toml", CASE);
+fn counters_do_not_depend_on_the_order_of_messages() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
     let mut counted = Vec::new();
     for seed in [1, 2, 2] {
         let comm = format!("--comm=sim:4:{seed}");
-        run(place.mesher(&["case.toml", "--json", "run.json", "--quiet", &comm])).succeeds();
-        counted.push(read_json(&place.path().join("run.json"))["counters"].clone());
+        run(workspace.mesher(&["case.toml", "--json", "run.json", "--quiet", &comm])).succeeds();
+        counted.push(workspace.json("run.json")["counters"].clone());
     }
     assert_eq!(counted[0], counted[1]);
     assert_eq!(counted[1], counted[2]);
 }
 
-/// Sums of parts are sums of the whole, however the parts are cut.
 #[test]
-fn digests_merge() {
-    let place = Place::new();
-    place.put("case.toml", CASE);
-    let words = meshed(&place, false);
+fn digests_of_any_parts_add_up_to_the_digest_of_the_mesh() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
+    let words = meshed(&workspace, false);
     let mut merged = Digests::default();
     for r in 0..7 {
         let part: Vec<u64> = words.iter().copied().skip(r).step_by(7).collect();
@@ -202,26 +197,24 @@ fn digests_merge() {
     assert_eq!(merged.whole(), sum(&words));
 }
 
-/// The report goes to standard output and tells the same.
 #[test]
-fn people_are_told_the_same() {
-    let place = Place::new();
-    place.put("case.toml", CASE);
-    let told = run(place.mesher(&["case.toml", "--json", "run.json"]));
-    told.succeeds();
-    let report = read_json(&place.path().join("run.json"));
+fn standard_output_agrees_with_the_json_report() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
+    let finished = run(workspace.mesher(&["case.toml", "--json", "run.json"]));
+    finished.succeeds();
+    let report = workspace.json("run.json");
     let digest = report["digest"].as_str().expect("text");
-    assert!(told.stdout.contains(digest), "{told:?}");
+    assert!(finished.stdout.contains(digest), "{finished:?}");
     for word in ["facets", "cells", "level  6", "time", "peak memory", "max/mean"] {
-        assert!(told.stdout.contains(word), "{word}: {told:?}");
+        assert!(finished.stdout.contains(word), "{word}: {finished:?}");
     }
 }
 
-/// An STL with options is the case file that says the same.
 #[test]
-fn options_are_a_case_file() {
-    let place = Place::new();
-    place.put("body.stl", process::binary_stl(&support::cuboid([0.25; 3], [1.0, 1.5, 2.0])));
+fn options_and_a_case_file_with_the_same_parameters_give_the_same_mesh() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", process::binary_stl(&support::cuboid([0.25; 3], [1.0, 1.5, 2.0])));
     let text = "geometry = \"body.stl\"\nspacing_min = 0.1\nlayer_cells_min = 3\nkeep = \"all\"\nkeep_crossing = false\n";
     let boxed = "[[box]]\nmin = [-1.0, 0.0, 0.0]\nmax = [0.5, 0.5, 0.5]\nspacing = 0.04\n";
     let exact = "[root]\norigin = [-2.0, -1.0, -1.5]\nedge = 5.0\n";
@@ -234,21 +227,21 @@ fn options_are_a_case_file() {
         "--box=-1,0,0,0.5,0.5,0.5,0.04",
     ];
     let digest = |args: &[&str]| {
-        run(place.mesher(&[args, &["--json", "run.json", "--quiet"]].concat())).succeeds();
-        read_json(&place.path().join("run.json"))["digest"].clone()
+        run(workspace.mesher(&[args, &["--json", "run.json", "--quiet"]].concat())).succeeds();
+        workspace.json("run.json")["digest"].clone()
     };
-    place.put("scaled.toml", format!("{text}root_scale = 3.0\n{boxed}"));
-    place.put("exact.toml", format!("{text}{exact}{boxed}"));
+    workspace.write("scaled.toml", format!("{text}root_scale = 3.0\n{boxed}"));
+    workspace.write("exact.toml", format!("{text}{exact}{boxed}"));
     let scaled = digest(&["scaled.toml"]);
     assert_eq!(digest(&[&options[..], &["--root-scale", "3"]].concat()), scaled);
     let exact = digest(&["exact.toml"]);
     assert_eq!(digest(&[&options[..], &["--root", "-2,-1,-1.5,5"]].concat()), exact);
     assert_ne!(scaled, exact);
     // The defaults.
-    place.put("plain.toml", "geometry = \"body.stl\"\nspacing_min = 0.5\n");
+    workspace.write("plain.toml", "geometry = \"body.stl\"\nspacing_min = 0.5\n");
     assert_eq!(digest(&["body.stl", "--spacing-min", "0.5"]), digest(&["plain.toml"]));
     // The path in a case file is relative to it.
-    std::fs::create_dir(place.path().join("deep")).expect("a directory");
-    place.put("deep/case.toml", "geometry = \"../body.stl\"\nspacing_min = 0.5\n");
+    std::fs::create_dir(workspace.path().join("deep")).expect("a directory");
+    workspace.write("deep/case.toml", "geometry = \"../body.stl\"\nspacing_min = 0.5\n");
     assert_eq!(digest(&["deep/case.toml"]), digest(&["plain.toml"]));
 }

@@ -1,4 +1,4 @@
-//! Changes of the input whose effect on the mesh is known exactly, each on whatever ranks.
+//! Metamorphic tests: changes of the input whose effect on the mesh is known exactly, on any number of ranks.
 #![allow(missing_docs)]
 
 mod support;
@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use support::symmetry::Symmetry;
 use support::{Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup};
 
-/// Asserts that both have the same leaves, and the same to say of ambiguous components.
+/// Asserts equal leaves and equal ambiguous components.
 macro_rules! assert_equal {
     ($a:expr, $b:expr) => {
         let (a, b) = (&$a, &$b);
@@ -19,14 +19,14 @@ macro_rules! assert_equal {
     };
 }
 
-/// The facet's four quarters. Exact where coordinates are even lattice points.
+/// The four quarters of a facet. Exact if the coordinates are even lattice points.
 fn quarters([a, b, c]: &Facet) -> [Facet; 4] {
     let middle = |p: &[f32; 3], q: &[f32; 3]| std::array::from_fn(|i| (p[i] + q[i]) * 0.5);
     let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
     [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]]
 }
 
-/// A scale, by a power of two.
+/// The case scaled by a power of two.
 fn scaled(case: &Small, power: i32) -> Small {
     let (narrow, wide) = (2f32.powi(power), 2f64.powi(power));
     let mut image =
@@ -40,8 +40,8 @@ fn scaled(case: &Small, power: i32) -> Small {
     image
 }
 
-/// A move, root and all.
-fn moved(case: &Small, by: [i32; 3]) -> Small {
+/// The case translated, including the root.
+fn translated(case: &Small, by: [i32; 3]) -> Small {
     let shift = |v: [f32; 3]| std::array::from_fn(|a| v[a] + by[a] as f32);
     let mut image = case.with(case.facets.iter().map(|f| f.map(shift)).collect());
     let shift = |v: [f64; 3]| std::array::from_fn(|a| v[a] + f64::from(by[a]));
@@ -52,7 +52,7 @@ fn moved(case: &Small, by: [i32; 3]) -> Small {
     image
 }
 
-/// The words with every leaf that is inside made one that is outside.
+/// The words with all inside leaves turned into outside leaves.
 fn all_outside(words: &[u64]) -> Vec<u64> {
     words.iter().map(|w| if w & 3 == 1 { w & !3 } else { *w }).collect()
 }
@@ -60,7 +60,7 @@ fn all_outside(words: &[u64]) -> Vec<u64> {
 proptest! {
     #![proptest_config(config(120))]
 
-    /// Which facet comes first, and so which rank reads it, does not matter.
+    /// The order of facets decides which rank reads which.
     #[test]
     fn shuffled_facets_give_the_same_mesh(
         (case, order) in small(soup()).prop_flat_map(|c| {
@@ -74,9 +74,8 @@ proptest! {
         assert_equal!(shuffled.outcome(&run, false), case.outcome(&Run::SOLO, false));
     }
 
-    /// Nor does the orientation of any of them.
     #[test]
-    fn flipped_facets_give_the_same_mesh(
+    fn reoriented_facets_give_the_same_mesh(
         case in small(soup()),
         which in any::<u64>(),
         run in run(),
@@ -92,8 +91,7 @@ proptest! {
         assert_equal!(turned.outcome(&run, false), case.outcome(&Run::SOLO, false));
     }
 
-    /// Every ray meets every facet twice, so nothing is inside; what is crossed stays the same, and
-    /// so does all that follows from it.
+    /// Every ray meets every facet twice, so no leaf is inside. Crossing leaves do not change.
     #[test]
     fn duplicated_facets_leave_nothing_inside(
         case in small(soup()),
@@ -115,7 +113,7 @@ proptest! {
             prop_assert!(got == want, "{:?}: {}", keep, first_difference(&got, &want));
         }
 
-        // Without boxes all crossing leaves are of one level, so gradation has nothing to do.
+        // Without boxes all crossing leaves are of one level, so gradation splits nothing.
         let alone = Small { keep: Keep::Inside, keep_crossing: true, boxes: vec![], ..twice };
         let mut want = alone.outcome(&Run::SOLO, true).words;
         want.retain(|w| w & 3 == 2);
@@ -123,7 +121,6 @@ proptest! {
         prop_assert!(got == want, "{:?}: {}", alone.keep, first_difference(&got, &want));
     }
 
-    /// A facet is its four quarters, for crossing and for rays.
     #[test]
     fn quartered_facets_give_the_same_mesh(
         case in small(soup()).prop_map(Small::on_lattice),
@@ -134,9 +131,9 @@ proptest! {
         assert_equal!(four.outcome(&run, false), case.outcome(&Run::SOLO, false));
     }
 
-    /// On a closed body all rays agree, whichever way they are moved, so the mesh turns with it.
+    /// On a closed body all rays agree, whichever way they are displaced.
     #[test]
-    fn turned_bodies_give_the_turned_mesh(
+    fn the_mesh_of_an_image_of_a_closed_body_is_the_image_of_the_mesh(
         case in small(closed()).prop_map(Small::on_lattice),
         which in 0usize..48,
         run in run(),
@@ -151,9 +148,9 @@ proptest! {
         }
     }
 
-    /// Crossing knows nothing of rays: it turns with any soup.
+    /// Crossing leaves do not depend on rays, so this holds for open soups as well.
     #[test]
-    fn turned_soups_are_crossed_alike(
+    fn crossing_leaves_of_an_image_are_the_images_of_crossing_leaves(
         case in small(soup()).prop_map(Small::on_lattice),
         which in 0usize..48,
         run in run(),
@@ -167,7 +164,6 @@ proptest! {
         prop_assert!(got == want, "{}", first_difference(&got, &want));
     }
 
-    /// A power of two changes no digit, whatever the root.
     #[test]
     fn dyadic_scaling_gives_the_same_mesh(
         case in small(soup()),
@@ -178,21 +174,19 @@ proptest! {
         assert_equal!(image.outcome(&run, false), case.outcome(&Run::SOLO, false));
     }
 
-    /// Nor does a move that is exact.
     #[test]
-    fn moving_everything_gives_the_same_mesh(
+    fn exact_translation_gives_the_same_mesh(
         case in small(soup()).prop_map(Small::on_lattice),
         by in [-200i32..200, -200i32..200, -200i32..200],
         run in run(),
     ) {
-        let image = moved(&case, by);
+        let image = translated(&case, by);
         assert_equal!(image.outcome(&run, true), case.outcome(&Run::SOLO, true));
         assert_equal!(image.outcome(&run, false), case.outcome(&Run::SOLO, false));
     }
 
-    /// A layer as thick as the root is as thick as can be.
     #[test]
-    fn layers_thicker_than_the_root_change_nothing_more(
+    fn layers_thicker_than_the_root_equal_layers_as_thick_as_the_root(
         case in small(soup()),
         more in prop_oneof![65u32..300, Just(u32::MAX), Just(u32::MAX - 1)],
         run in run(),
@@ -203,7 +197,7 @@ proptest! {
     }
 }
 
-/// A body without symmetries of its own, with a box finer than its surface and one coarser.
+/// A body without symmetries, with an extent box finer than its surface and one coarser.
 fn crooked() -> Small {
     let mut facets = cuboid([9.0, 17.0, 30.0], [21.5, 40.0, 33.0]);
     facets.extend(cuboid([20.0, 18.25, 10.5], [50.0, 22.0, 31.0]));
@@ -223,11 +217,11 @@ fn crooked() -> Small {
 }
 
 #[test]
-fn all_48_symmetries_of_one_body() {
+fn the_mesh_of_each_of_48_images_of_a_body_is_the_image_of_its_mesh() {
     for (keep, keep_crossing) in [(Keep::Outside, true), (Keep::Inside, true), (Keep::All, false)] {
         let case = Small { keep, keep_crossing, ..crooked() };
         let straight = case.outcome(&Run::SOLO, false).words;
-        assert!(straight.len() > 100, "{keep:?}: {} leaves say little", straight.len());
+        assert!(straight.len() > 100, "{keep:?}: {} leaves are too few", straight.len());
         let mut images = std::collections::BTreeSet::new();
         for symmetry in Symmetry::all() {
             let got = symmetry.case(&case).outcome(&Run::SOLO, false).words;
@@ -235,13 +229,13 @@ fn all_48_symmetries_of_one_body() {
             assert!(got == want, "{symmetry:?}: {}", first_difference(&got, &want));
             images.insert(got);
         }
-        assert_eq!(images.len(), 48, "the body must have no symmetry of its own");
+        assert_eq!(images.len(), 48, "the body must have no symmetry");
     }
 }
 
-/// Every way to divide the work, ranks without base leaves included.
+/// Includes ranks without base leaves.
 #[test]
-fn every_division_gives_the_same_mesh() {
+fn every_partition_gives_the_same_mesh() {
     let leaky = Small { facets: crooked().facets[1..].to_vec(), keep: Keep::All, ..crooked() };
     let hollow = Small { keep: Keep::Inside, keep_crossing: false, ..crooked() };
     let boxes_alone = Small { facets: vec![], ..crooked() };
@@ -254,7 +248,7 @@ fn every_division_gives_the_same_mesh() {
     ] {
         for ungraded in [true, false] {
             let want = case.outcome(&Run::SOLO, ungraded);
-            for run in divisions() {
+            for run in partitions() {
                 let got = case.outcome(&run, ungraded);
                 let difference = || first_difference(&got.words, &want.words);
                 assert!(got == want, "{name}, ungraded {ungraded}, {run:?}: {}", difference());
@@ -263,7 +257,7 @@ fn every_division_gives_the_same_mesh() {
     }
 }
 
-fn divisions() -> impl Iterator<Item = Run> {
+fn partitions() -> impl Iterator<Item = Run> {
     let levels = [None, Some(0), Some(1), Some(2), Some(4), Some(6), Some(19)];
     let ways = [Partitioner::Metis, Partitioner::Morton]
         .into_iter()

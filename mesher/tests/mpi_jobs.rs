@@ -1,11 +1,11 @@
-//! Jobs of real MPI ranks: the same mesh, and errors that end all ranks and are told once.
+//! Jobs on real MPI ranks: the mesh is the serial one, and an error ends all ranks and is printed once. Without
+//! the feature `mpi` these tests are ignored; with it, a missing `mpirun` fails them.
 #![allow(missing_docs)]
 
 #[path = "support/process.rs"]
 mod process;
 
-use process::{Place, has_mpi, run, start};
-use serde_json::Value;
+use process::{Workspace, run, start};
 use std::process::Command;
 use std::time::Duration;
 
@@ -13,20 +13,13 @@ const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"torus\"\nfacets = 640\n
 [[box]]\nmin = [0.2, 0.2, 0.2]\nmax = [0.6, 0.5, 0.4]\nspacing = 0.02\n";
 
-fn json(place: &Place, name: &str) -> Value {
-    let text = std::fs::read_to_string(place.path().join(name)).expect("a report was written");
-    serde_json::from_str(&text).expect("the report is JSON")
-}
-
 #[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
 fn the_mesh_is_the_serial_one() {
-    if !has_mpi() {
-        return;
-    }
-    let place = Place::new();
-    place.put("case.toml", CASE);
-    run(place.mesher(&["case.toml", "--quiet", "--json", "serial.json"])).succeeds();
-    let serial = json(&place, "serial.json");
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
+    run(workspace.mesher(&["case.toml", "--quiet", "--json", "serial.json"])).succeeds();
+    let serial = workspace.json("serial.json");
     assert!(serial["cells"].as_u64() > Some(10_000));
     for (ranks, partitioner, level_base) in [
         (1, "metis", "auto"),
@@ -37,34 +30,32 @@ fn the_mesh_is_the_serial_one() {
     ] {
         let args = ["case.toml", "--quiet", "--json", "run.json", "--out", "mesh"];
         let division = ["--partitioner", partitioner, "--level-base", level_base];
-        run(place.mpirun(ranks, &[&args[..], &division].concat())).succeeds();
-        let told = json(&place, "run.json");
+        run(workspace.mpirun(ranks, &[&args[..], &division].concat())).succeeds();
+        let report = workspace.json("run.json");
         for same in ["cells", "digest", "cells_by_level", "cells_by_side", "components"] {
-            assert_eq!(told[same], serial[same], "{same} on {ranks} ranks");
+            assert_eq!(report[same], serial[same], "{same} on {ranks} ranks");
         }
-        assert_eq!(told["ranks"], ranks);
-        assert_eq!(json(&place, "mesh/mesh.json")["parts"].as_array().map(Vec::len), Some(ranks));
-        std::fs::remove_dir_all(place.path().join("mesh")).expect("the mesh is there");
+        assert_eq!(report["ranks"], ranks);
+        assert_eq!(workspace.json("mesh/mesh.json")["parts"].as_array().map(Vec::len), Some(ranks));
+        std::fs::remove_dir_all(workspace.path().join("mesh")).expect("the mesh exists");
     }
 }
 
 #[test]
-fn one_ranks_error_ends_all() {
-    if !has_mpi() {
-        return;
-    }
-    let place = Place::new();
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn an_error_on_one_rank_ends_all_ranks() {
+    let workspace = Workspace::new();
     let nothing = [[[0.0f32; 3]; 3]; 40];
     let mut last_is_bad = nothing;
     last_is_bad[39][1][2] = f32::NAN;
-    place.put("nan.stl", process::binary_stl(&last_is_bad));
-    place.put("cut.stl", &process::binary_stl(&nothing)[..1000]);
-    place.put("typo.toml", "spacing_mim = 0.5\n");
-    place.put("case.toml", CASE);
-    place.put("file", "kept");
+    workspace.write("nan.stl", process::binary_stl(&last_is_bad));
+    workspace.write("cut.stl", &process::binary_stl(&nothing)[..1000]);
+    workspace.write("typo.toml", "spacing_mim = 0.5\n");
+    workspace.write("case.toml", CASE);
+    workspace.write("file", "kept");
     let spacing = "--spacing-min=0.5";
     for (args, code, words) in [
-        // The facet is in the last rank's share.
+        // This facet is in the last rank's slice.
         (&["nan.stl", spacing][..], 2, &["facet 39", "not finite"][..]),
         (&["cut.stl", spacing], 2, &["cut.stl", "promises 40 facets"]),
         (&["absent.stl", spacing], 2, &["absent.stl"]),
@@ -73,65 +64,64 @@ fn one_ranks_error_ends_all() {
         (&["case.toml", "--out", "file/mesh"], 4, &["file/mesh"]),
         (&["case.toml", "--out", "mesh", "--json", "file/run.json"], 4, &["file/run.json"]),
     ] {
-        let before = place.contents();
-        run(place.mpirun(3, args)).refuses_under_launcher(code, words);
+        let before = workspace.contents();
+        run(workspace.mpirun(3, args)).refuses_under_launcher(code, words);
         assert!(
-            place.contents().keys().eq(before.keys()),
+            workspace.contents().keys().eq(before.keys()),
             "{args:?}: {:?}",
-            place.contents().keys()
+            workspace.contents().keys()
         );
     }
 }
 
-/// Each rank may write 100 blocks: all of them fail, and one of them says so.
+/// Each rank may write 100 blocks: all of them fail, and one of them prints the error.
 #[test]
-fn a_full_disk_ends_all() {
-    if !has_mpi() {
-        return;
-    }
-    let place = Place::new();
-    place.put("case.toml", CASE);
-    // The limit is set on the ranks alone: the launcher has files of its own. A shell ignores the signal
-    // for its children; the write then fails.
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_full_disk_ends_all_ranks() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
+    // The limit applies to the ranks only, because the launcher writes files, too. The shell makes its children
+    // ignore the signal, so that the write fails.
     let limited = format!(
         "trap '' XFSZ; ulimit -f 100; exec '{}' case.toml --out mesh --quiet",
         process::MESHER
     );
-    let command = place.mpirun_of(3, "sh", &["-c", &limited]);
-    let before = place.contents();
+    let command = workspace.mpirun_of(3, "sh", &["-c", &limited]);
+    let before = workspace.contents();
     run(command).refuses_under_launcher(4, &["mesh"]);
-    assert!(place.contents().keys().eq(before.keys()), "{:?}", place.contents().keys());
+    assert!(workspace.contents().keys().eq(before.keys()), "{:?}", workspace.contents().keys());
 }
 
-/// A launcher passes an interrupt on when it gets to it, and kills ranks that do not end within a second
-/// or two: so a job may have finished, or have had no time to clean up. But what has its final name is
-/// whole, and the manifest comes last.
+/// A launcher forwards an interrupt with some delay, and kills ranks that do not end within a second or two.
+/// So a job may have finished, or may have had no time to clean up. But every file with its final name is
+/// complete, and the manifest is written last.
 #[test]
-fn an_interrupted_job_leaves_nothing_half_written() {
-    if !has_mpi() {
-        return;
-    }
-    let place = Place::new();
-    place.put("case.toml", CASE.replace("0.05", "0.002"));
-    let mut job = start(place.mpirun(2, &["case.toml", "--out", "mesh", "--json", "run.json"]));
-    while !place.path().join("mesh").exists() {
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn an_interrupted_job_leaves_no_incomplete_file() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE.replace("0.05", "0.002"));
+    let mut job = start(workspace.mpirun(2, &["case.toml", "--out", "mesh", "--json", "run.json"]));
+    while !workspace.path().join("mesh").exists() {
         assert!(!job.is_over(), "the job ended before it wrote");
         std::thread::sleep(Duration::from_millis(1));
     }
     let sent = Command::new("kill").args(["-s", "INT", &job.id().to_string()]).status();
-    assert!(sent.expect("kill is there").success());
-    let told = job.finish();
-    assert!(told.code != Some(0), "{told:?}");
-    let whole = |name: &str| {
-        let text = std::fs::read_to_string(place.path().join(name)).ok()?;
-        Some(serde_json::from_str::<serde_json::Value>(&text).expect("what is there is whole"))
+    assert!(sent.expect("kill is installed").success());
+    let finished = job.finish();
+    assert!(finished.code != Some(0), "{finished:?}");
+    let complete = |name: &str| {
+        let text = std::fs::read_to_string(workspace.path().join(name)).ok()?;
+        Some(
+            serde_json::from_str::<serde_json::Value>(&text)
+                .expect("a file with its final name is complete"),
+        )
     };
-    let reported = whole("run.json");
-    let manifest = whole("mesh/mesh.json");
-    assert!(reported.is_none() || manifest.is_some(), "the report comes after the mesh");
+    let reported = complete("run.json");
+    let manifest = complete("mesh/mesh.json");
+    assert!(reported.is_none() || manifest.is_some(), "the report must be written after the mesh");
     for part in manifest.iter().flat_map(|m| m["parts"].as_array().expect("parts")) {
-        let file = place.path().join("mesh").join(part["file"].as_str().expect("a name"));
-        let bytes = std::fs::metadata(file).expect("the manifest comes last").len();
-        assert!(bytes > 8 * part["leaves"].as_u64().expect("a number"), "{told:?}");
+        let file = workspace.path().join("mesh").join(part["file"].as_str().expect("a name"));
+        let bytes = std::fs::metadata(file).expect("the parts exist before the manifest").len();
+        assert!(bytes > 8 * part["leaves"].as_u64().expect("a number"), "{finished:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! STL files as they are found in the wild: the tricky are read whole, the broken refused, none crash.
+//! Unusual STL files are read completely, malformed ones are refused, and none makes the mesher crash.
 #![allow(missing_docs)]
 
 mod support;
@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::Path;
 use support::{Facet, config, cuboid};
 
-/// Reads a file to its end, as one rank does.
+/// Reads a whole file on one rank.
 fn read(path: &Path) -> Result<Vec<Facet>, Error> {
     Ok(ingest::read(&Source::Stl(path.to_owned()), &Solo)?.facets)
 }
@@ -24,7 +24,7 @@ fn file(bytes: &[u8]) -> tempfile::NamedTempFile {
 }
 
 #[test]
-fn tricky_files_are_read_bit_for_bit() {
+fn unusual_files_are_read_bit_for_bit() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/tricky");
     let want = read(&folder.join("binary.stl")).expect("an ordinary binary STL");
     assert_eq!(want.len(), 8);
@@ -40,7 +40,9 @@ fn tricky_files_are_read_bit_for_bit() {
         let got = read(&path).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(bits(&got), bits(&want), "{}", path.display());
         let parts = sim::run(3, 11, |c| {
-            ingest::read(&Source::Stl(path.clone()), c).expect("what one rank reads").facets
+            ingest::read(&Source::Stl(path.clone()), c)
+                .expect("several ranks read what one rank reads")
+                .facets
         });
         assert_eq!(bits(&parts.concat()), bits(&want), "{} on 3 ranks", path.display());
         count += 1;
@@ -64,14 +66,14 @@ fn text(facets: &[Facet]) -> Vec<u8> {
     (s + "endsolid body\n").into_bytes()
 }
 
-/// Something that goes wrong with a file.
+/// A kind of damage to a file.
 #[derive(Clone, Debug)]
 enum Damage {
     Cut(prop::sample::Index),
     Flip(prop::sample::Index, u8),
     Insert(prop::sample::Index, Vec<u8>),
     Remove(prop::sample::Index, usize),
-    /// A number of facets that is not the file's.
+    /// A wrong number of facets in the header.
     Count(u32),
 }
 
@@ -126,7 +128,7 @@ fn damaged(mut bytes: Vec<u8>, by: &[Damage]) -> Vec<u8> {
 proptest! {
     #![proptest_config(config(1500))]
 
-    /// Whatever happens to a file: finite facets or the user's error, and a mesh or the user's error.
+    /// Damaged files give finite facets and a mesh, or an input error.
     #[test]
     fn damaged_files_are_read_or_refused(
         in_text in any::<bool>(),
@@ -136,8 +138,8 @@ proptest! {
         let bytes = if in_text { text(&body) } else { binary(&body) };
         let file = file(&damaged(bytes, &by));
         match read(file.path()) {
-            Err(Error::Input(told)) => prop_assert!(!told.is_empty() && !told.contains('\n'), "{}", told),
-            Err(other) => prop_assert!(false, "not the input's error: {:?}", other),
+            Err(Error::Input(message)) => prop_assert!(!message.is_empty() && !message.contains('\n'), "{}", message),
+            Err(other) => prop_assert!(false, "not an input error: {:?}", other),
             Ok(facets) => {
                 prop_assert!(facets.as_flattened().as_flattened().iter().all(|c| c.is_finite()));
                 mesh_coarsely(file.path(), &facets)?;
@@ -145,9 +147,8 @@ proptest! {
         }
     }
 
-    /// A file of a binary STL's length is read whole, or is no binary STL.
     #[test]
-    fn binary_files_are_told_by_their_length(count in 0u32..40, length in 0usize..2100, text in any::<bool>()) {
+    fn binary_files_are_recognised_by_their_length(count in 0u32..40, length in 0usize..2100, text in any::<bool>()) {
         let mut bytes = vec![if text { b' ' } else { 0 }; length];
         bytes.iter_mut().zip(b"solid").for_each(|(b, s)| *b = *s);
         if length >= 84 {
@@ -161,7 +162,7 @@ proptest! {
         }
     }
 
-    /// Case files too.
+    /// Damaged case files give a case with valid rules, or an input error.
     #[test]
     fn damaged_case_files_are_read_or_refused(by in prop::collection::vec(damage(), 1..4)) {
         const GOOD: &str = "geometry = \"uav.stl\"\nspacing_min = 0.01\nlayer_cells_min = 4\nkeep = \"outside\"\n
@@ -169,8 +170,8 @@ proptest! {
             max = [4.0, 1.0, 1.0]\nspacing = 0.05\n";
         let file = file(&damaged(GOOD.into(), &by));
         match Case::read(file.path()) {
-            Err(Error::Input(told)) => prop_assert!(!told.contains('\n'), "{}", told),
-            Err(other) => prop_assert!(false, "not the input's error: {:?}", other),
+            Err(Error::Input(message)) => prop_assert!(!message.contains('\n'), "{}", message),
+            Err(other) => prop_assert!(false, "not an input error: {:?}", other),
             Ok(case) => {
                 let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
                 if let Ok(rules) = case.rules(&unit) {
@@ -181,7 +182,7 @@ proptest! {
     }
 }
 
-/// Meshes what was read at a few cells along its longest edge: however large or small, it must not crash.
+/// Meshes the facets with a few cells along their longest edge; of whatever size, it must not crash.
 fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
     let bounds = Bounds::of(facets);
     let longest = (0..3).map(|a| bounds.hi[a] - bounds.lo[a]).fold(0.0, f64::max);
@@ -199,7 +200,7 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
         Ok((words, _)) => prop_assert!(words.is_sorted() && !words.is_empty()),
         Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),
     }
-    // A root that most of it is outside of.
+    // A root that most facets are outside.
     let root = mesher::lattice::Root { origin: [0.0; 3], edge: 1.0 };
     (case.root, case.spacing_min) = (mesher::case::RootSpec::Exact(root), 0.25);
     if let Err(e) = mesher::words(&case, &options, &Solo) {

@@ -1,4 +1,4 @@
-//! Fixed work for the benches: the mesher's kernels, each on what the phases before it made of an aircraft.
+//! Fixed work for the benches: the mesher's kernels, each on the results of the preceding phases for an aircraft.
 #![allow(dead_code, missing_docs)]
 
 use mesher::brick::{flood, valid};
@@ -21,16 +21,15 @@ use mesher::{Options, digest, grade, stl};
 use std::convert::Infallible;
 use std::hint::black_box;
 
-/// A kernel with the things that one run of it works on, in number.
+/// A kernel, and the number of elements that one run of it processes.
 pub struct Kernel {
     pub name: &'static str,
     pub elements: u64,
-    /// Does the work once; returns something that depends on all of it.
+    /// Does the work once. Returns a value that depends on all of it.
     pub run: Box<dyn FnMut() -> u64>,
 }
 
-/// A generated shape around which to mesh, with the finest cells `1 / 2^finer` of its longest edge or
-/// smaller.
+/// A case around a generated shape. The finest cells are at most `1 / 2^finer` of its longest edge.
 pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Case {
     let generator = toml::from_str(&format!("shape = \"{shape}\"\nfacets = {facets}\n"));
     let facets = read(&Source::Generated(generator.expect("a shape")), &Solo).expect("its facets");
@@ -54,12 +53,12 @@ pub fn options() -> Options {
     Options { division, ungraded: false, out: None, check: false }
 }
 
-/// What the phases make of the aircraft, kept for as long as the benches run.
+/// Results of all phases for the aircraft.
 struct Phases {
     given: Slice,
     facets: Vec<Facet>,
     rules: Rules,
-    share: Ownership,
+    ownership: Ownership,
     binned: BinnedFacets,
     depth: Depth,
     tree: Tree,
@@ -76,15 +75,15 @@ impl Phases {
             .root
             .facets(given.facets.clone(), &Bounds::of(&given.facets), 0)
             .expect("near the root");
-        let share = Ownership::solo();
+        let ownership = Ownership::solo();
         let binned = BinnedFacets::new(&facets);
         let depth = Depth { surface: rules.level_surface, boxes: vec![] };
         let (tree, _) = refine(&binned, &depth, &[SubtreeRoot { level: 0, code: 0 }]);
-        let sides = decide(&tree, &share, &facets, rules.keep, &Solo);
+        let sides = decide(&tree, &ownership, &facets, rules.keep, &Solo);
         let kept = Kept::new(&sides.deleted);
         let (graded, _) =
-            grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &share, &Solo);
-        Self { given, facets, rules, share, binned, depth, tree, sides, graded }
+            grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
+        Self { given, facets, rules, ownership, binned, depth, tree, sides, graded }
     }
 
     fn leaves(&self) -> Leaves<'_> {
@@ -92,7 +91,7 @@ impl Phases {
             split: &self.graded,
             crossing: &self.tree.crossing,
             sides: &self.sides,
-            ownership: &self.share,
+            ownership: &self.ownership,
             all_leaves: false,
             rules: &self.rules,
         }
@@ -125,7 +124,7 @@ pub fn kernels() -> Vec<Kernel> {
     vec![
         kernel("stl_read", facets, stl_read(&p.given)),
         kernel("crossed", facets, Box::new(|| brick_masks(&p.facets))),
-        kernel("file", facets, Box::new(|| drop_counted(BinnedFacets::new(black_box(&p.facets))))),
+        kernel("bin", facets, Box::new(|| drop_counted(BinnedFacets::new(black_box(&p.facets))))),
         kernel(
             "refine",
             facets,
@@ -139,7 +138,7 @@ pub fn kernels() -> Vec<Kernel> {
         kernel(
             "sides",
             leaves_of(&p.tree),
-            Box::new(|| decide(&p.tree, &p.share, &p.facets, p.rules.keep, &Solo).components),
+            Box::new(|| decide(&p.tree, &p.ownership, &p.facets, p.rules.keep, &Solo).components),
         ),
         kernel("dilate_3", bricks, Box::new(move || dilated(p.surface(), surface, 3))),
         kernel("dilate_9", bricks, Box::new(move || dilated(p.surface(), surface, 9))),
@@ -153,7 +152,7 @@ pub fn kernels() -> Vec<Kernel> {
                     &p.tree.crossing,
                     &kept,
                     &p.rules,
-                    &p.share,
+                    &p.ownership,
                     &Solo,
                 )
                 .1
@@ -186,7 +185,7 @@ fn stl_read(given: &Slice) -> Box<dyn FnMut() -> u64> {
     })
 }
 
-/// Each facet against the brick of its own size that its first vertex is in.
+/// Tests each facet against the brick of about its own size that contains its first vertex.
 fn brick_masks(facets: &[Facet]) -> u64 {
     facets.iter().fold(0, |all, f| {
         let widest = (0..3).map(|a| f.range(a).1 - f.range(a).0).max().unwrap_or(0).max(2);
@@ -197,7 +196,7 @@ fn brick_masks(facets: &[Facet]) -> u64 {
     })
 }
 
-/// Components of what the surface leaves open in its bricks.
+/// Flood fill of the octants off the surface, in the bricks of the surface.
 fn floods(set: &BrickSet, l: u32) -> u64 {
     let mut components = 0;
     for b in set.bricks() {
@@ -222,7 +221,7 @@ fn drop_counted<T>(made: T) -> u64 {
     1
 }
 
-/// Leaves of a base tree.
+/// Number of leaves of a base tree.
 fn leaves_of(tree: &Tree) -> u64 {
     1 + 7 * tree.split.iter().map(BrickSet::count).sum::<u64>()
 }

@@ -4,10 +4,10 @@ use super::*;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
-fn set(codes: &[u64]) -> BrickSet {
-    BrickSet::from_unsorted(
-        codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect(),
-    )
+/// The set of octants with these codes.
+pub fn set<'a>(codes: impl IntoIterator<Item = &'a u64>) -> BrickSet {
+    let brick = |c: &u64| Brick { key: c >> 6, bits: 1 << (c & 63) };
+    BrickSet::from_unsorted(codes.into_iter().map(brick).collect())
 }
 
 #[test]
@@ -122,7 +122,7 @@ proptest! {
 }
 
 #[test]
-#[should_panic(expected = "brick 0x3 must come before Some(")]
+#[should_panic(expected = "brick 0x1 must precede brick 0x3")]
 fn keys_out_of_order_are_found() {
     let mut s = set(&[64, 3 * 64]);
     s.low.swap(0, 1);

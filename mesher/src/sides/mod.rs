@@ -133,8 +133,9 @@ impl Sides {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brickset::tests::set;
     use crate::comm::Solo;
-    use crate::tree::tests::{set, small};
+    use crate::tree::tests::small;
 
     /// Sides of a tree without facets: all leaves that do not cross are outside.
     fn decided(keep: Keep) -> (Tree, Sides) {

@@ -194,6 +194,32 @@ impl Nodes {
         0..self.levels[l as usize].placements.len() as Node
     }
 
+    /// Checks the invariants, with the links.
+    ///
+    /// # Panics
+    /// If one is violated; the message names it, the level and a node.
+    pub fn check_invariants(&self) {
+        let mut component = 0;
+        for (l, level) in self.levels.iter().enumerate() {
+            let mut child = 0;
+            for (n, (&first, &split)) in level.first_child.iter().zip(&level.split).enumerate() {
+                assert_eq!(first, child, "children of node {n} of level {l} must be contiguous");
+                child += brick::parents(split).count_ones();
+            }
+            let next = self.levels.get(l + 1).map_or(0, |next| next.components.len() as Node - 1);
+            assert_eq!(child, next, "each node of level {} must be a child", l + 1);
+            for (n, range) in level.components.windows(2).enumerate() {
+                assert_eq!(range[0], component, "components of node {n} of level {l} must follow");
+                for &mask in &self.masks[range[0] as usize..range[1] as usize] {
+                    let connected = brick::flood(mask & mask.wrapping_neg(), mask);
+                    assert!(mask != 0 && connected == mask, "node {n} of level {l}: {mask:#x}");
+                }
+                component = range[1];
+            }
+        }
+        assert_eq!(component, self.component_count(), "each component must belong to a node");
+    }
+
     /// A finder of components by octants.
     pub fn finder(&self) -> Finder<'_> {
         Finder { nodes: self, path: vec![(0, 0)] }
@@ -220,15 +246,15 @@ impl Finder<'_> {
             let node = self.path[m as usize].1;
             // At two levels above `l` and higher, one octant contains all of `bits`; at one level above, those of
             // one sibling group do.
-            let here = match l - m {
+            let octants = match l - m {
                 0 => bits,
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
                 up => 1 << (key >> (3 * (up - 2)) & 63),
             };
             let split = nodes.split(m, node);
-            let leaves = here & !split;
+            let leaves = octants & !split;
             nodes.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
-            if here & split == 0 || m == l {
+            if octants & split == 0 || m == l {
                 return;
             }
             if self.path.len() == m as usize + 1 {
@@ -249,35 +275,27 @@ fn brick_above(l: Level, key: u64, m: Level) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brick::Brick;
-    use crate::brickset::BrickSet;
+    use crate::brickset::ones;
+    use crate::brickset::tests::set;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    /// Deepest level of the trees here.
+    /// Deepest level of the trees octants.
     const DEEPEST: Level = 6;
-
-    fn of_codes(codes: &BTreeSet<u64>) -> BrickSet {
-        BrickSet::from_unsorted(
-            codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) }).collect(),
-        )
-    }
 
     /// A tree with the given octants at its deepest level; every third of its leaves is crossing.
     fn tree(deepest: &[u64]) -> Tree {
         let mut tree = Tree::default();
         for l in 0..DEEPEST {
             let up = |code: &u64| (code % (1 << (3 * DEEPEST))) >> (3 * (DEEPEST - l));
-            tree.split[l as usize] = of_codes(&deepest.iter().map(up).collect());
+            tree.split[l as usize] = set(&deepest.iter().map(up).collect::<BTreeSet<u64>>());
         }
         for l in 0..=DEEPEST as usize {
             let leaf = |code: &u64| !tree.split[l].contains(*code);
             let leaves = Tree::exists(&tree.split, l as Level)
-                .flat_map(|b| {
-                    crate::brickset::ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit))
-                })
+                .flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
                 .filter(leaf);
-            tree.crossing[l] = of_codes(&leaves.step_by(3).collect());
+            tree.crossing[l] = set(&leaves.step_by(3).collect::<BTreeSet<u64>>());
         }
         tree
     }
@@ -303,6 +321,7 @@ mod tests {
             let tree = tree(&deepest);
             tree.check_structure();
             let nodes = Nodes::new(&tree, &Ownership::solo());
+            nodes.check_invariants();
             let mut finder = nodes.finder();
             for (l, near, offset, bits) in queries {
                 // Near a region where the tree is deep, as queries by neighbouring ranks are.
@@ -310,11 +329,28 @@ mod tests {
                 let key = (place ^ offset) >> 6;
                 let mut found = BTreeSet::new();
                 finder.find(l, key, bits, |c| _ = found.insert(c));
-                let codes = crate::brickset::ones(bits).map(|bit| key << 6 | u64::from(bit));
+                let codes = ones(bits).map(|bit| key << 6 | u64::from(bit));
                 let want: BTreeSet<Component> =
                     codes.filter_map(|code| component_of(&nodes, &tree, l, code)).collect();
                 prop_assert_eq!(found, want, "level {} key {}", l, key);
             }
         }
+    }
+
+    #[test]
+    #[should_panic(expected = "children of node 1 of level 2 must be contiguous")]
+    fn a_wrong_link_is_found() {
+        let mut nodes = Nodes::new(&tree(&[0, 1 << 12]), &Ownership::solo());
+        nodes.levels[2].first_child[1] += 1;
+        nodes.check_invariants();
+    }
+
+    #[test]
+    #[should_panic(expected = "node 0 of level 1: 0x81")]
+    fn a_component_of_two_parts_is_found() {
+        let mut nodes = Nodes::new(&tree(&[0]), &Ownership::solo());
+        let first = nodes.levels[1].components[0];
+        nodes.masks[first as usize] = 0x81;
+        nodes.check_invariants();
     }
 }

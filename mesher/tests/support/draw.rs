@@ -1,4 +1,4 @@
-//! What is drawn at random: bodies, soups, cases, and ways to run them.
+//! Random bodies, facet soups, cases and run configurations.
 
 use super::{Facet, Run, Small};
 use mesher::case::BoxSpec;
@@ -6,7 +6,7 @@ use mesher::lattice::{Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 
-/// Runs of all kinds, on few ranks mostly.
+/// Run configurations of all kinds, mostly with few ranks.
 pub fn run() -> impl Strategy<Value = Run> {
     let ranks = prop_oneof![2 => Just(1usize), 4 => 2usize..9, 1 => 9usize..65];
     let partitioner = prop_oneof![Just(Partitioner::Metis), Just(Partitioner::Morton)];
@@ -27,7 +27,7 @@ pub fn run() -> impl Strategy<Value = Run> {
     })
 }
 
-/// As many cases as asked for by `PROPTEST_CASES`, else `cases`.
+/// A configuration with `PROPTEST_CASES` cases, or `cases` if the variable is not set.
 pub fn config(cases: u32) -> ProptestConfig {
     let asked = std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok());
     ProptestConfig {
@@ -60,7 +60,7 @@ fn tetrahedron(v: [[f32; 3]; 4]) -> Vec<Facet> {
     vec![[v[0], v[1], v[2]], [v[0], v[3], v[1]], [v[0], v[2], v[3]], [v[1], v[3], v[2]]]
 }
 
-/// A coordinate: anywhere in and around the root, or on the lattice of level 6, or of level 3.
+/// A coordinate: anywhere in or near the root, or a multiple of the cells of level 6 or 3.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => -3.0f32..67.0,
@@ -74,7 +74,7 @@ fn point() -> impl Strategy<Value = [f32; 3]> {
     [coordinate(), coordinate(), coordinate()]
 }
 
-/// Closed bodies, of whole-number corners or any.
+/// Closed bodies: boxes with integer corners, spheres, tetrahedra.
 pub fn closed() -> impl Strategy<Value = Vec<Facet>> {
     let corner = || [2i32..62, 2i32..62, 2i32..62];
     let boxed = (corner(), [1i32..40, 1i32..40, 1i32..40]).prop_map(|(lo, d)| {
@@ -94,11 +94,11 @@ pub fn closed() -> impl Strategy<Value = Vec<Facet>> {
     prop_oneof![2 => boxed, 2 => sphere, 1 => tetra]
 }
 
-/// A facet of a few lattice units around a corner of cells: it comes as near to cells as can be without
-/// touching them.
+/// A facet of a few lattice units near a corner of cells: touches cells, or misses them by the smallest possible
+/// distance.
 fn near_miss() -> impl Strategy<Value = Facet> {
     let corner = prop::sample::select(vec![0.0f32, 1.0, 2.0]);
-    // On a root of edge 64 a lattice unit is 2^-21; f32 holds four times as fine up to 2, twice beyond.
+    // On a root of edge 64 a lattice unit is 2^-21, which f32 resolves four times up to 2, and twice beyond.
     let vertex =
         || [-4i32..=4, -4i32..=4, -4i32..=4].prop_map(|k| k.map(|k| k as f32 / 2_097_152.0));
     let vertices = [vertex(), vertex(), vertex()];
@@ -106,9 +106,9 @@ fn near_miss() -> impl Strategy<Value = Facet> {
         .prop_map(|(c, f)| f.map(|v| std::array::from_fn(|a| c[a] + v[a])))
 }
 
-/// A facet of no area: two points, in any order, and one of them again or one between them.
+/// A facet without area: two points, and one of them again or a point between them, in any order.
 fn segment() -> impl Strategy<Value = Facet> {
-    // Multiples of four, so that quarters of the way are exact.
+    // Multiples of four, so that quarter points are exact.
     let end = || [-1i32..=16, -1i32..=16, -1i32..=16].prop_map(|p| p.map(|c| 4 * c));
     let between = (end(), end(), 0..=4).prop_map(|(p, q, k)| {
         let m = std::array::from_fn(|a| p[a] + (q[a] - p[a]) / 4 * k);
@@ -169,8 +169,8 @@ pub fn small(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value =
     )
 }
 
-/// Plates as thin as cells or thinner, with boxes about them that are finer than their surface: what is
-/// deleted lies between what is kept, a cell away or less.
+/// Plates about as thin as cells, with extent boxes finer than their surface: deleted leaves lie between kept
+/// leaves that are few cells apart.
 pub fn thin() -> impl Strategy<Value = Small> {
     let reach =
         || prop_oneof![Just((-10i32, 74i32)), (0i32..50, 2i32..30).prop_map(|(a, d)| (a, a + d))];
@@ -209,7 +209,7 @@ pub fn thin() -> impl Strategy<Value = Small> {
     )
 }
 
-/// Leaky soups whose edges and vertices lie on the rays from the centroids of coarse leaves.
+/// Open facet soups whose edges and vertices lie on the rays from the centroids of coarse leaves.
 pub fn leaky_on_rays() -> impl Strategy<Value = Small> {
     let point = || [-1i32..10, -1i32..10, -1i32..10].prop_map(|p| p.map(|c| 8.0 * c as f32));
     let facets = prop::collection::vec([point(), point(), point()], 1..10);

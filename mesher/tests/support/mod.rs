@@ -1,4 +1,4 @@
-//! Test support: small cases, and both programs run on them.
+//! Test support: small cases, meshed by the mesher and by the reference.
 #![allow(dead_code, missing_docs)]
 
 use mesher::case::{BoxSpec, Case, RootSpec};
@@ -12,13 +12,13 @@ use mesher::{Options, words};
 pub mod draw;
 pub mod symmetry;
 
-// Each test uses some of it.
+// Each test uses some of these.
 #[allow(unused_imports)]
 pub use draw::{closed, config, cuboid, leaky_on_rays, run, small, soup, thin};
 
 pub type Facet = [[f32; 3]; 3];
 
-/// A case on a root of edge 64 at the origin, so that whole numbers are multiples of level-6 cells.
+/// A small case, by default on a root of edge 64 at the origin, so that integers are multiples of level-6 cells.
 #[derive(Clone, Debug)]
 pub struct Small {
     pub facets: Vec<Facet>,
@@ -74,7 +74,7 @@ impl Small {
         mesh.expect("the case is good")
     }
 
-    /// What the reference makes of the case.
+    /// The reference's result.
     pub fn reference_outcome(&self, ungraded: bool) -> Outcome {
         let mesh = self.reference_mesh(ungraded);
         let on_lattice = |p: [f64; 3]| std::array::from_fn(|a| self.root.quantise(a, p[a]));
@@ -91,28 +91,27 @@ impl Small {
             .0
     }
 
-    /// Leaf words by the mesher on simulated ranks, merged; each rank's must be sorted.
+    /// Leaf words by the mesher on simulated ranks, merged.
     pub fn ranks(&self, ranks: usize, seed: u64, division: Division, ungraded: bool) -> Vec<u64> {
         self.outcome(&Run { ranks, seed, division }, ungraded).words
     }
 
-    /// What the mesher makes of the case when it is run like this.
+    /// The mesher's result with a run configuration. Asserts that ranks agree and that each rank's words are sorted.
     pub fn outcome(&self, run: &Run, ungraded: bool) -> Outcome {
         let options = options(run.division, ungraded);
         let case = self.mesher_case();
         let parts =
             sim::run(run.ranks, run.seed, |c| words(&case, &options, c).expect("the case is good"));
         let ambiguous = parts[0].1;
-        assert!(parts.iter().all(|p| p.1 == ambiguous), "ranks must agree on what is ambiguous");
+        assert!(parts.iter().all(|p| p.1 == ambiguous), "ranks must agree on ambiguous components");
         assert!(parts.iter().all(|p| p.0.is_sorted()), "parts must be sorted");
         let mut words: Vec<u64> = parts.into_iter().flat_map(|p| p.0).collect();
         words.sort_unstable();
         Outcome { words, ambiguous }
     }
 
-    /// The nearest case on a root of edge 64 at the origin whose coordinates are multiples of 1/128: they
-    /// are lattice points, and remain so, as f32 too, when they are mirrored, moved by as much, or
-    /// halved.
+    /// The nearest case on a root of edge 64 at the origin whose coordinates are multiples of 1/128. They are lattice
+    /// points and exact in f32, and remain so when they are mirrored, translated by such multiples, or halved.
     pub fn on_lattice(mut self) -> Self {
         let near = |x: f32| (x * 128.0).round() / 128.0;
         self.facets.iter_mut().for_each(|f| *f = f.map(|v| v.map(near)));
@@ -125,13 +124,13 @@ impl Small {
         self
     }
 
-    /// The case with other facets.
+    /// The same case with other facets.
     pub fn with(&self, facets: Vec<Facet>) -> Self {
         Self { facets, ..self.clone() }
     }
 }
 
-/// How to run the mesher: nothing of it may change the mesh.
+/// A run configuration, on which the mesh must not depend.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
     pub ranks: usize,
@@ -151,7 +150,7 @@ impl Run {
     };
 }
 
-/// What the mesher made of a case.
+/// A mesh: leaf words and components decided by majority.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     pub words: Vec<u64>,
@@ -166,7 +165,7 @@ pub fn options(division: Division, ungraded: bool) -> Options {
     Options { division, ungraded, out: None, check: false }
 }
 
-/// The first differing leaf, as people can read it.
+/// Describes the first leaf that differs.
 pub fn first_difference(a: &[u64], b: &[u64]) -> String {
     let show = |w: Option<&u64>| {
         w.map_or("nothing".into(), |&w| {
@@ -180,7 +179,7 @@ pub fn first_difference(a: &[u64], b: &[u64]) -> String {
     };
     let at = a.iter().zip(b).position(|(x, y)| x != y).unwrap_or(a.len().min(b.len()));
     format!(
-        "{} and {} leaves; first difference at {at}: {} against {}",
+        "{} and {} leaves; first difference at {at}: {} and {}",
         a.len(),
         b.len(),
         show(a.get(at)),

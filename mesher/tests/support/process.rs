@@ -1,6 +1,7 @@
-//! The mesher as a program: run in a directory of its own, within a time limit, and what it left there.
+//! Runs the mesher's program in a temporary directory, within a time limit, and inspects output and files.
 #![allow(dead_code, missing_docs)]
 
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -8,9 +9,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// A run on small input that takes longer hangs.
+/// Time limit of a run on small input.
 const LIMIT: Duration = Duration::from_secs(20);
-/// The same under an MPI launcher, which takes its time when it shares the machine.
+/// Time limit under an MPI launcher, which starts slowly on a busy machine.
 const LIMIT_MPI: Duration = Duration::from_secs(90);
 
 /// The program under test.
@@ -19,18 +20,18 @@ pub const MESHER: &str = env!("CARGO_BIN_EXE_mesher");
 /// The launcher of MPI jobs.
 const MPIRUN: &str = "mpirun";
 
-/// What a run said. The code is none if a signal ended it.
+/// Exit code and output of a run. The code is none if a signal ended it.
 #[derive(Debug)]
-pub struct Told {
+pub struct Finished {
     pub code: Option<i32>,
     pub stdout: String,
     pub stderr: String,
 }
 
 /// A directory to run in.
-pub struct Place(TempDir);
+pub struct Workspace(TempDir);
 
-impl Place {
+impl Workspace {
     pub fn new() -> Self {
         Self(tempfile::tempdir().expect("a temporary directory"))
     }
@@ -39,22 +40,22 @@ impl Place {
         self.0.path()
     }
 
-    /// Puts a file there.
-    pub fn put(&self, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
+    /// Writes a file in the directory.
+    pub fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path().join(name);
-        std::fs::write(&path, contents).expect("the place can be written to");
+        std::fs::write(&path, contents).expect("the workspace is writable");
         path
     }
 
-    /// A command of the mesher's that runs there.
+    /// A command that runs the mesher in the directory.
     pub fn mesher(&self, args: &[&str]) -> Command {
         let mut command = Command::new(MESHER);
         command.args(args);
-        self.at(command)
+        self.enter(command)
     }
 
-    /// A command that runs there, away from any MPI job that runs this test.
-    pub fn at(&self, mut command: Command) -> Command {
+    /// A command that runs in the directory, outside any MPI job that runs this test.
+    pub fn enter(&self, mut command: Command) -> Command {
         command.current_dir(self.path());
         for v in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "PMIX_RANK", "MPI_LOCALNRANKS"] {
             command.env_remove(v);
@@ -62,7 +63,7 @@ impl Place {
         command
     }
 
-    /// A command that runs the mesher on real MPI ranks there.
+    /// A command that runs the mesher on real MPI ranks in the directory.
     pub fn mpirun(&self, ranks: usize, args: &[&str]) -> Command {
         self.mpirun_of(ranks, MESHER, args)
     }
@@ -71,7 +72,7 @@ impl Place {
     pub fn mpirun_of(&self, ranks: usize, program: &str, args: &[&str]) -> Command {
         let mut command = Command::new(MPIRUN);
         command.args(["-n", &ranks.to_string(), program]).args(args);
-        let mut command = self.at(command);
+        let mut command = self.enter(command);
         for v in ["ALLOW_RUN_AS_ROOT", "ALLOW_RUN_AS_ROOT_CONFIRM", "MCA_rmaps_base_oversubscribe"]
         {
             command.env(format!("OMPI_{v}"), "1");
@@ -79,7 +80,12 @@ impl Place {
         command
     }
 
-    /// All that is there: paths with the contents of files; directories have none.
+    /// A JSON file in the directory.
+    pub fn json(&self, name: &str) -> Value {
+        read_json(&self.path().join(name))
+    }
+
+    /// The paths in the directory, with the contents of files and none for directories.
     pub fn contents(&self) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
         let mut found = BTreeMap::new();
         let mut open = vec![self.path().to_owned()];
@@ -99,10 +105,21 @@ impl Place {
     }
 }
 
-/// Starts a command with its output caught.
+/// Reads a JSON file.
+pub fn read_json(path: &Path) -> Value {
+    let text = std::fs::read_to_string(path).expect("the file exists");
+    serde_json::from_str(&text).expect("the file is JSON")
+}
+
+/// Starts a command and captures its output.
+///
+/// # Panics
+/// If the program is not installed.
 pub fn start(mut command: Command) -> Running {
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().expect("the program can be started");
+    let program = command.get_program().to_owned();
+    let mut child =
+        command.spawn().unwrap_or_else(|e| panic!("{program:?} cannot be started: {e}"));
     let stdout = drain(child.stdout.take().expect("a pipe"));
     let stderr = drain(child.stderr.take().expect("a pipe"));
     let launched = command.get_program() == MPIRUN;
@@ -120,7 +137,7 @@ fn drain(mut from: impl Read + Send + 'static) -> Drained {
     })
 }
 
-/// A command under way.
+/// A running command.
 pub struct Running {
     child: Child,
     stdout: Drained,
@@ -138,8 +155,8 @@ impl Running {
         self.child.try_wait().expect("a child can be waited for").is_some()
     }
 
-    /// Waits for the end; a run that takes too long is killed, and fails the test.
-    pub fn finish(mut self) -> Told {
+    /// Waits for the end. Kills a run that exceeds the time limit, and fails the test.
+    pub fn finish(mut self) -> Finished {
         while !self.is_over() {
             if self.since.elapsed() > self.limit {
                 let _ = self.child.kill();
@@ -152,32 +169,32 @@ impl Running {
             String::from_utf8_lossy(&d.join().expect("a reader of output")).into_owned()
         };
         let code = self.child.wait().expect("a child can be waited for").code();
-        Told { code, stdout: text(self.stdout), stderr: text(self.stderr) }
+        Finished { code, stdout: text(self.stdout), stderr: text(self.stderr) }
     }
 }
 
 /// Runs a command to its end.
-pub fn run(command: Command) -> Told {
+pub fn run(command: Command) -> Finished {
     start(command).finish()
 }
 
-impl Told {
-    /// Asserts the exit code, and one sentence that has all of `words` on standard error alone.
+impl Finished {
+    /// Asserts the exit code, and that the only output is one sentence on standard error with all of `words`.
     #[track_caller]
     pub fn refuses(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, Some(code), "{self:?}");
         assert_eq!(self.stdout, "", "{self:?}");
         let lines: Vec<&str> = self.stderr.lines().collect();
-        assert_eq!(lines.len(), 1, "one sentence must be told, not more: {self:?}");
+        assert_eq!(lines.len(), 1, "exactly one sentence must be printed: {self:?}");
         self.explains(lines[0], words);
     }
 
-    /// The same for a run under a launcher, which may say things of its own: one line is the mesher's.
+    /// The same for a run under a launcher, which may print lines as well: exactly one line is the mesher's.
     #[track_caller]
     pub fn refuses_under_launcher(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, Some(code), "{self:?}");
         let ours: Vec<&str> = self.stderr.lines().filter(|l| l.starts_with("mesher: ")).collect();
-        assert_eq!(ours.len(), 1, "one rank must tell one sentence: {self:?}");
+        assert_eq!(ours.len(), 1, "one rank must print one sentence: {self:?}");
         self.explains(ours[0], words);
     }
 
@@ -186,33 +203,20 @@ impl Told {
         assert!(line.starts_with("mesher: ") && line.len() > 15, "{self:?}");
         assert!(!self.stderr.contains("panicked"), "{self:?}");
         for word in words {
-            assert!(line.contains(word), "{word:?} is not said: {self:?}");
+            assert!(line.contains(word), "{word:?} is missing: {self:?}");
         }
     }
 
-    /// Asserts that all went well and nothing was complained about.
+    /// Asserts exit code 0 and no message on standard error.
     #[track_caller]
     pub fn succeeds(&self) {
         assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{self:?}");
     }
 }
 
-/// Whether MPI jobs can be run; says so if not.
-pub fn has_mpi() -> bool {
-    if !cfg!(feature = "mpi") {
-        left_out("real MPI", "the mesher is built without it (--features mpi)");
-        return false;
-    }
-    let found = Command::new(MPIRUN).arg("--version").stdout(Stdio::null()).status().is_ok();
-    if !found {
-        left_out("real MPI", "there is no mpirun");
-    }
-    found
-}
-
-/// Says, even where the test's output is captured, that something was left out.
-pub fn left_out(what: &str, why: &str) {
-    let _ = writeln!(std::io::stderr(), "left out: {what}, because {why}");
+/// Reports, even if the test's output is captured, that a part of a test was skipped.
+pub fn skip(what: &str, why: &str) {
+    let _ = writeln!(std::io::stderr(), "skipped: {what}: {why}");
 }
 
 /// A binary STL of these facets.
@@ -236,11 +240,11 @@ pub fn tetrahedron() -> Vec<u8> {
 /// One rank, and several.
 pub const COMMS: [&str; 2] = ["--comm=solo", "--comm=sim:3:7"];
 
-/// Runs the mesher with `args`, asking for output, and asserts that it refuses and leaves nothing.
+/// Runs the mesher with `args` and output options, and asserts that it refuses and leaves no files.
 #[track_caller]
-pub fn refused(place: &Place, args: &[&str], code: i32, words: &[&str]) {
+pub fn refused(workspace: &Workspace, args: &[&str], code: i32, words: &[&str]) {
     for comm in COMMS {
-        let before = place.contents();
+        let before = workspace.contents();
         let mut all = args.to_vec();
         if !args.iter().any(|a| a.starts_with("--out")) {
             all.extend(["--out", "mesh"]);
@@ -249,12 +253,8 @@ pub fn refused(place: &Place, args: &[&str], code: i32, words: &[&str]) {
             all.extend(["--json", "run.json"]);
         }
         all.push(comm);
-        run(place.mesher(&all)).refuses(code, words);
-        let (before, after) = (before.keys(), place.contents());
-        assert!(
-            before.eq(after.keys()),
-            "{args:?} {comm} left something behind: {:?}",
-            after.keys()
-        );
+        run(workspace.mesher(&all)).refuses(code, words);
+        let (before, after) = (before.keys(), workspace.contents());
+        assert!(before.eq(after.keys()), "{args:?} {comm} left files: {:?}", after.keys());
     }
 }

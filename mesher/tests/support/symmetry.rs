@@ -6,14 +6,14 @@ use mesher::octant::{LEVEL_MAX, morton, position};
 /// A permutation of the axes, then mirror images.
 #[derive(Clone, Copy, Debug)]
 pub struct Symmetry {
-    /// Where each axis goes.
+    /// The image of each axis.
     to: [usize; 3],
-    /// Whether the coordinate on the axis that it came from is mirrored.
+    /// Whether the coordinate along each original axis is mirrored.
     mirrored: [bool; 3],
 }
 
 impl Symmetry {
-    /// All of them; the first changes nothing.
+    /// All 48 symmetries; the first is the identity.
     pub fn all() -> impl Iterator<Item = Self> {
         const ORDERS: [[usize; 3]; 6] =
             [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
@@ -22,7 +22,7 @@ impl Symmetry {
         })
     }
 
-    /// The image of a point of a cube from 0 to `extent`.
+    /// The image of a point in the cube from 0 to `extent`.
     fn apply<T: Copy + std::ops::Sub<Output = T>>(&self, p: [T; 3], extent: T) -> [T; 3] {
         let mut q = p;
         for a in 0..3 {
@@ -31,7 +31,7 @@ impl Symmetry {
         q
     }
 
-    /// The image of a case whose root is from 0 to 64.
+    /// The image of a case whose root extends from 0 to 64.
     pub fn case(&self, case: &Small) -> Small {
         let turn = |f: &Facet| f.map(|v| self.apply(v, 64.0));
         let mut image = case.with(case.facets.iter().map(turn).collect());
