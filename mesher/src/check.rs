@@ -243,18 +243,13 @@ fn as_brick(code: u64) -> Brick {
     Brick { key: code >> 6, bits: 1 << (code & 63) }
 }
 
-/// The leaves of each rank are linear (in order and without overlap), equal in number to the counts; with the deleted ones, those of
-/// all ranks tile the root.
+/// The leaves of each rank are linear, and equal in number to the counts. With the deleted ones, those of all ranks tile the root.
 pub fn leaves(mesh: &Mesh, counts: &Counts, written: &Written, comm: &dyn Comm) {
     let (mut end, mut number, mut volume) = (0, 0, 0);
     let Ok(_) = mesh.leaves().emit(|words| {
-        for w in words {
-            let (start, size) = (w >> 7, volume_of((w >> 2 & 31) as Level, 1));
-            assert!(start >= end, "leaves must be in order and must not overlap");
-            end = start + size;
-            volume += size;
-        }
+        end = is_linear(end, words);
         number += words.len() as u64;
+        volume += words.iter().map(|w| volume_of(level_of(*w), 1)).sum::<u64>();
         Ok::<(), std::convert::Infallible>(())
     });
     assert_eq!((counts.total(), written.leaves), (number, number), "counts must add up");
@@ -270,6 +265,19 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, written: &Written, comm: &dyn Comm) 
         }
     }
     assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves and deleted leaves must tile the root");
+}
+
+/// Leaves are in order and do not overlap: each begins at the end of the one before it or after that. The first begins at `end` or
+/// after it. Returns the end of the last.
+fn is_linear(end: u64, words: &[u64]) -> u64 {
+    words.iter().fold(end, |end, w| {
+        assert!(w >> 7 >= end, "leaves must be in order and must not overlap");
+        (w >> 7) + volume_of(level_of(*w), 1)
+    })
+}
+
+fn level_of(word: u64) -> Level {
+    (word >> 2 & 31) as Level
 }
 
 /// The numbers of leaves by level, by rank and of this rank add up.

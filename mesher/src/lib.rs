@@ -148,7 +148,7 @@ fn mesh_into(
     let totals =
         record.phase("finish", comm, || leaves::finish(&mesh, &counts, &written, out, comm))?;
     counters.leaves = written.leaves;
-    // All ranks cast the same number of rays in total.
+    // The number of rays is a sum over the ranks, the same on all.
     counters.rays = if comm.rank() == 0 { mesh.sides.rays } else { 0 };
     counters.add_traffic(comm.traffic());
     debug_check(options, comm, || check::totals(&totals, &written, comm));

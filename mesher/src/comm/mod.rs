@@ -34,7 +34,7 @@ pub struct Traffic {
     pub time_cpu_s: f64,
 }
 
-/// The messages of all ranks, in the order of the ranks. Ranks in one process share one buffer: copies would take memory and time
+/// The messages of all ranks, in the order of the ranks. Ranks in one process use the same buffer: copies would take memory and time
 /// that ranks of an MPI job do not take.
 pub type Gathered = Arc<MessageBuffer>;
 

@@ -1,7 +1,7 @@
 //! Ranks of a real MPI job, through `rsmpi`.
 //!
 //! A sparse all-to-all sends point-to-point messages only to the ranks that need one: of a thousand ranks each sends to dozens. A
-//! dense all-to-all of mostly empty messages was measured to take a hundred times as long when ranks share cores. Messages
+//! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. Messages
 //! are sent in chunks, as MPI counts in i32.
 
 use super::{Comm, Gathered, MessageBuffer, Meter, Traffic, matrix};

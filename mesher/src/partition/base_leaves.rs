@@ -1,4 +1,4 @@
-//! The paper's partition: T0 is cut at its *base leaves*, which are assigned to ranks.
+//! The paper's partition: the subtrees of T0 below its *base leaves* are assigned to ranks.
 //!
 //! All ranks need the top of T0 for it. Each rank marks the octants that its slice of the facets splits; the union of the
 //! marks is the same tree on all ranks. Base leaves tile the root, in Morton order.

@@ -10,9 +10,9 @@ pub const RANKS: usize = 12;
 /// Owners of all octants of level [`FINE`]: one interval for each rank, or many as from METIS.
 pub fn owners() -> impl Strategy<Value = Vec<usize>> {
     let octants = 1usize << (3 * FINE);
-    let ascending = prop::collection::vec(0..octants, RANKS - 1).prop_map(move |mut cuts| {
-        cuts.sort_unstable();
-        (0..octants).map(|o| cuts.partition_point(|&c| c <= o)).collect()
+    let ascending = prop::collection::vec(0..octants, RANKS - 1).prop_map(move |mut boundaries| {
+        boundaries.sort_unstable();
+        (0..octants).map(|o| boundaries.partition_point(|&b| b <= o)).collect()
     });
     let any = prop::collection::vec((0..RANKS, 1usize..90), octants).prop_map(move |intervals| {
         let all = intervals.into_iter().flat_map(|(owner, n)| std::iter::repeat_n(owner, n));
