@@ -1,18 +1,19 @@
-//! A gate's report for people (text, Markdown) and for CI (JUnit, JSON).
+//! The report of a gate as text, Markdown, JUnit XML and JSON.
 
+use crate::markdown::{escaped, table};
 use crate::verification::junit::to_text;
 use bench::gate::report::{Finding, Layer, Report, Verdict};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// As text: a part for each layer, what is unchanged counted only.
+/// The report as text: a section per layer; unchanged values are only counted.
 pub fn text(report: &Report) -> String {
     let mut text = format!("{}\n", heading(report));
     for layer in &report.layers {
         // Writing into a string cannot fail.
         let _ = writeln!(text, "{:<13} {}", layer.name, summary(layer));
-        for finding in layer.findings.iter().filter(|finding| worth_telling(layer, finding)) {
+        for finding in layer.findings.iter().filter(|finding| is_shown(layer, finding)) {
             let _ = writeln!(text, "  {}", line(finding));
         }
     }
@@ -20,32 +21,37 @@ pub fn text(report: &Report) -> String {
     text
 }
 
-/// As Markdown, for a CI system's summary page.
+/// The columns of the Markdown table.
+const COLUMNS: [&str; 8] =
+    ["layer", "verdict", "case", "metric", "baseline", "candidate", "change", "note"];
+
+/// The report as Markdown, for the summary page of a CI system.
 pub fn markdown(report: &Report) -> String {
-    let mut text = format!("## harness gate\n\n{}: **{}**\n\n", heading(report), verdict(report));
-    text.push_str("| layer | verdict | case | metric | baseline | candidate | change | |\n");
-    text.push_str("| --- | --- | --- | --- | ---: | ---: | ---: | --- |\n");
+    let mut rows: Vec<[String; 8]> = Vec::new();
     for layer in &report.layers {
-        let _ = writeln!(text, "| **{}** | {} | | | | | | |", layer.name, escaped(&summary(layer)));
-        for finding in layer.findings.iter().filter(|finding| worth_telling(layer, finding)) {
+        let mut head = [const { String::new() }; 8];
+        (head[0], head[1]) = (layer.name.to_string(), summary(layer));
+        rows.push(head);
+        rows.extend(layer.findings.iter().filter(|f| is_shown(layer, f)).map(|finding| {
             let number = |value: Option<f64>| value.map(number).unwrap_or_default();
-            let change = finding.change_percent.map(|by| format!("{by:+.2} %")).unwrap_or_default();
-            let _ = writeln!(
-                text,
-                "| | {} | {} | {} | {} | {} | {change} | {} |",
-                finding.verdict,
-                escaped(&finding.case),
-                escaped(&finding.metric),
+            [
+                String::new(),
+                finding.verdict.to_string(),
+                finding.case.clone(),
+                finding.metric.clone(),
                 number(finding.baseline),
                 number(finding.candidate),
-                escaped(&finding.note)
-            );
-        }
+                finding.change_percent.map(|by| format!("{by:+.2} %")).unwrap_or_default(),
+                finding.note.clone(),
+            ]
+        }));
     }
-    text
+    let align = |column: usize| if (4..7).contains(&column) { "---:" } else { "---" };
+    let head = format!("## harness gate\n\n{}: **{}**\n\n", escaped(&heading(report)), verdict(report));
+    head + &table(&COLUMNS, align, rows)
 }
 
-/// As JUnit XML: a suite per layer, a test per metric; what is inconclusive is skipped, with the reason.
+/// The report as JUnit XML: a suite per layer, a test per metric. Inconclusive metrics are skipped tests with a reason.
 pub fn junit(report: &Report) -> String {
     let mut xml = quick_junit::Report::new("harness gate");
     xml.set_time(Duration::from_secs_f64(report.time_s));
@@ -63,11 +69,9 @@ pub fn junit(report: &Report) -> String {
     to_text(&xml)
 }
 
-/// As JSON.
+/// The report as JSON.
 pub fn json(report: &Report) -> String {
-    let mut text = serde_json::to_string_pretty(report).expect("a report is representable in JSON");
-    text.push('\n');
-    text
+    crate::json::pretty(report)
 }
 
 fn test(finding: &Finding) -> TestCase {
@@ -96,7 +100,7 @@ fn heading(report: &Report) -> String {
     }
 }
 
-/// One sentence on the whole.
+/// The verdict on the candidate, with the time of the gate.
 fn verdict(report: &Report) -> String {
     let bad: Vec<String> = report
         .layers
@@ -126,17 +130,14 @@ fn summary(layer: &Layer) -> String {
         Verdict::Unchanged,
     ];
     let counts = all.map(|verdict| (count(verdict), verdict));
-    let told = counts.iter().filter(|(n, _)| *n > 0).map(|(n, verdict)| format!("{n} {verdict}"));
-    let told: Vec<String> = told.collect();
-    format!(
-        "{} ({:.1} s)",
-        if told.is_empty() { "nothing compared".into() } else { told.join(", ") },
-        layer.time_s
-    )
+    let present = counts.iter().filter(|(n, _)| *n > 0);
+    let present: Vec<String> = present.map(|(n, verdict)| format!("{n} {verdict}")).collect();
+    let counts = if present.is_empty() { "nothing compared".into() } else { present.join(", ") };
+    format!("{counts} ({:.1} s)", layer.time_s)
 }
 
-/// What is unchanged is told where it has something to say: how sure a time is.
-fn worth_telling(layer: &Layer, finding: &Finding) -> bool {
+/// Unchanged values are shown for the layers whose notes matter then, too: they state how certain a time is.
+fn is_shown(layer: &Layer, finding: &Finding) -> bool {
     use bench::gate::report::LayerName::{Correctness, Time};
     finding.verdict != Verdict::Unchanged || matches!(layer.name, Time | Correctness)
 }
@@ -156,14 +157,9 @@ fn line(finding: &Finding) -> String {
     line
 }
 
-/// Counts as they are, seconds to four figures.
+/// Counts exactly, times to four decimals.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.4}") }
-}
-
-/// Text in which a Markdown table sees nothing of its own.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('|', "\\|").replace('\n', "<br>")
 }
 
 #[cfg(test)]
@@ -173,8 +169,8 @@ mod tests {
     use bench::gate::report::LayerName;
 
     fn sample() -> Report {
-        let told = |named: &str| Measured { named: named.into(), revision: None };
-        let mut report = Report::new(Some(told("main")), told("."));
+        let measured = |named: &str| Measured { named: named.into(), revision: None };
+        let mut report = Report::new(Some(measured("main")), measured("."));
         let mut counters = Layer::new(LayerName::Counters);
         counters.findings = vec![
             Finding::exact("cube", "rays", 6, 7, 0.0),
@@ -189,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn text_tells_changes_and_counts_the_rest() {
+    fn text_lists_changes_and_counts_the_rest() {
         let text = text(&sample());
         assert!(
             text.contains("regression   cube: rays 6 -> 7 (+16.67 %); more than the 0 %"),
@@ -203,15 +199,15 @@ mod tests {
     }
 
     #[test]
-    fn markdown_keeps_its_columns() {
+    fn every_row_of_the_markdown_has_every_column() {
         let text = markdown(&sample());
-        assert!(text.contains("a &lt;busy> machine \\| or so"), "{text}");
+        assert!(text.contains("a &lt;busy&gt; machine \\| or so"), "{text}");
         let rows = text.lines().filter(|line| line.starts_with('|'));
         assert!(rows.clone().all(|row| row.replace("\\|", "").matches('|').count() == 9), "{text}");
     }
 
     #[test]
-    fn junit_survives_a_reader() {
+    fn a_junit_reader_finds_the_counts() {
         let back = quick_junit::Report::deserialize_from_str(&junit(&sample())).unwrap();
         assert_eq!((back.tests, back.failures), (4, 1));
     }

@@ -1,13 +1,20 @@
-//! The forms in which the harness shows what it found.
+//! The forms in which the harness presents its findings.
 //!
+//! - [`figure`]: the model of a figure, and SVG, PGF/TikZ and CSV from it;
+//! - [`page`](mod@page), [`markdown`], [`json`], [`write`]: what all reports share;
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
 //! - [`vtu`](mod@vtu): meshes for VTK.
 
 pub mod benchmark;
+pub mod figure;
 pub mod gate;
+pub mod json;
+pub mod markdown;
+pub mod page;
 pub mod targets;
 pub mod track;
 pub mod verification;
 pub mod vtu;
+pub mod write;

@@ -1,23 +1,23 @@
-//! The table of targets, for a terminal and as Markdown.
+//! The table of targets as text and as Markdown.
 
-use crate::verification::markdown::escaped;
+use crate::markdown::{self, escaped};
 use bench::experiments::entry::{Judged, Verdict};
 use bench::targets::declare::Targets;
 use bench::targets::row::fields;
 use std::fmt::Write;
 
-/// Titles of the columns.
-const TITLES: [&str; 5] = ["row", "target", "measured", "how", ""];
+/// Headings of the columns.
+const TITLES: [&str; 5] = ["row", "target", "measured", "how", "verdict"];
 
-/// The table for a terminal, with a line that counts.
+/// The table as text, followed by the counts of the verdicts.
 pub fn text(targets: &Targets, rows: &[Judged]) -> String {
     let cells: Vec<[String; 5]> = rows.iter().map(|row| fields(targets, row)).collect();
     let titles = TITLES.map(str::to_owned);
-    let wide = |column: usize| {
-        let of = |row: &[String; 5]| row[column].chars().count();
-        cells.iter().chain([&titles]).map(of).max().unwrap_or(0)
+    let width = |column: usize| {
+        let length = |row: &[String; 5]| row[column].chars().count();
+        cells.iter().chain([&titles]).map(length).max().unwrap_or(0)
     };
-    let [a, b, c, d] = [0, 1, 2, 3].map(wide);
+    let [a, b, c, d] = [0, 1, 2, 3].map(width);
     let mut out = String::new();
     for [name, target, measured, how, verdict] in [&titles].into_iter().chain(&cells) {
         // Writing into a string cannot fail.
@@ -27,27 +27,21 @@ pub fn text(targets: &Targets, rows: &[Judged]) -> String {
     out
 }
 
-/// The same as Markdown, with the machine that it was measured on in a line above.
+/// The table as Markdown, below a line about the machine and the counts of the verdicts.
 pub fn markdown(targets: &Targets, rows: &[Judged], machine: &str) -> String {
-    let mut out = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
-    let mut row = |fields: &[String; 5]| {
-        let _ = writeln!(out, "| {} |", fields.each_ref().map(|f| escaped(f)).join(" | "));
-    };
-    row(&TITLES.map(str::to_owned));
-    row(&TITLES.map(|_| "---".to_owned()));
-    rows.iter().for_each(|judged| row(&fields(targets, judged)));
-    out
+    let head = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
+    head + &markdown::table(&TITLES, |_| "---", rows.iter().map(|row| fields(targets, row)))
 }
 
 fn count(rows: &[Judged]) -> String {
-    let of = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    let number = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
     format!(
         "{} met, {} missed, {} failed, {} left out, {} for comparison",
-        of(Verdict::Met),
-        of(Verdict::Missed),
-        of(Verdict::Failed),
-        of(Verdict::LeftOut),
-        of(Verdict::Told)
+        number(Verdict::Met),
+        number(Verdict::Missed),
+        number(Verdict::Failed),
+        number(Verdict::LeftOut),
+        number(Verdict::Told)
     )
 }
 
@@ -58,7 +52,7 @@ mod tests {
     use bench::testing::targets as read;
 
     #[test]
-    fn every_verdict_is_told_with_its_reason() {
+    fn every_verdict_is_shown_with_its_reason() {
         let targets = read(
             "mesh.a.case = \"a\"\nrun.a.mesh = \"a\"\n[[row]]\nname = \"rate|1\"\nrun = \"a\"\n\
              measure = \"cells_per_second_per_core\"\nat_least = 100e6\nat_most = 3e8\n",
@@ -82,9 +76,9 @@ mod tests {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
         let markdown = markdown(&targets, &rows, "2 cores");
-        let of_table: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
-        assert_eq!(of_table.len(), 4);
-        assert!(of_table[1].starts_with("| --- | --- |"), "{markdown}");
-        assert!(of_table[2].starts_with("| rate\\|1 |") && markdown.contains("&lt;no memory&gt;"));
+        let table: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
+        assert_eq!(table.len(), 4);
+        assert!(table[1].starts_with("| --- | --- |"), "{markdown}");
+        assert!(table[2].starts_with("| rate\\|1 |") && markdown.contains("&lt;no memory&gt;"));
     }
 }

@@ -1,16 +1,15 @@
-//! Leaf sets as VTK unstructured grids, for looking at.
+//! Leaf sets as VTK unstructured grids, for visualisation.
 //!
-//! One hexahedron per leaf, with its level, side and part. Corners that leaves share are one point; a
-//! hanging node is a point of the finer cells only. All is held in memory, about 200 bytes per leaf:
-//! meshes for looking at are not those of a billion cells.
+//! Each leaf becomes one hexahedron with its level, side and part. Coinciding corners of leaves are one point; a hanging
+//! node belongs to the finer cells only. The grid is held in memory, about 200 bytes per leaf: meshes for visualisation
+//! are smaller than those of a billion cells.
 
+use crate::write::replace;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::octant::CELLS_PER_EDGE;
 use contract::word;
-use std::fs::Permissions;
-use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
+use std::io;
 use std::path::Path;
 use thiserror::Error;
 use vtkio::model::{
@@ -18,56 +17,37 @@ use vtkio::model::{
     Version, VertexNumbers, Vtk,
 };
 
-/// Most leaves that are exported.
+/// Maximum number of leaves in one file.
 pub const LEAVES_MAX: usize = 50_000_000;
 
 /// Why a mesh was not exported.
 #[derive(Debug, Error)]
 pub enum ExportError {
-    /// More than is sensible in one file.
+    /// The mesh has more than [`LEAVES_MAX`] leaves.
     #[error(
-        "{0} leaves are more than the {LEAVES_MAX} that one VTK file takes: mesh it coarser to look at it"
+        "the mesh has {0} leaves, more than the {LEAVES_MAX} that fit in one VTK file: export a coarser mesh"
     )]
     TooMany(usize),
-    /// A word that is no leaf.
-    #[error("a word is no leaf ({0}): run harness audit on the directory")]
+    /// A word that does not encode a leaf.
+    #[error("the leaf set has an invalid word ({0}): run harness audit on the directory")]
     Word(#[from] word::WordError),
     /// The file could not be written.
-    #[error("{path}: {why}: choose another file")]
-    Write {
-        /// The file.
-        path: String,
-        /// What went wrong.
-        why: String,
-    },
+    #[error("{0}: choose another file")]
+    Write(#[from] io::Error),
 }
 
 /// Corners of a hexahedron in VTK's order, in cell edges.
 const CORNERS: [[u32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
-/// Writes the mesh as `.vtu`: beside it first, then renamed.
+/// Writes the mesh as `.vtu`.
 ///
 /// # Errors
-/// Too many leaves, words that are none, or a file that cannot be written.
+/// If the mesh has too many leaves or an invalid word, or if the file cannot be written.
 pub fn vtu(mesh: &LeafSet, path: &Path) -> Result<(), ExportError> {
     let grid = grid(mesh)?;
-    let fail = |why: &dyn std::fmt::Display| ExportError::Write {
-        path: path.display().to_string(),
-        why: why.to_string(),
-    };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| fail(&e))?;
-    let mut out = BufWriter::new(&mut file);
-    grid.write_xml(&mut out).map_err(|e| fail(&format!("{e:?}")))?;
-    let finish = |mut out: BufWriter<_>| -> io::Result<()> { out.flush() };
-    finish(out).map_err(|e| fail(&e))?;
-    // A temporary file is its owner's alone; this one is to be looked at.
-    let readable = Permissions::from_mode(0o644);
-    file.as_file().set_permissions(readable).map_err(|e| fail(&e))?;
-    file.as_file().sync_all().map_err(|e| fail(&e))?;
-    file.persist(path).map_err(|e| fail(&e.error))?;
-    Ok(())
+    let invalid = |error| io::Error::other(format!("{error:?}"));
+    Ok(replace(path, |out| grid.write_xml(out).map_err(invalid))?)
 }
 
 fn grid(mesh: &LeafSet) -> Result<Vtk, ExportError> {
@@ -80,8 +60,8 @@ fn grid(mesh: &LeafSet) -> Result<Vtk, ExportError> {
     for (part, words) in (0i32..).zip(&mesh.parts) {
         for &w in words {
             let octant = word::decode(w)?.octant;
-            let (at, edge) = (octant.corner, octant.edge());
-            corners.extend(CORNERS.map(|c| packed([0, 1, 2].map(|a| at[a] + edge * c[a]))));
+            let (corner, edge) = (octant.corner, octant.edge());
+            corners.extend(CORNERS.map(|c| packed([0, 1, 2].map(|a| corner[a] + edge * c[a]))));
             levels.push(i32::from(octant.level));
             sides.push((w & 3) as i32);
             parts.push(part);
@@ -90,13 +70,13 @@ fn grid(mesh: &LeafSet) -> Result<Vtk, ExportError> {
     let mut points = corners.clone();
     points.sort_unstable();
     points.dedup();
-    let number = |c: &u64| points.binary_search(c).map_or(0, |i| i as u64);
-    let connectivity = corners.iter().map(number).collect();
+    let index = |c: &u64| points.binary_search(c).expect("every corner is a point") as u64;
+    let connectivity = corners.iter().map(index).collect();
     let scalars = |name: &str, data: Vec<i32>| {
         Attribute::DataArray(DataArray::scalars(name, 1).with_vec(data))
     };
     let piece = UnstructuredGridPiece {
-        points: locate(&points, &mesh.manifest.root).into(),
+        points: coordinates(&points, &mesh.manifest.root).into(),
         cells: Cells {
             cell_verts: VertexNumbers::XML {
                 connectivity,
@@ -118,16 +98,16 @@ fn grid(mesh: &LeafSet) -> Result<Vtk, ExportError> {
     })
 }
 
-/// A corner as one number; 20 bits per axis, as the far side of the root is a corner too.
+/// A corner as one number, 20 bits per axis: lattice coordinates range from 0 to 2^19 inclusive.
 fn packed(corner: [u32; 3]) -> u64 {
     corner.iter().rev().fold(0, |p, &c| p << 20 | u64::from(c))
 }
 
-/// Points in the geometry's units, three numbers each.
-fn locate(points: &[u64], root: &Root) -> Vec<f64> {
+/// Coordinates of packed corners in the units of the geometry, three per point.
+fn coordinates(points: &[u64], root: &Root) -> Vec<f64> {
     let step = root.edge / f64::from(CELLS_PER_EDGE);
-    let at = |p: u64, a: usize| root.origin[a] + (p >> (20 * a) & 0xf_ffff) as f64 * step;
-    points.iter().flat_map(|&p| [at(p, 0), at(p, 1), at(p, 2)]).collect()
+    let along = |p: u64, a: usize| root.origin[a] + (p >> (20 * a) & 0xf_ffff) as f64 * step;
+    points.iter().flat_map(|&p| [along(p, 0), along(p, 1), along(p, 2)]).collect()
 }
 
 #[cfg(test)]
@@ -135,10 +115,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_are_packed_and_found_again() {
+    fn packed_corners_have_the_coordinates_of_the_geometry() {
         let root = Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 };
         let corners = [[0, 0, 0], [CELLS_PER_EDGE, 0, 0], [0, CELLS_PER_EDGE / 2, CELLS_PER_EDGE]];
-        let at = locate(&corners.map(packed), &root);
-        assert_eq!(at, [-1.0, 0.0, 2.0, 3.0, 0.0, 2.0, -1.0, 2.0, 6.0]);
+        let coordinates = coordinates(&corners.map(packed), &root);
+        assert_eq!(coordinates, [-1.0, 0.0, 2.0, 3.0, 0.0, 2.0, -1.0, 2.0, 6.0]);
     }
 }

@@ -1,25 +1,25 @@
-//! Groups of runs as figures need them: by case, as points, with how they were measured.
+//! Groups of runs in the form that figures need: by case, as points, with their provenance.
 
-use super::figure::{How, Point};
+use crate::figure::{Point, Provenance};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::stats::Median;
 
-/// How a group's times were come by.
-pub fn how(group: &Group) -> How {
+/// How the times of a group were obtained.
+pub fn provenance(group: &Group) -> Provenance {
     match group.setup.comm {
-        Comm::Sim => How::Projected,
-        _ if group.oversubscribed() => How::Oversubscribed,
-        _ => How::Measured,
+        Comm::Sim => Provenance::Projected,
+        _ if group.oversubscribed() => Provenance::Oversubscribed,
+        _ => Provenance::Measured,
     }
 }
 
-/// A median as a point.
+/// A median with its confidence interval as a point.
 pub fn point(x: f64, m: Median) -> Point {
     Point { x, y: m.value, low: m.low, high: m.high, count: m.count, coverage: m.coverage }
 }
 
-/// "n = 6, bars: 95 % or more" and the like, for a caption.
+/// The number of repetitions and the meaning of the error bars, as a sentence without its full stop.
 pub fn repetitions(groups: &[&Group]) -> String {
     let counts: Vec<usize> = groups.iter().map(|g| g.time_s.count).collect();
     let (least, most) =
@@ -27,17 +27,17 @@ pub fn repetitions(groups: &[&Group]) -> String {
     let covered = groups.iter().map(|g| g.time_s.coverage).fold(1.0, f64::min);
     let n = if least == most { format!("{least}") } else { format!("{least} to {most}") };
     format!(
-        "Medians of {n} runs; bars are nonparametric intervals that contain the true median with at least {:.0} % probability{}",
+        "Medians of {n} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{}",
         covered * 100.0,
         if groups.iter().any(|g| g.by_rank && g.setup.comm == Comm::Sim) {
-            "; where projected, medians are taken rank by rank, and bars are of the runs' own projections"
+            "; projections use medians per rank, and their bars are those of the projections of single runs"
         } else {
             ""
         }
     )
 }
 
-/// Cases, in the order in which they come, with the groups of an experiment.
+/// The groups of an experiment by case, in the order of the record.
 pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(&'a str, Vec<&'a Group>)> {
     let mut out: Vec<(&str, Vec<&Group>)> = Vec::new();
     for group in groups.all.iter().filter(|g| g.setup.experiment == experiment) {

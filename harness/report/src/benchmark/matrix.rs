@@ -1,36 +1,36 @@
-//! Figures of message matrices: how much every rank sends to every other.
+//! Figures of message matrices: bytes and messages between pairs of ranks.
 
-use super::figure::{Axis, Body, Claims, Figure, Heat, Layer};
-use super::scaling::about;
+use super::scaling::cells_label;
+use crate::figure::{Axis, Body, Claims, Figure, HeatMap, Layer, svg};
 use bench::experiments::entry::Run;
 use bench::experiments::group::Groups;
 use bench::experiments::table::{division, grouped};
 
-/// One of every mesh and number of ranks that is on record.
+/// A figure per recorded message matrix.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     groups.matrices.iter().map(figure).collect()
 }
 
 fn figure(run: &Run) -> Figure {
     let s = &run.setup;
-    let layer = |label: &str, of: usize| {
-        let cell = |e: &[u64; 4]| (e[0] as usize, e[1] as usize, e[of] as f64);
-        Layer { label: label.to_owned(), cells: run.message_matrix.iter().map(cell).collect() }
+    let layer = |label: &str, quantity: usize| {
+        let entry = |e: &[u64; 4]| (e[0] as usize, e[1] as usize, e[quantity] as f64);
+        Layer { label: label.to_owned(), entries: run.message_matrix.iter().map(entry).collect() }
     };
-    let total = |of: usize| run.message_matrix.iter().map(|e| e[of]).sum::<u64>();
+    let total = |quantity: usize| run.message_matrix.iter().map(|e| e[quantity]).sum::<u64>();
     let pairs = s.ranks * s.ranks.saturating_sub(1);
     Figure {
-        id: format!("messages-{}-{}-{}", s.case, about(run.cells), s.ranks),
+        id: format!("messages-{}-{}-{}", s.case, cells_label(run.cells), s.ranks),
         title: format!(
-            "Messages from rank to rank: {}, {} cells, {} ranks",
+            "Messages between pairs of ranks: {}, {} cells, {} ranks",
             s.case,
             grouped(run.cells),
             s.ranks
         ),
         caption: format!(
-            "Bytes and messages that every rank sends to every other in exchanges: {}, {} cells, n = {}, on {} simulated ranks, partition: {}. In \
-             total {} messages with {:.1} MB between {} of {} pairs of sender and receiver; white is none. Collective calls, which are between no \
-             pair, are left out{}. The counts repeat exactly.",
+            "Bytes and messages sent between pairs of ranks in point-to-point communication: {}, {} cells, n = {}, {} simulated ranks, partition: \
+             {}. The total is {} messages with {:.1} MB between {} of {} ordered pairs; white pairs exchange nothing. Collective calls are not \
+             included{}. The counts repeat exactly.",
             s.case,
             grouped(run.cells),
             s.layer_cells_min,
@@ -40,25 +40,26 @@ fn figure(run: &Run) -> Figure {
             total(3) as f64 / 1e6,
             grouped(run.message_matrix.len() as u64),
             grouped(pairs as u64),
-            of_all(run, total(3))
+            collective_fraction(run, total(3))
         ),
         x: Axis::linear("to rank"),
         y: Axis::linear("from rank"),
-        body: Body::Heat(Heat {
-            side: s.ranks,
+        body: Body::HeatMap(HeatMap {
+            order: s.ranks,
             layers: vec![layer("bytes", 3), layer("messages", 2)],
             command: run.command.clone(),
         }),
+        height: svg::HEIGHT,
         claims: Claims { deterministic: true, ..Claims::default() },
     }
 }
 
-/// What part of all bytes that is, where the program counts those.
-fn of_all(run: &Run, bytes: u64) -> String {
+/// The fraction of all bytes that collective calls send, in parentheses; empty if the program does not count all bytes.
+fn collective_fraction(run: &Run, point_to_point_bytes: u64) -> String {
     let all = run.counters.get("message_bytes").map(|c| c.sum).filter(|sum| *sum > 0.0);
     all.map_or(String::new(), |sum| {
-        let part = 100.0 * (1.0 - bytes as f64 / sum);
-        format!(": {part:.0} % of all bytes")
+        let percent = 100.0 * (1.0 - point_to_point_bytes as f64 / sum);
+        format!(" ({percent:.0} % of all bytes)")
     })
 }
 
@@ -66,25 +67,24 @@ fn of_all(run: &Run, bytes: u64) -> String {
 mod tests {
     use super::*;
     use bench::experiments::entry::{Comm, Spread, What};
-    use bench::testing::line;
-    use bench::testing::run;
+    use bench::testing::{line, run};
 
     #[test]
-    fn a_caption_tells_totals_and_what_is_left_out() {
-        let mut warm = run(Comm::Sim, 2_000_000, &[("a", &[1.0, 1.0, 1.0])]);
-        (warm.warm_up, warm.message_matrix) =
-            (true, vec![[0, 1, 2, 3_000_000], [2, 0, 1, 1_000_000]]);
-        warm.counters.insert("message_bytes".into(), Spread::brief(&[4e6, 0.0, 1e6]));
-        let figures = figures(&Groups::of(&[line(What::Run(Box::new(warm)))]));
+    fn the_caption_has_the_totals_and_the_fraction_of_collective_calls() {
+        let mut warm_up = run(Comm::Sim, 2_000_000, &[("a", &[1.0, 1.0, 1.0])]);
+        warm_up.warm_up = true;
+        warm_up.message_matrix = vec![[0, 1, 2, 3_000_000], [2, 0, 1, 1_000_000]];
+        warm_up.counters.insert("message_bytes".into(), Spread::brief(&[4e6, 0.0, 1e6]));
+        let figures = figures(&Groups::of(&[line(What::Run(Box::new(warm_up)))]));
         let [f] = &figures[..] else { panic!("{figures:?}") };
         assert_eq!(f.id, "messages-cube-2M-3");
-        for words in [
-            "n = 4, on 3 simulated ranks, partition: metis area",
-            "3 messages with 4.0 MB between 2 of 6 pairs",
-            "Collective calls, which are between no pair, are left out: 20 % of all bytes",
+        for part in [
+            "n = 4, 3 simulated ranks, partition: metis area",
+            "3 messages with 4.0 MB between 2 of 6 ordered pairs",
+            "Collective calls are not included (20 % of all bytes)",
         ] {
-            assert!(f.caption.contains(words), "{words} is missing in {}", f.caption);
+            assert!(f.caption.contains(part), "{part} is missing in {}", f.caption);
         }
-        assert!(matches!(&f.body, Body::Heat(h) if h.layers[0].cells[1] == (2, 0, 1e6)));
+        assert!(matches!(&f.body, Body::HeatMap(map) if map.layers[0].entries[1] == (2, 0, 1e6)));
     }
 }

@@ -1,5 +1,7 @@
-//! The history for other people's tools: Bencher, github-action-benchmark, spreadsheets, JUnit readers.
+//! The history for other programs: Bencher, github-action-benchmark, spreadsheets, readers of JUnit XML.
 
+use crate::figure::csv::table;
+use crate::json::pretty;
 use crate::verification::junit::to_text;
 use bench::track::history::Record;
 use bench::track::{Series, told};
@@ -33,35 +35,19 @@ fn unit(name: &str) -> &'static str {
     }
 }
 
-fn pretty(value: &Value) -> String {
-    // A value that was made here holds nothing that JSON cannot.
-    let mut text = serde_json::to_string_pretty(value).expect("plain data");
-    text.push('\n');
-    text
-}
-
-/// The whole history as a table, one number to a line.
+/// The whole history as CSV, one value per line.
 pub fn csv(records: &[Record]) -> String {
-    let mut text = "commit,time,case,metric,value\n".to_owned();
-    for record in records {
-        for (name, value) in &record.metrics {
+    let rows = records.iter().flat_map(|record| {
+        record.metrics.iter().map(|(name, value)| {
             let (case, metric) = name.split_once('/').unwrap_or(("all", name));
-            let fields = [&record.commit, &record.time, case, metric].map(quoted).join(",");
-            text.push_str(&format!("{fields},{value}\n"));
-        }
-    }
-    text
+            let names = [&record.commit, &record.time, case, metric].map(str::to_owned);
+            names.into_iter().chain([value.to_string()]).collect()
+        })
+    });
+    table(&["commit", "time", "case", "metric", "value"], rows)
 }
 
-/// A field of RFC 4180.
-fn quoted(field: &str) -> String {
-    match field.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field.to_owned(),
-    }
-}
-
-/// A test per metric, which fails where the last change is for the worse and recent.
+/// A test per metric. It fails if the last change point is an increase of a cost among the last `recent` values.
 pub fn junit(all: &[Series], recent: usize) -> String {
     let mut xml = quick_junit::Report::new("harness track");
     let mut suite = TestSuite::new("track");
@@ -92,7 +78,7 @@ mod tests {
     use bench::track::divisive::Rules;
 
     #[test]
-    fn forms_are_those_that_the_tools_document() {
+    fn the_forms_are_those_that_the_tools_document() {
         let record = Record {
             metrics: [("uav/4 ranks/words".to_owned(), 3.5)].into(),
             ..Record::new("a".into())
@@ -111,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn junit_fails_what_got_worse_recently() {
+    fn a_recent_increase_of_a_cost_is_a_failed_test() {
         let all = analyse(&sample(), &Rules::default());
         let failures = |recent| {
             quick_junit::Report::deserialize_from_str(&junit(&all, recent)).unwrap().failures

@@ -1,4 +1,5 @@
-//! The history of numbers by commit: a page, and forms for other programs.
+//! The history of measured values by commit: a page, figures, and forms for other programs.
 
 pub mod export;
+pub mod figures;
 pub mod page;

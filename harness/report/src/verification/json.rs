@@ -1,13 +1,10 @@
-//! JSON for programs; the schema is documented in the harness's README.
+//! A verification as JSON; the schema is documented in harness/README.md.
 
 use run::verify::report::Report;
 
 /// The report as JSON, ending in a line feed.
 pub fn json(report: &Report) -> String {
-    // The model holds strings, numbers and lists only: nothing of it can fail to become JSON.
-    let mut text = serde_json::to_string_pretty(report).expect("a report is representable in JSON");
-    text.push('\n');
-    text
+    crate::json::pretty(report)
 }
 
 #[cfg(test)]
@@ -16,14 +13,14 @@ mod tests {
     use run::testing::report as sample;
 
     #[test]
-    fn round_trip() {
+    fn reading_restores_the_report() {
         let text = json(&sample());
         let back: Report = serde_json::from_str(&text).unwrap();
         assert_eq!(json(&back), text);
     }
 
     #[test]
-    fn outcomes_are_words() {
+    fn outcomes_are_named_and_have_reasons() {
         let value: serde_json::Value = serde_json::from_str(&json(&sample())).unwrap();
         let checks = value["cases"][0]["checks"].as_array().unwrap();
         let outcomes: Vec<_> =

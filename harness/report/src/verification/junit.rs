@@ -1,4 +1,5 @@
-//! JUnit XML for CI: a suite per case, a test per check; what was left out is skipped, with the reason.
+//! A verification as JUnit XML: a suite per case, a test per check. Checks that were left out are skipped tests with a
+//! reason.
 
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use run::verify::report::{CaseReport, Check, Outcome, Report};
@@ -15,10 +16,9 @@ pub fn junit(report: &Report) -> String {
     to_text(&xml)
 }
 
-/// JUnit XML as text, valid by the schema that Jenkins' xUnit plugin publishes (junit-10.xsd), which does not know
-/// `skipped` on the outermost element.
+/// JUnit XML as text, valid by the schema of Jenkins' xUnit plugin (junit-10.xsd), which does not allow `skipped` on the
+/// outermost element.
 pub fn to_text(report: &quick_junit::Report) -> String {
-    // XML into memory fails only for a formatter's own bug.
     let text = report.to_string().expect("a report is representable in XML");
     let Some((start, end)) = text.find("<testsuites").and_then(|from| {
         let until = from + text[from..].find('>')?;
@@ -67,7 +67,7 @@ fn test(check: &Check) -> TestCase {
     test
 }
 
-/// What `--require` named and is missing fails a build, so it is an error here too.
+/// A missing program that `--require` names fails the build, so it is an error here too.
 fn requirements(report: &Report) -> TestSuite {
     let mut suite = TestSuite::new("required");
     for missing in report.missing.iter().filter(|missing| missing.required) {
@@ -84,7 +84,7 @@ mod tests {
     use run::testing::report as sample;
 
     #[test]
-    fn the_outermost_element_has_no_attribute_that_the_schema_does_not_know() {
+    fn the_outermost_element_has_only_attributes_of_the_schema() {
         let text = junit(&sample());
         let outermost = text.lines().find(|line| line.starts_with("<testsuites")).unwrap();
         assert!(
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_and_reasons_survive_a_reader() {
+    fn a_reader_finds_the_counts_and_reasons() {
         let mut report = sample();
         report.missing[0].required = true;
         let back = quick_junit::Report::deserialize_from_str(&junit(&report)).unwrap();
@@ -106,7 +106,7 @@ mod tests {
         let case = &back.test_suites[0];
         assert_eq!((case.name.as_str(), case.tests), ("cube_small", 3));
         let TestCaseStatus::Skipped { message, .. } = &case.test_cases[2].status else {
-            panic!("a check that was left out is skipped");
+            panic!("a check that was left out must be skipped");
         };
         assert_eq!(message.as_ref().unwrap().as_str(), "left out: the engine is not built");
     }

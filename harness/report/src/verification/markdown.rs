@@ -1,20 +1,15 @@
-//! Markdown, for a CI system's summary page and for the demo's report.
+//! A verification as Markdown, for the summary page of a CI system and for the report of the demo.
 
 use super::remarks::remarks;
 use super::table::{COLUMN_PAPER, COLUMNS, rows_of};
+use crate::markdown::{escaped, table};
 use run::verify::report::Report;
 
 /// The report as Markdown: verdict, table, remarks.
 pub fn markdown(report: &Report) -> String {
-    let titles: Vec<String> =
-        COLUMNS.iter().chain([&COLUMN_PAPER]).map(|title| (*title).to_owned()).collect();
-    let rule = vec!["---".to_owned(); titles.len()];
-    let rows = report.cases.iter().flat_map(rows_of);
+    let columns: Vec<&str> = COLUMNS.iter().chain([&COLUMN_PAPER]).copied().collect();
     let mut text = format!("## harness verify\n\n{}\n\n", report.verdict());
-    for row in [titles, rule].into_iter().chain(rows) {
-        let fields: Vec<String> = row.iter().map(|field| escaped(field)).collect();
-        text.push_str(&format!("| {} |\n", fields.join(" | ")));
-    }
+    text += &table(&columns, |_| "---", report.cases.iter().flat_map(rows_of));
     let remarks = remarks(report);
     if !remarks.is_empty() {
         text.push('\n');
@@ -23,22 +18,6 @@ pub fn markdown(report: &Report) -> String {
         text.push_str(&format!("- {}\n", escaped(&remark)));
     }
     text
-}
-
-/// Text in which Markdown and HTML see nothing of theirs, on one line.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '&' => out.push_str("&amp;"),
-            '\n' => out.push_str("<br>"),
-            '|' | '*' | '_' | '`' | '[' | ']' | '\\' => out.extend(['\\', character]),
-            _ => out.push(character),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

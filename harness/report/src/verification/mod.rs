@@ -1,4 +1,4 @@
-//! A verification's report, printed: a file per format.
+//! The report of a verification; one module per format.
 
 pub mod json;
 pub mod junit;

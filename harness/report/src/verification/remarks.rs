@@ -1,30 +1,29 @@
-//! What a table cannot hold: everything that failed, was left out, or is worth a note, a line each.
+//! The lines below the table: failures, omissions and notes.
 
 use run::verify::report::{CaseReport, Check, Outcome, Report};
 
-/// What is missing, then each case's failures, omissions and notes.
+/// Missing programs, then failures, omissions and notes of each case, one line each.
 pub fn remarks(report: &Report) -> Vec<String> {
     let missing = report.missing.iter();
-    let told = missing.map(|missing| format!("left out: {} because {}", missing.what, missing.why));
-    let mut lines: Vec<String> = told.collect();
+    let mut lines: Vec<String> =
+        missing.map(|m| format!("left out: {} because {}", m.what, m.why)).collect();
     for case in &report.cases {
         let name = &case.name;
         lines.extend(case.input_error.iter().map(|error| format!("input: {name}: {error}")));
         lines.extend(outcomes(case, report));
-        let noted = |check: &Check| {
-            let (subject, check, notes) = (check.subject.clone(), check.name.clone(), &check.notes);
-            let told = move |note| format!("note: {name}: {subject}: {check}: {note}");
-            notes.iter().map(told).collect::<Vec<_>>()
+        let notes = case.checks.iter().flat_map(|c| c.notes.iter().map(move |note| (c, note)));
+        let line = |(c, note): (&Check, &String)| {
+            format!("note: {name}: {}: {}: {note}", c.subject, c.name)
         };
-        lines.extend(case.checks.iter().flat_map(noted));
+        lines.extend(notes.map(line));
         lines.extend(case.kept.iter().map(|place| format!("kept: {name}: {place}")));
         lines.extend(case.repeat_with.iter().map(|command| format!("repeat with: {command}")));
     }
     lines
 }
 
-/// A case's checks that did not pass; those with one reason are told together, since what is wrong with
-/// one layout of ranks is often wrong with all.
+/// The checks of a case that did not pass. Those with the same reason share a line, because a fault with one layout of ranks
+/// is often a fault with all.
 fn outcomes(case: &CaseReport, report: &Report) -> Vec<String> {
     let mut groups: Vec<(&Check, Vec<&str>)> = Vec::new();
     for check in &case.checks {
@@ -36,17 +35,17 @@ fn outcomes(case: &CaseReport, report: &Report) -> Vec<String> {
             None => groups.push((check, vec![&check.subject])),
         }
     }
-    let told = groups.into_iter().filter_map(|(check, subjects)| {
+    let lines = groups.into_iter().filter_map(|(check, subjects)| {
         let what = format!("{}: {}: {}", case.name, subjects.join("; "), check.name);
         match &check.outcome {
             Outcome::Pass => None,
             Outcome::Fail(why) => Some(format!("FAILED: {what}: {why}")),
-            // What is missing everywhere has been said once.
+            // The line about the missing program covers it.
             Outcome::LeftOut(why) if report.missing.iter().any(|one| one.why == *why) => None,
             Outcome::LeftOut(why) => Some(format!("left out: {what} because {why}")),
         }
     });
-    told.collect()
+    lines.collect()
 }
 
 #[cfg(test)]
@@ -55,7 +54,7 @@ mod tests {
     use run::testing::report as sample;
 
     #[test]
-    fn failures_omissions_and_notes_are_all_there_once() {
+    fn failures_omissions_and_notes_have_one_line_each() {
         let expected = [
             "left out: p4est because the engine is not built",
             "FAILED: cube_small: 4 ranks, metis, base auto: same leaves: first difference <at> root",
@@ -67,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn one_reason_is_told_once() {
+    fn checks_that_fail_for_one_reason_share_a_line() {
         let mut report = sample();
         let again = Check { subject: "7 ranks".into(), ..report.cases[0].checks[1].clone() };
         report.cases[0].checks.push(again);

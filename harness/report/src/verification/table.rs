@@ -1,4 +1,4 @@
-//! The table for people: a line for each case's serial run, one for each rank count, then the remarks.
+//! A verification as a text table: a line for the serial run of each case and one per rank count, then the remarks.
 
 use super::remarks::remarks;
 use run::verify::report::{CaseReport, Report, Run, Tally};
@@ -20,7 +20,7 @@ pub const COLUMNS: [&str; 12] = [
     "B/cell",
 ];
 
-/// The column that compares with the paper's 38 k cells per second on one core.
+/// Heading of the speedup over the 38,000 cells per second that the paper reports on one core.
 pub const COLUMN_PAPER: &str = "x paper";
 
 /// The report as plain text.
@@ -49,7 +49,7 @@ pub fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
         let with_ranks =
             |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks.count() == ranks);
         let runs = case.runs.iter().filter(with_ranks);
-        // Layouts differ in time and not in result; the table shows what the best of them gives.
+        // All layouts give the same mesh; the table has the time of the fastest.
         let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));
         let checks = case.checks.iter().filter(|check| check.ranks == Some(ranks)).collect();
         let mut row = vec![String::new(); 4];
@@ -83,7 +83,7 @@ fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
     fields
 }
 
-/// Columns as wide as their widest field; all but the first set to the right.
+/// Columns as wide as their widest field, all but the first right-aligned.
 fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width =
@@ -109,7 +109,7 @@ mod tests {
     use run::testing::report as sample;
 
     #[test]
-    fn a_line_for_the_serial_run_and_one_for_each_rank_count() {
+    fn the_serial_run_and_every_rank_count_have_a_line() {
         let text = table(&sample());
         let lines: Vec<Vec<&str>> =
             text.lines().map(|line| line.split_whitespace().collect()).collect();

@@ -1,13 +1,10 @@
-//! PNG and PDF from SVG, with the shipped typeface only, so that they look the same on every machine.
+//! PNG and PDF from SVG, with the typeface in `font/` only, so that they look the same on every machine.
 
 use resvg::{tiny_skia, usvg};
 use std::sync::Arc;
 
-/// DejaVu Sans, Latin part; its licence is beside it.
+/// DejaVu Sans, Latin part; its licence is in the same directory.
 const FONT: &[u8] = include_bytes!("font/DejaVuSans-latin.ttf");
-
-/// PNG's pixels per SVG's.
-const ZOOM: f32 = 1.0;
 
 fn tree(svg: &str) -> Result<usvg::Tree, String> {
     let mut options =
@@ -16,25 +13,23 @@ fn tree(svg: &str) -> Result<usvg::Tree, String> {
     usvg::Tree::from_str(svg, &options).map_err(|error| error.to_string())
 }
 
-/// The figure as PNG, on white.
+/// The figure as PNG, on white, with one pixel per unit of the SVG's coordinates.
 ///
 /// # Errors
-/// Where `svg` is none.
+/// If `svg` is not an SVG document.
 pub fn png(svg: &str) -> Result<Vec<u8>, String> {
     let tree = tree(svg)?;
-    let size = tree.size();
-    let side = |length: f32| (length * ZOOM).ceil() as u32;
-    let mut pixels =
-        tiny_skia::Pixmap::new(side(size.width()), side(size.height())).ok_or("it has no size")?;
+    let size = tree.size().to_int_size();
+    let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height()).ok_or("the size is 0")?;
     pixels.fill(tiny_skia::Color::WHITE);
-    resvg::render(&tree, tiny_skia::Transform::from_scale(ZOOM, ZOOM), &mut pixels.as_mut());
+    resvg::render(&tree, tiny_skia::Transform::identity(), &mut pixels.as_mut());
     pixels.encode_png().map_err(|error| error.to_string())
 }
 
-/// The figure as PDF with its text as text.
+/// The figure as PDF, whose text remains text.
 ///
 /// # Errors
-/// Where `svg` is none.
+/// If `svg` is not an SVG document.
 pub fn pdf(svg: &str) -> Result<Vec<u8>, String> {
     let tree = tree(svg)?;
     svg2pdf::to_pdf(&tree, svg2pdf::ConversionOptions::default(), svg2pdf::PageOptions::default())
@@ -43,18 +38,18 @@ pub fn pdf(svg: &str) -> Result<Vec<u8>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::{Body, How};
-    use super::super::paint::{svg, tests};
+    use super::super::samples::{figure, series};
+    use super::super::svg::svg;
+    use super::super::{Body, Provenance};
     use super::*;
 
     #[test]
-    fn both_formats_come_out_with_their_words() {
-        let drawn = svg(&tests::figure(Body::Points(vec![tests::series(How::Measured)])));
+    fn png_and_pdf_contain_the_text() {
+        let drawn = svg(&figure(Body::points(vec![series(Provenance::Measured)])));
         let image = png(&drawn).unwrap();
         assert_eq!(&image[1..4], b"PNG");
-        // Without its words the image would be another one.
-        let silent = png(&drawn.replace("speedup", "").replace("ranks", "")).unwrap();
-        assert_ne!(image, silent);
+        let without_text = png(&drawn.replace(">speedup<", "><").replace(">ranks<", "><")).unwrap();
+        assert_ne!(image, without_text);
         let page = pdf(&drawn).unwrap();
         assert!(page.starts_with(b"%PDF"));
         assert!(page.windows(10).any(|w| w == b"DejaVuSans"), "the typeface is in the file");

@@ -1,0 +1,68 @@
+//! The HTML page that every report is put into: self-contained, without scripts, light and dark, narrow and wide.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const STYLE: &str = include_str!("page.css");
+
+/// A page with a title, which is its heading too.
+pub fn page(title: &str, content: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body { main { h1 { (title) } (content) } }
+        }
+    };
+    page.into_string() + "\n"
+}
+
+/// A table with numbers to the right; `class` may choose another layout of the style sheet.
+pub fn table(class: Option<&str>, columns: &[&str], rows: &[Vec<Markup>]) -> Markup {
+    html! {
+        div.scroll { table class=[class] {
+            thead { tr { @for column in columns { th { (column) } } } }
+            tbody { @for row in rows { "\n" tr { @for field in row { td { (field) } } } } }
+        } }
+    }
+}
+
+/// A figure with its heading, drawing and caption.
+pub fn figure(id: &str, title: &str, svg: &str, caption: &Markup) -> Markup {
+    html! {
+        "\n"
+        figure id=(id) {
+            h3 { (title) }
+            div.plot { (PreEscaped(svg)) }
+            figcaption { (caption) }
+        }
+    }
+}
+
+/// Text in which words between backquotes are set as code.
+pub fn with_code(text: &str) -> Markup {
+    html! {
+        @for (i, part) in text.split('`').enumerate() {
+            @if i % 2 == 1 { code { (part) } } @else { (part) }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_escaped_and_backquotes_become_code() {
+        assert_eq!(with_code("a `b<c` d").into_string(), "a <code>b&lt;c</code> d");
+        let page = page("a & b", &table(None, &["<x>"], &[vec![html! { "<y>" }]]));
+        for part in ["<title>a &amp; b</title>", "<th>&lt;x&gt;</th>", "<td>&lt;y&gt;</td>"] {
+            assert!(page.contains(part), "{part} is missing in\n{page}");
+        }
+    }
+}
