@@ -138,14 +138,15 @@ fn base_tree_and_mesh_equal_those_of_the_dense_grid() {
         let is_deep = |level: u32| level > random.level_surface;
         count(&crossing_deep, cells.iter().any(|c| c.side == CROSSING && is_deep(c.level)));
     });
-    // Rare situations must occur among the random cases.
+    // Rare situations must occur among the random cases. The bounds are far below the mean rates,
+    // so that the test does not fail by chance.
     let [tested, inside, ambiguous, crossing_deep] =
         [tested, inside, ambiguous, crossing_deep].map(Cell::into_inner);
-    assert!(inside > tested / 8, "{inside} of {tested} cases have an inside");
-    assert!(ambiguous > tested / 20, "{ambiguous} of {tested} cases are ambiguous");
+    assert!(inside >= tested / 20, "{inside} of {tested} cases have an inside");
+    assert!(ambiguous >= tested / 50, "{ambiguous} of {tested} cases are ambiguous");
     assert!(
-        crossing_deep > tested / 8,
-        "{crossing_deep} of {tested} have boxes finer than the surface"
+        crossing_deep >= tested / 20,
+        "{crossing_deep} of {tested} cases have boxes finer than the surface"
     );
 }
 
