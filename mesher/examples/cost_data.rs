@@ -11,7 +11,7 @@ use mesher::kept::Kept;
 use mesher::partition::cost::Counts;
 use mesher::partition::initial::{self, Partition};
 use mesher::partition::{Division, Partitioner, Weights, repartition};
-use mesher::voxelise::Filed;
+use mesher::voxelise::BinnedFacets;
 use mesher::{grade, ingest, quantise, refine, sides};
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let mark = |level| refine::refine_top(&facets, &rules, level).0.split;
     let Partition { ownership, level_base, .. } =
         initial::partition(&facets, &rules, &division, mark, comm)?;
-    let binned = Filed::new(&refine::route(&facets, &ownership, comm));
+    let binned = BinnedFacets::new(&refine::route(&facets, &ownership, comm));
     let (mut tree, _) = refine::refine(&binned, &rules, &ownership);
     let ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);
     ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);

@@ -4,11 +4,11 @@
 #[path = "support/process.rs"]
 mod process;
 
-use process::{Place, Told, has_mpi, run, tetrahedron};
+use process::{Finished, Workspace, run, tetrahedron};
 
 /// Runs the mesher as rank `rank` of three under a launcher that sets `variables`, as `_SIZE` and `_RANK`.
-fn run_as_rank(place: &Place, args: &[&str], launcher: &str, rank: usize) -> Told {
-    let mut command = place.mesher(args);
+fn run_as_rank(workspace: &Workspace, args: &[&str], launcher: &str, rank: usize) -> Finished {
+    let mut command = workspace.mesher(args);
     for v in ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "SLURM_PROCID"] {
         command.env_remove(v);
     }
@@ -18,88 +18,90 @@ fn run_as_rank(place: &Place, args: &[&str], launcher: &str, rank: usize) -> Tol
 
 #[test]
 fn help_is_printed_once_per_job() {
-    let place = Place::new();
+    let workspace = Workspace::new();
     for launcher in ["OMPI_COMM_WORLD", "PMI", "PMIX"] {
         for (rank, is_printed) in [(0, true), (1, false), (2, false)] {
             for option in ["--help", "--version", "--man", "--completions=bash"] {
-                let told = run_as_rank(&place, &[option], launcher, rank);
-                told.succeeds();
-                assert_eq!(!told.stdout.is_empty(), is_printed, "{launcher} {rank} {option}");
+                let finished = run_as_rank(&workspace, &[option], launcher, rank);
+                finished.succeeds();
+                assert_eq!(!finished.stdout.is_empty(), is_printed, "{launcher} {rank} {option}");
             }
         }
     }
 }
 
-/// A build without MPI cannot agree on errors: only the launcher's variables tell ranks apart.
+/// A build without MPI cannot agree on errors: only the launcher's variables distinguish ranks.
 #[cfg(not(feature = "mpi"))]
 #[test]
 fn without_mpi_one_process_of_a_job_prints_the_error() {
-    let place = Place::new();
+    let workspace = Workspace::new();
     for launcher in ["OMPI_COMM_WORLD", "PMI", "PMIX"] {
         for args in [&["case.toml"][..], &["case.toml", "--weights", "no-such-weights"]] {
-            run_as_rank(&place, args, launcher, 0).refuses(2, &["built without MPI"]);
+            run_as_rank(&workspace, args, launcher, 0).refuses(2, &["built without MPI"]);
             for rank in [1, 2] {
-                let told = run_as_rank(&place, args, launcher, rank);
-                assert_eq!((told.code, &*told.stdout, &*told.stderr), (Some(2), "", ""));
+                let finished = run_as_rank(&workspace, args, launcher, rank);
+                assert_eq!(
+                    (finished.code, &*finished.stdout, &*finished.stderr),
+                    (Some(2), "", "")
+                );
             }
         }
     }
 }
 
 #[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
 fn ranks_of_mpi_print_help_and_command_line_errors_once() {
-    if !has_mpi() {
-        return;
-    }
-    let place = Place::new();
-    let told = run(place.mpirun(3, &["--version"]));
-    told.succeeds();
-    assert_eq!(told.stdout.lines().count(), 1, "{told:?}");
-    run(place.mpirun(3, &["case.toml", "--weights", "rehearsal"]))
+    let workspace = Workspace::new();
+    let finished = run(workspace.mpirun(3, &["--version"]));
+    finished.succeeds();
+    assert_eq!(finished.stdout.lines().count(), 1, "{finished:?}");
+    run(workspace.mpirun(3, &["case.toml", "--weights", "rehearsal"]))
         .refuses_under_launcher(2, &["'rehearsal'", "--weights"]);
 }
 
 #[test]
 fn the_version_has_the_commit_of_the_work_tree() {
-    let place = Place::new();
-    let told = run(place.mesher(&["--version"]));
-    told.succeeds();
+    let workspace = Workspace::new();
+    let finished = run(workspace.mesher(&["--version"]));
+    finished.succeeds();
     let version = concat!("mesher ", env!("CARGO_PKG_VERSION"));
-    let rest = told.stdout.trim_end().strip_prefix(version).expect("the crate's version").trim();
+    let rest =
+        finished.stdout.trim_end().strip_prefix(version).expect("the crate's version").trim();
     let commit = rest.strip_prefix('(').and_then(|r| r.strip_suffix(')'));
     let is_hash = |c: &str| c.len() >= 7 && c.chars().all(|c| c.is_ascii_hexdigit());
     let is_tag_or_hash = |c: &str| is_hash(c.trim_end_matches("-dirty")) || c.contains("-g");
     // Sources without git have no commit.
-    assert!(rest.is_empty() || commit.is_some_and(is_tag_or_hash), "{told:?}");
+    assert!(rest.is_empty() || commit.is_some_and(is_tag_or_hash), "{finished:?}");
 }
 
 #[test]
 fn completions_and_man_page_have_all_options() {
-    let place = Place::new();
-    let shown = run(place.mesher(&["--help"])).stdout;
+    let workspace = Workspace::new();
+    let shown = run(workspace.mesher(&["--help"])).stdout;
     let words = shown.split_whitespace().map(|w| w.trim_end_matches(','));
     let options: Vec<&str> = words.filter(|w| w.starts_with("--") && w.len() > 3).collect();
     assert!(options.len() > 15, "{options:?}");
     for args in [&["--completions", "bash"][..], &["--completions=zsh"], &["--man"]] {
-        let told = run(place.mesher(args));
-        told.succeeds();
-        let text = told.stdout.replace('\\', "");
+        let finished = run(workspace.mesher(args));
+        finished.succeeds();
+        let text = finished.stdout.replace('\\', "");
         for option in options.iter().filter(|o| o.chars().all(|c| c == '-' || c.is_alphabetic())) {
             assert!(text.contains(option), "{option} is missing from {args:?}");
         }
     }
-    run(place.mesher(&["--completions", "no-such-shell"])).refuses(2, &["no-such-shell"]);
-    run(place.mesher(&["case.toml", "--man"])).refuses(2, &["--man"]);
+    run(workspace.mesher(&["--completions", "no-such-shell"])).refuses(2, &["no-such-shell"]);
+    run(workspace.mesher(&["case.toml", "--man"])).refuses(2, &["--man"]);
 }
 
 /// Standard error is not a terminal here, so clap writes no colours and the mesher no progress.
 #[test]
 fn output_into_a_pipe_has_no_control_characters() {
-    let place = Place::new();
-    place.put("body.stl", tetrahedron());
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
     for args in [&["--help"][..], &["body.stl", "--spacing-min", "0.5"], &["body.stl", "--no"]] {
-        let told = run(place.mesher(args));
+        let finished = run(workspace.mesher(args));
         let is_plain = |s: &str| s.chars().all(|c| c == '\n' || !c.is_control());
-        assert!(is_plain(&told.stdout) && is_plain(&told.stderr), "{told:?}");
+        assert!(is_plain(&finished.stdout) && is_plain(&finished.stderr), "{finished:?}");
     }
 }

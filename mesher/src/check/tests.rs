@@ -47,7 +47,8 @@ fn run(ungraded: bool, corrupt: impl Fn(&mut Mesh) + Sync, check: impl Fn(Mesh, 
 }
 
 fn check_base_tree(mesh: Mesh, comm: &dyn Comm) {
-    base_tree(&Tree { split: mesh.split, crossing: mesh.crossing }, &mesh.ownership, comm);
+    let Mesh { split, crossing, ownership, rules, .. } = mesh;
+    base_tree(&Tree { split, crossing }, &rules, &ownership, comm);
 }
 
 fn check_sides(mesh: Mesh, comm: &dyn Comm) {
