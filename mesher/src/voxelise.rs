@@ -22,8 +22,7 @@ use crate::tree::Tree;
 use std::ops::Range;
 
 /// The smallest octant that contains all closed level-19 cells that a facet's extent meets, and so the facet:
-/// the level-19 Morton code of its minimum corner and
-/// its level. Sorts in Morton order, ancestors first.
+/// its level and the level-19 Morton code of its minimum corner. Sorts in Morton order, ancestors first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ContainingOctant(u64);
 
