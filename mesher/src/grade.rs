@@ -25,11 +25,12 @@
 //!
 //! *Layer*: Q is of level `l - 1`, and the box of S, enlarged, meets Q in a set with interior. Choose a
 //! generic point y in Q whose Chebyshev distance from a generic point s in S is less than the width by
-//! which the box is enlarged, so that the segment from s to y passes from leaf to leaf through faces only. Consider the last part of the segment that is kept. It begins either in a leaf below S, or,
-//! by the second fact, in a crossing leaf; in both cases in a leaf of level `l` or deeper. It ends in
-//! Q, which lies in a leaf of level `l - 1` or shallower. Earlier steps have balanced all leaves
-//! deeper than `l`: none of them touches an unsplit kept octant of level `l - 1`. Hence the segment
-//! passes through a kept leaf of level `l` itself. A point of the segment in this leaf is no farther from y
+//! which the box is enlarged, so that the segment from s to y passes from leaf to leaf through faces
+//! only. Consider the last part of the segment that is kept. It begins either in a leaf below S, or, by
+//! the second fact, in a crossing leaf; in both cases in a leaf of level `l` or deeper. It ends in Q,
+//! which lies in a leaf of level `l - 1` or shallower. Earlier steps have balanced all leaves deeper
+//! than `l`: none of them touches an unsplit kept octant of level `l - 1`. Hence the segment passes
+//! through a kept leaf of level `l` itself. A point of the segment in this leaf is no farther from y
 //! than s is, so the leaf reaches Q.
 //!
 //! *Balance*: Q is of level `l - 2`, and S touches it at a point p. If a kept leaf of a level deeper than

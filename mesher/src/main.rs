@@ -13,11 +13,12 @@ use mesher::error::Error;
 use mesher::partition::Division;
 use mesher::record::{INTERRUPTED, Recorder};
 use mesher::report::Report;
+use mesher::write::Draft;
 use mesher::{Options, mesh};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::exit;
 use std::sync::{Arc, Once};
 
@@ -144,9 +145,12 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
             Error::output(format!("{}: {e}: choose another --status", dir.display()))
         }))?;
     }
-    // Fails now rather than after meshing if the file cannot be written.
-    let json = args.json.as_ref().filter(|_| comm.rank() == 0).map(|p| Json::begin(p)).transpose();
-    let json = mesher::comm::agree(comm, json)?;
+    // Created before meshing, so that a path that cannot be written to ends the run at once.
+    let json = args.json.as_deref().filter(|_| comm.rank() == 0);
+    let json_error =
+        |path: &Path, e| Error::output(format!("{}: {e}: choose another --json", path.display()));
+    let draft = json.map(|path| Draft::create(path).map_err(|e| json_error(path, e))).transpose();
+    let draft = mesher::comm::agree(comm, draft)?;
     let case = mesher::comm::agree(comm, case(args))?;
     let options = Options {
         division: Division {
@@ -162,43 +166,9 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     if args.message_matrix {
         report = report.with_message_matrix(comm);
     }
-    comm.agree(json.map_or(Ok(()), |json| json.finish(&report)))?;
+    let publish = |(path, draft): (&Path, Draft)| {
+        draft.publish_json(&report).map_err(|e| json_error(path, e))
+    };
+    comm.agree(json.zip(draft).map_or(Ok(()), publish))?;
     Ok(report)
-}
-
-/// The JSON file of the report: written under a temporary name, and renamed when it is complete.
-struct Json {
-    path: PathBuf,
-    file: tempfile::NamedTempFile,
-}
-
-impl Json {
-    fn begin(path: &Path) -> Result<Self, Error> {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let begin = || {
-            if path.is_dir() {
-                return Err(std::io::ErrorKind::IsADirectory.into());
-            }
-            // The permissions of the user's other files.
-            let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-            tempfile::Builder::new().permissions(permissions).tempfile_in(folder)
-        };
-        let file = begin().map_err(|e| Self::fail(path, &e))?;
-        Ok(Self { path: path.to_owned(), file })
-    }
-
-    fn finish(mut self, report: &Report) -> Result<(), Error> {
-        let mut write = || -> std::io::Result<()> {
-            serde_json::to_writer_pretty(&mut self.file, report)?;
-            self.file.write_all(b"\n")?;
-            self.file.as_file().sync_all()
-        };
-        write().map_err(|e| Self::fail(&self.path, &e))?;
-        self.file.persist(&self.path).map_err(|e| Self::fail(&self.path, &e.error))?;
-        Ok(())
-    }
-
-    fn fail(path: &Path, e: &std::io::Error) -> Error {
-        Error::output(format!("{}: {e}: choose another --json", path.display()))
-    }
 }

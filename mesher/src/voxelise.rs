@@ -6,7 +6,7 @@
 //! its children is.
 //!
 //! Facets are binned by their *containing octant*, the smallest octant that contains the facet's extent.
-//! A facet crosses all ancestors of its containing octant, so it need not be tested on the way down to
+//! A facet crosses all ancestors of its containing octant, so it need not be tested at the levels above
 //! it, and the facets contained in an octant are a contiguous range. A facet smaller than a leaf therefore
 //! costs a sort and one bit. Facets that cross an octant without being contained in it are *straddling*:
 //! they are passed down in lists.
@@ -21,8 +21,8 @@ use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton
 use crate::tree::Tree;
 use std::ops::Range;
 
-/// The smallest octant that contains a facet's extent: the level-19 Morton code of its minimum corner and
-/// its level. Sorts in Morton order, ancestors first.
+/// The smallest octant that contains all closed level-19 cells that a facet's extent meets, and so the facet:
+/// its level and the level-19 Morton code of its minimum corner. Sorts in Morton order, ancestors first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ContainingOctant(u64);
 
@@ -366,7 +366,7 @@ impl Voxeliser<'_> {
     }
 }
 
-/// Number of leading octants before `end`, by doubling steps: runs are short deep down, long high up.
+/// Number of leading octants before `end`. Galloping search: runs are short at fine levels, long at coarse ones.
 fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
     let mut step = 1;
     while containing.get(step).is_some_and(|h| *h < end) {

@@ -338,10 +338,10 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "children of node 1 of level 2 must be contiguous")]
+    #[should_panic(expected = "children of node 1 of level 4 must be contiguous")]
     fn a_wrong_link_is_found() {
         let mut nodes = Nodes::new(&tree(&[0, 1 << 12]), &Ownership::solo());
-        nodes.levels[2].first_child[1] += 1;
+        nodes.levels[4].first_child[1] += 1;
         nodes.check_invariants();
     }
 
