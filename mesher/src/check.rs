@@ -144,10 +144,11 @@ pub fn graded(mesh: &Mesh, base: Option<&PerLevel>, comm: &dyn Comm) {
 fn is_within_tree(sets: &PerLevel, split: &PerLevel) {
     for (l, set) in sets.iter().enumerate() {
         set.check_invariants();
+        let mut parents = split[l.saturating_sub(1)].cursor();
         for b in set.bricks() {
             let exists = match l {
                 0 => 1,
-                _ => brick::children(brick::byte(split[l - 1].get(b.key >> 3), b.key & 7)),
+                _ => brick::children(brick::byte(parents.get(b.key >> 3), b.key & 7)),
             };
             assert_eq!(b.bits & !exists, 0, "level {l}: the parents of octants must be split");
         }
@@ -202,16 +203,24 @@ fn volume_of(l: Level, octants: u64) -> u64 {
 /// brick itself or touch it: they must be split, or lie in a deleted leaf.
 fn is_balanced(split: &PerLevel, deleted: &PerLevel, ownership: &Ownership, comm: &dyn Comm) {
     for l in 2..=LEVEL_MAX {
+        let above = &split[l as usize - 2];
         let (mut splits, mut deletions) =
             (split[l as usize].cursor(), deleted[l as usize].cursor());
-        let mut touched = Vec::new();
+        let (mut near, mut touched) = (above.cursor(), Vec::new());
         for b in Tree::exists(split, l).filter(|b| ownership.owns(l, b.key)) {
             let leaves = b.bits & !splits.get(b.key) & !deletions.get(b.key);
-            touched.extend(octants_touched(l - 2, b.key, leaves).map(as_brick));
+            let near = near.get(b.key >> 6);
+            // Most octants touched are split, and most are in the same brick as the one that touches them.
+            let is_split = |code: u64| match code >> 6 == b.key >> 6 {
+                true => near >> (code & 63) & 1 == 1,
+                false => above.contains(code),
+            };
+            let unknown = octants_touched(l - 2, b.key, leaves).filter(|q| !is_split(*q));
+            touched.extend(unknown.map(as_brick));
         }
-        let touched = BrickSet::from_unsorted(touched);
-        let ([touched], _) = ownership.redistribute(l - 2, [touched], comm);
-        for code in touched.codes().filter(|c| !split[l as usize - 2].contains(*c)) {
+        let ([touched], _) =
+            ownership.redistribute(l - 2, [BrickSet::from_unsorted(touched)], comm);
+        for code in touched.without(above).codes() {
             let is_deleted = |m: Level| deleted[m as usize].contains(code >> (3 * (l - 2 - m)));
             assert!(
                 (0..=l - 2).any(is_deleted),
@@ -226,7 +235,8 @@ fn is_balanced(split: &PerLevel, deleted: &PerLevel, ownership: &Ownership, comm
 /// The octants of level `l` that touch some octants two levels deeper, which lie in octant `code`, from outside of it.
 fn octants_touched(l: Level, code: u64, inner: u64) -> impl Iterator<Item = u64> {
     let p = position(code).map(i64::from);
-    (0..27).filter_map(move |k| {
+    let steps = if inner == 0 { 0..0 } else { 0..27 };
+    steps.filter_map(move |k: i64| {
         let step = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
         let facing = (0..3).fold(inner, |bits, a| match step[a] {
             -1 => bits & brick::AXES[a][0],
