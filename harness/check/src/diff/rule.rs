@@ -9,7 +9,7 @@
 //! and so can be no witnesses; the ruling says so where it matters.
 
 use crate::checks::Terms;
-use crate::checks::identical::tell;
+use crate::checks::identical::describe;
 use contract::case::Case;
 use contract::manifest::Keep;
 use contract::octant::Octant;
@@ -229,7 +229,7 @@ fn crossed_by(octant: &Octant, case: &Case) -> Option<usize> {
 /// Both sides of the first difference, for people.
 pub fn sides(a: Option<u64>, b: Option<u64>, root: &contract::lattice::Root) -> String {
     let told =
-        |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| tell(word, root));
+        |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| describe(word, root));
     format!("first difference:\n  A has {}\n  B has {}", told(a), told(b))
 }
 

@@ -65,16 +65,16 @@ proptest! {
 
     #[test]
     fn all_checks_hold(facets in prop_oneof![soup(), hull()], text in settings()) {
-        let specimen = support::specimen_of_facets(&text, &facets);
-        let subject = Subject::new(&specimen.case, &specimen.mesh);
-        let informed = subject.with_base(&specimen.base).with_reference(&specimen.mesh);
+        let correct = support::selftest_case_of_facets(&text, &facets);
+        let subject = Subject::new(&correct.case, &correct.mesh);
+        let informed = subject.with_base(&correct.base).with_reference(&correct.mesh);
         for result in checks::all(&informed) {
             prop_assert!(result.holds(), "{text}{result}");
         }
-        for result in checks::all(&Subject::new(&specimen.case, &specimen.mesh)) {
+        for result in checks::all(&Subject::new(&correct.case, &correct.mesh)) {
             prop_assert!(result.holds(), "without T0: {text}{result}");
         }
-        for set in [&specimen.mesh, &specimen.base] {
+        for set in [&correct.mesh, &correct.base] {
             let dir = tempfile::tempdir().unwrap();
             set.write(dir.path()).unwrap();
             let report = audit::audit(dir.path(), &AuditOptions::default());

@@ -2,7 +2,7 @@
 
 use crate::support;
 use check::selftest::scale::{self, Options, Source};
-use check::selftest::{self, SelftestReport, Specimen};
+use check::selftest::{self, SelftestCase, SelftestReport};
 use std::path::Path;
 
 /// Between them every corruption applies that a mesh can hold; the first has some 10^4 leaves.
@@ -18,14 +18,14 @@ const CASES: [(&str, &str); 4] = [
     ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
 ];
 
-fn written(name: &str, specimen: &Specimen, place: &Path) -> Source {
+fn written(name: &str, correct: &SelftestCase, place: &Path) -> Source {
     let write = |what: &str, set: &contract::leafset::LeafSet| {
         let dir = place.join(format!("{name}-{what}"));
         std::fs::create_dir(&dir).unwrap();
         set.write(&dir).unwrap();
         dir
     };
-    let (mesh, base) = (write("mesh", &specimen.mesh), write("base", &specimen.base));
+    let (mesh, base) = (write("mesh", &correct.mesh), write("base", &correct.base));
     Source { name: name.to_owned(), mesh, base: Some(base) }
 }
 
@@ -42,10 +42,10 @@ fn run(sources: &[Source], seed: u64, jobs: usize) -> SelftestReport {
 fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
     let place = tempfile::tempdir().unwrap();
     let sources = CASES.map(|(name, text)| {
-        let specimen = support::specimen(name, text);
-        let leaves = specimen.mesh.words.len();
+        let correct = support::selftest_case(name, text);
+        let leaves = correct.mesh.words.len();
         assert!(name != "outside" || leaves > 20_000, "{leaves}");
-        written(name, &specimen, place.path())
+        written(name, &correct, place.path())
     });
     let report = run(&sources, 1, 2);
     println!("{report}");
@@ -59,7 +59,7 @@ fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
     }
     // Leaves are corrupted behind a manifest that is true to them, so that no digest helps.
     let of_leaves = |kill: &&selftest::Kill| {
-        !["manifest", "files"].contains(&kill.meant) && !kill.mutant.starts_with("part ")
+        !["manifest", "files"].contains(&kill.expected) && !kill.mutant.starts_with("part ")
     };
     for kill in report.kills.iter().filter(of_leaves).filter(|k| !k.mutant.starts_with("manifest"))
     {
@@ -71,7 +71,7 @@ fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
 fn the_seed_decides_places_and_the_number_of_jobs_does_not() {
     let place = tempfile::tempdir().unwrap();
     let (name, text) = CASES[0];
-    let source = [written(name, &support::specimen(name, text), place.path())];
+    let source = [written(name, &support::selftest_case(name, text), place.path())];
     let (one, two, other) = (run(&source, 1, 1), run(&source, 1, 2), run(&source, 2, 2));
     assert_eq!(one.to_string(), two.to_string());
     assert_ne!(one.to_string(), other.to_string());
@@ -81,15 +81,15 @@ fn the_seed_decides_places_and_the_number_of_jobs_does_not() {
 fn a_mesh_that_is_wrong_before_is_a_false_alarm_and_no_success() {
     let place = tempfile::tempdir().unwrap();
     let (name, text) = CASES[2];
-    let sound = support::specimen(name, text);
+    let sound = support::selftest_case(name, text);
     let mut lying = sound.clone();
     lying.mesh.manifest.leaves_by_side.crossing += 1;
     let mut disordered = sound;
     disordered.mesh.parts[0].reverse();
-    for (name, specimen, check) in
+    for (name, correct, check) in
         [("lying", lying, "manifest"), ("disordered", disordered, "linear")]
     {
-        let report = run(&[written(name, &specimen, place.path())], 1, 1);
+        let report = run(&[written(name, &correct, place.path())], 1, 1);
         assert!(!report.holds() && report.kills.is_empty());
         assert!(report.alarms.iter().any(|alarm| alarm.contains(check)), "{:?}", report.alarms);
     }

@@ -5,7 +5,6 @@ use bench::shrink::leave::{Repeat, leave};
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{Budget, shrink};
 use clap::Args;
-use contract::catalogue;
 use contract::plain::PlainCase;
 use run::engine::description::Description;
 use run::engine::programs::Programs;
@@ -71,10 +70,7 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
         Some(ranks) => Ranks::Simulated { ranks: ranks as usize, seed: arguments.seed },
     };
-    let case = match arguments.case.ends_with(".toml") {
-        true => PathBuf::from(&arguments.case),
-        false => catalogue::named(&arguments.case, &programs.paths.catalogue)?.path,
-    };
+    let case = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let probe = Probe::new(engine, reference, ranks)?;
     if arguments.check {
         let failure = probe.failure(&Trial { case: PlainCase::read(&case)?, ranks })?;

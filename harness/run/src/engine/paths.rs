@@ -1,5 +1,6 @@
 //! Where the programs are: given on the command line, or next to the harness, or on the machine.
 
+use contract::catalogue::Catalogue;
 use std::env;
 use std::path::{Path, PathBuf};
 
@@ -31,7 +32,7 @@ pub struct Paths {
     /// repository's.
     pub p4est: PathBuf,
     /// The catalogue of cases.
-    pub catalogue: PathBuf,
+    pub catalogue: Catalogue,
     /// The directory of engine descriptions.
     pub engines: PathBuf,
     /// The repository.
@@ -57,7 +58,7 @@ impl Paths {
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
             oracles: root.join("harness/oracles"),
             p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| p4est_below(&target, &root)),
-            catalogue: root.join("geometries/catalogue.toml"),
+            catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
             engines: root.join("harness/engines"),
             root,
             harness,

@@ -40,7 +40,7 @@ impl DiffReport {
 }
 
 /// Octants told by path; the rest are counted.
-const OCTANTS_TOLD: usize = 8;
+const OCTANTS_LISTED: usize = 8;
 
 impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -50,8 +50,8 @@ impl fmt::Display for DiffReport {
         if self.same_leaves() {
             return write!(f, "the leaves are the same");
         }
-        let paths: Vec<_> = self.octants.iter().take(OCTANTS_TOLD).map(Octant::path).collect();
-        let more = if self.octants.len() > OCTANTS_TOLD { ", ..." } else { "" };
+        let paths: Vec<_> = self.octants.iter().take(OCTANTS_LISTED).map(Octant::path).collect();
+        let more = if self.octants.len() > OCTANTS_LISTED { ", ..." } else { "" };
         let (count, paths) = (self.octants.len(), paths.join(", "));
         write!(f, "the leaves differ in {count} of 512 level-3 octants: {paths}{more}")?;
         match &self.leaf {
