@@ -55,7 +55,11 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
             )));
         }
     }
-    let selected = programs.paths.catalogue.select(&options.cases, &options.sizes).map_err(VerifyError::Input)?;
+    let selected = programs
+        .paths
+        .catalogue
+        .select(&options.cases, &options.sizes)
+        .map_err(VerifyError::Input)?;
     let mut workplace = Workplace::new(options)?;
     let mut needs = Needs::probe(options, programs, workplace.root());
     let progress = Progress::new(&selected);
