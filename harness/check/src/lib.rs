@@ -1,4 +1,5 @@
-//! Checks of oct-tree meshes. This crate shares no algorithm with the programs that it checks, and starts no process.
+//! Checks of oct-tree meshes. This crate shares no algorithm with the programs that it checks, and starts no
+//! process.
 //!
 //! - [`checks`]: one file per property; [`audit`](mod@audit): the checks that need only the leaves, for meshes of any size;
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;

@@ -178,7 +178,8 @@ fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
     }
 }
 
-/// The root cube, given or computed from the body. The order of floating-point operations is part of the definition.
+/// The root cube, given or computed from the body. The order of floating-point operations is part of the
+/// definition.
 fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     if let Some(root) = file.root {
         if file.root_scale.is_some() {

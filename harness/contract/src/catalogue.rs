@@ -34,8 +34,8 @@ pub struct Selected {
     pub absent: Option<String>,
 }
 
-/// The catalogue. Its file is parsed at most once, on the first look-up that needs it: a user's own case file can be
-/// selected without a catalogue.
+/// The catalogue. Its file is parsed at most once, on the first look-up that needs it: a user's own case file
+/// can be selected without a catalogue.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     path: PathBuf,
@@ -72,8 +72,8 @@ impl Catalogue {
         &self.path
     }
 
-    /// The selected cases, in the order of `arguments`, which are names or paths of case files. Without arguments, all cases
-    /// of the catalogue that have one of these sizes.
+    /// The selected cases, in the order of `arguments`, which are names or paths of case files. Without
+    /// arguments, all cases of the catalogue that have one of these sizes.
     ///
     /// # Errors
     /// One sentence, if an argument is neither in the catalogue nor a file, or if the catalogue cannot be read.
@@ -133,7 +133,8 @@ fn is_path(argument: &str) -> bool {
     Path::new(argument).extension().is_some_and(|extension| extension == "toml")
 }
 
-/// A user's own case. A missing geometry is not recorded: that is an error of the case, and not a reason to leave it out.
+/// A user's own case. A missing geometry is not recorded: that is an error of the case, and not a reason to
+/// leave it out.
 fn from_path(argument: &str) -> Result<Selected, String> {
     let path = fs::canonicalize(argument).map_err(|error| format!("{argument}: {error}"))?;
     Ok(Selected {
@@ -164,8 +165,8 @@ fn read(path: &Path) -> Result<Vec<Selected>, String> {
     Ok(file.entries.into_iter().map(selected).collect())
 }
 
-/// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported when the
-/// case is used.
+/// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported
+/// when the case is used.
 fn missing_geometry(case: &Path) -> Option<String> {
     let text = fs::read_to_string(case).ok()?;
     let geometry = toml::from_str::<Geometry>(&text).ok()?.geometry?;
@@ -185,8 +186,8 @@ mod tests {
     const CATALOGUE: &str = "[[case]]\nname = \"cube_small\"\nfile = \"cube_small.toml\"\nsize = \"small\"\n\
                              [[case]]\nname = \"jet\"\nfile = \"jet.toml\"\nsize = \"large\"\n";
 
-    /// The name of each selected case and whether its geometry is missing, or the error, for a catalogue of two cases, the
-    /// larger without its geometry. `HERE` in an argument is the catalogue's directory.
+    /// The name of each selected case and whether its geometry is missing, or the error, for a catalogue of two
+    /// cases, the larger without its geometry. `HERE` in an argument is the catalogue's directory.
     fn select(arguments: &[&str], sizes: &[Size]) -> Result<Vec<(String, bool)>, String> {
         let place = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();

@@ -1,5 +1,5 @@
-//! The digest of a set of leaf words (reference/DEFINITION.md, section 8). It is a sum, so it depends neither on order nor on
-//! the partition, and the digests of parts are merged by addition.
+//! The digest of a set of leaf words (reference/DEFINITION.md, section 8). It is a sum, so it depends neither
+//! on order nor on the partition, and the digests of parts are merged by addition.
 
 use std::fmt;
 use std::str::FromStr;

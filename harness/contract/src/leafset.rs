@@ -1,7 +1,8 @@
 //! Leaf-set directories: the manifest `mesh.json` and the part files that it names.
 //!
-//! Reading fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an array of
-//! words, or a part file that the manifest does not name. The checks establish whether the contents are correct.
+//! Reading fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an
+//! array of words, or a part file that the manifest does not name. The checks establish whether the contents
+//! are correct.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What the programs exchange, implemented independently of them, and the algebra of octants and trees.
+//! The formats that the programs exchange, implemented independently of them, and the algebra of octants and trees.
 //!
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
 //!   [`leafset`], [`files`] (atomic writes);

@@ -141,8 +141,8 @@ pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
     File::create(path)?.write_all(&bytes)
 }
 
-/// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does. It is not written by `npyz`, because the self
-/// test needs headers that contradict the data.
+/// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does. It is not written by `npyz`,
+/// because the self test needs headers that contradict the data.
 pub fn header(descr: &str, shape: &str) -> Vec<u8> {
     let mut text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
     let padding = (64 - (10 + text.len() + 1) % 64) % 64;

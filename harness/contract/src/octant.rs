@@ -1,7 +1,8 @@
 //! Octants: cells of the oct-tree, given by corner and level.
 //!
-//! Invariants: `level <= LEVEL_MAX`; every coordinate of `corner` is less than `CELLS_PER_EDGE` and a multiple of the
-//! octant's edge. The unit of coordinates is the edge of a level-19 cell, which is `UNITS_PER_CELL` lattice units.
+//! Invariants: `level <= LEVEL_MAX`; every coordinate of `corner` is less than `CELLS_PER_EDGE` and a multiple
+//! of the octant's edge. The unit of coordinates is the edge of a level-19 cell, which is `UNITS_PER_CELL`
+//! lattice units.
 
 use std::fmt;
 

@@ -1,9 +1,9 @@
 //! Exact ray parity (reference/DEFINITION.md, section 4), which decides where other oracles disagree.
 //!
-//! Six axis-parallel rays start at a point, and each counts the facets that it crosses. To decide whether a ray crosses a
-//! facet, the facet is projected along the ray, and a second ray in that plane counts the edges of the projection. An edge
-//! is crossed iff its half-open range contains the point's second coordinate, which is equivalent to an infinitesimal
-//! perturbation of the point. All arithmetic is in integers.
+//! Six axis-parallel rays start at a point, and each counts the facets that it crosses. To decide whether a ray
+//! crosses a facet, the facet is projected along the ray, and a second ray in that plane counts the edges of
+//! the projection. An edge is crossed iff its half-open range contains the point's second coordinate, which is
+//! equivalent to an infinitesimal perturbation of the point. All arithmetic is in integers.
 
 use crate::lattice::FacetLattice;
 
@@ -14,7 +14,8 @@ pub struct Parity {
     grids: [Grid; 3],
 }
 
-/// Facets binned by their projection along one axis: cell (i, j) lists every facet whose projected bounding box meets it.
+/// Facets binned by their projection along one axis: cell (i, j) lists every facet whose projected bounding box
+/// meets it.
 #[derive(Debug)]
 struct Grid {
     /// Number of cells along each of the two axes.
@@ -35,8 +36,8 @@ impl Parity {
         Self { facets: facets.to_vec(), grids }
     }
 
-    /// Whether each ray from this point crosses an odd number of facets: +x, -x, +y, -y, +z, -z. A facet that contains the
-    /// point is crossed by neither ray of an axis.
+    /// Whether each ray from this point crosses an odd number of facets: +x, -x, +y, -y, +z, -z. A facet that
+    /// contains the point is crossed by neither ray of an axis.
     pub fn inside(&self, point: [i64; 3]) -> [bool; 6] {
         let mut odd = [false; 6];
         for axis in 0..3 {
@@ -57,8 +58,8 @@ fn project(point: [i64; 3], axis: usize) -> [i64; 2] {
     [point[(axis + 1) % 3], point[(axis + 2) % 3]]
 }
 
-/// Whether the line along `axis` through the perturbed point crosses the facet in the positive direction (true), in the
-/// negative direction (false), or not at all.
+/// Whether the line along `axis` through the perturbed point crosses the facet in the positive direction
+/// (true), in the negative direction (false), or not at all.
 fn crosses(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     let projected = project(point, axis);
     let corners = facet.map(|v| project(v, axis));
@@ -70,9 +71,9 @@ fn crosses(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     is_positive(facet, point, axis)
 }
 
-/// Whether the edge crosses the horizontal line through the perturbed point, to the right of the point. The perturbation is
-/// eps to the right and eps squared upwards: a corner at the height of the point is below it, and a point on the edge lies to the
-/// right of it.
+/// Whether the edge crosses the horizontal line through the perturbed point, to the right of the point. The
+/// perturbation is eps to the right and eps squared upwards: a corner at the height of the point is below it,
+/// and a point on the edge lies to the right of it.
 fn edge_is_right(a: [i64; 2], b: [i64; 2], point: [i64; 2]) -> bool {
     if (a[1] > point[1]) == (b[1] > point[1]) {
         return false;
@@ -82,8 +83,8 @@ fn edge_is_right(a: [i64; 2], b: [i64; 2], point: [i64; 2]) -> bool {
     (high[0] - low[0]) * (point[1] - low[1]) - (high[1] - low[1]) * (point[0] - low[0]) > 0
 }
 
-/// Whether a line that crosses the facet does so in the positive direction from the point; `None` if the plane contains the
-/// point.
+/// Whether a line that crosses the facet does so in the positive direction from the point; `None` if the plane
+/// contains the point.
 fn is_positive(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     let normal = normal(facet);
     let from = |a: usize| i128::from(point[a] - facet[0][a]);

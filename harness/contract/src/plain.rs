@@ -1,7 +1,7 @@
 //! A case in its plainest form, which every mesher can read: an STL file and an explicit root.
 //!
-//! Invariant: the case that is written defines exactly the same mesh as the case that was read. Vertices remain unchanged f32
-//! values, and a root that was given by `root_scale` is written with its origin and edge.
+//! Invariant: the case that is written defines exactly the same mesh as the case that was read. Vertices remain
+//! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
 use std::fmt::Write as _;
@@ -40,8 +40,8 @@ impl PlainCase {
         Ok(Self { table, facets: case.facets })
     }
 
-    /// Writes `case.toml` and `body.stl` into an existing directory, and returns the path of the case file. A body of at most
-    /// [`FACETS_AS_TEXT`] facets is written as ASCII.
+    /// Writes `case.toml` and `body.stl` into an existing directory, and returns the path of the case file. A
+    /// body of at most [`FACETS_AS_TEXT`] facets is written as ASCII.
     ///
     /// # Errors
     /// If a file cannot be written.

@@ -28,8 +28,8 @@ pub fn read(path: &Path) -> Result<Vec<Facet>, StlError> {
     }
 }
 
-/// The facets of a binary file; `None` if the length of the file contradicts its facet count. The header cannot decide, because
-/// that of some binary files begins with "solid".
+/// The facets of a binary file; `None` if the length of the file contradicts its facet count. The header cannot
+/// decide, because that of some binary files begins with "solid".
 fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     let count = u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?);
     if bytes.len() as u64 != 84 + 50 * u64::from(count) {
@@ -47,8 +47,8 @@ fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     Some(bytes[84..].chunks_exact(50).map(facet).collect())
 }
 
-/// The facets of all solids of an ASCII file. A solid's name may be any text, so lines with a name are removed before the rest is
-/// split into words.
+/// The facets of all solids of an ASCII file. A solid's name may be any text, so lines with a name are removed
+/// before the rest is split into words.
 fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
     let text = String::from_utf8_lossy(bytes);
     let mut lines = text.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty()).peekable();

@@ -42,8 +42,8 @@ pub fn random_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
     })
 }
 
-/// Trees that are refined towards a point, steeply or gently, so that about half of them have layers that are thick enough.
-/// A few leaves are missing, and a few are crossing.
+/// Trees that are refined towards a point, steeply or gently, so that about half of them have layers that are
+/// thick enough. A few leaves are missing, and a few are crossing.
 pub fn graded_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
     let point = prop::array::uniform3(0..CELLS_PER_EDGE);
     (point, 0.1f64..3.5, any::<u64>(), 0u64..40).prop_map(move |(point, reach, seed, odd)| {

@@ -1,8 +1,9 @@
 //! Exact test whether a closed triangle and a closed box share a point.
 //!
-//! They do iff the box contains a corner of the triangle, or an edge of the triangle meets the box, or the box intersects only
-//! the interior of the triangle. In the last case, the triangle contains the whole intersection of its plane with the box, so any
-//! point of that intersection decides. The test takes the point on the box diagonal that is most nearly parallel to the normal.
+//! They do iff the box contains a corner of the triangle, or an edge of the triangle meets the box, or the box
+//! intersects only the interior of the triangle. In the last case, the triangle contains the whole intersection
+//! of its plane with the box, so any point of that intersection decides. The test takes the point on the box
+//! diagonal that is most nearly parallel to the normal.
 
 use crate::lattice::FacetLattice;
 
@@ -60,8 +61,8 @@ impl Triangle {
         (near, far)
     }
 
-    /// Whether the line through two points on opposite sides of the plane intersects the triangle: seen along the line, the
-    /// three edges have the same orientation. A degenerate triangle has no interior.
+    /// Whether the line through two points on opposite sides of the plane intersects the triangle: seen along
+    /// the line, the three edges have the same orientation. A degenerate triangle has no interior.
     fn pierced(&self, near: [i64; 3], far: [i64; 3]) -> bool {
         if self.normal == [0; 3] {
             return false;
@@ -74,8 +75,8 @@ impl Triangle {
     }
 }
 
-/// Whether a segment meets a closed box: its intersections with the three slabs of the box have a common point. Positions
-/// along the segment are fractions.
+/// Whether a segment meets a closed box: its intersections with the three slabs of the box have a common point.
+/// Positions along the segment are fractions.
 fn segment_meets(from: [i64; 3], to: [i64; 3], low: [i64; 3], high: [i64; 3]) -> bool {
     let (mut enter, mut leave) = ((0, 1), (1, 1));
     for a in 0..3 {

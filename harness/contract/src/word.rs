@@ -1,7 +1,7 @@
 //! The leaf word: one leaf packed into a `u64` (reference/DEFINITION.md, section 8).
 //!
-//! A word is `morton57 << 7 | level << 2 | side`. The Morton code interleaves the bits of x (lowest), y and z of the minimum
-//! corner in level-19 cells. Ascending words are in Morton order.
+//! A word is `morton57 << 7 | level << 2 | side`. The Morton code interleaves the bits of x (lowest), y and z
+//! of the minimum corner in level-19 cells. Ascending words are in Morton order.
 
 use std::fmt;
 

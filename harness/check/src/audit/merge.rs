@@ -31,8 +31,9 @@ impl Reader<'_> {
     }
 }
 
-/// Passes the words of all parts to `run` in runs, until it returns false. Each run comes from the part with the given index,
-/// and the next word of every other part is at least as large. If every part is sorted, so is the stream.
+/// Passes the words of all parts to `run` in runs, until it returns false. Each run comes from the part with
+/// the given index, and the next word of every other part is at least as large. If every part is sorted, so is
+/// the stream.
 ///
 /// # Errors
 /// The index of a part that cannot be read.

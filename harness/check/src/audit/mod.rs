@@ -1,9 +1,10 @@
 //! All checks that need only a leaf-set directory, for meshes of any size.
 //!
-//! One pass over the part files, which are merged while they are read, computes the tally, checks the order and builds the tree.
-//! Leaves are not stored. The tree stores equal subtrees once, so memory grows with the variety of a mesh and not with its size;
-//! an option limits it. The checks use the requirements in the manifest, without T0, facets or another mesh. The head of each
-//! check names what it cannot detect without them.
+//! One pass over the part files, which are merged while they are read, computes the tally, checks the order and
+//! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
+//! variety of a mesh and not with its size; an option limits it. The checks use the requirements in the
+//! manifest, without T0, facets or another mesh. The head of each check names what it cannot detect without
+//! them.
 
 use std::fmt;
 use std::path::Path;

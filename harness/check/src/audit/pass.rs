@@ -97,7 +97,8 @@ impl<'a> State<'a> {
         self.last_of_part[part] = before;
     }
 
-    /// Adds to counts and digests. Digests are summed per octant first, because this loop dominates the time of the pass.
+    /// Adds to counts and digests. Digests are summed per octant first, because this loop dominates the time of
+    /// the pass.
     fn count(&mut self, part: usize, run: &[u64]) {
         self.parts[part].0 += run.len() as u64;
         for words in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {

@@ -1,7 +1,7 @@
 //! The result of an audit as JSON (schema `octree-audit/1`), with its time and memory.
 //!
-//! CPU time and peak memory are those of the process. They describe the audit only if the process did nothing else, as in
-//! `harness audit`.
+//! CPU time and peak memory are those of the process. They describe the audit only if the process did nothing
+//! else, as in `harness audit`.
 
 use super::AuditReport;
 use contract::files::write_atomically;
@@ -109,8 +109,8 @@ mod tests {
     fn a_record_is_read_back_unchanged() {
         let place = tempfile::tempdir().unwrap();
         let mut set = leaf_set(vec![words_of(|o| o.level == 0)]);
-        for (lie, holds) in [(0, true), (1, false)] {
-            set.manifest.leaves += lie;
+        for (extra_leaves, holds) in [(0, true), (1, false)] {
+            set.manifest.leaves += extra_leaves;
             set.write(place.path()).unwrap();
             let record = AuditRecord::of(&audit(place.path(), &AuditOptions::default()));
             let path = place.path().join("audit.json");

@@ -1,8 +1,9 @@
-//! 2:1 balance: leaves that touch in a face, an edge or a corner differ by at most one level, deleted crossing leaves included.
+//! 2:1 balance: leaves that touch in a face, an edge or a corner differ by at most one level, deleted crossing
+//! leaves included.
 //!
-//! Section 7 of reference/DEFINITION.md (the paper's 4:1 rule: at most one hanging node per edge, which is counted as well). The
-//! check cannot detect needless refinement. If crossing leaves are deleted and T0 is unknown, it cannot detect imbalance between a
-//! deleted leaf and its neighbours.
+//! Section 7 of reference/DEFINITION.md (the paper's 4:1 rule: at most one hanging node per edge, which is
+//! counted as well). The check cannot detect needless refinement. If crossing leaves are deleted and T0 is
+//! unknown, it cannot detect imbalance between a deleted leaf and its neighbours.
 
 use std::fmt::Write;
 
@@ -64,7 +65,8 @@ mod tests {
         }
     }
 
-    /// Each octant of level 3 in turn is the only one of its level that is refined, so that all 26 directions occur.
+    /// Each octant of level 3 in turn is the only one of its level that is refined, so that all 26 directions
+    /// occur.
     #[test]
     fn a_single_fine_octant_is_unbalanced_iff_it_touches_a_coarse_leaf() {
         for fine in octants_of(&words_of(|o| o.level < 3)).into_iter().filter(|o| o.level == 3) {

@@ -1,9 +1,10 @@
 //! Kept and deleted leaves tile the root.
 //!
-//! Sections 5 and 7 of reference/DEFINITION.md. With T0 the check is exact: leaves fill every kept T0 leaf, every deleted T0
-//! leaf is empty, and no leaf is coarser than T0. Without T0 the boundary of every hole must be one that deletion can leave: a
-//! leaf lacks a neighbour across a face only if the definition may delete the neighbours of such a leaf. Without T0 the check
-//! cannot detect a missing leaf if all leaves around it may lack neighbours, for example a crossing leaf among crossing leaves.
+//! Sections 5 and 7 of reference/DEFINITION.md. With T0 the check is exact: leaves fill every kept T0 leaf,
+//! every deleted T0 leaf is empty, and no leaf is coarser than T0. Without T0 the boundary of every hole must
+//! be one that deletion can leave: a leaf lacks a neighbour across a face only if the definition may delete the
+//! neighbours of such a leaf. Without T0 the check cannot detect a missing leaf if all leaves around it may
+//! lack neighbours, for example a crossing leaf among crossing leaves.
 
 use std::fmt::Write;
 

@@ -14,8 +14,8 @@ pub struct Contacts<'a> {
 }
 
 impl Contacts<'_> {
-    /// Calls `visit` with the octant and the kind of every selected leaf, and with the kinds of everything that shares part of a
-    /// face with it, holes included.
+    /// Calls `visit` with the octant and the kind of every selected leaf, and with the kinds of everything that
+    /// shares part of a face with it, holes included.
     pub fn visit(&self, visit: &mut dyn FnMut(Octant, Kind, Kinds)) {
         let neighbourhood = Neighbourhood::root(self.tree);
         match neighbourhood.centre().as_leaf() {

@@ -1,9 +1,10 @@
 //! Crossing leaves are exactly those that facets cross.
 //!
-//! Sections 2 and 7 of reference/DEFINITION.md. With T0: a leaf of T0 is crossing iff a facet crosses it, and a leaf of the mesh is
-//! crossing iff the T0 leaf that contains it is. Without T0: a leaf that a facet crosses is crossing, and a crossing leaf is crossed
-//! or, if it is finer than the surface, lies in a crossed octant of the surface's level. The check ignores facets outside the root,
-//! and does not detect a missing crossing leaf (`complete` does).
+//! Sections 2 and 7 of reference/DEFINITION.md. With T0: a leaf of T0 is crossing iff a facet crosses it, and a
+//! leaf of the mesh is crossing iff the T0 leaf that contains it is. Without T0: a leaf that a facet crosses is
+//! crossing, and a crossing leaf is crossed or, if it is finer than the surface, lies in a crossed octant of
+//! the surface's level. The check ignores facets outside the root, and does not detect a missing crossing leaf
+//! (`complete` does).
 
 use super::facets::{Facets, Visit};
 use super::{CheckResult, Subject, identical, valid_leaves};
@@ -19,7 +20,8 @@ pub fn check(subject: &Subject) -> CheckResult {
         Some(base) => {
             let words = valid_leaves(&base.words);
             exact(facets, &words, &mut result, &subject.terms.root);
-            inherited(subject, &words, &mut result);
+            let differs = |w, base| is_crossing(w) != is_crossing(base);
+            inherited(subject, &words, &differs, &mut result);
         }
         None => without_base(subject, facets, &mut result),
     }
@@ -44,24 +46,28 @@ fn exact(facets: &Facets, words: &[u64], result: &mut CheckResult, root: &contra
     });
 }
 
-/// Every leaf of the mesh is crossing iff the T0 leaf that contains it is.
-fn inherited(subject: &Subject, base: &[u64], result: &mut CheckResult) {
+/// Reports every leaf of the mesh whose side differs from that of the T0 leaf that contains it.
+pub(super) fn inherited(
+    subject: &Subject,
+    base: &[u64],
+    differs: &dyn Fn(u64, u64) -> bool,
+    result: &mut CheckResult,
+) {
+    let root = &subject.terms.root;
     for &w in &valid_leaves(&subject.mesh.words) {
-        let Some(from) = enclosing(base, w) else {
-            continue;
-        };
-        if is_crossing(w) != is_crossing(from) {
-            let side = word::side(from);
-            let root = &subject.terms.root;
+        if let Some(from) = enclosing(base, w)
+            && differs(w, from)
+        {
             result.report_with(|| {
-                format!("a T0 leaf that is {side} contains a {}", identical::describe(w, root))
+                let (side, leaf) = (word::side(from), identical::describe(w, root));
+                format!("a T0 leaf is {side}, but contains the {leaf}")
             });
         }
     }
 }
 
 /// The one of some sorted leaves that equals or contains this leaf.
-pub(super) fn enclosing(words: &[u64], leaf: u64) -> Option<u64> {
+fn enclosing(words: &[u64], leaf: u64) -> Option<u64> {
     let after = words.partition_point(|&w| word::key(w) <= word::key(leaf));
     let &w = words.get(after.checked_sub(1)?)?;
     let encloses = word::level(w) <= word::level(leaf)

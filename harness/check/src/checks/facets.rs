@@ -1,4 +1,5 @@
-//! The octants of a mesh that facets cross, found by descent through the sorted words with shrinking lists of facets.
+//! The octants of a mesh that facets cross, found by descent through the sorted words with shrinking lists of
+//! facets.
 
 use contract::lattice::FacetLattice;
 use contract::octant::Octant;
@@ -24,8 +25,8 @@ impl Facets {
         Self(facets.iter().map(Triangle::new).collect())
     }
 
-    /// Visits every octant that is a leaf or contains leaves, parents first, with whether a facet crosses it. The words must
-    /// be sorted leaves without overlap.
+    /// Visits every octant that is a leaf or contains leaves, parents first, with whether a facet crosses it.
+    /// The words must be sorted leaves without overlap.
     pub fn walk(&self, words: &[u64], visit: &mut dyn FnMut(Visit, &Octant, bool)) {
         let all: Vec<u32> =
             (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect();

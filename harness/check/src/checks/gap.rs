@@ -1,8 +1,10 @@
-//! The common property of balance and layers: a minimum distance of split octants from leaves coarser than themselves.
+//! The common property of balance and layers: a minimum distance of split octants from leaves coarser than
+//! themselves.
 //!
-//! A leaf of level `l + 1` or finer lies in a split octant of level `l`. So leaves of levels `l + 1` and `l - 1` have a minimum
-//! distance iff no leaf of level `l - 1` is nearer than that to a split octant of level `l`. The walk visits all split octants. It skips
-//! a subtree if its finest leaf is at most one level finer than the coarsest leaf nearby.
+//! A leaf of level `l + 1` or finer lies in a split octant of level `l`. So leaves of levels `l + 1` and `l -
+//! 1` have a minimum distance iff no leaf of level `l - 1` is nearer than that to a split octant of level `l`.
+//! The walk visits all split octants. It skips a subtree if its finest leaf is at most one level finer than the
+//! coarsest leaf nearby.
 
 use super::CheckResult;
 use super::trail::Trail;
@@ -16,8 +18,8 @@ pub struct Gap<'a> {
     pub tree: &'a Tree,
     /// For coordinates in findings.
     pub root: &'a Root,
-    /// Minimum distance from split octants of a level, in level-19 cells; `None` from the first level on that has none. It must
-    /// not increase with the level.
+    /// Minimum distance from split octants of a level, in level-19 cells; `None` from the first level on that
+    /// has none. It must not increase with the level.
     pub margin: &'a dyn Fn(u8) -> Option<i64>,
     /// Name of a violation.
     pub what: &'a str,
@@ -29,7 +31,8 @@ impl Gap<'_> {
         self.check_children(&mut Trail::new(self.tree), result);
     }
 
-    /// Checks the split children of the current octant. All children are tested together first, which mostly suffices.
+    /// Checks the split children of the current octant. All children are tested together first, which mostly
+    /// suffices.
     fn check_children(&self, trail: &mut Trail, result: &mut CheckResult) {
         let (handle, octant) = (trail.current().centre(), trail.current().octant);
         let level = octant.level + 1;
@@ -44,7 +47,8 @@ impl Gap<'_> {
         let nearby = trail.coarsest_nearby(self.tree, margin, &region, level);
         for digit in (0..8).filter(|d| split >> d & 1 == 1) {
             let child = self.tree.child(handle, digit, octant.level);
-            // The neighbourhood of the children contains that of each child, which contains those of the grandchildren.
+            // The neighbourhood of the children contains that of each child, which contains those of the
+            // grandchildren.
             let deep = self.tree.finest_level(child, level) > nearby.max(level) + 1;
             if nearby < level || deep {
                 trail.descend(self.tree, digit);

@@ -34,8 +34,8 @@ pub fn count(tree: &Tree) -> Counts {
     counts
 }
 
-/// Number of hanging nodes on the edge along `axis` that lies on the low (0) or high (1) side of the leaf in the other two
-/// axes.
+/// Number of hanging nodes on the edge along `axis` that lies on the low (0) or high (1) side of the leaf in
+/// the other two axes.
 fn on_edge(tree: &Tree, neighbourhood: &Neighbourhood, axis: usize, sides: [u8; 2]) -> u64 {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut neighbours = [(Handle::HOLE, 0); 3];
@@ -50,8 +50,8 @@ fn on_edge(tree: &Tree, neighbourhood: &Neighbourhood, axis: usize, sides: [u8; 
     along(tree, neighbours, axis, neighbourhood.octant.level)
 }
 
-/// Number of nodes in the interior of part of an edge. Each of the three octants around it is given with the digit of its first
-/// child along the edge.
+/// Number of nodes in the interior of part of an edge. Each of the three octants around it is given with the
+/// digit of its first child along the edge.
 fn along(tree: &Tree, octants: [(Handle, u8); 3], axis: usize, level: u8) -> u64 {
     if !octants.iter().any(|(handle, _)| handle.is_node()) {
         return 0;
@@ -91,8 +91,8 @@ mod tests {
         let tree =
             Tree::of_words(&words_of(|o| o.level == 0 || (o.level == 1 && o.corner == [0; 3])));
         let counts = count(&tree);
-        // Three faces of the refined octant are in the interior of the root. Of their nine edges, three are in the interior
-        // of the root (three coarse leaves each) and six in its faces (one coarse leaf each).
+        // Three faces of the refined octant are in the interior of the root. Of their nine edges, three are in
+        // the interior of the root (three coarse leaves each) and six in its faces (one coarse leaf each).
         assert_eq!(counts.edges, [12 * 15 - 15, 15, 0]);
         assert!(counts.worst.is_none());
     }

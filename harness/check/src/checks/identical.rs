@@ -1,7 +1,8 @@
 //! The mesh equals another one, leaf by leaf.
 //!
-//! Section 1 of reference/DEFINITION.md: the mesh is a function of the inputs only, so the mesh of the reference is the only
-//! correct one. The check cannot detect an error that both programs make; the other checks do.
+//! Section 1 of reference/DEFINITION.md: the mesh is a function of the inputs only, so the mesh of the
+//! reference is the only correct one. The check cannot detect an error that both programs make; the other
+//! checks do.
 
 use super::{CheckResult, Subject};
 use contract::lattice::Root;
@@ -15,8 +16,8 @@ pub fn check(subject: &Subject) -> Option<CheckResult> {
     Some(compare(&subject.mesh.words, &reference.words, &subject.terms.root))
 }
 
-/// Compares two sorted sequences of words. The total is the number of leaves in only one of them, and the one listed finding is the
-/// first difference.
+/// Compares two sorted sequences of words. The total is the number of leaves in only one of them, and the one
+/// listed finding is the first difference.
 pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
     let mut result = CheckResult::new(NAME);
     result.examined = mesh.len() as u64;

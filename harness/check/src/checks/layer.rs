@@ -1,10 +1,11 @@
 //! Every layer is at least n cells thick, at every level.
 //!
-//! Section 7 of reference/DEFINITION.md: the Chebyshev distance of a leaf of level l + 1 or finer from a leaf of level l - 1 or
-//! coarser is at least n cells of level l, for every l coarser than the surface and, if all leaves are kept, for every l. Leaves
-//! that are nearer than n - 1 surface cells to a crossing leaf of the surface's level have at least that level. If crossing leaves are
-//! deleted, leaves that touched one have at least the surface's level. The check cannot detect layers that are too thick and,
-//! without T0, layers that deleted crossing leaves require.
+//! Section 7 of reference/DEFINITION.md: the Chebyshev distance of a leaf of level l + 1 or finer from a leaf
+//! of level l - 1 or coarser is at least n cells of level l, for every l coarser than the surface and, if all
+//! leaves are kept, for every l. Leaves that are nearer than n - 1 surface cells to a crossing leaf of the
+//! surface's level have at least that level. If crossing leaves are deleted, leaves that touched one have at
+//! least the surface's level. The check cannot detect layers that are too thick and, without T0, layers that
+//! deleted crossing leaves require.
 
 use super::gap::Gap;
 use super::trail::Trail;
@@ -43,7 +44,8 @@ fn cell(level: u8) -> i64 {
 }
 
 impl Terms {
-    /// Minimum distance of a crossing leaf of this kind and level from leaves coarser than the surface, in level-19 cells.
+    /// Minimum distance of a crossing leaf of this kind and level from leaves coarser than the surface, in
+    /// level-19 cells.
     fn surface_layer(&self, kind: Kind, level: u8) -> i64 {
         let layer = i64::from(self.layer_cells_min) - 1;
         // The extra layer is required only if crossing leaves are deleted.

@@ -1,7 +1,7 @@
 //! Every word is a leaf, each part is sorted, and no two leaves overlap.
 //!
-//! Sections 7 and 8 of reference/DEFINITION.md. The check does not detect holes (`complete` does), nor wrong sides (`sides` and
-//! `crossing` do).
+//! Sections 7 and 8 of reference/DEFINITION.md. The check does not detect holes (`complete` does), nor wrong
+//! sides (`sides` and `crossing` do).
 
 use super::{CheckResult, Subject, identical};
 use contract::lattice::Root;

@@ -1,7 +1,7 @@
 //! The manifest agrees with the files and with the case.
 //!
-//! Section 8 of reference/DEFINITION.md: counts, digests, and inputs. The check cannot detect wrong leaves, or two sets of
-//! leaves with equal digests. `sides` checks the ambiguous components.
+//! Section 8 of reference/DEFINITION.md: counts, digests, and inputs. The check cannot detect wrong leaves, or
+//! two sets of leaves with equal digests. `sides` checks the ambiguous components.
 
 use std::fmt::Debug;
 

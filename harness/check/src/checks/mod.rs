@@ -1,8 +1,8 @@
-//! The checks, one per file. The head of each file names the property of reference/DEFINITION.md that it checks, and the
-//! errors that it cannot detect.
+//! The checks, one per file. The head of each file names the property of reference/DEFINITION.md that it
+//! checks, and the errors that it cannot detect.
 //!
-//! A check never trusts the program under test. It derives what it needs from the case, from the leaves and, if it is known,
-//! from the base tree T0, whose own correctness `spacing`, `crossing` and `sides` establish.
+//! A check never trusts the program under test. It derives what it needs from the case, from the leaves and, if
+//! it is known, from the base tree T0, whose own correctness `spacing`, `crossing` and `sides` establish.
 
 pub mod balance;
 pub mod complete;
@@ -29,7 +29,8 @@ use subject::valid_leaves;
 pub use terms::Terms;
 pub(crate) use terms::interiors_meet;
 
-/// Runs all checks, in the order in which their findings are most helpful. `identical` is omitted without a reference.
+/// Runs all checks, in the order in which their findings are most helpful. `identical` is omitted without a
+/// reference.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
     let mut results = vec![
         manifest::check(subject),

@@ -1,10 +1,11 @@
 //! Each component has one side, and it is the side that rays determine.
 //!
-//! Section 4 of reference/DEFINITION.md. With T0: the components of its leaves (connected through faces) are found by union-find,
-//! the harness's own exact rays determine the side of each, and every leaf must have the side of its component. The manifest must
-//! state the number of ambiguous components. Every leaf of the mesh must have the side of the T0 leaf that contains it. Without T0:
-//! no outside leaf shares part of a face with an inside leaf, and no leaf has a side that is deleted. The check cannot detect that all
-//! rays are wrong, which is possible on a body that is not watertight; the oracles can.
+//! Section 4 of reference/DEFINITION.md. With T0: the components of its leaves (connected through faces) are
+//! found by union-find, the harness's own exact rays determine the side of each, and every leaf must have the
+//! side of its component. The manifest must state the number of ambiguous components. Every leaf of the mesh
+//! must have the side of the T0 leaf that contains it. Without T0: no outside leaf shares part of a face with
+//! an inside leaf, and no leaf has a side that is deleted. The check cannot detect that all rays are wrong,
+//! which is possible on a body that is not watertight; the oracles can.
 
 use super::components::{self, Component};
 use super::contact::{self, Contacts};
@@ -24,7 +25,7 @@ pub fn check(subject: &Subject) -> CheckResult {
     result.examined = subject.mesh.words.len() as u64;
     if let Some(base) = subject.base {
         let words = valid_leaves(&base.words);
-        inherited(subject, &words, &mut result);
+        crossing::inherited(subject, &words, &|w, base| w & 3 != base & 3, &mut result);
         let components = components::find(&words, &Parity::new(&subject.case.facets_lattice));
         labelled(&components, &words, &subject.terms, &mut result);
         for (prefix, set) in [("", subject.mesh), ("T0: ", base)] {
@@ -69,20 +70,6 @@ fn not_kept(tree: &Tree, handle: Handle, octant: Octant, terms: &Terms, result: 
             let (side, leaf) = (contact::name(deleted), terms.root.describe(&octant));
             format!("{side} leaves are deleted, but one still exists: {leaf}")
         });
-    }
-}
-
-/// Every leaf of the mesh has the side of the T0 leaf that contains it.
-fn inherited(subject: &Subject, base: &[u64], result: &mut CheckResult) {
-    for &w in &valid_leaves(&subject.mesh.words) {
-        if let Some(from) = crossing::enclosing(base, w)
-            && w & 3 != from & 3
-        {
-            let (side, root) = (word::side(from), &subject.terms.root);
-            result.report_with(|| {
-                format!("a T0 leaf that is {side} contains a {}", identical::describe(w, root))
-            });
-        }
     }
 }
 

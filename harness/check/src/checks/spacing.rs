@@ -1,9 +1,10 @@
 //! Leaves are as fine as the surface and the boxes require, and T0 is no finer than that.
 //!
-//! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has at least the level of the surface, and every leaf
-//! whose interior meets the interior of a box has at least the level of the box. T0 is the smallest such tree: every octant that it
-//! splits is crossed and coarser than the surface, or meets a box of a finer level. Without T0 the check establishes only that
-//! leaves are fine enough. It cannot detect needless refinement by gradation; `identical` does.
+//! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has at least the level of the surface,
+//! and every leaf whose interior meets the interior of a box has at least the level of the box. T0 is the
+//! smallest such tree: every octant that it splits is crossed and coarser than the surface, or meets a box of a
+//! finer level. Without T0 the check establishes only that leaves are fine enough. It cannot detect needless
+//! refinement by gradation; `identical` does.
 
 use super::facets::{Facets, Visit};
 use super::{CheckResult, Subject, Terms, identical, interiors_meet, valid_leaves};

@@ -68,8 +68,9 @@ impl<'a> Subject<'a> {
         self.base.map(|b| self.tree_base.get_or_init(|| Tree::of_words(&b.words)))
     }
 
-    /// The final mesh together with the deleted crossing leaves of T0, if T0 is known. If gradation may have refined them
-    /// before they were deleted (because a box is finer than the surface), their kind is [`DELETED`].
+    /// The final mesh together with the deleted crossing leaves of T0, if T0 is known. If gradation may have
+    /// refined them before they were deleted (because a box is finer than the surface), their kind is
+    /// [`DELETED`].
     pub fn tree_with_deleted(&self) -> &Tree {
         let Some(base) = self.base.filter(|_| !self.terms.keep_crossing) else {
             return self.tree();
@@ -96,8 +97,8 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// The sorted words that are leaves and overlap no earlier one. A check that needs a linear mesh continues with these;
-/// `linear` reports the others.
+/// The sorted words that are leaves and overlap no earlier one. A check that needs a linear mesh continues with
+/// these; `linear` reports the others.
 pub(super) fn valid_leaves(words: &[u64]) -> Vec<u64> {
     let mut builder = Builder::default();
     words.iter().copied().filter(|&w| builder.push(w).is_ok()).collect()

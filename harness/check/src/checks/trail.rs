@@ -49,8 +49,8 @@ impl Trail {
         self.neighbourhoods.iter().rev().find(fits).unwrap_or(&self.neighbourhoods[0])
     }
 
-    /// Level of the coarsest leaf in a region within `margin` of the current octant, if it is coarser than `bound`; otherwise a
-    /// level that is at least `bound` and at most that of the coarsest leaf.
+    /// Level of the coarsest leaf in a region within `margin` of the current octant, if it is coarser than
+    /// `bound`; otherwise a level that is at least `bound` and at most that of the coarsest leaf.
     pub fn coarsest_nearby(&self, tree: &Tree, margin: i64, region: &Region, bound: u8) -> u8 {
         let (_, coarsest) = self.wide(margin);
         if *coarsest >= bound { *coarsest } else { self.search(tree, margin, region, bound).level }

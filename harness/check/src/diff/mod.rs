@@ -1,7 +1,8 @@
-//! The differences of two meshes: first of their manifests, then of the leaves in the first octant that differs. Only that octant is
-//! read, so meshes of any size are compared quickly.
+//! The differences of two meshes: first of their manifests, then of the leaves in the first octant that
+//! differs. Only that octant is read, so meshes of any size are compared quickly.
 //!
-//! The comparison trusts the digests in the manifests; the check `manifest` establishes that they agree with the leaves.
+//! The comparison trusts the digests in the manifests; the check `manifest` establishes that they agree with
+//! the leaves.
 
 pub mod rule;
 mod witness;
@@ -29,7 +30,7 @@ pub struct DiffReport {
     pub rules: Vec<String>,
 }
 
-/// Maximum number of leaves of both meshes for which rules are sought, because that holds both in memory.
+/// Maximum number of leaves of both meshes together for which rules are sought: the search needs both in memory.
 const LEAVES_RULED: u64 = 200_000_000;
 
 impl DiffReport {

@@ -1,12 +1,13 @@
 //! The rule of reference/DEFINITION.md that decides which of two meshes is right at their first difference.
 //!
-//! If one mesh has a leaf that the other has split, something must require the split: a facet or a box (section 3), or a finer
-//! leaf nearby (section 6), which is the witness. If both meshes have the witness, it decides. If only the mesh with the split has it,
-//! the witness itself is disputed, and the search continues there. Gradation goes from fine to coarse, so the search ends at the first
-//! difference in the order of the definition.
+//! If one mesh has a leaf that the other has split, something must require the split: a facet or a box (section
+//! 3), or a finer leaf nearby (section 6), which is the witness. If both meshes have the witness, it decides.
+//! If only the mesh with the split has it, the witness itself is disputed, and the search continues there.
+//! Gradation goes from fine to coarse, so the search ends at the first difference in the order of the
+//! definition.
 //!
-//! Crossing leaves that were deleted after gradation are in neither mesh and cannot be witnesses. The text says so where that is
-//! possible.
+//! Crossing leaves that were deleted after gradation are in neither mesh and cannot be witnesses. The text says
+//! so where that is possible.
 
 use crate::checks::Terms;
 use crate::checks::identical::describe;
@@ -102,8 +103,8 @@ impl Dispute<'_> {
             6 => Side::Inside,
             _ => return format!("{text}: another candidate of its component decides"),
         };
-        // The first candidate whose rays agree determines the side of the component. The rays of other leaves can differ only if the
-        // body is not watertight.
+        // The first candidate whose rays agree determines the side of the component. The rays of other leaves
+        // can differ only if the body is not watertight.
         let right = [(a, "A"), (b, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
         match right {
             Some((_, name)) => format!("{text}: {name} is right, if the body is watertight"),
@@ -168,8 +169,8 @@ impl Dispute<'_> {
         rules
     }
 
-    /// The leaf that one mesh has split and the other has not, at a witness that mesh `mesh` does not have: a coarser leaf of `mesh`,
-    /// or a coarser leaf of the other mesh where `mesh` has finer ones.
+    /// The leaf that one mesh has split and the other has not, at a witness that mesh `mesh` does not have: a
+    /// coarser leaf of `mesh`, or a coarser leaf of the other mesh where `mesh` has finer ones.
     fn disputed_leaf(&self, mesh: Mesh, witness: &Octant) -> Option<(Mesh, Leaf)> {
         if let Some(leaf) = self.ancestor_leaf(mesh, witness) {
             return Some((mesh, leaf));
@@ -271,29 +272,30 @@ mod tests {
         dispute.rule(a.get(first).copied(), b.get(first).copied()).join("\n")
     }
 
-    /// Two meshes with the octant `fine`, one with the octant 1 as a leaf, and one with three of its children instead.
+    /// Two meshes with the octant `fine`, one with the octant 1 as a leaf, and one with three of its children
+    /// instead.
     fn pair(fine: &[u8]) -> (Vec<u64>, Vec<u64>) {
-        let whole = mesh(&[fine, &[1]]);
+        let unsplit = mesh(&[fine, &[1]]);
         let split = mesh(&[fine, &[1, 0], &[1, 1], &[1, 2]]);
-        (whole, split)
+        (unsplit, split)
     }
 
     #[test]
     fn rules_of_layer_and_balance_name_their_witness() {
-        let (whole, split) = pair(&[0, 1]);
-        let text = rule(&whole, &split, 2);
+        let (unsplit, split) = pair(&[0, 1]);
+        let text = rule(&unsplit, &split, 2);
         assert!(
             text.contains("step 2 (layer)")
                 && text.ends_with("by the leaf octant 0.1 (level 2), which both have: B is right"),
             "{text}"
         );
-        let text = rule(&whole, &split, 1);
+        let text = rule(&unsplit, &split, 1);
         assert!(
             text.contains("nothing in either mesh asks") && text.contains("A is right"),
             "{text}"
         );
-        let (whole, split) = pair(&[0, 1, 1]);
-        let text = rule(&split, &whole, 1);
+        let (unsplit, split) = pair(&[0, 1, 1]);
+        let text = rule(&split, &unsplit, 1);
         assert!(text.contains("step 3 (balance)") && text.contains("A is right"), "{text}");
     }
 

@@ -5,8 +5,8 @@ use contract::octant::Octant;
 use contract::word::{self, Leaf};
 
 impl Dispute<'_> {
-    /// The leaf of the other mesh that requires an octant of this mesh to be split, and whether both meshes have it. A leaf that both
-    /// have takes precedence, then the finest.
+    /// The leaf of the other mesh that requires an octant of this mesh to be split, and whether both meshes
+    /// have it. A leaf that both have takes precedence, then the finest.
     pub(super) fn witness(&self, mesh: Mesh, octant: &Octant) -> Option<(u64, bool)> {
         let (own, other) = match mesh {
             Mesh::A => (self.a, self.b),

@@ -1,7 +1,7 @@
 //! The points for which the oracles are asked: centroids of leaves of the base tree.
 //!
-//! Invariants: no point lies within [`Sample::band`] of the surface that the oracles read; the choice of points depends on the
-//! leaves and the seed only.
+//! Invariants: no point lies within [`Sample::band`] of the surface that the oracles read; the choice of points
+//! depends on the leaves and the seed only.
 
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
@@ -27,8 +27,8 @@ pub fn choose(case: &Case, base: &[u64], points_max: usize, seed: u64) -> Sample
     let band = band(case);
     let candidates = base.iter().copied().filter(|&leaf| word::side(leaf) != Side::Crossing);
     let count = candidates.clone().count();
-    // No facet meets the closed octant of a leaf that is not crossing, so its centroid is at least half an edge away from
-    // the surface.
+    // No facet meets the closed octant of a leaf that is not crossing, so its centroid is at least half an edge
+    // away from the surface.
     let clear = |leaf: &u64| case.root.edge / f64::from(1u32 << word::level(*leaf)) / 2.0 >= band;
     let mut words: Vec<u64> = candidates.filter(clear).collect();
     let in_band = count - words.len();
@@ -41,8 +41,9 @@ pub fn choose(case: &Case, base: &[u64], points_max: usize, seed: u64) -> Sample
     Sample { words, points, band, in_band: in_band as u64, candidates: count as u64 }
 }
 
-/// A generous bound of the displacement of the surface by single precision and by the lattice. The oracles compute with
-/// coordinates relative to the centre of the body, but they read an STL file of f32 coordinates relative to the origin.
+/// A generous bound of the displacement of the surface by single precision and by the lattice. The oracles
+/// compute with coordinates relative to the centre of the body, but they read an STL file of f32 coordinates
+/// relative to the origin.
 fn band(case: &Case) -> f64 {
     let coordinates = case.facets.iter().flatten().flatten();
     let largest = coordinates.fold(0.0, |most: f64, &c| most.max(f64::from(c).abs()));

@@ -1,8 +1,9 @@
 //! Comparison of the mesh with the oracles and with exact rays.
 //!
-//! Every point has a side in the mesh, an answer of each oracle, and the result of the harness's own six exact rays, which
-//! decide if they agree. On a watertight body they always agree, and the mesh fails if the rays or three unanimous oracles contradict
-//! it. On any other body the side belongs to a component and not to a point, so contradictions are reported only.
+//! Every point has a side in the mesh, an answer of each oracle, and the result of the harness's own six exact
+//! rays, which decide if they agree. On a watertight body they always agree, and the mesh fails if the rays or
+//! three unanimous oracles contradict it. On any other body the side belongs to a component and not to a point,
+//! so contradictions are reported only.
 
 /// One oracle's answers.
 #[derive(Clone, Debug)]

@@ -4,8 +4,8 @@ use contract::lattice::FacetLattice;
 
 /// Whether every edge belongs to an even number of facets on the lattice, regardless of their winding.
 ///
-/// If so, all rays from a point off the surface have the same parity. Degenerate facets count here, although no ray crosses them,
-/// because they close slits of zero width.
+/// If so, all rays from a point off the surface have the same parity. Degenerate facets count here, although no
+/// ray crosses them, because they close slits of zero width.
 pub fn is_watertight(facets: &[FacetLattice]) -> bool {
     let sides = |facet: &FacetLattice| {
         let [a, b, c] = *facet;

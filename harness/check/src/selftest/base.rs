@@ -1,5 +1,5 @@
-//! Base trees that are too coarse or too fine, and meshes that such a base tree leads to. The check `spacing` must detect most
-//! of them.
+//! Base trees that are too coarse or too fine, and meshes that such a base tree leads to. The check `spacing`
+//! must detect most of them.
 
 use super::SelftestCase;
 use super::edit::{self, has_side, merge, sibling_groups, split};
@@ -39,7 +39,8 @@ fn coarse_at_surface(s: &SelftestCase) -> Option<Mutation> {
     with_base(s, all)
 }
 
-/// Index of eight sibling leaves of T0 on the surface's level, of which at least one is crossing. (All eight rarely are.)
+/// Index of eight sibling leaves of T0 on the surface's level, of which at least one is crossing. (All eight
+/// rarely are.)
 fn siblings_at_surface(s: &SelftestCase) -> Option<usize> {
     let words = &s.base.words;
     let sideless: Vec<u64> = words.iter().map(|w| w & !3).collect();

@@ -1,5 +1,5 @@
-//! Damaged, swapped and missing files. The check `files` must detect them or, if every file is valid by itself, `manifest` or
-//! `linear`.
+//! Damaged, swapped and missing files. The check `files` must detect them or, if every file is valid by itself,
+//! `manifest` or `linear`.
 
 use std::fs;
 use std::io::{Result, Write};

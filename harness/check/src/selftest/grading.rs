@@ -1,7 +1,8 @@
 //! Wrong gradation, which the checks `balance` and `layer` must detect.
 //!
-//! Each corruption is found by a search among all leaves that can be split, or among all groups of siblings that can be merged
-//! because T0 is coarser there. The search looks for a change that violates exactly the property in the corruption's name.
+//! Each corruption is found by a search among all leaves that can be split, or among all groups of siblings
+//! that can be merged because T0 is coarser there. The search looks for a change that violates exactly the
+//! property in the corruption's name.
 
 use super::SelftestCase;
 use super::edit::{self, base_level, has_side, merge, sibling_groups, split};
@@ -35,10 +36,10 @@ fn coarser_neighbours(neighbourhood: &Neighbourhood) -> [usize; 4] {
 }
 
 /// Splits the first leaf whose numbers of coarser neighbours satisfy a predicate. They are then two levels coarser.
-fn split_where(s: &SelftestCase, wanted: impl Fn([usize; 4]) -> bool) -> Option<Mutation> {
+fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Option<Mutation> {
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
-        word::level(w) < LEVEL_MAX && wanted(coarser_neighbours(&edit::neighbourhood(&tree, w)))
+        word::level(w) < LEVEL_MAX && predicate(coarser_neighbours(&edit::neighbourhood(&tree, w)))
     };
     let i = s.mesh.words.iter().position(fit)?;
     Some(Mutation::with_words(s, split(&s.mesh.words, i)))
@@ -79,8 +80,8 @@ fn meet_in_corner(a: &Octant, b: &Octant) -> bool {
 }
 
 fn split_twice(s: &SelftestCase) -> Option<Mutation> {
-    // A neighbour of the leaf's level is two levels coarser than the leaf's grandchildren. The first child is split, so the
-    // neighbour must be across a low face.
+    // A neighbour of the leaf's level is two levels coarser than the leaf's grandchildren. The first child is
+    // split, so the neighbour must be across a low face.
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
         let neighbourhood = edit::neighbourhood(&tree, w);
@@ -111,7 +112,8 @@ struct Surroundings {
     in_surface_layer: bool,
 }
 
-/// The surroundings of the siblings at index `i`, found among all leaves: slow, simple, and independent of the checks.
+/// The surroundings of the siblings at index `i`, found among all leaves: slow, simple, and independent of the
+/// checks.
 fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
     let words = &s.mesh.words;
     let merged = word::octant(edit::parent(words[i]));
@@ -172,8 +174,8 @@ fn surface_layer_merged(s: &SelftestCase) -> Option<Mutation> {
     merge_where(s, |level, near| level == s.case.level_surface && near.in_surface_layer)
 }
 
-/// Merges all graded siblings of one level that touch nothing finer. The level is the first on which that makes a layer too
-/// thin.
+/// Merges all graded siblings of one level that touch nothing finer. The level is the first on which that makes
+/// a layer too thin.
 fn layer_missing(s: &SelftestCase) -> Option<Mutation> {
     let words = &s.mesh.words;
     let graded = graded_siblings(s);

@@ -1,8 +1,9 @@
-//! Tests of the checks: correct meshes are corrupted, and the check that is responsible for a corruption must report it.
+//! Tests of the checks: correct meshes are corrupted, and the check that is responsible for a corruption must
+//! report it.
 //!
-//! A corruption that the responsible check misses is a gap in that check, even if another check reports it, because the next
-//! corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a false alarm and fails the self test,
-//! too.
+//! A corruption that the responsible check misses is a gap in that check, even if another check reports it,
+//! because the next corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a
+//! false alarm and fails the self test, too.
 
 use std::fmt;
 use std::fs;

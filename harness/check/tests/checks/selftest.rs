@@ -1,4 +1,4 @@
-//! The self test on meshes of the reference: every corruption is caught by the check meant for it.
+//! The self test on meshes of the reference: the responsible check reports every corruption.
 
 use crate::support;
 use check::selftest;
@@ -11,7 +11,7 @@ const CASES: [(&str, &str); 4] = [
 ];
 
 #[test]
-fn every_corruption_is_killed_and_no_correct_mesh_is_accused() {
+fn every_corruption_is_reported_and_no_correct_mesh_fails() {
     let cases = CASES.map(|(name, text)| support::selftest_case(name, text));
     let scratch = tempfile::tempdir().unwrap();
     let report = selftest::run(&cases, scratch.path()).unwrap();

@@ -1,4 +1,4 @@
-//! Correct meshes for tests: the reference makes them, file contract and all.
+//! Correct meshes for tests, made by the reference and passed through files.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use contract::case::Case;
 use contract::leafset;
 use reference::write::Which;
 
-/// Final mesh and T0 of a case, through files as a user would have them. `text` names its own geometry.
+/// Final mesh and T0 of a case file with this text, which includes the geometry.
 pub fn selftest_case(name: &str, text: &str) -> SelftestCase {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(format!("{name}.toml"));
@@ -15,7 +15,7 @@ pub fn selftest_case(name: &str, text: &str) -> SelftestCase {
     read_meshes(&path, dir.path())
 }
 
-/// The same for a body given as facets: `text` says all but the geometry.
+/// Final mesh and T0 of a body given as facets. `text` is the case file without the geometry.
 pub fn selftest_case_of_facets(text: &str, facets: &[geometries::Facet]) -> SelftestCase {
     let dir = tempfile::tempdir().unwrap();
     let stl = std::fs::File::create(dir.path().join("body.stl")).unwrap();

@@ -10,7 +10,7 @@ use run::engine::description::Description;
 use run::engine::programs::Programs;
 use run::engine::runner::{Engine, Ranks};
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail.

@@ -7,8 +7,8 @@ use crate::word::{self, WordError};
 
 /// Builds a tree from leaves in ascending order of their keys.
 ///
-/// The octants from the root to the parent of the last leaf are open, one per level. An octant is closed, and its node is
-/// stored, as soon as a leaf follows that lies outside it.
+/// The octants from the root to the parent of the last leaf are open, one per level. An octant is closed, and
+/// its node is stored, as soon as a leaf follows that lies outside it.
 #[derive(Debug, Default)]
 pub struct Builder {
     store: Store,

@@ -1,9 +1,9 @@
 //! The leaves of a mesh as a tree that stores equal subtrees once.
 //!
-//! The tree is built in one pass over sorted words. A node consists of its eight children only and has neither a position nor a
-//! level. Most leaves around a smooth surface lie in uniform runs, so a billion of them need a small fraction of the memory
-//! of one node per octant. A walk that carries a [`Neighbourhood`] (an octant and its 26 neighbours) finds the neighbours of
-//! every leaf without a search.
+//! The tree is built in one pass over sorted words. A node consists of its eight children only and has neither
+//! a position nor a level. Most leaves around a smooth surface lie in uniform runs, so a billion of them need a
+//! small fraction of the memory of one node per octant. A walk that carries a [`Neighbourhood`] (an octant and
+//! its 26 neighbours) finds the neighbours of every leaf without a search.
 //!
 //! Invariants: a node has at least one child that is not a hole; children are stored before their parents.
 
@@ -101,8 +101,8 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// The tree of sorted words. Words that are not leaves or that overlap an earlier leaf are omitted; the check `linear`
-    /// reports them.
+    /// The tree of sorted words. Words that are not leaves or that overlap an earlier leaf are omitted; the
+    /// check `linear` reports them.
     pub fn of_words(words: &[u64]) -> Self {
         let mut builder = Builder::default();
         for &w in words {
@@ -143,8 +143,8 @@ impl Tree {
         }
     }
 
-    /// Level of the coarsest leaf in an octant with content `of` at this level, deleted leaves excluded; at least [`NO_LEAF`] if
-    /// there is none.
+    /// Level of the coarsest leaf in an octant with content `of` at this level, deleted leaves excluded; at
+    /// least [`NO_LEAF`] if there is none.
     pub fn coarsest_level(&self, of: Handle, level: u8) -> u8 {
         if of.is_node() {
             return level + self.store.summary(of).coarsest;

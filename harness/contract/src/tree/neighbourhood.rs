@@ -9,8 +9,8 @@ const SELF: usize = 13;
 /// Offsets of the 27 octants from the one in the middle, in edges.
 pub const OFFSETS: [[i32; 3]; 27] = offsets();
 
-/// For each child and each of its 27 neighbours: the index of the neighbour's parent in the parent's neighbourhood, and
-/// the neighbour's digit.
+/// For each child and each of its 27 neighbours: the index of the neighbour's parent in the parent's
+/// neighbourhood, and the neighbour's digit.
 const DESCENT: [[(u8, u8); 27]; 8] = descent();
 
 const fn offsets() -> [[i32; 3]; 27] {

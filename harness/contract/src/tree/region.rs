@@ -18,8 +18,8 @@ impl Region {
         Self { low, high: low.map(|c| c + edge + 2 * margin) }
     }
 
-    /// The bounding box of some children of an octant, enlarged by `margin` on every side. Bit `d` of `digits` selects the
-    /// child with digit `d`.
+    /// The bounding box of some children of an octant, enlarged by `margin` on every side. Bit `d` of `digits`
+    /// selects the child with digit `d`.
     pub fn around_children(parent: &Octant, digits: u8, margin: i64) -> Self {
         let half = i64::from(parent.edge()) / 2;
         // Children on the low and on the high side of each axis.
@@ -56,8 +56,9 @@ impl Coarsest {
 }
 
 impl Neighbourhood {
-    /// The coarsest leaf that is coarser than level `bound` and whose interior meets the region, deleted leaves excluded. The
-    /// result is exact if the region lies within the 27 octants, or if this is the neighbourhood of the root.
+    /// The coarsest leaf that is coarser than level `bound` and whose interior meets the region, deleted leaves
+    /// excluded. The result is exact if the region lies within the 27 octants, or if this is the neighbourhood
+    /// of the root.
     pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Coarsest {
         let mut found = Coarsest { level: bound, cell: None };
         let edge = i64::from(self.octant.edge());

@@ -1,6 +1,7 @@
 //! Distinct nodes, and the hash table that finds equal ones.
 //!
-//! The table is our own because its entries are indices into `children`: a standard map would store every node twice.
+//! The table is our own because its entries are indices into `children`: a standard map would store every node
+//! twice.
 
 use super::{DELETED, HOLES, Handle, NO_LEAF, Summary};
 

@@ -1,8 +1,8 @@
 //! The mesh to be corrupted, distributed to parts.
 //!
-//! Invariants: intervals of equal length, in ascending order of leaves, are assigned to the parts in turn, so that parts interleave
-//! and the leaf with any index is found without a search; there are at least [`PARTS_MIN`] parts; files do not change after
-//! [`DistributedMesh::new`].
+//! Invariants: intervals of equal length, in ascending order of leaves, are assigned to the parts in turn, so
+//! that parts interleave and the leaf with any index is found without a search; there are at least
+//! [`PARTS_MIN`] parts; files do not change after [`DistributedMesh::new`].
 
 use super::Source;
 use crate::audit::merge::merge;
@@ -119,8 +119,8 @@ impl DistributedMesh {
         Ok((part, word[0]))
     }
 
-    /// The window around the leaf with this index: the largest octant whose leaves are few enough and all in one part. `None` if the
-    /// word at the index is not a leaf.
+    /// The window around the leaf with this index: the largest octant whose leaves are few enough and all in
+    /// one part. `None` if the word at the index is not a leaf.
     pub(super) fn window(&self, index: u64) -> io::Result<Option<Window>> {
         let (part, leaf) = self.leaf(index)?;
         let Ok(leaf) = word::decode(leaf) else { return Ok(None) };

@@ -22,7 +22,8 @@ pub(super) enum GlobalChange {
 }
 
 impl GlobalChange {
-    /// The change of the corruption with this name: `None` if the corruption is local, `Some(None)` if it does not apply.
+    /// The change of the corruption with this name: `None` if the corruption is local, `Some(None)` if it does
+    /// not apply.
     ///
     /// # Errors
     /// If the mesh cannot be read.

@@ -1,13 +1,14 @@
-//! The self test for meshes of any size: the corruptions are planted in a few leaves, in the manifest or in the files, and the
-//! streaming audit must find them.
+//! The self test for meshes of any size: the corruptions are planted in a few leaves, in the manifest or in the
+//! files, and the streaming audit must find them.
 //!
-//! The mesh is distributed to many parts once (`distributed`). The functions of the self test corrupt a *window*, the leaves of one
-//! octant, as if it were a complete mesh. The result replaces the window in a copy of the one part that contains it; all other parts
-//! are hard links (`plant`). So a trial needs disk space for one part, and memory for a window and an audit. The few
-//! corruptions that change every leaf process the parts one by one (`global`).
+//! The mesh is distributed to many parts once (`distributed`). The functions of the self test corrupt a
+//! *window*, the leaves of one octant, as if it were a complete mesh. The result replaces the window in a copy
+//! of the one part that contains it; all other parts are hard links (`plant`). So a trial needs disk space for
+//! one part, and memory for a window and an audit. The few corruptions that change every leaf process the parts
+//! one by one (`global`).
 //!
-//! If the leaves alone do not show a corruption, the corrupted mesh is compared with the original by the digests and inputs in
-//! their manifests, as `harness verify` compares parallel meshes with the serial one.
+//! If the leaves alone do not show a corruption, the corrupted mesh is compared with the original by the
+//! digests and inputs in their manifests, as `harness verify` compares parallel meshes with the serial one.
 
 mod distributed;
 mod global;
@@ -46,11 +47,13 @@ pub struct Options {
     pub interrupted: fn() -> bool,
 }
 
-/// Applies every corruption to every mesh to which it applies. `scratch` is an existing empty directory with room for a copy of the
-/// largest mesh and another one per job. `progress` is called with the numbers of finished and of all trials.
+/// Applies every corruption to every mesh to which it applies. `scratch` is an existing empty directory with
+/// room for a copy of the largest mesh and another one per job. `progress` is called with the numbers of
+/// finished and of all trials.
 ///
 /// # Errors
-/// If a mesh cannot be read, or a scratch file cannot be written; `Interrupted` if the user interrupted the program.
+/// If a mesh cannot be read, or a scratch file cannot be written; `Interrupted` if the user interrupted the
+/// program.
 pub fn run(
     sources: &[Source],
     options: &Options,

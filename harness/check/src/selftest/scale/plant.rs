@@ -123,7 +123,7 @@ fn splice(file: &PartFile, window: &Window, words: &[u64], to: &Path) -> io::Res
     let mut out = BufWriter::new(File::create(to)?);
     out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
     copy(file, 0, window.from, &mut out)?;
-    put(words, &mut out)?;
+    write_words(words, &mut out)?;
     copy(file, window.from + removed, file.len(), &mut out)?;
     out.flush()
 }
@@ -133,17 +133,18 @@ fn copy(file: &PartFile, from: u64, until: u64, out: &mut impl Write) -> io::Res
     while next < until {
         let mut words = vec![0; (until - next).min(CHUNK) as usize];
         file.read_at(next, &mut words)?;
-        put(&words, out)?;
+        write_words(&words, out)?;
         next += words.len() as u64;
     }
     Ok(())
 }
 
-fn put(words: &[u64], out: &mut impl Write) -> io::Result<()> {
+fn write_words(words: &[u64], out: &mut impl Write) -> io::Result<()> {
     words.iter().try_for_each(|w| out.write_all(&w.to_le_bytes()))
 }
 
-/// The manifest of the original, updated to the new leaves of the window: no check shall detect the change by a digest.
+/// The manifest of the original, updated to the new leaves of the window: no check shall detect the change by a
+/// digest.
 fn updated_manifest(original: &Manifest, window: &Window, words: &[u64]) -> Manifest {
     let mut manifest = original.clone();
     let (old, new) = (Tally::of(&window.correct.mesh.words), Tally::of(words));
@@ -173,8 +174,8 @@ fn updated_manifest(original: &Manifest, window: &Window, words: &[u64]) -> Mani
     manifest
 }
 
-/// Writes a mesh into a new directory `dir` in which every part is changed. Returns false, and writes nothing, if the leaves stay the
-/// same, for example if a symmetric mesh is mirrored.
+/// Writes a mesh into a new directory `dir` in which every part is changed. Returns false, and writes nothing,
+/// if the leaves stay the same, for example if a symmetric mesh is mirrored.
 pub(super) fn apply_globally(
     original: &DistributedMesh,
     change: &GlobalChange,

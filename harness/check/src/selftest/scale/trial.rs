@@ -81,7 +81,8 @@ impl Trial<'_> {
         Ok(None)
     }
 
-    /// Audits the corrupted mesh and, if the leaves alone do not show the corruption, compares it with the original.
+    /// Audits the corrupted mesh and, if the leaves alone do not show the corruption, compares it with the
+    /// original.
     fn examine(&self) -> io::Result<Outcome> {
         let audited = audit::audit(self.dir, &AuditOptions::default()).checks;
         let failed: Vec<&CheckResult> = audited.iter().filter(|c| !c.holds()).collect();
