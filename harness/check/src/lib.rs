@@ -1,9 +1,10 @@
-//! Checks on oct-tree meshes. Nothing here shares an algorithm with the programs it judges, and nothing starts a process.
+//! Checks of oct-tree meshes. This crate shares no algorithm with the programs that it checks, and starts no
+//! process.
 //!
-//! - [`checks`]: a file per promise; [`audit`](mod@audit): those that need no more than the leaves, at any size;
-//! - [`diff`](mod@diff): where two meshes differ;
-//! - [`oracle`]: which points other programs are asked about, and how their answers are counted;
-//! - [`selftest`]: corruptions that the checks must catch.
+//! - [`checks`]: one file per property; [`audit`](mod@audit): the checks that need only the leaves, for meshes of any size;
+//! - [`diff`](mod@diff): where two meshes differ, and which is right;
+//! - [`oracle`]: the points for which other programs are asked, and the evaluation of their answers;
+//! - [`selftest`]: corrupted meshes that the checks must detect.
 
 pub mod audit;
 pub mod checks;

@@ -1,5 +1,4 @@
-//! Case files: what a mesh is made from, as the harness reads them (reference/DEFINITION.md,
-//! section 10).
+//! Case files, which describe the input of a mesher (reference/DEFINITION.md, section 10).
 
 use std::path::{Path, PathBuf};
 
@@ -11,59 +10,59 @@ use crate::stl::{self, StlError};
 
 pub use geometries::Facet;
 
-/// A case, ready for checks: everything on the lattice.
+/// A case, with its geometry on the lattice.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The file's name without extension.
+    /// Name of the case file without its extension.
     pub name: String,
-    /// The body as it was given.
+    /// The body, in the user's units.
     pub facets: Vec<Facet>,
     /// The body on the lattice.
     pub facets_lattice: Vec<FacetLattice>,
     /// The root cube.
     pub root: Root,
-    /// D: the level that crossing leaves have.
+    /// D: the level of crossing leaves.
     pub level_surface: u8,
     /// n: minimum thickness of a layer, in cells.
     pub layer_cells_min: u32,
-    /// Which side stays.
+    /// The side that is kept.
     pub keep: Keep,
-    /// Whether crossing leaves stay.
+    /// Whether crossing leaves are kept.
     pub keep_crossing: bool,
     /// Extent boxes on the lattice.
     pub boxes: Vec<ExtentBox>,
 }
 
-/// What is wrong with a case.
+/// Why a case cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
-    /// The case file could not be read.
+    /// The case file cannot be read.
     #[error("{path}: {source}")]
     Io {
         /// The case file.
         path: PathBuf,
-        /// Why it failed.
+        /// The cause.
         source: std::io::Error,
     },
-    /// Not TOML, or not a case.
+    /// The file is not TOML, or not a valid case.
     #[error("{path}: {why}")]
     Content {
         /// The case file.
         path: PathBuf,
-        /// What is wrong, in a sentence.
+        /// The cause, in one sentence.
         why: String,
     },
-    /// The body could not be read.
+    /// The body cannot be read.
     #[error("{path} {source}")]
     Stl {
-        /// The geometry's file.
+        /// The geometry file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         source: StlError,
     },
 }
 
-/// The file as it stands.
+/// The case file, key by key.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CaseFile {
@@ -101,7 +100,10 @@ fn keep_crossing_default() -> bool {
 }
 
 impl Case {
-    /// Reads a case file and the body it names.
+    /// Reads a case file and the body that it names or generates.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or if the case is invalid.
     pub fn read(path: &Path) -> Result<Self, CaseError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| CaseError::Io { path: path.to_owned(), source })?;
@@ -112,7 +114,10 @@ impl Case {
         Self::build(name, &file, facets).map_err(wrong)
     }
 
-    /// A case from text and a body in memory, for tests: `text` is a case file without geometry.
+    /// A case from the text of a case file without geometry, and from a body in memory.
+    ///
+    /// # Errors
+    /// One sentence, if the case is invalid.
     pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
         let file: CaseFile = toml::from_str(text).map_err(|e| explain(&e))?;
         Self::build("in-memory".to_owned(), &file, facets)
@@ -125,7 +130,8 @@ impl Case {
             return Err("layer_cells_min is 0; a layer has at least one cell".to_owned());
         }
         let level = |what: &str, spacing| {
-            let deep = || format!("{what} = {spacing} asks for a level deeper than 19");
+            let deep =
+                || format!("{what} = {spacing} requires a level deeper than 19; increase it");
             root.level_for(spacing).ok_or_else(deep)
         };
         let level_surface = level("spacing_min", file.spacing_min)?;
@@ -153,13 +159,13 @@ impl Case {
         })
     }
 
-    /// Deepest level that anything in the case asks for.
+    /// Deepest level that the surface or a box requires.
     pub fn level_deepest(&self) -> u8 {
         self.boxes.iter().map(|b| b.level).fold(self.level_surface, u8::max)
     }
 }
 
-/// The body: from the file named, or generated.
+/// The body, read from a file or generated.
 fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
     let wrong = |why: String| CaseError::Content { path: case.to_owned(), why };
     match (&file.geometry, &file.generator) {
@@ -168,15 +174,16 @@ fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
             stl::read(&path).map_err(|source| CaseError::Stl { path, source })
         }
         (None, Some(generator)) => generator.facets().map_err(|e| wrong(e.to_string())),
-        _ => Err(wrong("exactly one of `geometry` and `[generator]` is wanted".to_owned())),
+        _ => Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
     }
 }
 
-/// The root cube, as given or around the body. The order of operations is part of the definition.
+/// The root cube, given or computed from the body. The order of floating-point operations is part of the
+/// definition.
 fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     if let Some(root) = file.root {
         if file.root_scale.is_some() {
-            return Err("root_scale and [root] exclude each other".to_owned());
+            return Err("root_scale and [root] exclude each other; give one of them".to_owned());
         }
         positive("root edge", root.edge)?;
         let finite = root.origin.iter().all(|c| c.is_finite());
@@ -198,7 +205,7 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     }
     let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::NEG_INFINITY, f64::max);
     if longest <= 0.0 {
-        return Err("the body has no extent to scale a root from; give a [root]".to_owned());
+        return Err("the body has no extent from which to compute a root; give a [root]".to_owned());
     }
     let edge = scale * longest;
     let origin = std::array::from_fn(|a| (low[a] + high[a]) * 0.5 - edge * 0.5);
@@ -210,7 +217,9 @@ fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String
     for (i, facet) in facets.iter().enumerate() {
         let mut on = [[0; 3]; 3];
         for (q, vertex) in on.iter_mut().zip(facet) {
-            let far = || format!("facet {i} is not finite or lies more than one root edge outside");
+            let far = || {
+                format!("facet {i} is not finite, or lies more than one root edge outside the root")
+            };
             *q = root.quantise(vertex.map(f64::from)).ok_or_else(far)?;
         }
         all.push(on);
@@ -220,33 +229,31 @@ fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String
 
 fn positive(what: &str, value: f64) -> Result<(), String> {
     let good = value.is_finite() && value > 0.0;
-    if good { Ok(()) } else { Err(format!("{what} = {value}: it must be finite and above zero")) }
+    if good {
+        Ok(())
+    } else {
+        Err(format!("{what} = {value} must be finite and greater than zero"))
+    }
 }
 
-/// A TOML error in one line, with the nearest known key where a key is unknown.
+/// A TOML error in one line, with the most similar known key if a key is unknown.
 fn explain(error: &toml::de::Error) -> String {
     let message = error.message();
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (message.starts_with("unknown field"), quoted.next()) {
-        (true, Some(key)) => match quoted.min_by_key(|known| distance(key, known)) {
-            Some(near) => format!("unknown key `{key}`; did you mean `{near}`?"),
-            None => format!("unknown key `{key}`"),
-        },
+        (true, Some(key)) => {
+            match quoted.max_by(|a, b| similarity(key, a).total_cmp(&similarity(key, b))) {
+                Some(near) => format!("unknown key `{key}`; did you mean `{near}`?"),
+                None => format!("unknown key `{key}`"),
+            }
+        }
         _ => message.replace('\n', " "),
     }
 }
 
-/// Edits between two words (Levenshtein).
-fn distance(a: &str, b: &str) -> usize {
-    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, y) in b.chars().enumerate() {
-            let best = (diagonal + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
-            diagonal = std::mem::replace(&mut row[j + 1], best);
-        }
-    }
-    *row.last().expect("at least one entry")
+/// Similarity of two keys, from 0 to 1, by the metric that the mesher uses too.
+fn similarity(a: &str, b: &str) -> f64 {
+    strsim::jaro_winkler(a, b)
 }
 
 #[cfg(test)]
@@ -256,7 +263,7 @@ mod tests {
     const UNIT: Facet = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
     #[test]
-    fn defaults_and_root_are_those_of_the_definition() {
+    fn defaults_and_the_computed_root_follow_the_definition() {
         let case = Case::from_parts("spacing_min = 0.5", vec![UNIT]).unwrap();
         assert_eq!((case.layer_cells_min, case.keep, case.keep_crossing), (4, Keep::Outside, true));
         assert_eq!(case.root, Root { origin: [-9.0, -9.5, -10.0], edge: 20.0 });
@@ -264,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_are_clamped_and_have_their_own_level() {
+    fn boxes_are_clamped_to_the_root_and_have_their_own_level() {
         let text = "spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n\
                     [[box]]\nmin = [-4.0, 1.0, 2.0]\nmax = [4.0, 99.0, 3.0]\nspacing = 0.3";
         let case = Case::from_parts(text, vec![]).unwrap();
@@ -276,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn errors_name_the_cause() {
         let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
         assert!(why("spacing_mim = 1.0").contains("did you mean `spacing_min`"));
         assert!(why("spacing_min = -1.0").contains("spacing_min"));

@@ -1,17 +1,17 @@
-//! The catalogue of cases: selection by name, by size, or by path of a case file.
+//! The catalogue of cases (`geometries/catalogue.toml`): cases by name, by size, or by the path of a case file.
 
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
-use toml::Table;
+use std::sync::OnceLock;
 
-/// How large the catalogue's cases are to be.
+/// Size class of a case in the catalogue.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
-    /// Seconds each; every leaf of the base tree is put to the oracles.
+    /// Seconds each; the oracles are asked about every leaf of the base tree.
     Small,
     /// Up to some millions of cells.
     Medium,
@@ -22,22 +22,30 @@ pub enum Size {
 /// A case that was selected.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Selected {
-    /// Its name; also that of its directory.
+    /// Its name, which is also the name of its directory.
     pub name: String,
-    /// What the user has to say to select it again.
+    /// The command-line argument that selects it again.
     pub argument: String,
     /// The case file.
     pub path: PathBuf,
-    /// Its size, if it is the catalogue's.
+    /// Its size, if it is in the catalogue.
     pub size: Option<Size>,
-    /// Why its geometry is not there.
+    /// Set if its geometry file does not exist: which file, and how to get it.
     pub absent: Option<String>,
 }
 
+/// The catalogue. Its file is parsed at most once, on the first look-up that needs it: a user's own case file
+/// can be selected without a catalogue.
+#[derive(Clone, Debug)]
+pub struct Catalogue {
+    path: PathBuf,
+    cases: OnceLock<Result<Vec<Selected>, String>>,
+}
+
 #[derive(Debug, Deserialize)]
-struct Catalogue {
+struct CatalogueFile {
     #[serde(rename = "case")]
-    cases: Vec<Entry>,
+    entries: Vec<Entry>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -47,41 +55,90 @@ struct Entry {
     size: Size,
 }
 
-/// The cases named, in that order; without names, all of the catalogue's of the given sizes.
-///
-/// # Errors
-/// Where a name is neither in the catalogue nor a file, or the catalogue cannot be read.
-pub fn select(cases: &[String], sizes: &[Size], catalogue: &Path) -> Result<Vec<Selected>, String> {
-    let all = read(catalogue);
-    if cases.is_empty() {
-        let of_size =
-            all?.into_iter().filter(|case| case.size.is_some_and(|size| sizes.contains(&size)));
-        return Ok(of_size.collect());
-    }
-    let mut selected: Vec<Selected> = Vec::new();
-    for argument in cases {
-        let mut one =
-            match Path::new(argument).extension().is_some_and(|extension| extension == "toml") {
-                true => of_path(argument)?,
-                false => of_name(argument, all.clone()?)?,
-            };
-        // Directories of results bear the case's name, so two of one name must not meet.
-        let same =
-            selected.iter().filter(|other| other.path.file_stem() == one.path.file_stem()).count();
-        if selected.iter().any(|other| other.name == one.name) {
-            one.name = format!("{}-{}", one.name, same + 1);
-        }
-        selected.push(one);
-    }
-    Ok(selected)
+/// The one key of a case file that the catalogue reads.
+#[derive(Debug, Deserialize)]
+struct Geometry {
+    geometry: Option<PathBuf>,
 }
 
-fn of_path(argument: &str) -> Result<Selected, String> {
+impl Catalogue {
+    /// The catalogue in this file, which is not opened yet.
+    pub fn new(path: PathBuf) -> Self {
+        Self { path, cases: OnceLock::new() }
+    }
+
+    /// The catalogue's file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The selected cases, in the order of `arguments`, which are names or paths of case files. Without
+    /// arguments, all cases of the catalogue that have one of these sizes.
+    ///
+    /// # Errors
+    /// One sentence, if an argument is neither in the catalogue nor a file, or if the catalogue cannot be read.
+    pub fn select(&self, arguments: &[String], sizes: &[Size]) -> Result<Vec<Selected>, String> {
+        if arguments.is_empty() {
+            let of_size = |case: &&Selected| case.size.is_some_and(|size| sizes.contains(&size));
+            return Ok(self.cases()?.iter().filter(of_size).cloned().collect());
+        }
+        let mut selected: Vec<Selected> = Vec::new();
+        for argument in arguments {
+            let mut case = match is_path(argument) {
+                true => from_path(argument)?,
+                false => self.named(argument)?.clone(),
+            };
+            // A directory of results has the name of its case, so names must be unique.
+            if selected.iter().any(|other| other.name == case.name) {
+                let same_stem = |other: &&Selected| other.path.file_stem() == case.path.file_stem();
+                let count = selected.iter().filter(same_stem).count();
+                case.name = format!("{}-{}", case.name, count + 1);
+            }
+            selected.push(case);
+        }
+        Ok(selected)
+    }
+
+    /// The case of the catalogue with this name.
+    ///
+    /// # Errors
+    /// One sentence, if there is none, or if the catalogue cannot be read.
+    pub fn named(&self, name: &str) -> Result<&Selected, String> {
+        let cases = self.cases()?;
+        cases.iter().find(|case| case.name == name).ok_or_else(|| {
+            let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
+            format!("no case {name} in the catalogue, which has {}", names.join(", "))
+        })
+    }
+
+    /// The case file that an argument selects: a path, relative to `directory`, or a name in the catalogue.
+    ///
+    /// # Errors
+    /// As [`Catalogue::named`].
+    pub fn case_file(&self, argument: &str, directory: &Path) -> Result<PathBuf, String> {
+        match is_path(argument) {
+            true => Ok(directory.join(argument)),
+            false => self.named(argument).map(|case| case.path.clone()),
+        }
+    }
+
+    fn cases(&self) -> Result<&[Selected], String> {
+        let cases = self.cases.get_or_init(|| read(&self.path));
+        cases.as_deref().map_err(Clone::clone)
+    }
+}
+
+/// Whether an argument is the path of a case file and not a name.
+fn is_path(argument: &str) -> bool {
+    Path::new(argument).extension().is_some_and(|extension| extension == "toml")
+}
+
+/// A user's own case. A missing geometry is not recorded: that is an error of the case, and not a reason to
+/// leave it out.
+fn from_path(argument: &str) -> Result<Selected, String> {
     let path = fs::canonicalize(argument).map_err(|error| format!("{argument}: {error}"))?;
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    // A geometry that a user's own case names is not left out if it is not there: it is the user's error.
     Ok(Selected {
-        name,
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         argument: path.to_string_lossy().into_owned(),
         path,
         size: None,
@@ -89,41 +146,36 @@ fn of_path(argument: &str) -> Result<Selected, String> {
     })
 }
 
-/// The catalogue's case of this name.
-///
-/// # Errors
-/// Where there is none, or the catalogue cannot be read.
-pub fn named(name: &str, catalogue: &Path) -> Result<Selected, String> {
-    of_name(name, read(catalogue)?)
-}
-
-fn of_name(name: &str, all: Vec<Selected>) -> Result<Selected, String> {
-    let names: Vec<String> = all.iter().map(|case| case.name.clone()).collect();
-    all.into_iter()
-        .find(|case| case.name == name)
-        .ok_or_else(|| format!("no case {name} in the catalogue, which has {}", names.join(", ")))
-}
-
-fn read(catalogue: &Path) -> Result<Vec<Selected>, String> {
-    let wrong = |why: String| format!("{}: {why}", catalogue.display());
-    let text = fs::read_to_string(catalogue).map_err(|error| wrong(error.to_string()))?;
-    let entries: Catalogue = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-    let directory = catalogue.parent().unwrap_or(Path::new("."));
+fn read(path: &Path) -> Result<Vec<Selected>, String> {
+    let wrong = |why: String| format!("{}: {why}", path.display());
+    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let file: CatalogueFile = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    let directory = path.parent().unwrap_or(Path::new("."));
     let selected = |entry: Entry| {
         let path = directory.join(entry.file);
-        let (argument, absent) = (entry.name.clone(), absent(&path));
-        Selected { name: entry.name, argument, path, size: Some(entry.size), absent }
+        let absent = missing_geometry(&path);
+        Selected {
+            argument: entry.name.clone(),
+            name: entry.name,
+            path,
+            size: Some(entry.size),
+            absent,
+        }
     };
-    Ok(entries.cases.into_iter().map(selected).collect())
+    Ok(file.entries.into_iter().map(selected).collect())
 }
 
-/// Why the geometry that a case file names is not there; nothing if it is, or if the file names none.
-fn absent(case: &Path) -> Option<String> {
-    let table: Table = fs::read_to_string(case).ok()?.parse().ok()?;
-    let geometry = table.get("geometry")?.as_str()?;
-    let path = case.parent()?.join(geometry);
-    (!path.exists()).then(|| {
-        format!("{geometry} is not here; ci/setup --geometries fetches what may be fetched")
+/// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported
+/// when the case is used.
+fn missing_geometry(case: &Path) -> Option<String> {
+    let text = fs::read_to_string(case).ok()?;
+    let geometry = toml::from_str::<Geometry>(&text).ok()?.geometry?;
+    let exists = case.parent()?.join(&geometry).exists();
+    (!exists).then(|| {
+        format!(
+            "{} is not here; ci/setup --geometries fetches what may be fetched",
+            geometry.display()
+        )
     })
 }
 
@@ -134,44 +186,49 @@ mod tests {
     const CATALOGUE: &str = "[[case]]\nname = \"cube_small\"\nfile = \"cube_small.toml\"\nsize = \"small\"\n\
                              [[case]]\nname = \"jet\"\nfile = \"jet.toml\"\nsize = \"large\"\n";
 
-    /// A catalogue of two cases, one without its geometry; what selecting gives, by name.
-    fn selecting(cases: &[&str], sizes: &[Size]) -> Result<Vec<(String, bool)>, String> {
+    /// The name of each selected case and whether its geometry is missing, or the error, for a catalogue of two
+    /// cases, the larger without its geometry. `HERE` in an argument is the catalogue's directory.
+    fn select(arguments: &[&str], sizes: &[Size]) -> Result<Vec<(String, bool)>, String> {
         let place = tempfile::tempdir().unwrap();
-        let catalogue = place.path().join("catalogue.toml");
-        fs::write(&catalogue, CATALOGUE).unwrap();
-        fs::write(
-            place.path().join("cube_small.toml"),
-            "[generator]\nshape = \"cube\"\nfacets = 12",
-        )
-        .unwrap();
-        fs::write(place.path().join("jet.toml"), "geometry = \"fetched/jet.stl\"").unwrap();
-        let cases: Vec<String> = cases
-            .iter()
-            .map(|case| case.replace("HERE", &place.path().to_string_lossy()))
-            .collect();
-        let selected = select(&cases, sizes, &catalogue)?;
+        let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+        write("catalogue.toml", CATALOGUE);
+        write("cube_small.toml", "[generator]\nshape = \"cube\"\nfacets = 12");
+        write("jet.toml", "geometry = \"fetched/jet.stl\"");
+        let here = place.path().to_string_lossy();
+        let arguments: Vec<String> =
+            arguments.iter().map(|argument| argument.replace("HERE", &here)).collect();
+        let catalogue = Catalogue::new(place.path().join("catalogue.toml"));
+        let selected = catalogue.select(&arguments, sizes)?;
         Ok(selected.into_iter().map(|case| (case.name, case.absent.is_some())).collect())
     }
 
-    fn named(cases: &[(&str, bool)]) -> Result<Vec<(String, bool)>, String> {
+    fn cases(cases: &[(&str, bool)]) -> Result<Vec<(String, bool)>, String> {
         Ok(cases.iter().map(|(name, absent)| ((*name).to_owned(), *absent)).collect())
     }
 
     #[test]
-    fn by_size_by_name_and_by_path() {
-        assert_eq!(selecting(&[], &[Size::Small]), named(&[("cube_small", false)]));
-        assert_eq!(selecting(&["jet"], &[Size::Small]), named(&[("jet", true)]));
+    fn cases_are_selected_by_size_by_name_and_by_path() {
+        assert_eq!(select(&[], &[Size::Small]), cases(&[("cube_small", false)]));
+        assert_eq!(select(&["jet"], &[Size::Small]), cases(&[("jet", true)]));
         let paths = ["HERE/jet.toml", "cube_small", "HERE/cube_small.toml"];
         assert_eq!(
-            selecting(&paths, &[]),
-            named(&[("jet", false), ("cube_small", false), ("cube_small-2", false)])
+            select(&paths, &[]),
+            cases(&[("jet", false), ("cube_small", false), ("cube_small-2", false)])
         );
     }
 
     #[test]
-    fn what_is_no_case_is_named() {
-        let unknown = selecting(&["cub"], &[]).unwrap_err();
+    fn an_unknown_name_and_a_missing_file_are_errors() {
+        let unknown = select(&["cub"], &[]).unwrap_err();
         assert_eq!(unknown, "no case cub in the catalogue, which has cube_small, jet");
-        assert!(selecting(&["HERE/none.toml"], &[]).unwrap_err().contains("none.toml"));
+        assert!(select(&["HERE/none.toml"], &[]).unwrap_err().contains("none.toml"));
+    }
+
+    #[test]
+    fn a_path_needs_no_catalogue_and_a_name_does() {
+        let catalogue = Catalogue::new("nowhere/catalogue.toml".into());
+        let path = catalogue.case_file("case.toml", Path::new("there"));
+        assert_eq!(path, Ok(PathBuf::from("there/case.toml")));
+        assert!(catalogue.named("cube").unwrap_err().starts_with("nowhere/catalogue.toml: "));
     }
 }

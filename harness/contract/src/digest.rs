@@ -1,12 +1,12 @@
-//! The digest of a set of leaf words (reference/DEFINITION.md, section 8): a sum, so neither order nor
-//! partition changes it, and digests of parts merge by addition.
+//! The digest of a set of leaf words (reference/DEFINITION.md, section 8). It is a sum, so it depends neither
+//! on order nor on the partition, and the digests of parts are merged by addition.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Sum modulo 2^128 of every leaf word's mix.
+/// Sum of [`mix`] over all leaf words, modulo 2^128.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Digest(pub u128);
 
@@ -19,7 +19,7 @@ fn finalise(mut x: u64) -> u64 {
     x ^ x >> 31
 }
 
-/// What one word adds to a digest.
+/// The contribution of one word to a digest.
 pub fn mix(word: u64) -> u128 {
     let a = finalise(word.wrapping_add(0x9e37_79b9_7f4a_7c15));
     let b = finalise(a ^ word.rotate_left(32));
@@ -27,24 +27,24 @@ pub fn mix(word: u64) -> u128 {
 }
 
 impl Digest {
-    /// The digest of some words.
+    /// The digest of these words.
     pub fn of(words: &[u64]) -> Self {
         let mut digest = Self::default();
         words.iter().for_each(|&w| digest.add(w));
         digest
     }
 
-    /// Counts one more word in.
+    /// Adds one word.
     pub fn add(&mut self, word: u64) {
         self.0 = self.0.wrapping_add(mix(word));
     }
 
-    /// Counts another set of words in.
+    /// Adds the words of another digest.
     pub fn merge(&mut self, other: Self) {
         self.0 = self.0.wrapping_add(other.0);
     }
 
-    /// Counts a set of words out that was counted in.
+    /// Removes words that were added.
     pub fn remove(&mut self, other: Self) {
         self.0 = self.0.wrapping_sub(other.0);
     }
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn order_and_parts_do_not_matter() {
+    fn a_digest_depends_neither_on_order_nor_on_parts() {
         let words = [5, 900, 1 << 40, 77];
         let mut merged = Digest::of(&[77, 5]);
         merged.merge(Digest::of(&[1 << 40, 900]));
@@ -100,14 +100,14 @@ mod tests {
     }
 
     #[test]
-    fn hex_reads_back_and_only_hex() {
+    fn digests_are_parsed_from_32_hex_digits_only() {
         let digest = Digest::of(&[42]);
         assert_eq!(digest.to_string().parse(), Ok(digest));
         assert!("12".parse::<Digest>().is_err());
         assert!("+0000000000000000000000000000001".parse::<Digest>().is_err());
     }
 
-    /// The finaliser's own published value: SplitMix64 seeded with 0 gives this first.
+    /// Published value: the first output of SplitMix64 with seed 0.
     #[test]
     fn the_finaliser_is_splitmix64() {
         assert_eq!(finalise(0x9e37_79b9_7f4a_7c15), 0xe220_a839_7b1d_cdaf);

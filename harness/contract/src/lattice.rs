@@ -20,19 +20,19 @@ pub struct Root {
 }
 
 impl Root {
-    /// A vertex on the lattice, or nothing where it is not finite or more than one root edge away.
+    /// A vertex on the lattice; `None` if it is not finite or lies more than one root edge outside the root.
     pub fn quantise(&self, at: [f64; 3]) -> Option<[i64; 3]> {
         let near = -(UNITS_PER_EDGE as f64)..=2.0 * UNITS_PER_EDGE as f64;
         let q = self.units(at);
         q.iter().all(|v| near.contains(v)).then(|| q.map(|v| v as i64))
     }
 
-    /// A corner of an extent box on the lattice: what lies beyond the root is brought to its faces.
+    /// A corner of an extent box on the lattice, clamped to the root.
     pub fn quantise_clamped(&self, at: [f64; 3]) -> [i64; 3] {
         self.units(at).map(|v| v.clamp(0.0, UNITS_PER_EDGE as f64) as i64)
     }
 
-    /// Lattice coordinates, still as floating point.
+    /// Lattice coordinates as floating-point numbers.
     fn units(&self, at: [f64; 3]) -> [f64; 3] {
         let scale = UNITS_PER_EDGE as f64 / self.edge;
         std::array::from_fn(|a| ((at[a] - self.origin[a]) * scale).round_ties_even())
@@ -44,13 +44,13 @@ impl Root {
         std::array::from_fn(|a| self.origin[a] + at[a] as f64 * scale)
     }
 
-    /// The least level whose cells are at most `spacing` wide; nothing if that is deeper than 19.
+    /// The coarsest level whose cells are at most `spacing` wide; `None` if it is deeper than 19.
     pub fn level_for(&self, spacing: f64) -> Option<u8> {
         let fits = |level: &u8| self.edge / f64::from(1u32 << level) <= spacing;
         (0..=LEVEL_MAX).find(fits)
     }
 
-    /// An octant for people: path, level, and where it is on the lattice and in the user's units.
+    /// An octant as text: path, level, and bounds on the lattice and in the user's units.
     pub fn describe(&self, octant: &Octant) -> String {
         let (low, high) = octant.bounds();
         let (from, to) = (self.to_user(low), self.to_user(high));
@@ -65,14 +65,14 @@ mod tests {
     const ROOT: Root = Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 };
 
     #[test]
-    fn corners_of_the_root_are_corners_of_the_lattice() {
+    fn corners_of_the_root_map_to_corners_of_the_lattice() {
         assert_eq!(ROOT.quantise([-1.0, 0.0, 2.0]), Some([0; 3]));
         assert_eq!(ROOT.quantise([3.0, 4.0, 6.0]), Some([UNITS_PER_EDGE; 3]));
         assert_eq!(ROOT.to_user([UNITS_PER_EDGE / 2; 3]), [1.0, 2.0, 4.0]);
     }
 
     #[test]
-    fn one_edge_beyond_is_the_limit() {
+    fn vertices_may_lie_up_to_one_root_edge_outside() {
         assert!(ROOT.quantise([-5.0, 0.0, 2.0]).is_some());
         assert!(ROOT.quantise([-5.001, 0.0, 2.0]).is_none());
         assert!(ROOT.quantise([7.0, 0.0, 2.0]).is_some());
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn same_size_or_smaller() {
+    fn cells_of_the_level_are_at_most_as_wide_as_the_spacing() {
         assert_eq!(ROOT.level_for(4.0), Some(0));
         assert_eq!(ROOT.level_for(3.9), Some(1));
         assert_eq!(ROOT.level_for(1e-9), None);

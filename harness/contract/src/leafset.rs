@@ -1,8 +1,8 @@
-//! Leaf-set directories: `mesh.json` and the part files it names, read and written.
+//! Leaf-set directories: the manifest `mesh.json` and the part files that it names.
 //!
-//! Reading refuses only what cannot be understood (no manifest, a part missing or not an array of
-//! words, a part file that the manifest does not name). Whether the contents are true is the
-//! checks' affair.
+//! Reading fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an
+//! array of words, or a part file that the manifest does not name. The checks establish whether the contents
+//! are correct.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,18 +14,18 @@ use crate::npy::{self, NpyError, PartFile};
 /// A mesh in memory.
 #[derive(Clone, Debug)]
 pub struct LeafSet {
-    /// What the directory says about itself.
+    /// The manifest.
     pub manifest: Manifest,
-    /// Every part's words as they stand in its file.
+    /// The words of each part, in the order of its file.
     pub parts: Vec<Vec<u64>>,
     /// The words of all parts, sorted.
     pub words: Vec<u64>,
 }
 
-/// A leaf-set directory, opened: every part's header is good, no leaf has been read.
+/// A leaf-set directory whose manifest and part headers were read and are valid. No leaf has been read.
 #[derive(Debug)]
 pub struct LeafDir {
-    /// What the directory says about itself.
+    /// The manifest.
     pub manifest: Manifest,
     /// The part files, in the manifest's order.
     pub parts: Vec<PartFile>,
@@ -34,28 +34,28 @@ pub struct LeafDir {
 /// Why a directory is not a leaf set.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The manifest or a listing could not be read.
+    /// The manifest or the directory cannot be read.
     #[error("{path}: {source}")]
     Io {
-        /// What was being read.
+        /// The file or directory.
         path: PathBuf,
-        /// Why it failed.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The manifest is not what its schema says.
+    /// The manifest does not follow its schema.
     #[error("{path}: not a leaf-set manifest: {why}")]
     Manifest {
         /// The manifest.
         path: PathBuf,
-        /// What is wrong.
+        /// The cause.
         why: String,
     },
-    /// A part is missing or is not an array of leaf words.
+    /// A part is missing, or is not an array of leaf words.
     #[error("{path}: the part {source}")]
     Part {
         /// The part file.
         path: PathBuf,
-        /// What is wrong.
+        /// The cause.
         source: NpyError,
     },
     /// A part file that the manifest does not name.
@@ -64,16 +64,27 @@ pub enum ReadError {
 }
 
 /// Reads a leaf-set directory into memory.
+///
+/// # Errors
+/// If the directory is not a leaf set.
 pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
     let LeafDir { manifest, parts } = open(dir)?;
-    let read = |p: &PartFile| {
-        p.read_all().map_err(|e| ReadError::Part { path: p.path().to_owned(), source: e.into() })
-    };
+    let read = |part: &PartFile| part.read_all().map_err(|e| ReadError::part(part, e));
     let parts = parts.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     Ok(LeafSet::new(manifest, parts))
 }
 
+impl ReadError {
+    /// A part that was opened, but cannot be read.
+    pub fn part(part: &PartFile, error: std::io::Error) -> Self {
+        Self::Part { path: part.path().to_owned(), source: error.into() }
+    }
+}
+
 /// Opens a leaf-set directory without reading leaves.
+///
+/// # Errors
+/// If the directory is not a leaf set.
 pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
     let manifest = read_manifest(dir)?;
     let mut parts = Vec::new();
@@ -85,7 +96,10 @@ pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
     Ok(LeafDir { manifest, parts })
 }
 
-/// Reads the manifest alone.
+/// Reads only the manifest.
+///
+/// # Errors
+/// If it cannot be read, or does not follow its schema.
 pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
     let path = dir.join(manifest::FILE);
     let text =
@@ -94,12 +108,12 @@ pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
         .map_err(|e| ReadError::Manifest { path: path.clone(), why: e.to_string() })?;
     let wrong = |why| Err(ReadError::Manifest { path, why });
     if manifest.schema != manifest::SCHEMA {
-        return wrong(format!("schema {:?}, not {:?}", manifest.schema, manifest::SCHEMA));
+        return wrong(format!("its schema is {:?}, not {:?}", manifest.schema, manifest::SCHEMA));
     }
     if manifest.octant_digests.len() != manifest::OCTANTS {
-        return wrong(format!("{} octant digests, not 512", manifest.octant_digests.len()));
+        return wrong(format!("it has {} octant digests, not 512", manifest.octant_digests.len()));
     }
-    // A name with a directory in it would let a manifest borrow another mesh's leaves.
+    // A path instead of a file name could refer to the leaves of another mesh.
     if let Some(part) = manifest.parts.iter().find(|p| Path::new(&p.file).components().count() != 1)
     {
         return wrong(format!("part {:?} is not a plain file name", part.file));
@@ -107,7 +121,7 @@ pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
     Ok(manifest)
 }
 
-/// Part files lying about unnamed mean that manifest and directory do not belong together.
+/// A part file that the manifest does not name shows that manifest and directory do not belong together.
 fn refuse_extra_parts(dir: &Path, manifest: &Manifest) -> Result<(), ReadError> {
     let io = |source| ReadError::Io { path: dir.to_owned(), source };
     for entry in fs::read_dir(dir).map_err(io)? {
@@ -121,38 +135,34 @@ fn refuse_extra_parts(dir: &Path, manifest: &Manifest) -> Result<(), ReadError> 
 }
 
 impl LeafSet {
-    /// A mesh of these parts; `words` follows from them.
+    /// A mesh of these parts.
     pub fn new(manifest: Manifest, parts: Vec<Vec<u64>>) -> Self {
         let mut words = parts.concat();
         words.sort_unstable();
         Self { manifest, parts, words }
     }
 
-    /// The same mesh with other parts, and a manifest made true to them.
+    /// The mesh with other parts, and with the counts and digests of its manifest updated to match.
     pub fn with_parts(&self, parts: Vec<Vec<u64>>) -> Self {
         let mut set = Self::new(self.manifest.clone(), parts);
-        let tally = Tally::of(&set.words);
-        let manifest = &mut set.manifest;
-        manifest.leaves = tally.leaves;
-        manifest.leaves_by_level = tally.by_level;
-        manifest.leaves_by_side = tally.by_side;
-        manifest.digest = tally.digest;
-        manifest.octant_digests = tally.octants;
+        set.manifest.set_tally(Tally::of(&set.words));
         let part = |(rank, words): (usize, &Vec<u64>)| Part {
-            file: format!("leaves-{rank:05}.npy"),
+            file: manifest::part_name(rank),
             leaves: words.len() as u64,
             digest: Digest::of(words),
         };
-        manifest.parts = set.parts.iter().enumerate().map(part).collect();
+        set.manifest.parts = set.parts.iter().enumerate().map(part).collect();
         set
     }
 
-    /// Writes the mesh as it stands, true or not, into an existing directory.
+    /// Writes the mesh into an existing directory, whether or not its manifest is correct.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
     pub fn write(&self, dir: &Path) -> std::io::Result<()> {
         for (part, words) in self.manifest.parts.iter().zip(&self.parts) {
             npy::write(&dir.join(&part.file), words)?;
         }
-        let text = serde_json::to_string(&self.manifest).expect("a manifest is plain data");
-        fs::write(dir.join(manifest::FILE), text)
+        self.manifest.write(dir)
     }
 }

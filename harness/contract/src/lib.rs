@@ -1,13 +1,15 @@
-//! What programs exchange, in the harness's own few lines for it, and the algebra of octants and trees.
+//! The formats that the programs exchange, implemented independently of them, and the algebra of octants and trees.
 //!
-//! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`], [`leafset`];
+//! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
+//!   [`leafset`], [`files`] (atomic writes);
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`];
-//! - what checks stand on: [`tree`] (leaves as a tree whose equal subtrees are stored once), [`parity`]
-//!   (rays), [`triangle`] (exact facet-octant test).
+//! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
+//!   [`triangle`] (exact facet-octant test).
 
 pub mod case;
 pub mod catalogue;
 pub mod digest;
+pub mod files;
 pub mod lattice;
 pub mod leafset;
 pub mod manifest;

@@ -1,4 +1,8 @@
-//! `mesh.json`: what a leaf-set directory says about itself.
+//! `mesh.json`, the manifest of a leaf-set directory: the inputs of the mesh, counts, digests and part files.
+
+use std::fs;
+use std::io;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
@@ -6,14 +10,14 @@ use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::octant::LEVEL_MAX;
 
-/// The only schema that is understood.
+/// The only supported schema.
 pub const SCHEMA: &str = "octree-leaf-set/1";
 /// Name of the manifest in its directory.
 pub const FILE: &str = "mesh.json";
-/// Level-3 octants, each with a digest of its own.
+/// Number of level-3 octants. Each has its own digest.
 pub const OCTANTS: usize = 512;
 
-/// Which side of the body stays in the mesh.
+/// The side of the body that is kept in the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
@@ -26,11 +30,11 @@ pub enum Keep {
     All,
 }
 
-/// Which of the two trees a leaf set holds.
+/// The tree that a leaf set holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tree {
-    /// All leaves of the base tree T0, sides decided, nothing deleted.
+    /// All leaves of the base tree T0 with their sides, before deletion.
     Base,
     /// The final mesh.
     Final,
@@ -44,29 +48,29 @@ pub struct ExtentBox {
     pub min: [i64; 3],
     /// Maximum corner, lattice units.
     pub max: [i64; 3],
-    /// Leaves whose interior meets the box's have at least this level.
+    /// Leaves whose interior meets the interior of the box have at least this level.
     pub level: u8,
 }
 
-/// Leaves by side.
+/// Leaf counts by side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BySide {
-    /// Leaves outside of the body.
+    /// Leaves outside the body.
     pub outside: u64,
-    /// Leaves inside.
+    /// Leaves inside the body.
     pub inside: u64,
-    /// Leaves that contain surface.
+    /// Leaves that the surface crosses.
     pub crossing: u64,
 }
 
-/// Components whose side was decided by majority.
+/// Components whose side was decided by a majority of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ambiguous {
-    /// How many.
+    /// Their number.
     pub count: u64,
-    /// Centroid of the first candidate of one of them, user coordinates.
+    /// Centroid of the first candidate leaf of one of them, in the user's units; `None` if there are none.
     pub example: Option<[f64; 3]>,
 }
 
@@ -74,31 +78,31 @@ pub struct Ambiguous {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// File name within the directory.
+    /// File name, without a directory.
     pub file: String,
-    /// Leaves in it.
+    /// Number of leaves.
     pub leaves: u64,
     /// Their digest.
     pub digest: Digest,
 }
 
-/// The whole manifest.
+/// The manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// [`SCHEMA`].
     pub schema: String,
-    /// Name and version of the program that wrote it.
+    /// Name and version of the program that wrote the mesh.
     pub program: String,
     /// Base tree or final mesh.
     pub tree: Tree,
     /// The root cube.
     pub root: Root,
-    /// D: the level that crossing leaves have.
+    /// D: the level of crossing leaves.
     pub level_surface: u8,
     /// n: minimum thickness of a layer, in cells.
     pub layer_cells_min: u32,
-    /// Which side was kept.
+    /// The side that was kept.
     pub keep: Keep,
     /// Whether crossing leaves were kept.
     pub keep_crossing: bool,
@@ -114,24 +118,49 @@ pub struct Manifest {
     pub components_ambiguous: Ambiguous,
     /// Digest of all leaves.
     pub digest: Digest,
-    /// Digest of each level-3 octant's leaves; the index is the leaf word's top nine bits.
+    /// Digest of the leaves in each level-3 octant, indexed by [`octant_index`].
     pub octant_digests: Vec<Digest>,
     /// The part files.
     pub parts: Vec<Part>,
 }
 
-/// Everything in a manifest that follows from the leaves alone.
+impl Manifest {
+    /// Replaces everything that follows from the leaves.
+    pub fn set_tally(&mut self, tally: Tally) {
+        self.leaves = tally.leaves;
+        self.leaves_by_level = tally.by_level;
+        self.leaves_by_side = tally.by_side;
+        self.digest = tally.digest;
+        self.octant_digests = tally.octants;
+    }
+
+    /// Writes the manifest into an existing directory.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, directory: &Path) -> io::Result<()> {
+        let text = serde_json::to_string(self).expect("a manifest is representable in JSON");
+        fs::write(directory.join(FILE), text)
+    }
+}
+
+/// The name of the part file with this index.
+pub fn part_name(index: usize) -> String {
+    format!("leaves-{index:05}.npy")
+}
+
+/// The entries of a manifest that follow from the leaves alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tally {
-    /// Leaves counted.
+    /// Number of words.
     pub leaves: u64,
-    /// By level; words whose level is impossible are not in here.
+    /// Leaves by level, without words of an invalid level.
     pub by_level: [u64; LEVEL_MAX as usize + 1],
-    /// By side.
+    /// Leaves by side, without words of an invalid side.
     pub by_side: BySide,
-    /// Digest of all.
+    /// Digest of all words.
     pub digest: Digest,
-    /// Digest by level-3 octant.
+    /// Digest of the words in each level-3 octant.
     pub octants: Vec<Digest>,
 }
 
@@ -148,31 +177,36 @@ impl Default for Tally {
 }
 
 impl Tally {
-    /// Counts some words.
+    /// The tally of these words.
     pub fn of(words: &[u64]) -> Self {
         let mut tally = Self::default();
         words.iter().for_each(|&w| tally.add(w));
-        tally.close();
+        tally.finish();
         tally
     }
 
-    /// Counts one word; [`Tally::close`] after the last.
+    /// Adds one word. Call [`Tally::finish`] after the last.
     pub fn add(&mut self, word: u64) {
-        self.leaves += 1;
-        if let Some(count) = self.by_level.get_mut(usize::from(crate::word::level(word))) {
-            *count += 1;
-        }
-        match word & 3 {
-            0 => self.by_side.outside += 1,
-            1 => self.by_side.inside += 1,
-            2 => self.by_side.crossing += 1,
-            _ => {}
-        }
+        self.count(word, 1);
         self.octants[octant_index(word)].add(word);
     }
 
-    /// Sums the octants' digests into the whole mesh's: one addition per leaf is saved that way.
-    pub fn close(&mut self) {
+    /// Counts `leaves` words with the level and side of `word`, and leaves the digests unchanged.
+    pub fn count(&mut self, word: u64, leaves: u64) {
+        self.leaves += leaves;
+        if let Some(count) = self.by_level.get_mut(usize::from(crate::word::level(word))) {
+            *count += leaves;
+        }
+        match word & 3 {
+            0 => self.by_side.outside += leaves,
+            1 => self.by_side.inside += leaves,
+            2 => self.by_side.crossing += leaves,
+            _ => {}
+        }
+    }
+
+    /// Computes the digest of all words from those of the octants, which saves one addition per leaf.
+    pub fn finish(&mut self) {
         self.digest = Digest::default();
         for &octant in &self.octants {
             self.digest.merge(octant);
@@ -180,7 +214,7 @@ impl Tally {
     }
 }
 
-/// Which level-3 octant a word belongs to: that of its minimum corner.
+/// Index of the level-3 octant that contains the minimum corner of a leaf: the top nine bits of its word.
 pub fn octant_index(word: u64) -> usize {
     (word >> 55) as usize
 }

@@ -1,4 +1,4 @@
-//! Part files: one-dimensional NumPy arrays of `<u8`, and nothing else.
+//! Part files: one-dimensional NumPy arrays of type `<u8`.
 
 use std::fs::File;
 use std::io::{Cursor, Read, Write};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use npyz::{DType, NpyHeader};
 
-/// More than any header of ours takes, so that one read gets it whole.
+/// Longer than any header that the programs write, so that one read suffices.
 const HEADER_BYTES_MAX: u64 = 1 << 16;
 
-/// A part file, header checked, that can be read from anywhere.
+/// An open part file with a valid header, for reading at any position.
 #[derive(Debug)]
 pub struct PartFile {
     path: PathBuf,
@@ -19,35 +19,38 @@ pub struct PartFile {
     len: u64,
 }
 
-/// Why a file is not a part file: one sentence, without the file's name.
+/// Why a file is not a part file: the predicate of a sentence whose subject is the file.
 #[derive(Debug, thiserror::Error)]
 pub enum NpyError {
-    /// The file could not be read at all.
+    /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Io(#[from] std::io::Error),
-    /// Not an npy header.
+    /// The file does not begin with an npy header.
     #[error("has no npy header: {0}")]
     Header(std::io::Error),
-    /// Another type than little-endian u64.
-    #[error("holds {0}, not '<u8'")]
+    /// The type is not little-endian u64.
+    #[error("has type {0}, not '<u8'")]
     Type(String),
-    /// Not one-dimensional.
-    #[error("has shape {0:?}; one dimension is wanted")]
+    /// The array is not one-dimensional.
+    #[error("has shape {0:?}, but must have one dimension")]
     Shape(Vec<u64>),
     /// The header and the size of the file contradict each other.
-    #[error("is {found} bytes long, but its header promises {wanted} ({leaves} leaves)")]
+    #[error("has {found} bytes, but its header implies {expected} ({leaves} leaves)")]
     Length {
-        /// Bytes there are.
+        /// Bytes in the file.
         found: u64,
-        /// Bytes there should be.
-        wanted: u128,
-        /// Leaves the header promises.
+        /// Bytes that the header implies.
+        expected: u128,
+        /// Leaves that the header announces.
         leaves: u64,
     },
 }
 
 impl PartFile {
-    /// Opens a part file and checks that header and length agree.
+    /// Opens a part file and checks its type, its shape and its length.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is not a part file.
     pub fn open(path: &Path) -> Result<Self, NpyError> {
         let file = File::open(path)?;
         let mut head = Vec::new();
@@ -62,29 +65,32 @@ impl PartFile {
             return Err(NpyError::Shape(header.shape().to_vec()));
         };
         let (offset, found) = (cursor.position(), file.metadata()?.len());
-        let wanted = u128::from(offset) + 8 * u128::from(len);
-        if u128::from(found) != wanted {
-            return Err(NpyError::Length { found, wanted, leaves: len });
+        let expected = u128::from(offset) + 8 * u128::from(len);
+        if u128::from(found) != expected {
+            return Err(NpyError::Length { found, expected, leaves: len });
         }
         Ok(Self { path: path.to_owned(), file, offset, len })
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Words in it.
+    /// Number of words.
     pub fn len(&self) -> u64 {
         self.len
     }
 
-    /// Whether there are none: an empty part is allowed.
+    /// Whether the part has no words, which is allowed.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Reads the words from `first` on into the whole of `words`.
+    /// Fills `words` with the words from index `first` on.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or ends too early.
     pub fn read_at(&self, first: u64, words: &mut [u64]) -> std::io::Result<()> {
         let mut bytes = vec![0; words.len() * 8];
         self.file.read_exact_at(&mut bytes, self.offset + 8 * first)?;
@@ -95,13 +101,19 @@ impl PartFile {
     }
 
     /// All words.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
     pub fn read_all(&self) -> std::io::Result<Vec<u64>> {
         let mut words = vec![0; usize::try_from(self.len).expect("a part fits the address space")];
         self.read_at(0, &mut words)?;
         Ok(words)
     }
 
-    /// Index of the first word not below `word`, the file being sorted.
+    /// Index of the first word that is not less than `word`, in a sorted file.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
     pub fn lower_bound(&self, word: u64) -> std::io::Result<u64> {
         let (mut low, mut high) = (0, self.len);
         while low < high {
@@ -119,6 +131,9 @@ impl PartFile {
 }
 
 /// Writes words as a part file.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
     let shape = format!("({},)", words.len());
     let mut bytes = header("<u8", &shape);
@@ -126,7 +141,8 @@ pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
     File::create(path)?.write_all(&bytes)
 }
 
-/// An npy header, version 1.0, padded to 64 bytes as NumPy does.
+/// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does. It is not written by `npyz`,
+/// because the self test needs headers that contradict the data.
 pub fn header(descr: &str, shape: &str) -> Vec<u8> {
     let mut text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
     let padding = (64 - (10 + text.len() + 1) % 64) % 64;
@@ -149,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn words_read_back_and_are_found() {
+    fn written_words_are_read_back_and_found_by_bisection() {
         let file = file_of(b"");
         let words: Vec<u64> = (0..100).map(|i| i * i).collect();
         write(file.path(), &words).unwrap();
@@ -162,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn other_arrays_are_refused() {
+    fn arrays_of_other_type_shape_or_length_are_rejected() {
         let data = [0; 16];
         let refused = |descr, shape, bytes: usize| {
             let file = file_of(&[&header(descr, shape)[..], &data[..bytes]].concat());

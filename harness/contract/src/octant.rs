@@ -1,12 +1,12 @@
-//! Octants: cells of the oct-tree, by corner and level.
+//! Octants: cells of the oct-tree, given by corner and level.
 //!
-//! Invariants: `level <= LEVEL_MAX`; every coordinate of `corner` is below `CELLS_PER_EDGE` and a
-//! multiple of the octant's own edge. Coordinates are level-19 cells; one is `UNITS_PER_CELL` lattice
-//! units wide.
+//! Invariants: `level <= LEVEL_MAX`; every coordinate of `corner` is less than `CELLS_PER_EDGE` and a multiple
+//! of the octant's edge. The unit of coordinates is the edge of a level-19 cell, which is `UNITS_PER_CELL`
+//! lattice units.
 
 use std::fmt;
 
-/// Deepest level there is.
+/// Deepest level.
 pub const LEVEL_MAX: u8 = 19;
 /// Level-19 cells along an edge of the root.
 pub const CELLS_PER_EDGE: u32 = 1 << LEVEL_MAX;
@@ -18,12 +18,12 @@ pub const UNITS_PER_CELL: i64 = 256;
 pub struct Octant {
     /// Minimum corner, in level-19 cells.
     pub corner: [u32; 3],
-    /// How many times the root was halved to get here.
+    /// Number of bisections of the root.
     pub level: u8,
 }
 
 impl Octant {
-    /// The whole tree.
+    /// The root.
     pub const ROOT: Self = Self { corner: [0; 3], level: 0 };
 
     /// Edge length in level-19 cells.
@@ -31,7 +31,7 @@ impl Octant {
         CELLS_PER_EDGE >> self.level
     }
 
-    /// The child with this digit: bit 0 is x, bit 1 is y, bit 2 is z. Panics below level 19.
+    /// The child with this digit: bit 0 is x, bit 1 is y, bit 2 is z. Panics on level 19.
     pub fn child(&self, digit: u8) -> Self {
         assert!(self.level < LEVEL_MAX && digit < 8, "no child {digit} of {self:?}");
         let half = self.edge() / 2;
@@ -39,27 +39,28 @@ impl Octant {
         Self { corner, level: self.level + 1 }
     }
 
-    /// The ancestor at a level not deeper than this one's own.
+    /// The ancestor at a level that is at most the octant's own.
     pub fn ancestor(&self, level: u8) -> Self {
-        assert!(level <= self.level, "level {level} is below {self:?}");
+        assert!(level <= self.level, "level {level} is deeper than {self:?}");
         let mask = !((CELLS_PER_EDGE >> level) - 1);
         Self { corner: self.corner.map(|c| c & mask), level }
     }
 
-    /// Which child of its parent an octant below the root is.
+    /// The digit of the octant among its siblings.
     pub fn digit(&self) -> u8 {
         (0..3).map(|a| u8::from(self.corner[a] & self.edge() != 0) << a).sum()
     }
 
-    /// The octant of the same level `by` cells away, if it lies in the root.
-    pub fn neighbour(&self, by: [i32; 3]) -> Option<Self> {
+    /// The octant of the same level at an offset in edges of the octant; `None` outside the root.
+    pub fn neighbour(&self, offset: [i32; 3]) -> Option<Self> {
         let mut corner = [0; 3];
         for a in 0..3 {
-            let at = i64::from(self.corner[a]) + i64::from(by[a]) * i64::from(self.edge());
-            if !(0..i64::from(CELLS_PER_EDGE)).contains(&at) {
+            let coordinate =
+                i64::from(self.corner[a]) + i64::from(offset[a]) * i64::from(self.edge());
+            if !(0..i64::from(CELLS_PER_EDGE)).contains(&coordinate) {
                 return None;
             }
-            corner[a] = at as u32;
+            corner[a] = coordinate as u32;
         }
         Some(Self { corner, level: self.level })
     }
@@ -69,6 +70,16 @@ impl Octant {
         other.level >= self.level && other.ancestor(self.level) == *self
     }
 
+    /// Chebyshev distance of two closed octants, in level-19 cells; 0 if they touch.
+    pub fn distance(&self, other: &Self) -> i64 {
+        let ends = |o: &Self, a: usize| (i64::from(o.corner[a]), i64::from(o.corner[a] + o.edge()));
+        let along = |a: usize| {
+            let ((low, high), (low_other, high_other)) = (ends(self, a), ends(other, a));
+            (low - high_other).max(low_other - high)
+        };
+        (0..3).map(along).fold(0, i64::max)
+    }
+
     /// Minimum and maximum corner in lattice units.
     pub fn bounds(&self) -> ([i64; 3], [i64; 3]) {
         let low = self.corner.map(|c| i64::from(c) * UNITS_PER_CELL);
@@ -76,13 +87,13 @@ impl Octant {
         (low, low.map(|c| c + edge))
     }
 
-    /// The centre in lattice units: exact, a level-19 cell being 256 of them wide.
+    /// The centre in lattice units. It is exact, because a level-19 cell is 256 units wide.
     pub fn centre(&self) -> [i64; 3] {
         let (low, high) = self.bounds();
         std::array::from_fn(|a| (low[a] + high[a]) / 2)
     }
 
-    /// Child digits from the root, as in `3.1.4`; the root itself is `root`.
+    /// The digits from the root to the octant, for example `3.1.4`; `root` for the root.
     pub fn path(&self) -> String {
         if self.level == 0 {
             return "root".to_owned();
@@ -102,7 +113,7 @@ impl fmt::Display for Octant {
 mod tests {
     use super::*;
 
-    /// Every octant down to `level`, coarse ones first.
+    /// Every octant down to `level`, coarse octants first.
     fn all_down_to(level: u8) -> Vec<Octant> {
         let mut all = vec![Octant::ROOT];
         let mut next = 0;
@@ -117,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn children_know_their_digit_and_tile_their_parent() {
+    fn children_have_their_digit_and_tile_their_parent() {
         for parent in all_down_to(2) {
             let mut volume = 0;
             for digit in 0..8 {
@@ -131,23 +142,23 @@ mod tests {
         }
     }
 
-    /// Exhaustive to level 3: a neighbour is what one finds by comparing bounds of all octants.
+    /// Exhaustive to level 3, compared with a search among the bounds of all octants.
     #[test]
-    fn neighbours_are_where_bounds_say() {
+    fn neighbours_have_adjacent_bounds() {
         let all = all_down_to(3);
         for octant in &all {
             let (low, high) = octant.bounds();
-            for by in itertools(-1..=1) {
+            for offset in triples(-1..=1) {
                 let edge = high[0] - low[0];
-                let want: [i64; 3] = std::array::from_fn(|a| low[a] + i64::from(by[a]) * edge);
+                let want: [i64; 3] = std::array::from_fn(|a| low[a] + i64::from(offset[a]) * edge);
                 let found = all.iter().find(|o| o.level == octant.level && o.bounds().0 == want);
-                assert_eq!(octant.neighbour(by), found.copied());
+                assert_eq!(octant.neighbour(offset), found.copied());
             }
         }
     }
 
-    /// All triples over a range.
-    fn itertools(range: std::ops::RangeInclusive<i32>) -> Vec<[i32; 3]> {
+    /// All triples of numbers of a range.
+    fn triples(range: std::ops::RangeInclusive<i32>) -> Vec<[i32; 3]> {
         let mut all = Vec::new();
         for x in range.clone() {
             for y in range.clone() {
@@ -158,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_spells_the_digits() {
+    fn a_path_lists_the_digits_from_the_root() {
         let octant = Octant::ROOT.child(3).child(1).child(4);
         assert_eq!(octant.path(), "3.1.4");
         assert_eq!(Octant::ROOT.path(), "root");

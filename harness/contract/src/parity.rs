@@ -1,48 +1,48 @@
-//! Exact ray parity (reference/DEFINITION.md, section 4), the adjudicator where other oracles disagree.
+//! Exact ray parity (reference/DEFINITION.md, section 4), which decides where other oracles disagree.
 //!
-//! A point's six axis-parallel rays count the facets they pass. To decide whether a ray passes a
-//! facet, the facet is projected along the ray, and a second ray within that plane counts its edges:
-//! an edge is met iff it straddles the point's second coordinate half-open, which is what moving the
-//! point by an infinitesimal amount comes to. All in integers.
+//! Six axis-parallel rays start at a point, and each counts the facets that it crosses. To decide whether a ray
+//! crosses a facet, the facet is projected along the ray, and a second ray in that plane counts the edges of
+//! the projection. An edge is crossed iff its half-open range contains the point's second coordinate, which is
+//! equivalent to an infinitesimal perturbation of the point. All arithmetic is in integers.
 
 use crate::lattice::FacetLattice;
 
-/// Facets, sorted into a grid per axis, ready for rays.
+/// Facets, binned into one grid per axis.
 #[derive(Debug)]
 pub struct Parity {
     facets: Vec<FacetLattice>,
     grids: [Grid; 3],
 }
 
-/// Facets by where their projection along one axis lies: cell (i, j) holds every facet whose
-/// projected bounding box meets it.
+/// Facets binned by their projection along one axis: cell (i, j) lists every facet whose projected bounding box
+/// meets it.
 #[derive(Debug)]
 struct Grid {
-    /// Cells along each of the two axes.
+    /// Number of cells along each of the two axes.
     cells: i64,
     /// Minimum of the projected facets.
     low: [i64; 2],
     /// Width of a cell, at least 1.
     width: [i64; 2],
-    /// `facets[starts[c]..starts[c + 1]]` are those of cell `c`.
+    /// Cell `c` lists `facets[starts[c]..starts[c + 1]]`.
     starts: Vec<u32>,
     facets: Vec<u32>,
 }
 
 impl Parity {
-    /// Prepares facets for rays.
+    /// Bins facets.
     pub fn new(facets: &[FacetLattice]) -> Self {
         let grids = std::array::from_fn(|axis| Grid::new(facets, axis));
         Self { facets: facets.to_vec(), grids }
     }
 
-    /// Whether each ray from this point finds it inside: +x, -x, +y, -y, +z, -z. A facet that holds
-    /// the point itself is passed by neither ray of an axis.
+    /// Whether each ray from this point crosses an odd number of facets: +x, -x, +y, -y, +z, -z. A facet that
+    /// contains the point is crossed by neither ray of an axis.
     pub fn inside(&self, point: [i64; 3]) -> [bool; 6] {
         let mut odd = [false; 6];
         for axis in 0..3 {
-            for &i in self.grids[axis].at(project(point, axis)) {
-                match passes(&self.facets[i as usize], point, axis) {
+            for &i in self.grids[axis].candidates(project(point, axis)) {
+                match crosses(&self.facets[i as usize], point, axis) {
                     Some(true) => odd[2 * axis] ^= true,
                     Some(false) => odd[2 * axis + 1] ^= true,
                     None => {}
@@ -53,48 +53,49 @@ impl Parity {
     }
 }
 
-/// The two coordinates that a ray along `axis` leaves fixed: those along axis + 1 and axis + 2.
+/// The two coordinates that are constant along `axis`: those along axis + 1 and axis + 2.
 fn project(point: [i64; 3], axis: usize) -> [i64; 2] {
     [point[(axis + 1) % 3], point[(axis + 2) % 3]]
 }
 
-/// Whether the line along `axis` through the moved point meets the facet ahead of the point (true),
-/// behind it (false), or not.
-fn passes(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
-    let at = project(point, axis);
+/// Whether the line along `axis` through the perturbed point crosses the facet in the positive direction
+/// (true), in the negative direction (false), or not at all.
+fn crosses(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
+    let projected = project(point, axis);
     let corners = facet.map(|v| project(v, axis));
     let edges = [(0, 1), (1, 2), (2, 0)];
-    let met = edges.iter().filter(|&&(a, b)| edge_is_right(corners[a], corners[b], at)).count();
-    if met != 1 {
+    let crossed = |&&(a, b): &&(usize, usize)| edge_is_right(corners[a], corners[b], projected);
+    if edges.iter().filter(crossed).count() != 1 {
         return None;
     }
-    ahead(facet, point, axis)
+    is_positive(facet, point, axis)
 }
 
-/// Whether the edge crosses the horizontal through the moved point, to the right of it. The point is
-/// moved right by eps and up by eps squared: so a corner level with it is below, and where the edge
-/// goes through it, it has been moved past the edge.
-fn edge_is_right(a: [i64; 2], b: [i64; 2], at: [i64; 2]) -> bool {
-    if (a[1] > at[1]) == (b[1] > at[1]) {
+/// Whether the edge crosses the horizontal line through the perturbed point, to the right of the point. The
+/// perturbation is eps to the right and eps squared upwards: a corner at the height of the point is below it,
+/// and a point on the edge lies to the right of it.
+fn edge_is_right(a: [i64; 2], b: [i64; 2], point: [i64; 2]) -> bool {
+    if (a[1] > point[1]) == (b[1] > point[1]) {
         return false;
     }
     let (low, high) = if a[1] < b[1] { (a, b) } else { (b, a) };
-    // Left of the upward edge iff the turn from it to the point is counter-clockwise.
-    (high[0] - low[0]) * (at[1] - low[1]) - (high[1] - low[1]) * (at[0] - low[0]) > 0
+    // The point is left of the upward edge iff the turn from the edge to the point is counter-clockwise.
+    (high[0] - low[0]) * (point[1] - low[1]) - (high[1] - low[1]) * (point[0] - low[0]) > 0
 }
 
-/// On which side of the point the facet's plane meets the line; the line is known to meet the facet.
-fn ahead(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
+/// Whether a line that crosses the facet does so in the positive direction from the point; `None` if the plane
+/// contains the point.
+fn is_positive(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     let normal = normal(facet);
     let from = |a: usize| i128::from(point[a] - facet[0][a]);
     let height: i128 = (0..3).map(|a| i128::from(normal[a]) * from(a)).sum();
-    let moved = [height, normal[(axis + 1) % 3].into(), normal[(axis + 2) % 3].into()];
-    let sign = moved.into_iter().map(i128::signum).find(|&s| s != 0)?;
-    // The plane is ahead iff going ahead brings the height towards zero.
+    let perturbed = [height, normal[(axis + 1) % 3].into(), normal[(axis + 2) % 3].into()];
+    let sign = perturbed.into_iter().map(i128::signum).find(|&s| s != 0)?;
+    // The plane lies in the positive direction iff the height decreases in that direction.
     Some(sign != i128::from(normal[axis].signum()))
 }
 
-/// The facet's normal, not normalised; coordinates on the lattice keep it within i64.
+/// The facet's normal, not normalised. Lattice coordinates are small enough for i64.
 fn normal(facet: &FacetLattice) -> [i64; 3] {
     let edge = |v: usize| -> [i64; 3] { std::array::from_fn(|a| facet[v][a] - facet[0][a]) };
     let (u, v) = (edge(1), edge(2));
@@ -145,9 +146,10 @@ impl Grid {
         (self.starts, self.facets) = (starts, list);
     }
 
+    /// Visits the cells that the projected bounding box of a facet meets.
     fn cells_of(&self, facet: &FacetLattice, axis: usize, mut visit: impl FnMut(usize)) {
         let (from, to) = bounds(facet, axis);
-        let cell = |at: i64, a: usize| (at - self.low[a]) / self.width[a];
+        let cell = |coordinate: i64, a: usize| (coordinate - self.low[a]) / self.width[a];
         for j in cell(from[1], 1)..=cell(to[1], 1) {
             for i in cell(from[0], 0)..=cell(to[0], 0) {
                 visit((j * self.cells + i) as usize);
@@ -155,8 +157,8 @@ impl Grid {
         }
     }
 
-    /// Facets whose projection may hold this point.
-    fn at(&self, point: [i64; 2]) -> &[u32] {
+    /// Facets whose projection may contain this point.
+    fn candidates(&self, point: [i64; 2]) -> &[u32] {
         let cell: [i64; 2] =
             std::array::from_fn(|a| (point[a] - self.low[a]).div_euclid(self.width[a]));
         if cell.iter().any(|c| !(0..self.cells).contains(c)) {
@@ -181,7 +183,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A box as twelve facets, each with a winding of its own.
+    /// A box of twelve facets whose windings differ.
     fn hull(low: [i64; 3], high: [i64; 3]) -> Vec<FacetLattice> {
         let corner = |i: usize| -> [i64; 3] { std::array::from_fn(|a| [low, high][i >> a & 1][a]) };
         let quads =
@@ -191,9 +193,9 @@ mod tests {
     }
 
     proptest! {
-        /// Rays that run along edges and through corners count each crossing once.
+        /// Rays along edges and through corners count each crossing once.
         #[test]
-        fn a_box_is_inside_where_it_is(
+        fn all_rays_agree_on_points_inside_and_outside_a_box(
             low in prop::array::uniform3(-4i64..4),
             size in prop::array::uniform3(2i64..6),
             point in prop::array::uniform3(-5i64..10),
@@ -208,17 +210,17 @@ mod tests {
     }
 
     #[test]
-    fn a_single_facet_is_odd_on_one_side_only() {
+    fn only_the_ray_towards_a_single_facet_is_odd() {
         let facet = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
         let parity = Parity::new(&[facet]);
         assert_eq!(parity.inside([2, 2, -3]), [false, false, false, false, true, false]);
         assert_eq!(parity.inside([2, 2, 3]), [false, false, false, false, false, true]);
-        // Duplicated, it cancels itself.
+        // Two copies of a facet cancel.
         assert_eq!(Parity::new(&[facet, facet]).inside([2, 2, 3]), [false; 6]);
     }
 
     #[test]
-    fn degenerate_facets_and_none_count_for_nothing() {
+    fn degenerate_facets_are_not_crossed() {
         let segment = [[0, 0, 0], [8, 8, 8], [4, 4, 4]];
         assert_eq!(Parity::new(&[segment]).inside([4, 4, 3]), [false; 6]);
         assert_eq!(Parity::new(&[]).inside([1, 2, 3]), [false; 6]);

@@ -1,7 +1,7 @@
-//! A case in its plainest form: an STL file and an exact root, which every mesher can read.
+//! A case in its plainest form, which every mesher can read: an STL file and an explicit root.
 //!
-//! Invariant: what is written means the same mesh as what was read, to the last bit. Vertices stay the
-//! f32 that they are, and the root that `root_scale` means is written out.
+//! Invariant: the case that is written defines exactly the same mesh as the case that was read. Vertices remain
+//! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use toml::{Table, Value};
 /// A case whose body is in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlainCase {
-    /// The case file but for the body.
+    /// The case file without its geometry.
     pub table: Table,
     /// The body.
     pub facets: Vec<Facet>,
@@ -23,7 +23,7 @@ impl PlainCase {
     /// Reads a case file and the body that it names or generates.
     ///
     /// # Errors
-    /// One sentence, where it is no case.
+    /// One sentence, if it is not a valid case.
     pub fn read(path: &Path) -> Result<Self, String> {
         let case = Case::read(path).map_err(|error| error.to_string())?;
         let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
@@ -40,11 +40,11 @@ impl PlainCase {
         Ok(Self { table, facets: case.facets })
     }
 
-    /// Writes `case.toml` and `body.stl` into an existing directory; the path of the case file. The body
-    /// is written as text where it is small enough to be read.
+    /// Writes `case.toml` and `body.stl` into an existing directory, and returns the path of the case file. A
+    /// body of at most [`FACETS_AS_TEXT`] facets is written as ASCII.
     ///
     /// # Errors
-    /// Where a file could not be written.
+    /// If a file cannot be written.
     pub fn write(&self, directory: &Path) -> io::Result<PathBuf> {
         let mut table = Table::new();
         table.insert("geometry".into(), Value::String("body.stl".into()));
@@ -64,9 +64,10 @@ impl PlainCase {
     }
 }
 
-const FACETS_AS_TEXT: usize = 1000;
+/// Largest body that is written as ASCII, which people can read.
+pub const FACETS_AS_TEXT: usize = 1000;
 
-/// Numbers are the shortest that read back as the same f32.
+/// An ASCII STL file. Each number has the fewest digits that identify its f32 value.
 fn ascii(facets: &[Facet]) -> String {
     let mut text = "solid body\n".to_owned();
     for facet in facets {
@@ -89,7 +90,7 @@ mod tests {
                         facets = FACETS\n[[box]]\nmin = [0.1, 0.0, 0.0]\nmax = [0.7, 0.3, 0.9]\nspacing = 0.1\n";
 
     #[test]
-    fn the_plain_case_means_the_same() {
+    fn a_plain_case_defines_the_same_mesh() {
         for facets in ["20", "5000"] {
             let place = tempfile::tempdir().unwrap();
             let path = place.path().join("given.toml");

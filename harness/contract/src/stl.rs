@@ -1,22 +1,25 @@
-//! The harness's own STL reader, whole file in memory, so that a misread body cannot hide by being
-//! misread alike by the program under test.
+//! The harness's own STL reader. It is independent of the reader of the program under test, so that a body that the
+//! program misreads cannot go unnoticed.
 
 use std::path::Path;
 
 use geometries::Facet;
 
-/// Why a file is not an STL file.
+/// Why a body cannot be read: the predicate of a sentence whose subject is the file.
 #[derive(Debug, thiserror::Error)]
 pub enum StlError {
-    /// The file could not be read.
+    /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Io(#[from] std::io::Error),
-    /// Neither binary by its length nor ASCII by its words.
+    /// The file has neither the length of a binary STL file nor the syntax of an ASCII one.
     #[error("is not an STL file: {0}")]
     Format(String),
 }
 
-/// Reads a binary or ASCII STL file.
+/// Reads a binary or ASCII STL file into memory.
+///
+/// # Errors
+/// If the file cannot be read, or is not an STL file.
 pub fn read(path: &Path) -> Result<Vec<Facet>, StlError> {
     let bytes = std::fs::read(path)?;
     match binary(&bytes) {
@@ -25,7 +28,8 @@ pub fn read(path: &Path) -> Result<Vec<Facet>, StlError> {
     }
 }
 
-/// Binary, if the length fits the facet count. The header is no help: some say "solid".
+/// The facets of a binary file; `None` if the length of the file contradicts its facet count. The header cannot
+/// decide, because that of some binary files begins with "solid".
 fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     let count = u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?);
     if bytes.len() as u64 != 84 + 50 * u64::from(count) {
@@ -43,13 +47,13 @@ fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     Some(bytes[84..].chunks_exact(50).map(facet).collect())
 }
 
-/// ASCII: the facets of every solid. Names may be anything, so lines that carry one are set apart
-/// before words are looked at.
+/// The facets of all solids of an ASCII file. A solid's name may be any text, so lines with a name are removed
+/// before the rest is split into words.
 fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
     let text = String::from_utf8_lossy(bytes);
     let mut lines = text.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty()).peekable();
     if lines.peek().is_none_or(|l| first_word(l) != "solid") {
-        return Err(wrong("it is not binary, and does not begin with `solid`"));
+        return Err(wrong("it is not binary and does not begin with `solid`"));
     }
     let (mut words, mut open) = (Vec::new(), false);
     for line in lines {
@@ -58,7 +62,7 @@ fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
             "solid" => open = true,
             "endsolid" => open = false,
             _ if open => words.extend(line.split_whitespace()),
-            _ => return Err(wrong(&format!("{line:?} stands outside of all solids"))),
+            _ => return Err(wrong(&format!("{line:?} is outside all solids"))),
         }
     }
     if open {
@@ -72,7 +76,7 @@ fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
     Ok(facets)
 }
 
-/// One facet; its normal is passed over unread.
+/// One facet. Its normal is ignored.
 fn facet<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<Facet, StlError> {
     expect(words, &["facet", "normal"])?;
     let normal = words.by_ref().take(3).count();
@@ -82,7 +86,7 @@ fn facet<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<Facet, StlErro
         expect(words, &["vertex"])?;
         for c in vertex {
             let text = words.next().unwrap_or_default();
-            *c = text.parse().map_err(|_| wrong(&format!("{text:?} is no coordinate")))?;
+            *c = text.parse().map_err(|_| wrong(&format!("{text:?} is not a coordinate")))?;
         }
     }
     expect(words, &["endloop", "endfacet"])?;
@@ -93,7 +97,7 @@ fn expect<'a>(words: &mut impl Iterator<Item = &'a str>, key: &[&str]) -> Result
     for key in key {
         let word = words.next().unwrap_or_default();
         if !word.eq_ignore_ascii_case(key) {
-            return Err(wrong(&format!("{word:?} stands where `{key}` belongs")));
+            return Err(wrong(&format!("`{key}` expected, found {word:?}")));
         }
     }
     Ok(())
@@ -120,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn ascii_in_the_wild_is_read_whole() {
+    fn ascii_files_may_have_several_solids_any_line_ends_and_any_case() {
         let plain = format!("solid a\n{FACET}endsolid a\n");
         let two = format!("{plain}solid vertex 1 2 3\n{FACET}endsolid\n");
         assert_eq!(of(plain.as_bytes()).unwrap(), [WANT]);
@@ -134,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn binary_may_call_itself_solid() {
+    fn a_binary_header_may_begin_with_solid() {
         let mut bytes = b"solid".to_vec();
         bytes.resize(80, b' ');
         bytes.extend(1u32.to_le_bytes());
@@ -146,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_stl_is_refused() {
+    fn other_text_is_rejected() {
         for text in [
             "",
             "hello",

@@ -1,4 +1,4 @@
-//! Small meshes for tests, made by hand or at random.
+//! Small meshes for tests, explicit or random.
 
 use proptest::prelude::*;
 
@@ -9,13 +9,16 @@ use crate::manifest::{self, Ambiguous, BySide, Keep, Manifest};
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word::{self, Leaf, Side};
 
-/// The leaves of the tree in which exactly the octants that `split` picks are split, all outside.
+/// The leaves of the tree in which an octant is split iff `split` returns true, all with side outside.
 pub fn words_of(split: impl Fn(&Octant) -> bool) -> Vec<u64> {
-    sided(split, |_| Some(Side::Outside))
+    words_with_sides(split, |_| Some(Side::Outside))
 }
 
-/// The same, each leaf with the side that `side` gives it, or left out.
-pub fn sided(split: impl Fn(&Octant) -> bool, side: impl Fn(&Octant) -> Option<Side>) -> Vec<u64> {
+/// The leaves of such a tree with the sides that `side` returns; a leaf for which it returns `None` is left out.
+pub fn words_with_sides(
+    split: impl Fn(&Octant) -> bool,
+    side: impl Fn(&Octant) -> Option<Side>,
+) -> Vec<u64> {
     let mut words = Vec::new();
     let mut stack = vec![Octant::ROOT];
     while let Some(octant) = stack.pop() {
@@ -29,29 +32,29 @@ pub fn sided(split: impl Fn(&Octant) -> bool, side: impl Fn(&Octant) -> Option<S
     words
 }
 
-/// Any tree to this level, with sides and holes at random.
+/// Random trees up to this level, with random sides and holes.
 pub fn random_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
     any::<u64>().prop_map(move |seed| {
-        sided(
+        words_with_sides(
             |o| o.level < level && pick(seed, o, 0) % 5 < 3,
             |o| Side::ALL.get(pick(seed, o, 1) as usize % 4).copied(),
         )
     })
 }
 
-/// Trees that grow finer towards a point, steeply or gently, so that about as many keep their distances
-/// as do not; a few leaves missing, a few crossing.
+/// Trees that are refined towards a point, steeply or gently, so that about half of them have layers that are
+/// thick enough. A few leaves are missing, and a few are crossing.
 pub fn graded_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
     let point = prop::array::uniform3(0..CELLS_PER_EDGE);
     (point, 0.1f64..3.5, any::<u64>(), 0u64..40).prop_map(move |(point, reach, seed, odd)| {
         let near = |o: &Octant| {
-            let away = (0..3).map(|a| {
-                let (low, at) = (i64::from(o.corner[a]), i64::from(point[a]));
-                (low - at).max(at - low - i64::from(o.edge())).max(0)
+            let distances = (0..3).map(|a| {
+                let (low, coordinate) = (i64::from(o.corner[a]), i64::from(point[a]));
+                (low - coordinate).max(coordinate - low - i64::from(o.edge())).max(0)
             });
-            away.fold(0, i64::max) as f64 <= reach * f64::from(o.edge())
+            distances.fold(0, i64::max) as f64 <= reach * f64::from(o.edge())
         };
-        sided(
+        words_with_sides(
             |o| o.level < level && near(o),
             |o| match pick(seed, o, 2) % 100 {
                 p if p < odd / 2 => None,
@@ -62,24 +65,13 @@ pub fn graded_words(level: u8) -> impl Strategy<Value = Vec<u64>> {
     })
 }
 
-/// A number that depends on nothing but its arguments.
+/// A pseudorandom number that depends on its arguments only.
 fn pick(seed: u64, octant: &Octant, salt: u32) -> u64 {
     let word = word::key_of(octant.corner) << 5 | u64::from(octant.level);
     (crate::digest::mix(word ^ seed.rotate_left(salt * 8)) >> 100) as u64
 }
 
-/// Chebyshev distance of two octants, in level-19 cells.
-pub fn distance(a: &Octant, b: &Octant) -> i64 {
-    let ends = |o: &Octant, i: usize| (i64::from(o.corner[i]), i64::from(o.corner[i] + o.edge()));
-    let along = |i| {
-        let ((al, ah), (bl, bh)) = (ends(a, i), ends(b, i));
-        (al - bh).max(bl - ah).max(0)
-    };
-    (0..3).map(along).fold(0, i64::max)
-}
-
-/// A mesh of these parts from which nothing was deleted and of which little was asked, with a true
-/// manifest.
+/// A mesh of these parts with a correct manifest. Its inputs delete nothing and require no refinement.
 pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
     let empty = Manifest {
         schema: manifest::SCHEMA.to_owned(),
@@ -102,7 +94,7 @@ pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
     LeafSet::new(empty, Vec::new()).with_parts(parts)
 }
 
-/// The leaves' octants and all their ancestors, each once.
+/// The octants of the leaves and all their ancestors, without duplicates.
 pub fn octants_of(words: &[u64]) -> Vec<Octant> {
     let mut all: Vec<Octant> = Vec::new();
     for octant in words.iter().map(|&w| word::octant(w)) {

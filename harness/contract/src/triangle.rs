@@ -1,26 +1,26 @@
-//! Whether a closed triangle and a closed octant share a point, exactly.
+//! Exact test whether a closed triangle and a closed box share a point.
 //!
-//! By containment: they do iff a corner of the triangle lies in the box, or an edge of the triangle
-//! meets the box, or the box pierces the triangle's inside. In the last case the plane's section of
-//! the box lies in the triangle as a whole, so any one point of it decides; the box's diagonal that
-//! runs most nearly along the normal provides it.
+//! They do iff the box contains a corner of the triangle, or an edge of the triangle meets the box, or the box
+//! intersects only the interior of the triangle. In the last case, the triangle contains the whole intersection
+//! of its plane with the box, so any point of that intersection decides. The test takes the point on the box
+//! diagonal that is most nearly parallel to the normal.
 
 use crate::lattice::FacetLattice;
 
-/// A facet with what every test needs.
+/// A facet with precomputed bounds, normal and height.
 #[derive(Clone, Debug)]
 pub struct Triangle {
     corners: FacetLattice,
     low: [i64; 3],
     high: [i64; 3],
-    /// Zero iff degenerate. At most 2^59 in size.
+    /// Not normalised. Zero iff the triangle is degenerate; components are at most 2^59 in magnitude.
     normal: [i64; 3],
-    /// Height of the plane along the normal.
+    /// Inner product of the normal and any point of the plane.
     height: i128,
 }
 
 impl Triangle {
-    /// Prepares a facet.
+    /// Precomputes bounds, normal and height.
     pub fn new(corners: &FacetLattice) -> Self {
         let pick = |f: fn(i64, i64) -> i64| -> [i64; 3] {
             std::array::from_fn(|a| f(f(corners[0][a], corners[1][a]), corners[2][a]))
@@ -39,8 +39,7 @@ impl Triangle {
         if self.corners.iter().any(within) {
             return true;
         }
-        // The box's corners nearest to and farthest along the normal: if the plane passes by, so
-        // does the triangle.
+        // If both ends of the diagonal are on one side of the plane, so is the box.
         let (near, far) = self.diagonal(low, high);
         let (below, above) =
             (dot(self.normal, near) - self.height, dot(self.normal, far) - self.height);
@@ -54,7 +53,7 @@ impl Triangle {
             || self.pierced(near, far)
     }
 
-    /// The box's diagonal along which the height grows most.
+    /// The ends of the box diagonal along which the height increases most.
     fn diagonal(&self, low: [i64; 3], high: [i64; 3]) -> ([i64; 3], [i64; 3]) {
         let up = |a: usize| self.normal[a] >= 0;
         let near = std::array::from_fn(|a| if up(a) { low[a] } else { high[a] });
@@ -62,8 +61,8 @@ impl Triangle {
         (near, far)
     }
 
-    /// Whether the line through two points, which cross the plane, goes through the triangle: seen
-    /// along the line, the three edges turn the same way. Degenerate triangles have only edges.
+    /// Whether the line through two points on opposite sides of the plane intersects the triangle: seen along
+    /// the line, the three edges have the same orientation. A degenerate triangle has no interior.
     fn pierced(&self, near: [i64; 3], far: [i64; 3]) -> bool {
         if self.normal == [0; 3] {
             return false;
@@ -76,8 +75,8 @@ impl Triangle {
     }
 }
 
-/// Whether a segment meets a closed box: the stretches of it between each pair of the box's planes
-/// have a point in common. Positions along the segment are fractions, compared by cross products.
+/// Whether a segment meets a closed box: its intersections with the three slabs of the box have a common point.
+/// Positions along the segment are fractions.
 fn segment_meets(from: [i64; 3], to: [i64; 3], low: [i64; 3], high: [i64; 3]) -> bool {
     let (mut enter, mut leave) = ((0, 1), (1, 1));
     for a in 0..3 {
@@ -89,14 +88,15 @@ fn segment_meets(from: [i64; 3], to: [i64; 3], low: [i64; 3], high: [i64; 3]) ->
             continue;
         }
         let (first, last) = if step > 0 { (low[a], high[a]) } else { (high[a], low[a]) };
-        let at = |plane: i64| ((plane - from[a]) * step.signum(), step.abs());
-        enter = if less(enter, at(first)) { at(first) } else { enter };
-        leave = if less(at(last), leave) { at(last) } else { leave };
+        let position = |plane: i64| ((plane - from[a]) * step.signum(), step.abs());
+        let (first, last) = (position(first), position(last));
+        enter = if less(enter, first) { first } else { enter };
+        leave = if less(last, leave) { last } else { leave };
     }
     !less(leave, enter)
 }
 
-/// Comparison of fractions with positive denominators; both terms stay below 2^60 on the lattice.
+/// Compares fractions with positive denominators. On the lattice both products are less than 2^60.
 fn less(a: (i64, i64), b: (i64, i64)) -> bool {
     a.0 * b.1 < b.0 * a.1
 }
@@ -129,24 +129,24 @@ mod tests {
     }
 
     #[test]
-    fn each_way_to_meet() {
-        // A corner within, an edge through, the inside pierced.
+    fn corners_edges_interior_and_boundary_can_meet_the_box() {
+        // A corner lies in the box; an edge crosses it; only the interior intersects it.
         assert!(meets([[1, 1, 1], [90, 90, 91], [90, 80, 70]]));
         assert!(meets([[-5, 2, 2], [9, 2, 3], [2, 90, 90]]));
         assert!(meets([[-90, -90, 2], [90, -90, 2], [0, 190, 3]]));
-        // In the plane of a face, at an edge, at a corner: closed sets share their boundary.
+        // Contact with a face, with an edge, with a corner: the sets are closed.
         assert!(meets([[-90, -90, 4], [90, -90, 4], [0, 190, 4]]));
         assert!(meets([[4, 4, -9], [4, 4, 9], [90, 90, 0]]));
         assert!(meets([[4, 4, 4], [90, 5, 5], [5, 90, 5]]));
     }
 
     #[test]
-    fn each_way_to_miss() {
-        // Beside a face; plane above a corner; plane through the box but the triangle elsewhere.
+    fn bounds_plane_and_edges_can_miss_the_box() {
+        // Beside a face; plane beyond a corner; plane through the box, but not the triangle.
         assert!(!meets([[5, -9, -9], [5, 9, -9], [5, 0, 90]]));
         assert!(!meets([[13, 0, 0], [0, 13, 0], [0, 0, 13]]));
         assert!(!meets([[6, -9, 2], [90, 0, 2], [6, 9, 2]]));
-        // The bounding box covers the box, an edge passes it diagonally.
+        // The bounding boxes overlap, but an edge passes the box diagonally.
         assert!(!meets([[-1, 6, 2], [6, -1, 2], [9, 9, 2]].map(|v: [i64; 3]| [
             v[0] + 2,
             v[1] + 2,
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn points_and_segments_are_triangles_too() {
+    fn triangles_may_degenerate_to_segments_and_points() {
         assert!(meets([[4, 0, 4]; 3]));
         assert!(!meets([[5, 0, 4]; 3]));
         assert!(meets([[-2, -2, -2], [9, 9, 9], [-2, -2, -2]]));
@@ -165,16 +165,16 @@ mod tests {
     #[test]
     fn the_largest_coordinates_do_not_overflow() {
         let (near, far) = (-(1 << 27), 1 << 28);
-        // Its plane passes through the far corner of the root, and through nothing else of it.
+        // Its plane meets the root in the far corner only.
         let triangle = Triangle::new(&[[near, far, far], [far, near, far], [far, far, near]]);
         assert!(triangle.meets([0; 3], [1 << 27; 3]));
         assert!(!triangle.meets([0; 3], [(1 << 27) - 1; 3]));
     }
 
     proptest! {
-        /// A point of the triangle that lies in the box proves that they meet.
+        /// A point that lies in the triangle and in the box proves that they meet.
         #[test]
-        fn whatever_holds_a_common_point_meets(
+        fn a_common_point_implies_that_they_meet(
             corners in prop::array::uniform3(prop::array::uniform3(-12i64..=16)),
             (i, j) in (0i64..=12, 0i64..=12),
         ) {
@@ -184,9 +184,8 @@ mod tests {
             prop_assert!(!within || meets(corners));
         }
 
-        /// Nothing depends on the order of corners or the names of axes.
         #[test]
-        fn corners_and_axes_may_be_permuted(corners in prop::array::uniform3(prop::array::uniform3(-12i64..=16))) {
+        fn the_result_is_invariant_under_permutation_of_corners_and_axes(corners in prop::array::uniform3(prop::array::uniform3(-12i64..=16))) {
             let [a, b, c] = corners;
             prop_assert_eq!(meets([b, c, a]), meets(corners));
             prop_assert_eq!(meets([c, b, a]), meets(corners));

@@ -1,7 +1,7 @@
-//! The leaf word: one leaf in one `u64` (reference/DEFINITION.md, section 8).
+//! The leaf word: one leaf packed into a `u64` (reference/DEFINITION.md, section 8).
 //!
-//! `morton57 << 7 | level << 2 | side`, the Morton code interleaving x (lowest bit), y and z of the
-//! minimum corner in level-19 cells. Ascending words are in Morton order.
+//! A word is `morton57 << 7 | level << 2 | side`. The Morton code interleaves the bits of x (lowest), y and z
+//! of the minimum corner in level-19 cells. Ascending words are in Morton order.
 
 use std::fmt;
 
@@ -9,23 +9,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 
-/// Morton code of one past the last level-19 cell.
+/// One past the Morton code of the last level-19 cell.
 pub const KEY_END: u64 = 1 << 57;
 
-/// Where a leaf lies with respect to the body.
+/// Position of a leaf relative to the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// Outside of the body.
+    /// Outside the body.
     Outside = 0,
-    /// Inside of the body.
+    /// Inside the body.
     Inside = 1,
-    /// The leaf contains part of the surface.
+    /// The surface crosses the leaf.
     Crossing = 2,
 }
 
 impl Side {
-    /// All of them, in the order of their codes.
+    /// All sides, in the order of their codes.
     pub const ALL: [Self; 3] = [Self::Outside, Self::Inside, Self::Crossing];
 }
 
@@ -42,18 +42,18 @@ impl fmt::Display for Side {
 /// One leaf, unpacked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Leaf {
-    /// Where and how large.
+    /// Its octant.
     pub octant: Octant,
-    /// On which side.
+    /// Its side.
     pub side: Side,
 }
 
 /// Why a word is not a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WordError {
-    /// The level field is above 19.
+    /// The level is deeper than 19.
     LevelTooDeep(u8),
-    /// The side field is 3.
+    /// The side is 3.
     SideUnknown,
     /// The corner is not a multiple of the leaf's edge.
     Misaligned,
@@ -71,7 +71,7 @@ impl fmt::Display for WordError {
 
 impl std::error::Error for WordError {}
 
-/// Spreads the low 19 bits of `v` so that two zero bits follow each.
+/// Spreads the low 19 bits of `v`, with two zero bits after each.
 fn spread(v: u32) -> u64 {
     let mut x = u64::from(v);
     x = (x | x << 32) & 0x001f_0000_0000_ffff;
@@ -81,7 +81,7 @@ fn spread(v: u32) -> u64 {
     (x | x << 2) & 0x1249_2492_4924_9249
 }
 
-/// The reverse of [`spread`].
+/// The inverse of [`spread`].
 fn gather(v: u64) -> u32 {
     let mut x = v & 0x1249_2492_4924_9249;
     x = (x | x >> 2) & 0x10c3_0c30_c30c_30c3;
@@ -102,7 +102,7 @@ pub fn corner_of(key: u64) -> [u32; 3] {
     [gather(key), gather(key >> 1), gather(key >> 2)]
 }
 
-/// Level-19 cells in an octant of this level.
+/// Number of level-19 cells in an octant of this level.
 pub fn span(level: u8) -> u64 {
     1 << (3 * (LEVEL_MAX - level))
 }
@@ -112,12 +112,12 @@ pub fn key(word: u64) -> u64 {
     word >> 7
 }
 
-/// The level field of a word, whatever its value (0 to 31).
+/// The level field of a word, which may be invalid (0 to 31).
 pub fn level(word: u64) -> u8 {
     (word >> 2 & 31) as u8
 }
 
-/// Why this word is not a leaf, or nothing.
+/// The reason why a word is not a leaf; `None` if it is one.
 pub fn fault(word: u64) -> Option<WordError> {
     let level = level(word);
     if level > LEVEL_MAX {
@@ -137,6 +137,9 @@ pub fn encode(leaf: &Leaf) -> u64 {
 }
 
 /// Unpacks a word.
+///
+/// # Errors
+/// If the word is not a leaf.
 pub fn decode(word: u64) -> Result<Leaf, WordError> {
     match fault(word) {
         Some(why) => Err(why),
@@ -144,12 +147,12 @@ pub fn decode(word: u64) -> Result<Leaf, WordError> {
     }
 }
 
-/// The octant of a word without [`fault`].
+/// The octant of a valid word.
 pub fn octant(word: u64) -> Octant {
     Octant { corner: corner_of(key(word)), level: level(word) }
 }
 
-/// The side of a word without [`fault`].
+/// The side of a valid word.
 pub fn side(word: u64) -> Side {
     Side::ALL[(word & 3) as usize]
 }
@@ -169,7 +172,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn words_read_back(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE,
+        fn decoding_inverts_encoding(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE,
                            level in 0..=LEVEL_MAX, side in 0usize..3) {
             let octant = Octant { corner: [x, y, z], level: LEVEL_MAX }.ancestor(level);
             let leaf = Leaf { octant, side: Side::ALL[side] };
@@ -177,7 +180,7 @@ mod tests {
         }
 
         #[test]
-        fn interleaving_is_bit_by_bit(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE) {
+        fn keys_interleave_bit_by_bit(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE) {
             let mut want = 0u64;
             for bit in 0..19 {
                 for (a, c) in [x, y, z].into_iter().enumerate() {
@@ -190,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_apart() {
+    fn each_fault_has_its_own_error() {
         assert_eq!(fault(20 << 2), Some(WordError::LevelTooDeep(20)));
         assert_eq!(fault(3), Some(WordError::SideUnknown));
         assert_eq!(fault(1 << 7), Some(WordError::Misaligned));

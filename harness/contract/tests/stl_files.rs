@@ -1,4 +1,4 @@
-//! STL files that must be read, and those that must be refused.
+//! STL files that must be read, and files that must be rejected.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn tricky_files_all_hold_the_same_facets() {
+fn all_tricky_files_contain_the_same_facets() {
     let files = files("tricky");
     let plain = files.iter().find(|p| p.ends_with("tricky/binary.stl")).unwrap();
     let want: Vec<Facet> = stl::read(plain).unwrap();
@@ -26,7 +26,7 @@ fn tricky_files_all_hold_the_same_facets() {
 }
 
 #[test]
-fn bad_files_are_refused_by_reader_or_case() {
+fn bad_files_are_rejected_by_the_reader_or_by_the_case() {
     let text = "spacing_min = 1.0\n[root]\norigin = [-8.0, -8.0, -8.0]\nedge = 16.0";
     for path in files("bad") {
         let case = stl::read(&path).map_err(|e| e.to_string());

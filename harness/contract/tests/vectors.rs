@@ -1,4 +1,4 @@
-//! The test vectors that all programs share.
+//! The test vectors that all programs share (reference/vectors).
 
 use contract::digest::{Digest, mix};
 use contract::lattice::Root;
@@ -19,7 +19,7 @@ fn hex(value: &Value) -> u64 {
     u64::from_str_radix(value.as_str().unwrap(), 16).unwrap()
 }
 
-/// Floating-point numbers are strings there, lest a JSON reader round them.
+/// The vectors contain floating-point numbers as strings, because some JSON readers round numbers.
 fn float(value: &Value) -> f64 {
     value.as_str().unwrap().parse().unwrap()
 }
@@ -29,7 +29,7 @@ fn triple<T>(value: &Value, of: impl Fn(&Value) -> T) -> [T; 3] {
 }
 
 #[test]
-fn mixes_and_digests() {
+fn mixed_words_and_digests_match_the_vectors() {
     for v in vectors("mix") {
         assert_eq!(Digest(mix(hex(&v["word"]))).to_string(), v["mix"]);
     }
@@ -40,7 +40,7 @@ fn mixes_and_digests() {
 }
 
 #[test]
-fn words() {
+fn leaf_words_match_the_vectors() {
     for v in vectors("words") {
         let level = v["level"].as_u64().unwrap() as u8;
         let corner = triple(&v["cell"], |c| c.as_u64().unwrap() as u32);
@@ -54,7 +54,7 @@ fn words() {
 }
 
 #[test]
-fn the_lattice() {
+fn levels_and_lattice_coordinates_match_the_vectors() {
     for v in vectors("levels") {
         let root = Root { origin: [0.0; 3], edge: float(&v["edge"]) };
         assert_eq!(root.level_for(float(&v["spacing"])).map(u64::from), v["level"].as_u64());
@@ -74,7 +74,7 @@ fn the_lattice() {
 }
 
 #[test]
-fn roots() {
+fn computed_roots_match_the_vectors() {
     for v in vectors("roots") {
         let coordinates = |vertex: &Value| triple(vertex, |c| float(c) as f32);
         let facet: [[f32; 3]; 3] = triple(&v["vertices"], coordinates);

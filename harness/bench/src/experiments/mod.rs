@@ -23,13 +23,12 @@ pub mod stats;
 pub mod table;
 pub mod variant;
 
-use contract::catalogue;
 use entry::{Comm, Line, What};
 use plan::Study;
 use points::warmers;
 use run::engine::programs::Programs;
 use session::{Bench, BenchError, Options, Point};
-use std::path::PathBuf;
+use std::path::Path;
 use variant::Base;
 
 /// What a session gave.
@@ -79,14 +78,8 @@ impl Bench<'_> {
 
     /// The case by its name in the catalogue or its path, with its geometry written out.
     fn base(&self, case: &str) -> Result<Base, BenchError> {
-        let path = match case.ends_with(".toml") {
-            true => PathBuf::from(case),
-            false => {
-                catalogue::named(case, &self.runner.programs.paths.catalogue)
-                    .map_err(BenchError::Input)?
-                    .path
-            }
-        };
+        let catalogue = &self.runner.programs.paths.catalogue;
+        let path = catalogue.case_file(case, Path::new("")).map_err(BenchError::Input)?;
         Base::read(&path, self.runner.place).map_err(BenchError::Input)
     }
 

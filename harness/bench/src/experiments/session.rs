@@ -100,7 +100,7 @@ impl Bench<'_> {
 
     fn begin(&mut self) -> Result<(), BenchError> {
         let catalogue = &self.runner.programs.paths.catalogue;
-        let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        let repository = catalogue.path().parent().and_then(Path::parent).unwrap_or(Path::new("."));
         let session = Session {
             command: self.options.command.clone(),
             machine: machine::describe(&self.options.launcher.program(), repository),

@@ -2,7 +2,6 @@
 
 use super::GateError;
 use super::report::LayerName;
-use contract::catalogue;
 use run::engine::programs::Programs;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -148,9 +147,9 @@ impl Rules {
                 std::fs::canonicalize(&path).map_err(|error| format!("{}: {error}", path.display()))
             }
             false => {
-                let found = catalogue::named(&rule.name, &programs.paths.catalogue)
-                    .map_err(GateError::Input)?;
-                found.absent.map_or(Ok(found.path), Err)
+                let catalogue = &programs.paths.catalogue;
+                let found = catalogue.named(&rule.name).map_err(GateError::Input)?;
+                found.absent.clone().map_or_else(|| Ok(found.path.clone()), Err)
             }
         };
         Ok(Selected { rule: rule.clone(), path })

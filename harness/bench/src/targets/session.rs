@@ -8,7 +8,6 @@ use crate::experiments::execute::Failed;
 use crate::experiments::session::{Bench, BenchError, Options, Point, temporary_directory};
 use crate::experiments::sizing::Sizes;
 use crate::experiments::variant::Base;
-use contract::catalogue;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use std::collections::{BTreeMap, BTreeSet};
@@ -232,10 +231,8 @@ impl<'a> Session<'a> {
     fn base(&self, name: &str, mesh: &Mesh) -> Result<Base, String> {
         let place = self.bench.runner.place;
         if let Some(case) = &mesh.case {
-            let path = match case.ends_with(".toml") {
-                true => self.targets.directory.join(case),
-                false => catalogue::named(case, &self.bench.runner.programs.paths.catalogue)?.path,
-            };
+            let catalogue = &self.bench.runner.programs.paths.catalogue;
+            let path = catalogue.case_file(case, &self.targets.directory)?;
             return Base::read(&path, place);
         }
         let path = place.join(format!("{name}-given.toml"));

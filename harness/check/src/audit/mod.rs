@@ -1,9 +1,10 @@
-//! Every check that needs nothing but a leaf-set directory, at any size.
+//! All checks that need only a leaf-set directory, for meshes of any size.
 //!
-//! One pass over the part files, merged as they are read, feeds the tally, the order check and the
-//! tree; leaves are not kept. The tree stores equal subtrees once, so that memory grows with the
-//! variety of a mesh and not with its size; how far it may grow is an option. Against the
-//! manifest's own terms, and without T0, facets or another mesh: what that misses, each check says.
+//! One pass over the part files, which are merged while they are read, computes the tally, checks the order and
+//! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
+//! variety of a mesh and not with its size; an option limits it. The checks use the requirements in the
+//! manifest, without T0, facets or another mesh. The head of each check names what it cannot detect without
+//! them.
 
 use std::fmt;
 use std::path::Path;
@@ -19,10 +20,10 @@ pub mod record;
 
 use pass::Pass;
 
-/// How an audit is run.
+/// Options of an audit.
 #[derive(Clone, Debug)]
 pub struct AuditOptions {
-    /// Distinct nodes that may be kept in memory. Each takes up to 120 bytes while the tables grow.
+    /// Maximum number of distinct nodes in memory. A node needs up to 120 bytes while the tables grow.
     pub nodes_max: usize,
 }
 
@@ -32,18 +33,18 @@ impl Default for AuditOptions {
     }
 }
 
-/// What an audit found.
+/// The result of an audit.
 #[derive(Clone, Debug)]
 pub struct AuditReport {
-    /// One per check.
+    /// One result per check.
     pub checks: Vec<CheckResult>,
-    /// Leaves read.
+    /// Number of leaves.
     pub leaves: u64,
-    /// Distinct nodes that they came down to.
+    /// Number of distinct nodes of their tree.
     pub nodes: u64,
-    /// Time for reading, merging, counting and building the tree.
+    /// Wall time for reading, merging, counting and building the tree.
     pub time_read_s: f64,
-    /// Time for all.
+    /// Wall time of the audit.
     pub time_wall_s: f64,
 }
 
@@ -69,10 +70,10 @@ impl fmt::Display for AuditReport {
     }
 }
 
-/// Name of the check that the tree fits the memory allowed.
+/// Name of the check that the tree does not exceed the memory limit.
 pub const CAPACITY: &str = "capacity";
 
-/// Audits a directory. What cannot be read as a leaf set at all is a finding of `files`.
+/// Audits a directory. If it cannot be read as a leaf set, that is a finding of `files`.
 pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
     let start = Instant::now();
     let mut report =
@@ -109,13 +110,13 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
             checks::balance::check_tree(&tree, &terms.root),
             checks::layer::check_tree(&tree, &terms),
         ],
-        // Deletion and gradation make the final mesh; of T0 neither is promised.
+        // T0 precedes deletion and gradation.
         Kind::Base => {
-            let everything = Terms { keep: Keep::All, keep_crossing: true, ..terms };
+            let terms = Terms { keep: Keep::All, keep_crossing: true, ..terms };
             vec![
-                checks::complete::check_holes(&tree, &everything),
-                checks::spacing::check_tree(&tree, &everything),
-                checks::sides::check_tree(&tree, &everything),
+                checks::complete::check_holes(&tree, &terms),
+                checks::spacing::check_tree(&tree, &terms),
+                checks::sides::check_tree(&tree, &terms),
             ]
         }
     };
@@ -142,38 +143,38 @@ mod tests {
     }
 
     /// A balanced mesh of three levels.
-    fn sound() -> Vec<u64> {
+    fn correct() -> Vec<u64> {
         words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3])
     }
 
     proptest! {
-        /// However leaves are dealt to parts, the audit says the same; and it counts every leaf.
         #[test]
-        fn parts_do_not_matter(words in random_words(3), deal in prop::collection::vec(0usize..5, 600)) {
+        fn the_result_does_not_depend_on_the_partition(words in random_words(3), part_of in prop::collection::vec(0usize..5, 600)) {
             let mut parts = vec![Vec::new(); 5];
-            words.iter().zip(&deal).for_each(|(&w, &part)| parts[part].push(w));
-            let dealt: Vec<u64> = words.iter().take(deal.len()).copied().collect();
-            let options = AuditOptions::default();
-            let (whole, cut) = (audited(&leaf_set(vec![dealt]), &options), audited(&leaf_set(parts), &options));
-            prop_assert_eq!(found(&whole), found(&cut));
-            prop_assert!(!found(&cut).contains(&"manifest") && !found(&cut).contains(&"linear"));
-            prop_assert_eq!(cut.leaves, words.len().min(deal.len()) as u64);
+            words.iter().zip(&part_of).for_each(|(&w, &part)| parts[part].push(w));
+            let words: Vec<u64> = words.into_iter().take(part_of.len()).collect();
+            let (leaves, options) = (words.len() as u64, AuditOptions::default());
+            let one = audited(&leaf_set(vec![words]), &options);
+            let several = audited(&leaf_set(parts), &options);
+            prop_assert_eq!(found(&one), found(&several));
+            prop_assert!(!found(&several).contains(&"manifest") && !found(&several).contains(&"linear"));
+            prop_assert_eq!(several.leaves, leaves);
         }
     }
 
     #[test]
-    fn a_sound_mesh_is_sound_and_a_disordered_part_is_not() {
-        let words = sound();
+    fn a_correct_mesh_passes_and_an_unsorted_part_fails() {
+        let words = correct();
         assert!(audited(&leaf_set(vec![words.clone(), vec![]]), &AuditOptions::default()).holds());
-        let mut disordered = words;
-        disordered.swap(3, 4);
-        let report = audited(&leaf_set(vec![disordered]), &AuditOptions::default());
+        let mut unsorted = words;
+        unsorted.swap(3, 4);
+        let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
         assert!(found(&report).contains(&"linear"));
     }
 
-    /// Where memory does not suffice the audit must not pass, but counts and digests are still checked.
+    /// The audit must not pass if memory does not suffice, but it still checks counts and digests.
     #[test]
-    fn too_small_a_capacity_is_a_finding() {
+    fn an_exceeded_memory_limit_is_a_finding() {
         let mut set = leaf_set(vec![words_of(|o| o.level < 5 && o.corner[0] < 1 << 18)]);
         set.manifest.leaves += 1;
         let report = audited(&set, &AuditOptions { nodes_max: 1 });

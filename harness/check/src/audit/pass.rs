@@ -1,40 +1,40 @@
-//! The one pass over the leaves: counting, order, tree.
+//! The pass over the leaves: it counts them, checks their order and builds the tree.
 
 use super::{AuditOptions, CAPACITY};
 use crate::checks::{CheckResult, linear};
 use contract::digest::{Digest, mix};
 use contract::lattice::Root;
 use contract::leafset::{LeafDir, ReadError};
-use contract::manifest::{BySide, Tally, octant_index};
+use contract::manifest::{Tally, octant_index};
 use contract::tree::{Builder, Tree};
 
-/// What one pass leaves behind.
+/// The result of the pass.
 pub(super) struct Pass {
     pub(super) tally: Tally,
-    /// Leaves and digest of each part.
+    /// Number of leaves and digest of each part.
     pub(super) parts: Vec<(u64, Digest)>,
     pub(super) linear: CheckResult,
-    /// Nothing if it would have become too large; `capacity` says so.
+    /// `None` if the tree exceeds the limit, which `capacity` reports.
     pub(super) tree: Option<Tree>,
     pub(super) capacity: Option<CheckResult>,
 }
 
 impl Pass {
     /// Reads all leaves.
+    ///
+    /// # Errors
+    /// If a part cannot be read.
     pub(super) fn over(set: &LeafDir, options: &AuditOptions) -> Result<Self, ReadError> {
         let mut state = State::new(set);
         let mut fits = true;
         super::merge::merge(&set.parts, &mut |part, run| {
-            state.take(part, run);
-            // Counts and digests go on where the tree cannot.
+            state.add(part, run);
+            // Counts and digests continue without the tree.
             fits &= state.builder.nodes() <= options.nodes_max;
             state.building = fits;
             true
         })
-        .map_err(|(part, e)| {
-            let path = set.parts[part].path().to_owned();
-            ReadError::Part { path, source: e.into() }
-        })?;
+        .map_err(|(part, error)| ReadError::part(&set.parts[part], error))?;
         Ok(state.finish(fits, options))
     }
 
@@ -46,13 +46,13 @@ impl Pass {
 struct State<'a> {
     set: &'a LeafDir,
     root: Root,
-    /// Leaves by the low seven bits of their words: level and side at once.
+    /// Number of leaves by the low seven bits of their words, which are level and side.
     by_code: [u64; 128],
     octants: Vec<Digest>,
     parts: Vec<(u64, Digest)>,
-    /// Each part's last word, if it had one.
+    /// The last word of each part so far.
     last_of_part: Vec<Option<u64>>,
-    /// Last word that the tree took.
+    /// The last word that was added to the tree.
     last: u64,
     builder: Builder,
     building: bool,
@@ -75,18 +75,9 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Takes a run of words from one part.
-    fn take(&mut self, part: usize, run: &[u64]) {
-        self.parts[part].0 += run.len() as u64;
-        for stretch in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {
-            let mut sum = 0u128;
-            for &w in stretch {
-                sum = sum.wrapping_add(mix(w));
-                self.by_code[(w & 127) as usize] += 1;
-            }
-            self.parts[part].1.merge(Digest(sum));
-            self.octants[octant_index(stretch[0])].merge(Digest(sum));
-        }
+    /// Adds a run of words of one part.
+    fn add(&mut self, part: usize, run: &[u64]) {
+        self.count(part, run);
         let mut before = self.last_of_part[part];
         for &w in run {
             if let Some(before) = before.filter(|&b| b >= w) {
@@ -106,28 +97,34 @@ impl<'a> State<'a> {
         self.last_of_part[part] = before;
     }
 
+    /// Adds to counts and digests. Digests are summed per octant first, because this loop dominates the time of
+    /// the pass.
+    fn count(&mut self, part: usize, run: &[u64]) {
+        self.parts[part].0 += run.len() as u64;
+        for words in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {
+            let mut sum = 0u128;
+            for &w in words {
+                sum = sum.wrapping_add(mix(w));
+                self.by_code[(w & 127) as usize] += 1;
+            }
+            self.parts[part].1.merge(Digest(sum));
+            self.octants[octant_index(words[0])].merge(Digest(sum));
+        }
+    }
+
     fn finish(mut self, fits: bool, options: &AuditOptions) -> Pass {
         let mut tally = Tally { octants: self.octants, ..Tally::default() };
-        for (code, &count) in self.by_code.iter().enumerate() {
-            tally.leaves += count;
-            if let Some(level) = tally.by_level.get_mut(code >> 2) {
-                *level += count;
-            }
-            let BySide { outside, inside, crossing } = &mut tally.by_side;
-            match code & 3 {
-                0 => *outside += count,
-                1 => *inside += count,
-                2 => *crossing += count,
-                _ => {}
-            }
+        for (code, &leaves) in self.by_code.iter().enumerate() {
+            tally.count(code as u64, leaves);
         }
-        tally.close();
+        tally.finish();
         self.linear.examined = tally.leaves;
         let capacity = (!fits).then(|| {
             let mut result = CheckResult::new(CAPACITY);
             let nodes = options.nodes_max;
-            result
-                .find(format!("more than {nodes} distinct octants: allow more to check the tree"));
+            result.report(format!(
+                "the tree has more than {nodes} distinct octants and was not checked; increase the limit"
+            ));
             result
         });
         let tree = fits.then(|| self.builder.finish());

@@ -1,9 +1,10 @@
-//! An audit as a record for programs, with what it took: schema `octree-audit/1`.
+//! The result of an audit as JSON (schema `octree-audit/1`), with its time and memory.
 //!
-//! CPU time and peak memory are those of the whole process, so they mean the audit only where the process
-//! did nothing else, as in `harness audit`.
+//! CPU time and peak memory are those of the process. They describe the audit only if the process did nothing
+//! else, as in `harness audit`.
 
 use super::AuditReport;
+use contract::files::write_atomically;
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -13,42 +14,42 @@ use std::path::Path;
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-audit/1";
 
-/// What an audit said and took.
+/// The result of an audit, with its time and memory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AuditRecord {
     /// [`SCHEMA`].
     pub schema: String,
     /// Whether every check holds.
     pub holds: bool,
-    /// Check by check.
+    /// The result of each check.
     pub checks: Vec<CheckRecord>,
-    /// Leaves read.
+    /// Number of leaves.
     pub leaves: u64,
-    /// Distinct octants that they came down to.
+    /// Number of distinct octants in their tree.
     pub nodes: u64,
     /// Wall time for reading, merging, counting and building the tree.
     pub time_read_s: f64,
-    /// Wall time for all.
+    /// Wall time of the audit.
     pub time_wall_s: f64,
     /// CPU time of the process so far.
     pub time_cpu_s: f64,
-    /// Peak resident memory of the process; 0 where the system does not tell.
+    /// Peak resident memory of the process; 0 if the system does not report it.
     pub peak_rss_bytes: u64,
 }
 
-/// A check's verdict.
+/// The result of a check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CheckRecord {
     /// Its name.
     pub name: String,
-    /// Things looked at.
+    /// Number of objects examined.
     pub examined: u64,
-    /// Violations found.
+    /// Number of violations.
     pub findings: u64,
 }
 
 impl AuditRecord {
-    /// What a report says, with what this process has taken so far.
+    /// The record of a report, with the time and memory of this process so far.
     pub fn of(report: &AuditReport) -> Self {
         let check = |c: &crate::checks::CheckResult| CheckRecord {
             name: c.name.to_owned(),
@@ -68,25 +69,18 @@ impl AuditRecord {
         }
     }
 
-    /// Writes it beside `path` and renames it there.
+    /// Writes the record.
     ///
     /// # Errors
-    /// Where that is not possible.
+    /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> io::Result<()> {
-        let directory = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let mut beside = tempfile::NamedTempFile::new_in(directory)?;
-        serde_json::to_writer_pretty(&mut beside, self)?;
-        beside.as_file().sync_all()?;
-        beside.persist(path).map(drop).map_err(|error| error.error)
+        write_atomically(path, |out| Ok(serde_json::to_writer_pretty(out, self)?))
     }
 
-    /// Reads one.
+    /// Reads a record.
     ///
     /// # Errors
-    /// One sentence, where it is none.
+    /// One sentence, if the file cannot be read or is not a record.
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("{}: {why}", path.display());
         let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
@@ -112,11 +106,11 @@ mod tests {
     use contract::testing::{leaf_set, words_of};
 
     #[test]
-    fn verdicts_survive_the_journey() {
+    fn a_record_is_read_back_unchanged() {
         let place = tempfile::tempdir().unwrap();
         let mut set = leaf_set(vec![words_of(|o| o.level == 0)]);
-        for (lie, holds) in [(0, true), (1, false)] {
-            set.manifest.leaves += lie;
+        for (extra_leaves, holds) in [(0, true), (1, false)] {
+            set.manifest.leaves += extra_leaves;
             set.write(place.path()).unwrap();
             let record = AuditRecord::of(&audit(place.path(), &AuditOptions::default()));
             let path = place.path().join("audit.json");

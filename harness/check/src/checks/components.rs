@@ -1,32 +1,31 @@
-//! Components of T0's leaves over faces, and the side that rays give each
-//! (reference/DEFINITION.md, section 4).
+//! The components of T0's leaves, and their sides (reference/DEFINITION.md, section 4).
 
 use contract::octant::Octant;
 use contract::parity::Parity;
 use contract::word::{self, Side};
 
-/// Candidates put to the rays before the majority decides.
+/// Number of candidates whose rays are computed before the majority decides.
 const CANDIDATES_MAX: usize = 32;
 
-/// Leaves that are joined over faces without passing a crossing one.
+/// Leaves that are connected through faces without a crossing leaf in between.
 #[derive(Clone, Debug)]
 pub struct Component {
-    /// Indices of its leaves, coarsest first, then by key.
+    /// Indices of its leaves, by level and then by key.
     pub leaves: Vec<u32>,
-    /// What rays find it to be.
+    /// The side that rays determine.
     pub side: Side,
-    /// Whether no candidate's rays agreed.
+    /// Whether there was no candidate whose rays agreed.
     pub ambiguous: bool,
     /// The first candidate.
     pub first: Octant,
 }
 
-/// Finds and decides all components of sorted leaves that tile the root.
+/// The components of sorted leaves that tile the root, with their sides.
 pub fn find(words: &[u64], parity: &Parity) -> Vec<Component> {
     let mut sets = Sets::new(words.len());
     for (i, &w) in words.iter().enumerate().filter(|(_, w)| !crossing(**w)) {
         for j in coarse_neighbours(words, &word::octant(w)).filter(|&j| !crossing(words[j])) {
-            sets.join(i as u32, j as u32);
+            sets.union(i as u32, j as u32);
         }
     }
     let mut members: Vec<(u32, u8, u32)> = Vec::new();
@@ -34,20 +33,20 @@ pub fn find(words: &[u64], parity: &Parity) -> Vec<Component> {
         members.push((sets.root(i as u32), word::level(w), i as u32));
     }
     members.sort_unstable();
-    let of_one = members.chunk_by(|a, b| a.0 == b.0);
-    of_one.map(|m| decide(m.iter().map(|&(_, _, i)| i).collect(), words, parity)).collect()
+    let components = members.chunk_by(|a, b| a.0 == b.0);
+    components.map(|m| decide(m.iter().map(|&(_, _, i)| i).collect(), words, parity)).collect()
 }
 
 fn crossing(word: u64) -> bool {
     word & 3 == Side::Crossing as u64
 }
 
-/// Leaves across a face that are at least as coarse; the finer ones find this leaf themselves.
+/// The leaves across a face that are at least as coarse. Finer neighbours find this leaf themselves.
 fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usize> {
     let across = (0..6).filter_map(|face| {
-        let mut by = [0; 3];
-        by[face / 2] = if face % 2 == 0 { -1 } else { 1 };
-        octant.neighbour(by)
+        let mut offset = [0; 3];
+        offset[face / 2] = if face % 2 == 0 { -1 } else { 1 };
+        octant.neighbour(offset)
     });
     across.filter_map(|neighbour| {
         let key = word::key_of(neighbour.corner);
@@ -57,7 +56,7 @@ fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usi
     })
 }
 
-/// The first candidate whose rays agree decides; failing that the majority of all their rays.
+/// The first candidate whose rays agree decides. Without one, the majority of all rays decides.
 fn decide(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
     let first = word::octant(words[leaves[0] as usize]);
     let (mut rays, mut inside) = (0, 0);
@@ -75,7 +74,7 @@ fn decide(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
     Component { leaves, side, ambiguous: true, first }
 }
 
-/// Disjoint sets, the smallest index of each being its root.
+/// Disjoint sets. The root of each is its smallest index.
 struct Sets(Vec<u32>);
 
 impl Sets {
@@ -85,14 +84,14 @@ impl Sets {
 
     fn root(&mut self, mut i: u32) -> u32 {
         while self.0[i as usize] != i {
-            let above = self.0[self.0[i as usize] as usize];
-            self.0[i as usize] = above;
-            i = above;
+            let grandparent = self.0[self.0[i as usize] as usize];
+            self.0[i as usize] = grandparent;
+            i = grandparent;
         }
         i
     }
 
-    fn join(&mut self, i: u32, j: u32) {
+    fn union(&mut self, i: u32, j: u32) {
         let (a, b) = (self.root(i), self.root(j));
         self.0[a.max(b) as usize] = a.min(b);
     }

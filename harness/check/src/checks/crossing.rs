@@ -1,35 +1,36 @@
 //! Crossing leaves are exactly those that facets cross.
 //!
-//! Sections 2 and 7 of reference/DEFINITION.md. With T0: its crossing leaves are exactly the
-//! crossed ones, and each leaf of the mesh is crossing iff the T0 leaf that it lies in is. Without
-//! T0: no crossed leaf has another side, and each crossing leaf is crossed or, if finer than the
-//! surface level, lies in an octant of that level that is. Misses: facets beyond the root, which
-//! cross nothing; a crossed leaf missing altogether, which is for `complete`.
+//! Sections 2 and 7 of reference/DEFINITION.md. With T0: a leaf of T0 is crossing iff a facet crosses it, and a
+//! leaf of the mesh is crossing iff the T0 leaf that contains it is. Without T0: a leaf that a facet crosses is
+//! crossing, and a crossing leaf is crossed or, if it is finer than the surface, lies in a crossed octant of
+//! the surface's level. The check ignores facets outside the root, and does not detect a missing crossing leaf
+//! (`complete` does).
 
 use super::facets::{Facets, Visit};
-use super::{CheckResult, Subject, identical};
+use super::{CheckResult, Subject, identical, valid_leaves};
 use contract::word::{self, Side};
 
 const NAME: &str = "crossing";
 
-/// Checks T0 and the mesh, or the mesh alone.
+/// Checks T0 and the mesh or, without T0, the mesh alone.
 pub fn check(subject: &Subject) -> CheckResult {
     let mut result = CheckResult::new(NAME);
     let facets = subject.facets();
     match subject.base {
         Some(base) => {
-            let words = subject.sound(&base.words);
+            let words = valid_leaves(&base.words);
             exact(facets, &words, &mut result, &subject.terms.root);
-            inherited(subject, &words, &mut result);
+            let differs = |w, base| is_crossing(w) != is_crossing(base);
+            inherited(subject, &words, &differs, &mut result);
         }
-        None => alone(subject, facets, &mut result),
+        None => without_base(subject, facets, &mut result),
     }
     result.examined = subject.mesh.words.len() as u64;
     result
 }
 
-/// Whether a word says that its leaf is crossing.
-fn says_crossing(word: u64) -> bool {
+/// Whether the side of a leaf is crossing.
+fn is_crossing(word: u64) -> bool {
     word & 3 == Side::Crossing as u64
 }
 
@@ -37,32 +38,36 @@ fn says_crossing(word: u64) -> bool {
 fn exact(facets: &Facets, words: &[u64], result: &mut CheckResult, root: &contract::lattice::Root) {
     facets.walk(words, &mut |visit, _, crossed| {
         if let Visit::Leaf(i) = visit
-            && crossed != says_crossing(words[i])
+            && crossed != is_crossing(words[i])
         {
             let what = if crossed { "a facet crosses" } else { "no facet crosses" };
-            result.find_with(|| format!("{what} the T0 {}", identical::tell(words[i], root)));
+            result.report_with(|| format!("{what} the T0 {}", identical::describe(words[i], root)));
         }
     });
 }
 
-/// Every leaf is crossing iff its T0 leaf is.
-fn inherited(subject: &Subject, base: &[u64], result: &mut CheckResult) {
-    for &w in &subject.sound(&subject.mesh.words) {
-        let Some(from) = enclosing(base, w) else {
-            continue;
-        };
-        if says_crossing(w) != says_crossing(from) {
-            let side = word::side(from);
-            let root = &subject.terms.root;
-            result.find_with(|| {
-                format!("in a T0 leaf that is {side} lies a {}", identical::tell(w, root))
+/// Reports every leaf of the mesh whose side differs from that of the T0 leaf that contains it.
+pub(super) fn inherited(
+    subject: &Subject,
+    base: &[u64],
+    differs: &dyn Fn(u64, u64) -> bool,
+    result: &mut CheckResult,
+) {
+    let root = &subject.terms.root;
+    for &w in &valid_leaves(&subject.mesh.words) {
+        if let Some(from) = enclosing(base, w)
+            && differs(w, from)
+        {
+            result.report_with(|| {
+                let (side, leaf) = (word::side(from), identical::describe(w, root));
+                format!("a T0 leaf is {side}, but contains the {leaf}")
             });
         }
     }
 }
 
-/// The leaf among sorted ones that is or encloses this one.
-pub(super) fn enclosing(words: &[u64], leaf: u64) -> Option<u64> {
+/// The one of some sorted leaves that equals or contains this leaf.
+fn enclosing(words: &[u64], leaf: u64) -> Option<u64> {
     let after = words.partition_point(|&w| word::key(w) <= word::key(leaf));
     let &w = words.get(after.checked_sub(1)?)?;
     let encloses = word::level(w) <= word::level(leaf)
@@ -70,9 +75,9 @@ pub(super) fn enclosing(words: &[u64], leaf: u64) -> Option<u64> {
     encloses.then_some(w)
 }
 
-/// What can be said without T0.
-fn alone(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
-    let words = subject.sound(&subject.mesh.words);
+/// Checks the mesh alone.
+fn without_base(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
+    let words = valid_leaves(&subject.mesh.words);
     let (surface, root) = (subject.terms.level_surface, &subject.terms.root);
     let mut crossed_at_surface = false;
     facets.walk(&words, &mut |visit, octant, crossed| {
@@ -82,12 +87,15 @@ fn alone(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
             }
             return;
         };
-        let descends = octant.level > surface && crossed_at_surface;
-        if crossed && !says_crossing(words[i]) {
-            result.find_with(|| format!("a facet crosses the {}", identical::tell(words[i], root)));
-        } else if says_crossing(words[i]) && !crossed && !descends {
-            result
-                .find_with(|| format!("no facet crosses the {}", identical::tell(words[i], root)));
+        let in_crossed = octant.level > surface && crossed_at_surface;
+        if crossed && !is_crossing(words[i]) {
+            result.report_with(|| {
+                format!("a facet crosses the {}", identical::describe(words[i], root))
+            });
+        } else if is_crossing(words[i]) && !crossed && !in_crossed {
+            result.report_with(|| {
+                format!("no facet crosses the {}", identical::describe(words[i], root))
+            });
         }
     });
 }

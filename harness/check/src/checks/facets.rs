@@ -1,20 +1,21 @@
-//! Which octants of a mesh facets cross, by descent through the sorted words with ever fewer facets.
+//! The octants of a mesh that facets cross, found by descent through the sorted words with shrinking lists of
+//! facets.
 
 use contract::lattice::FacetLattice;
 use contract::octant::Octant;
 use contract::triangle::Triangle;
 use contract::word;
 
-/// An octant that holds leaves.
+/// An octant that is a leaf or contains leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visit {
-    /// It is the leaf with this index.
+    /// The leaf with this index.
     Leaf(usize),
-    /// It is split.
+    /// A split octant.
     Split,
 }
 
-/// Facets, prepared once for any number of walks.
+/// Facets, prepared for any number of walks.
 #[derive(Debug)]
 pub struct Facets(Vec<Triangle>);
 
@@ -24,8 +25,8 @@ impl Facets {
         Self(facets.iter().map(Triangle::new).collect())
     }
 
-    /// Visits every octant that holds leaves, parents first, and tells whether a facet crosses it.
-    /// The words are sorted leaves without overlap.
+    /// Visits every octant that is a leaf or contains leaves, parents first, with whether a facet crosses it.
+    /// The words must be sorted leaves without overlap.
     pub fn walk(&self, words: &[u64], visit: &mut dyn FnMut(Visit, &Octant, bool)) {
         let all: Vec<u32> =
             (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect();

@@ -1,81 +1,82 @@
-//! Hanging nodes: corners of leaves that lie inside an edge of a coarser leaf.
+//! Hanging nodes: corners of leaves in the interior of an edge of a coarser leaf.
 
 use contract::octant::Octant;
-use contract::tree::{GHOST, Handle, Hood, Kind, Tree, walk};
+use contract::tree::{DELETED, Handle, Kind, Neighbourhood, Tree, walk};
 
-/// Leaf edges by the hanging nodes on them.
+/// Leaf edges by their number of hanging nodes.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
-    /// Edges with none, with one, and with more. An edge shared by leaves counts once for each.
+    /// Number of edges with none, with one, and with more. An edge of several leaves is counted once for each.
     pub edges: [u64; 3],
-    /// A leaf with an edge that has more than one.
+    /// The first leaf that has an edge with more than one.
     pub worst: Option<Octant>,
 }
 
 /// Counts over all edges of all leaves.
 pub fn count(tree: &Tree) -> Counts {
     let mut counts = Counts::default();
-    let mut leaf = |hood: &Hood, kind: Kind| {
-        if kind == GHOST {
-            // It may have been refined before it was deleted.
+    let mut leaf = |neighbourhood: &Neighbourhood, kind: Kind| {
+        if kind == DELETED {
+            // Its level is a lower bound only.
             return;
         }
         for axis in 0..3 {
             for corner in 0..4 {
-                let nodes = on_edge(tree, hood, axis, [corner & 1, corner >> 1]);
+                let nodes = on_edge(tree, neighbourhood, axis, [corner & 1, corner >> 1]);
                 counts.edges[nodes.min(2) as usize] += 1;
                 if nodes > 1 && counts.worst.is_none() {
-                    counts.worst = Some(hood.octant);
+                    counts.worst = Some(neighbourhood.octant);
                 }
             }
         }
     };
-    walk(tree, &mut |_| true, &mut leaf);
+    walk(tree, &mut leaf);
     counts
 }
 
-/// Hanging nodes on the edge along `axis` at the leaf's low (0) or high (1) side in the other two axes.
-fn on_edge(tree: &Tree, hood: &Hood, axis: usize, at: [u8; 2]) -> u64 {
+/// Number of hanging nodes on the edge along `axis` that lies on the low (0) or high (1) side of the leaf in
+/// the other two axes.
+fn on_edge(tree: &Tree, neighbourhood: &Neighbourhood, axis: usize, sides: [u8; 2]) -> u64 {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let mut around = [(Handle::HOLE, 0); 3];
-    for (slot, away) in around.iter_mut().zip([[1, 0], [0, 1], [1, 1]]) {
-        let mut by = [0; 3];
-        by[u] = away[0] * (2 * i32::from(at[0]) - 1);
-        by[v] = away[1] * (2 * i32::from(at[1]) - 1);
-        // Within the neighbour, the edge runs along the side that faces the leaf.
-        let facing = |a: usize, side: u8| u8::from((by[a] == 0) == (side == 1)) << a;
-        *slot = (hood.place(by), facing(u, at[0]) | facing(v, at[1]));
+    let mut neighbours = [(Handle::HOLE, 0); 3];
+    for (neighbour, across) in neighbours.iter_mut().zip([[1, 0], [0, 1], [1, 1]]) {
+        let mut offset = [0; 3];
+        offset[u] = across[0] * (2 * i32::from(sides[0]) - 1);
+        offset[v] = across[1] * (2 * i32::from(sides[1]) - 1);
+        // The edge is on the side of the neighbour that faces the leaf.
+        let facing = |a: usize, side: u8| u8::from((offset[a] == 0) == (side == 1)) << a;
+        *neighbour = (neighbourhood.at_offset(offset), facing(u, sides[0]) | facing(v, sides[1]));
     }
-    along(tree, around, axis, hood.octant.level)
+    along(tree, neighbours, axis, neighbourhood.octant.level)
 }
 
-/// Nodes inside a stretch of edge around which lie these octants, each with the digit of its first
-/// child along the edge.
-fn along(tree: &Tree, around: [(Handle, u8); 3], axis: usize, level: u8) -> u64 {
-    if !around.iter().any(|(at, _)| at.is_node()) {
+/// Number of nodes in the interior of part of an edge. Each of the three octants around it is given with the
+/// digit of its first child along the edge.
+fn along(tree: &Tree, octants: [(Handle, u8); 3], axis: usize, level: u8) -> u64 {
+    if !octants.iter().any(|(handle, _)| handle.is_node()) {
         return 0;
     }
     let half = |which: u8| {
-        let child =
-            |(at, digit): (Handle, u8)| (tree.child(at, digit | which << axis, level), digit);
-        along(tree, around.map(child), axis, level + 1)
+        let child = |(handle, digit): (Handle, u8)| {
+            (tree.child(handle, digit | which << axis, level), digit)
+        };
+        along(tree, octants.map(child), axis, level + 1)
     };
-    // Between the halves is a node if a leaf has a corner there; where all that touches it was
-    // deleted, there is none.
-    let touched = around.iter().filter(|(at, _)| at.is_node()).any(|&(at, digit)| {
+    // The midpoint is a node if it is a corner of a leaf. It is none if all leaves around it were deleted.
+    let is_node = octants.iter().filter(|(handle, _)| handle.is_node()).any(|&(handle, digit)| {
         let (low, high) = (digit, digit | 1 << axis);
-        leaf_in_corner(tree, tree.child(at, low, level), high)
-            || leaf_in_corner(tree, tree.child(at, high, level), low)
+        has_leaf_in_corner(tree, tree.child(handle, low, level), high)
+            || has_leaf_in_corner(tree, tree.child(handle, high, level), low)
     });
-    u64::from(touched) + half(0) + half(1)
+    u64::from(is_node) + half(0) + half(1)
 }
 
-/// Whether the corner of an octant, given as the digit of the child there, is a leaf's.
-fn leaf_in_corner(tree: &Tree, mut at: Handle, digit: u8) -> bool {
-    while at.is_node() {
-        at = tree.child(at, digit, 0);
+/// Whether a corner of an octant is a corner of a leaf. The corner is given by the digit of the child in it.
+fn has_leaf_in_corner(tree: &Tree, mut handle: Handle, digit: u8) -> bool {
+    while handle.is_node() {
+        handle = tree.child(handle, digit, 0);
     }
-    at.as_leaf().is_some()
+    handle.as_leaf().is_some()
 }
 
 #[cfg(test)]
@@ -86,20 +87,19 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_refined_corner_hangs_one_node_on_each_edge_it_halves() {
+    fn a_refined_corner_adds_one_hanging_node_to_each_edge_that_it_bisects() {
         let tree =
             Tree::of_words(&words_of(|o| o.level == 0 || (o.level == 1 && o.corner == [0; 3])));
         let counts = count(&tree);
-        // Three faces of the refined octant lie inside the root. Of their nine edges three lie
-        // inside the root (three coarse leaves each), six in its faces (one coarse leaf each).
+        // Three faces of the refined octant are in the interior of the root. Of their nine edges, three are in
+        // the interior of the root (three coarse leaves each) and six in its faces (one coarse leaf each).
         assert_eq!(counts.edges, [12 * 15 - 15, 15, 0]);
         assert!(counts.worst.is_none());
     }
 
     proptest! {
-        /// Agrees with collecting all corners and looking at each edge.
         #[test]
-        fn agrees_with_all_corners(words in random_words(3)) {
+        fn counts_agree_with_a_search_among_all_corners(words in random_words(3)) {
             let mut corners = std::collections::BTreeSet::new();
             for &w in &words {
                 let (low, high) = word::octant(w).bounds();

@@ -1,8 +1,8 @@
-//! Leaf by leaf the same as another mesh.
+//! The mesh equals another one, leaf by leaf.
 //!
-//! Section 1 of reference/DEFINITION.md: the mesh is a function of the inputs alone, so what the
-//! reference makes of a case is the only right answer. Misses: an error that both programs make;
-//! the other checks are for those.
+//! Section 1 of reference/DEFINITION.md: the mesh is a function of the inputs only, so the mesh of the
+//! reference is the only correct one. The check cannot detect an error that both programs make; the other
+//! checks do.
 
 use super::{CheckResult, Subject};
 use contract::lattice::Root;
@@ -10,13 +10,14 @@ use contract::word::{self, Leaf};
 
 const NAME: &str = "identical";
 
-/// Compares with the reference, if there is one.
+/// Compares the mesh with the reference; `None` without a reference.
 pub fn check(subject: &Subject) -> Option<CheckResult> {
     let reference = subject.reference?;
     Some(compare(&subject.mesh.words, &reference.words, &subject.terms.root))
 }
 
-/// Compares two sorted sequences of words; the findings name the first difference.
+/// Compares two sorted sequences of words. The total is the number of leaves in only one of them, and the one
+/// listed finding is the first difference.
 pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
     let mut result = CheckResult::new(NAME);
     result.examined = mesh.len() as u64;
@@ -24,29 +25,29 @@ pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
         return result;
     }
     let first = mesh.iter().zip(reference).take_while(|(a, b)| a == b).count();
-    result.find(difference(("mesh", mesh), ("reference", reference), first, root));
+    result.report(difference(("mesh", mesh), ("reference", reference), first, root));
     result.findings_total = symmetric_difference(&mesh[first..], &reference[first..]);
     result
 }
 
-/// Tells what two sequences hold at the first index where they differ.
-pub fn difference(a: (&str, &[u64]), b: (&str, &[u64]), first: usize, root: &Root) -> String {
-    let told = |(name, words): (&str, &[u64])| match words.get(first) {
-        Some(&word) => format!("{name} has {}", tell(word, root)),
+/// The words of two named sequences at the first index where they differ, as text.
+fn difference(a: (&str, &[u64]), b: (&str, &[u64]), first: usize, root: &Root) -> String {
+    let text = |(name, words): (&str, &[u64])| match words.get(first) {
+        Some(&word) => format!("{name} has {}", describe(word, root)),
         None => format!("{name} has no more leaves"),
     };
-    format!("first difference: {}; {}", told(a), told(b))
+    format!("first difference: {}; {}", text(a), text(b))
 }
 
-/// A word for people, be it a leaf or not.
-pub fn tell(word: u64, root: &Root) -> String {
+/// A word as text, whether or not it is a leaf.
+pub fn describe(word: u64, root: &Root) -> String {
     match word::decode(word) {
         Ok(Leaf { octant, side }) => format!("{side} leaf: {}", root.describe(&octant)),
         Err(why) => format!("the word {word:#018x}: {why}"),
     }
 }
 
-/// Words in one sorted sequence but not in both.
+/// Number of words that are in only one of two sorted sequences.
 fn symmetric_difference(mut a: &[u64], mut b: &[u64]) -> u64 {
     let mut count = 0;
     while let (Some(x), Some(y)) = (a.first(), b.first()) {
@@ -64,7 +65,7 @@ mod tests {
     const ROOT: Root = Root { origin: [0.0; 3], edge: 8.0 };
 
     #[test]
-    fn the_first_difference_is_told_with_both_levels() {
+    fn the_first_difference_names_both_leaves_and_all_differences_are_counted() {
         let fine: Vec<u64> = (0..8)
             .map(|d| {
                 word::encode(&Leaf {
@@ -78,9 +79,9 @@ mod tests {
         assert!(compare(&fine, &fine, &ROOT).holds());
         let result = compare(&coarse, &fine, &ROOT);
         assert_eq!(result.findings_total, 2);
-        let told = &result.findings[0].detail;
-        assert!(told.contains("mesh has inside leaf: octant 3 (level 1)"), "{told}");
-        assert!(told.contains("reference has outside leaf: octant 3 (level 1)"), "{told}");
+        let detail = &result.findings[0].detail;
+        assert!(detail.contains("mesh has inside leaf: octant 3 (level 1)"), "{detail}");
+        assert!(detail.contains("reference has outside leaf: octant 3 (level 1)"), "{detail}");
         assert_eq!(compare(&fine[..7], &fine, &ROOT).findings_total, 1);
     }
 }

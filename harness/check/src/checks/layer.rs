@@ -1,55 +1,57 @@
 //! Every layer is at least n cells thick, at every level.
 //!
-//! Section 7 of reference/DEFINITION.md: a leaf of level l + 1 or more and one of level l - 1 or
-//! less are at least n cells of level l apart by Chebyshev distance, for every l below the
-//! surface's level and, where all is kept, for every l; and leaves nearer than n - 1 surface cells
-//! to a crossing leaf of the surface's level have that level at least. Where crossing leaves are
-//! deleted, whatever touched one has the surface's level. Misses: layers thicker than they need be;
-//! without T0, what deleted crossing leaves asked for.
+//! Section 7 of reference/DEFINITION.md: the Chebyshev distance of a leaf of level l + 1 or finer from a leaf
+//! of level l - 1 or coarser is at least n cells of level l, for every l coarser than the surface and, if all
+//! leaves are kept, for every l. Leaves that are nearer than n - 1 surface cells to a crossing leaf of the
+//! surface's level have at least that level. If crossing leaves are deleted, leaves that touched one have at
+//! least the surface's level. The check cannot detect layers that are too thick and, without T0, layers that
+//! deleted crossing leaves require.
 
-use super::gap::{Gap, Trail};
+use super::gap::Gap;
+use super::trail::Trail;
 use super::{CheckResult, Subject, Terms, contact};
 use contract::manifest::Keep;
 use contract::octant::CELLS_PER_EDGE;
-use contract::tree::{GHOST, Kind, Kinds, Region, Tree};
+use contract::tree::{DELETED, Kind, Kinds, Region, Tree};
 use contract::word::Side;
 
 const NAME: &str = "layer";
 
-/// Checks the mesh, with deleted crossing leaves put back where T0 tells them.
+/// Checks the mesh together with the deleted crossing leaves, if T0 is known.
 pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = check_tree(subject.tree_with_ghosts(), &subject.terms);
+    let mut result = check_tree(subject.tree_with_deleted(), &subject.terms);
     result.examined = subject.mesh.words.len() as u64;
     result
 }
 
-/// What can be said of the leaves alone.
+/// Checks the layers of a tree.
 pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     let mut result = CheckResult::new(NAME);
     let n = i64::from(terms.layer_cells_min);
     let margin = |level: u8| {
-        let promised = terms.keep == Keep::All || level < terms.level_surface;
-        promised.then(|| n * cell(level))
+        let required = terms.keep == Keep::All || level < terms.level_surface;
+        required.then(|| n * cell(level))
     };
     let what = &format!("a layer is thinner than {n} cells");
     Gap { tree, root: &terms.root, margin: &margin, what }.check(&mut result);
-    Insulation { tree, terms }.children(&mut Trail::new(tree), &mut result);
+    SurfaceLayer { tree, terms }.check_children(&mut Trail::new(tree), &mut result);
     result
 }
 
-/// Edge of a cell in level-19 cells.
+/// Edge of a cell of this level, in level-19 cells.
 fn cell(level: u8) -> i64 {
     i64::from(CELLS_PER_EDGE >> level)
 }
 
 impl Terms {
-    /// How far around a leaf none may be coarser than the surface, in level-19 cells.
-    fn insulation(&self, kind: Kind, level: u8) -> i64 {
+    /// Minimum distance of a crossing leaf of this kind and level from leaves coarser than the surface, in
+    /// level-19 cells.
+    fn surface_layer(&self, kind: Kind, level: u8) -> i64 {
         let layer = i64::from(self.layer_cells_min) - 1;
-        // The extra layer is asked for only where crossing leaves are deleted.
+        // The extra layer is required only if crossing leaves are deleted.
         let extra = i64::from(!self.keep_crossing);
         let cells = match kind {
-            GHOST => extra,
+            DELETED => extra,
             _ if level == self.level_surface => layer.max(extra),
             _ => extra,
         };
@@ -57,52 +59,51 @@ impl Terms {
     }
 }
 
-const SURFACE: Kinds = 1 << Side::Crossing as u8 | 1 << GHOST;
+const SURFACE: Kinds = 1 << Side::Crossing as u8 | 1 << DELETED;
 
-/// Every crossing leaf is insulated from leaves coarser than the surface.
-struct Insulation<'a> {
+/// Requires that no leaf near a crossing leaf is coarser than the surface.
+struct SurfaceLayer<'a> {
     tree: &'a Tree,
     terms: &'a Terms,
 }
 
-impl Insulation<'_> {
-    /// Looks at the children of where the walk is, first all at once: what is insulated as a whole is
-    /// not looked into.
-    fn children(&self, trail: &mut Trail, result: &mut CheckResult) {
+impl SurfaceLayer<'_> {
+    /// Checks the children of the current octant. All children are tested together first, which mostly suffices.
+    fn check_children(&self, trail: &mut Trail, result: &mut CheckResult) {
         let (tree, surface) = (self.tree, self.terms.level_surface);
-        let (at, octant) = (trail.here().centre(), trail.here().octant);
-        let most = self.terms.insulation(Side::Crossing as Kind, surface);
-        let near = trail.children(tree, |child| tree.kinds(child) & SURFACE != 0);
-        if near == 0 || most == 0 {
+        let (handle, octant) = (trail.current().centre(), trail.current().octant);
+        let margin_max = self.terms.surface_layer(Side::Crossing as Kind, surface);
+        let crossing = trail.select_children(tree, |child| tree.kinds(child) & SURFACE != 0);
+        if crossing == 0 || margin_max == 0 {
             return;
         }
-        let region = Region::around_children(&octant, near, most);
-        if trail.coarsest_nearby(tree, most, &region, surface) >= surface {
+        let region = Region::around_children(&octant, crossing, margin_max);
+        if trail.coarsest_nearby(tree, margin_max, &region, surface) >= surface {
             return;
         }
-        for digit in (0..8).filter(|d| near >> d & 1 == 1) {
-            let child = tree.child(at, digit, octant.level);
+        for digit in (0..8).filter(|d| crossing >> d & 1 == 1) {
+            let child = tree.child(handle, digit, octant.level);
             trail.descend(tree, digit);
             match child.as_leaf() {
-                // Crossing leaves coarser than the surface are for `spacing` to report.
-                Some(kind) if octant.level + 1 >= surface => self.leaf(trail, kind, result),
+                Some(kind) if octant.level + 1 >= surface => self.check_leaf(trail, kind, result),
+                // `spacing` reports crossing leaves coarser than the surface.
                 Some(_) => {}
-                None => self.children(trail, result),
+                None => self.check_children(trail, result),
             }
             trail.ascend();
         }
     }
 
-    fn leaf(&self, trail: &Trail, kind: Kind, result: &mut CheckResult) {
-        let (octant, surface) = (trail.here().octant, self.terms.level_surface);
-        let margin = self.terms.insulation(kind, octant.level);
+    fn check_leaf(&self, trail: &Trail, kind: Kind, result: &mut CheckResult) {
+        let (octant, surface) = (trail.current().octant, self.terms.level_surface);
+        let margin = self.terms.surface_layer(kind, octant.level);
         let found = trail.search(self.tree, margin, &Region::around(&octant, margin), surface);
         if let Some(coarse) = found.leaf(self.tree) {
-            result.find_with(|| {
+            result.report_with(|| {
                 let (what, cells) = (contact::name(1 << kind), margin / cell(octant.level));
                 let (leaf, coarse) =
                     (self.terms.root.describe(&octant), self.terms.root.describe(&coarse));
-                format!("within {cells} cells of the {what} leaf {leaf}, coarser than the surface: {coarse}")
+                format!("a leaf within {cells} cells of the {what} leaf {leaf} is coarser than the surface: {coarse}")
             });
         }
     }
@@ -112,7 +113,7 @@ impl Insulation<'_> {
 mod tests {
     use super::*;
     use contract::lattice::Root;
-    use contract::testing::{distance, graded_words};
+    use contract::testing::graded_words;
     use contract::word;
     use proptest::prelude::*;
 
@@ -121,22 +122,22 @@ mod tests {
         Terms { root, level_surface, layer_cells_min: n, keep, keep_crossing, boxes: Vec::new() }
     }
 
-    /// The definition word by word, over all pairs of leaves.
-    fn thin(words: &[u64], terms: &Terms) -> bool {
+    /// Whether a layer is too thin, literally by the definition and over all pairs of leaves.
+    fn is_thin(words: &[u64], terms: &Terms) -> bool {
         let n = i64::from(terms.layer_cells_min);
         let leaves: Vec<_> = words.iter().map(|&w| (word::octant(w), word::side(w))).collect();
         let all = terms.keep == Keep::All;
         leaves.iter().any(|(fine, side)| {
             leaves.iter().any(|(coarse, _)| {
-                let apart = distance(fine, coarse);
+                let distance = fine.distance(coarse);
                 let levels = coarse.level + 1..fine.level;
-                let promised = |l: &u8| all || *l < terms.level_surface;
-                let layer = levels.filter(promised).any(|l| apart < n * cell(l));
+                let required = |l: &u8| all || *l < terms.level_surface;
+                let layer = levels.filter(required).any(|l| distance < n * cell(l));
                 let surface = terms.level_surface;
-                let surrounded = *side == Side::Crossing && fine.level == surface;
-                let insulation = apart < (n - 1) * cell(surface)
-                    || !terms.keep_crossing && apart < cell(surface);
-                layer || surrounded && coarse.level < surface && insulation
+                let at_surface = *side == Side::Crossing && fine.level == surface;
+                let surface_layer = distance < (n - 1) * cell(surface)
+                    || !terms.keep_crossing && distance < cell(surface);
+                layer || at_surface && coarse.level < surface && surface_layer
             })
         })
     }
@@ -145,15 +146,15 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(256))]
 
         #[test]
-        fn agrees_with_all_pairs(words in graded_words(4), n in 1u32..=6, surface in 0u8..=4,
+        fn the_check_agrees_with_a_comparison_of_all_pairs(words in graded_words(4), n in 1u32..=6, surface in 0u8..=4,
                                  all in any::<bool>(), keep_crossing in any::<bool>()) {
             let keep = if all { Keep::All } else { Keep::Outside };
             let terms = terms(n, surface, keep, keep_crossing);
-            // Crossing leaves deeper than the surface ask for nothing but the extra layer.
-            let fit = |w: &&u64| word::side(**w) != Side::Crossing || word::level(**w) == surface;
-            let words: Vec<u64> = words.iter().filter(fit).copied().collect();
-            let found = check_tree(&Tree::of_words(&words), &terms);
-            prop_assert_eq!(found.holds(), !thin(&words, &terms), "{}", found);
+            // Crossing leaves finer than the surface require the extra layer only, which `is_thin` does not model.
+            let at_surface = |w: &&u64| word::side(**w) != Side::Crossing || word::level(**w) == surface;
+            let words: Vec<u64> = words.iter().filter(at_surface).copied().collect();
+            let result = check_tree(&Tree::of_words(&words), &terms);
+            prop_assert_eq!(result.holds(), !is_thin(&words, &terms), "{}", result);
         }
     }
 }

@@ -1,35 +1,35 @@
-//! One side per component, and the side that rays find.
+//! Each component has one side, and it is the side that rays determine.
 //!
-//! Section 4 of reference/DEFINITION.md. With T0: components of its leaves over faces are found by
-//! union-find, each is decided by the harness's own exact rays, and every leaf must have its
-//! component's side; the ambiguous components must be counted as the manifest counts them; every
-//! leaf of the mesh must have the side of the T0 leaf it lies in. Without T0: no outside leaf
-//! shares part of a face with an inside one, and no leaf has a side that is deleted. Misses: a body
-//! whose rays agree on what is wrong, as a leaky one's may; the oracles are for that.
+//! Section 4 of reference/DEFINITION.md. With T0: the components of its leaves (connected through faces) are
+//! found by union-find, the harness's own exact rays determine the side of each, and every leaf must have the
+//! side of its component. The manifest must state the number of ambiguous components. Every leaf of the mesh
+//! must have the side of the T0 leaf that contains it. Without T0: no outside leaf shares part of a face with
+//! an inside leaf, and no leaf has a side that is deleted. The check cannot detect that all rays are wrong,
+//! which is possible on a body that is not watertight; the oracles can.
 
 use super::components::{self, Component};
 use super::contact::{self, Contacts};
-use super::{CheckResult, Subject, Terms, crossing, identical};
+use super::{CheckResult, Subject, Terms, crossing, identical, valid_leaves};
 use contract::leafset::LeafSet;
 use contract::manifest::Ambiguous;
 use contract::octant::Octant;
 use contract::parity::Parity;
-use contract::tree::{Handle, Kind, Tree};
+use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
 const NAME: &str = "sides";
 
-/// Checks the mesh against T0 and T0 against rays, or the mesh alone.
+/// Checks the mesh against T0 and T0 against rays or, without T0, the mesh alone.
 pub fn check(subject: &Subject) -> CheckResult {
     let mut result = check_tree(subject.tree(), &subject.terms);
     result.examined = subject.mesh.words.len() as u64;
     if let Some(base) = subject.base {
-        let words = subject.sound(&base.words);
-        inherited(subject, &words, &mut result);
+        let words = valid_leaves(&base.words);
+        crossing::inherited(subject, &words, &|w, base| w & 3 != base & 3, &mut result);
         let components = components::find(&words, &Parity::new(&subject.case.facets_lattice));
         labelled(&components, &words, &subject.terms, &mut result);
-        for (whose, set) in [("", subject.mesh), ("T0: ", base)] {
-            ambiguous(whose, set, &components, &subject.terms, &mut result);
+        for (prefix, set) in [("", subject.mesh), ("T0: ", base)] {
+            ambiguous(prefix, set, &components, &subject.terms, &mut result);
         }
         let undecided = components.iter().filter(|c| c.ambiguous).count();
         result.note = format!("{} components, {undecided} ambiguous", components.len());
@@ -37,74 +37,60 @@ pub fn check(subject: &Subject) -> CheckResult {
     result
 }
 
-/// What can be said of the leaves alone.
+/// Checks the sides of neighbours, from the leaves only.
 pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     let mut result = CheckResult::new(NAME);
-    unwanted(tree, tree.root(), Octant::ROOT, terms, &mut result);
+    not_kept(tree, tree.root(), Octant::ROOT, terms, &mut result);
     let inside = 1 << Side::Inside as u8;
     let matters = |kind: Kind, _: u8| kind == Side::Outside as Kind;
     Contacts { tree, sought: inside, matters: &matters }.visit(&mut |outside, _, across| {
         if across & inside != 0 {
             let leaf = terms.root.describe(&outside);
-            result
-                .find_with(|| format!("an inside leaf shares a face with the outside leaf {leaf}"));
+            result.report_with(|| {
+                format!("an inside leaf shares a face with the outside leaf {leaf}")
+            });
         }
     });
     result
 }
 
-/// No leaf has a side that is deleted.
-fn unwanted(tree: &Tree, at: Handle, octant: Octant, terms: &Terms, result: &mut CheckResult) {
-    let wanted =
-        (0..3).filter(|&k| terms.keeps(k)).fold(contract::tree::HOLES, |all, k| all | 1 << k);
-    let foreign = tree.kinds(at) & !wanted;
-    if foreign == 0 {
+/// Reports leaves whose side is deleted.
+fn not_kept(tree: &Tree, handle: Handle, octant: Octant, terms: &Terms, result: &mut CheckResult) {
+    let kept = (0..3).filter(|&k| terms.keeps(k)).fold(HOLES, |all, k| all | 1 << k);
+    let deleted = tree.kinds(handle) & !kept;
+    if deleted == 0 {
         return;
     }
-    if at.is_node() {
+    if handle.is_node() {
         for d in 0..8 {
-            unwanted(tree, tree.child(at, d, octant.level), octant.child(d), terms, result);
+            not_kept(tree, tree.child(handle, d, octant.level), octant.child(d), terms, result);
         }
     } else {
-        result.find_with(|| {
-            let (side, leaf) = (contact::name(foreign), terms.root.describe(&octant));
-            format!("{side} leaves are deleted, but here is one: {leaf}")
+        result.report_with(|| {
+            let (side, leaf) = (contact::name(deleted), terms.root.describe(&octant));
+            format!("{side} leaves are deleted, but one still exists: {leaf}")
         });
     }
 }
 
-/// Every leaf has the side of the T0 leaf it lies in.
-fn inherited(subject: &Subject, base: &[u64], result: &mut CheckResult) {
-    for &w in &subject.sound(&subject.mesh.words) {
-        if let Some(from) = crossing::enclosing(base, w)
-            && w & 3 != from & 3
-        {
-            let (side, root) = (word::side(from), &subject.terms.root);
-            result.find_with(|| {
-                format!("in a T0 leaf that is {side} lies a {}", identical::tell(w, root))
-            });
-        }
-    }
-}
-
-/// Every leaf of T0 has its component's side.
+/// Every leaf of T0 has the side of its component.
 fn labelled(components: &[Component], words: &[u64], terms: &Terms, result: &mut CheckResult) {
     for component in components {
         for &i in &component.leaves {
             if word::side(words[i as usize]) != component.side {
                 let (side, count) = (component.side, component.leaves.len());
-                result.find_with(|| {
-                    let leaf = identical::tell(words[i as usize], &terms.root);
-                    format!("rays find a component of {count} leaves to be {side}; of it, T0 has the {leaf}")
+                result.report_with(|| {
+                    let leaf = identical::describe(words[i as usize], &terms.root);
+                    format!("rays show that a component of {count} leaves is {side}, but it contains the T0 {leaf}")
                 });
             }
         }
     }
 }
 
-/// The manifest counts ambiguous components as rays do, and places its example in one of them.
+/// The manifest states the number of ambiguous components, and its example is in one of them.
 fn ambiguous(
-    whose: &str,
+    prefix: &str,
     set: &LeafSet,
     components: &[Component],
     terms: &Terms,
@@ -114,18 +100,20 @@ fn ambiguous(
     let found: Vec<_> = components.iter().filter(|c| c.ambiguous).collect();
     if count != found.len() as u64 {
         let total = found.len();
-        result.find(format!(
-            "{whose}the manifest has {count} ambiguous components, rays find {total}"
+        result.report(format!(
+            "{prefix}the manifest counts {count} ambiguous components, but rays find {total}"
         ));
     }
     let near = |c: &&Component| {
-        let at = terms.root.to_user(c.first.centre());
-        // Exact on the lattice; in user units within rounding.
-        example.is_some_and(|e| (0..3).all(|a| (e[a] - at[a]).abs() <= 1e-9 * terms.root.edge))
+        let centre = terms.root.to_user(c.first.centre());
+        // Lattice coordinates are exact, but those in the user's units are rounded.
+        let equal = |a: usize, e: f64| (e - centre[a]).abs() <= 1e-9 * terms.root.edge;
+        example.is_some_and(|e| (0..3).all(|a| equal(a, e[a])))
     };
     let placed = if found.is_empty() { example.is_none() } else { found.iter().any(near) };
     if !placed {
-        result
-            .find(format!("{whose}the example of an ambiguous component, {example:?}, is in none"));
+        result.report(format!(
+            "{prefix}the example {example:?} of an ambiguous component is in no such component"
+        ));
     }
 }

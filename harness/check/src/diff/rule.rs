@@ -1,45 +1,47 @@
-//! Which rule of reference/DEFINITION.md decides between two meshes where they differ first, and for whom.
+//! The rule of reference/DEFINITION.md that decides which of two meshes is right at their first difference.
 //!
-//! Where one mesh has a leaf and the other has split it, the split must be asked for: by a facet or a box
-//! (section 3), or by a leaf near enough (section 6). That leaf is the witness. A witness that both meshes have
-//! settles the matter; one that only the split mesh has is itself in dispute, and the dispute is followed
-//! to it. Gradation goes from fine to coarse, so this ends at the first difference in the definition's order.
+//! If one mesh has a leaf that the other has split, something must require the split: a facet or a box (section
+//! 3), or a finer leaf nearby (section 6), which is the witness. If both meshes have the witness, it decides.
+//! If only the mesh with the split has it, the witness itself is disputed, and the search continues there.
+//! Gradation goes from fine to coarse, so the search ends at the first difference in the order of the
+//! definition.
 //!
-//! Sources that were deleted afterwards (crossing leaves where `keep_crossing` is false) are in neither mesh
-//! and so can be no witnesses; the ruling says so where it matters.
+//! Crossing leaves that were deleted after gradation are in neither mesh and cannot be witnesses. The text says
+//! so where that is possible.
 
 use crate::checks::Terms;
-use crate::checks::identical::tell;
+use crate::checks::identical::describe;
 use contract::case::Case;
 use contract::manifest::Keep;
 use contract::octant::Octant;
 use contract::parity::Parity;
+use contract::tree::Kind;
 use contract::triangle::Triangle;
 use contract::word::{self, Leaf, Side};
 
-/// A dispute is followed so far: one step per level is the most that refinement can need.
+/// Maximum number of disputed witnesses: refinement needs at most one step per level.
 const STEPS_MAX: usize = 20;
 
-/// Two meshes, and what is known of what they should be.
+/// Two meshes with their inputs.
 pub struct Dispute<'a> {
     /// Words of mesh A, sorted.
     pub a: &'a [u64],
     /// Words of mesh B, sorted.
     pub b: &'a [u64],
-    /// What was asked for.
+    /// Their common requirements.
     pub terms: &'a Terms,
-    /// The case, where it is given.
+    /// Their common case, if it is known.
     pub case: Option<&'a Case>,
 }
 
-/// Whose leaf it is.
+/// One of the two meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Who {
+pub(super) enum Mesh {
     A,
     B,
 }
 
-impl Who {
+impl Mesh {
     fn name(self) -> char {
         if self == Self::A { 'A' } else { 'B' }
     }
@@ -49,43 +51,43 @@ impl Who {
     }
 }
 
-/// Why an octant must be split, or not.
+/// The reason why an octant must be split, as text.
 enum Reason {
-    /// Undisputed: the text.
+    /// The inputs or a leaf of both meshes require the split.
     Settled(String),
-    /// By a leaf that only the mesh with the split has.
+    /// This leaf requires the split, but only the mesh with the split has it.
     Disputed(String, Octant),
-    /// Nothing asks for it.
+    /// Nothing requires the split.
     None,
 }
 
 impl Dispute<'_> {
-    /// The rules that decide where these words, the first that differ, stand.
+    /// The rules that decide at the first difference, given by the words of both meshes.
     pub fn rule(&self, a: Option<u64>, b: Option<u64>) -> Vec<String> {
         let leaf = |word: Option<u64>| word.map(word::decode).transpose();
         let (a, b) = match (leaf(a), leaf(b)) {
             (Ok(a), Ok(b)) => (a, b),
             _ => {
-                return vec!["section 8: a word that is no leaf is wrong whatever the case".into()];
+                return vec!["section 8: a word that is not a leaf is wrong in any case".into()];
             }
         };
         match (a, b) {
             (Some(a), Some(b)) if a.octant == b.octant => vec![self.side(&a, &b)],
-            (Some(a), Some(b)) if a.octant.contains(&b.octant) => self.split(Who::A, a),
-            (Some(a), Some(b)) if b.octant.contains(&a.octant) => self.split(Who::B, b),
+            (Some(a), Some(b)) if a.octant.contains(&b.octant) => self.split(Mesh::A, a),
+            (Some(a), Some(b)) if b.octant.contains(&a.octant) => self.split(Mesh::B, b),
             (Some(a), Some(b)) if word::encode(&a) > word::encode(&b) => {
-                vec![self.absence(Who::B, &b)]
+                vec![self.absence(Mesh::B, &b)]
             }
-            (Some(a), _) => vec![self.absence(Who::A, &a)],
-            (None, Some(b)) => vec![self.absence(Who::B, &b)],
+            (Some(a), _) => vec![self.absence(Mesh::A, &a)],
+            (None, Some(b)) => vec![self.absence(Mesh::B, &b)],
             (None, None) => Vec::new(),
         }
     }
 
-    /// One octant, two sides.
+    /// The rule for an octant that has different sides.
     fn side(&self, a: &Leaf, b: &Leaf) -> String {
         let Some(case) = self.case else {
-            return "section 4: the side. Give the case file (--case) to have it decided".into();
+            return "section 4 (side): give the case file (--case) to decide it".into();
         };
         if let Some(facet) = crossed_by(&a.octant, case) {
             let right = if a.side == Side::Crossing { "A" } else { "B" };
@@ -93,32 +95,28 @@ impl Dispute<'_> {
                 "section 4: facet {facet} crosses it, so it is crossing: {right} is right"
             );
         }
-        let votes = Parity::new(&case.facets_lattice).inside(a.octant.centre());
-        let inside = votes.iter().filter(|&&vote| vote).count();
-        let told = format!("section 4: no facet crosses it, and {inside} of its 6 rays say inside");
+        let rays = Parity::new(&case.facets_lattice).inside(a.octant.centre());
+        let inside = rays.iter().filter(|&&inside| inside).count();
+        let text = format!("section 4: no facet crosses it, and {inside} of its 6 rays are inside");
         let side = match inside {
             0 => Side::Outside,
             6 => Side::Inside,
-            _ => return format!("{told}: an earlier candidate of its component decides"),
+            _ => return format!("{text}: another candidate of its component decides"),
         };
-        // A component's side is its first agreeing candidate's; only on a leak may another leaf's rays differ.
+        // The first candidate whose rays agree determines the side of the component. The rays of other leaves
+        // can differ only if the body is not watertight.
         let right = [(a, "A"), (b, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
         match right {
-            Some((_, name)) => format!("{told}: {name} is right, unless the surface leaks"),
-            None => format!("{told}: neither is right, unless the surface leaks"),
+            Some((_, name)) => format!("{text}: {name} is right, if the body is watertight"),
+            None => format!("{text}: neither is right, if the body is watertight"),
         }
     }
 
-    /// A leaf where the other mesh has nothing.
-    fn absence(&self, who: Who, leaf: &Leaf) -> String {
-        let (has, lacks, side) = (who.name(), who.other().name(), leaf.side);
-        let keep = self.terms.keep;
-        let kept = match side {
-            Side::Crossing => self.terms.keep_crossing,
-            Side::Outside => keep != Keep::Inside,
-            Side::Inside => keep != Keep::Outside,
-        };
-        let keep = format!("{keep:?}").to_lowercase();
+    /// The rule for a leaf that the other mesh does not have in any form.
+    fn absence(&self, mesh: Mesh, leaf: &Leaf) -> String {
+        let (has, lacks, side) = (mesh.name(), mesh.other().name(), leaf.side);
+        let kept = self.terms.keeps(side as Kind);
+        let keep = format!("{:?}", self.terms.keep).to_lowercase();
         match (side, kept) {
             (Side::Crossing, false) => {
                 format!("section 7: keep_crossing is false, so {has} must not have a crossing leaf")
@@ -127,50 +125,61 @@ impl Dispute<'_> {
                 format!("section 5: keep is {keep}, so {has} must not have a leaf that is {side}")
             }
             _ => format!(
-                "section 5: keep is {keep}, so a leaf that is {side} stays; {lacks} has nothing there: it lost \
-                 the leaf, or section 4 gave its component another side"
+                "section 5: keep is {keep}, so a leaf that is {side} is kept; {lacks} lost the leaf, or gave its \
+                 component another side (section 4)"
             ),
         }
     }
 
-    /// A leaf that the other mesh has split, followed to what is undisputed.
-    fn split(&self, who: Who, leaf: Leaf) -> Vec<String> {
-        let (mut who, mut leaf) = (who, leaf);
-        let mut told = Vec::new();
-        let mut seen = vec![leaf.octant];
+    /// The rules for a leaf that the other mesh has split, one for each disputed witness.
+    fn split(&self, mut mesh: Mesh, mut leaf: Leaf) -> Vec<String> {
+        let mut rules = Vec::new();
+        let mut visited = vec![leaf.octant];
         for _ in 0..STEPS_MAX {
-            let (coarse, fine) = (who.name(), who.other().name());
+            let (coarse, fine) = (mesh.name(), mesh.other().name());
             let what = format!("{coarse} has the leaf {}, {fine} has split it", leaf.octant);
-            match self.reason(who, &leaf) {
-                Reason::Settled(why) => told.push(format!("{what}: {why}: {fine} is right")),
-                Reason::None => told.push(format!(
-                    "{what}: nothing in either mesh asks for that, and refinement is least (sections 3 and 6): {coarse} \
-                     is right{}", self.caveat()
-                )),
-                Reason::Disputed(why, witness) => {
-                    told.push(format!("{what}: {why}, which {coarse} does not have"));
-                    // What the other mesh has there: a coarser leaf, or finer ones.
-                    let next = match self.holder(who, &witness) {
-                        Some(next) => Some((who, next)),
-                        None => self.holder(who.other(), &witness).filter(|_| self.has_within(who, &witness)).map(|next| (who.other(), next)),
-                    };
-                    let Some((whose, next)) = next else {
-                        told.push(format!("{coarse} has nothing at {witness}: section 5 decides, or a leaf was lost"));
-                        return told;
-                    };
-                    if seen.contains(&next.octant) {
-                        return told;
-                    }
-                    seen.push(next.octant);
-                    (who, leaf) = (whose, next);
-                    continue;
+            let (why, witness) = match self.reason(mesh, &leaf) {
+                Reason::Disputed(why, witness) => (why, witness),
+                Reason::Settled(why) => {
+                    rules.push(format!("{what}: {why}: {fine} is right"));
+                    return rules;
                 }
+                Reason::None => {
+                    rules.push(format!(
+                        "{what}: nothing in either mesh asks for that, and refinement is minimal (sections 3 and 6): \
+                         {coarse} is right{}",
+                        self.caveat()
+                    ));
+                    return rules;
+                }
+            };
+            rules.push(format!("{what}: {why}, which {coarse} does not have"));
+            let Some((next_mesh, next)) = self.disputed_leaf(mesh, &witness) else {
+                rules.push(format!(
+                    "{coarse} has no leaf at {witness}: section 5 decides, or a leaf was lost"
+                ));
+                return rules;
+            };
+            if visited.contains(&next.octant) {
+                return rules;
             }
-            return told;
+            visited.push(next.octant);
+            (mesh, leaf) = (next_mesh, next);
         }
-        told
+        rules
     }
 
+    /// The leaf that one mesh has split and the other has not, at a witness that mesh `mesh` does not have: a
+    /// coarser leaf of `mesh`, or a coarser leaf of the other mesh where `mesh` has finer ones.
+    fn disputed_leaf(&self, mesh: Mesh, witness: &Octant) -> Option<(Mesh, Leaf)> {
+        if let Some(leaf) = self.ancestor_leaf(mesh, witness) {
+            return Some((mesh, leaf));
+        }
+        let leaf = self.ancestor_leaf(mesh.other(), witness)?;
+        self.has_within(mesh, witness).then_some((mesh.other(), leaf))
+    }
+
+    /// A restriction of the statement that nothing requires a split.
     fn caveat(&self) -> &'static str {
         match (self.terms.keep_crossing, self.case) {
             (false, _) => ", unless a crossing leaf that was deleted afterwards does",
@@ -181,8 +190,8 @@ impl Dispute<'_> {
         }
     }
 
-    /// Why this leaf of one mesh must be split.
-    fn reason(&self, who: Who, leaf: &Leaf) -> Reason {
+    /// The reason why this leaf of one mesh must be split.
+    fn reason(&self, mesh: Mesh, leaf: &Leaf) -> Reason {
         let octant = &leaf.octant;
         if octant.level < self.terms.level_surface {
             let d = self.terms.level_surface;
@@ -197,20 +206,16 @@ impl Dispute<'_> {
                 ));
             }
         }
-        let meets = |b: &&contract::manifest::ExtentBox| {
-            let (low, high) = octant.bounds();
-            b.level > octant.level && (0..3).all(|a| low[a].max(b.min[a]) < high[a].min(b.max[a]))
-        };
-        if let Some(b) = self.terms.boxes.iter().find(meets) {
+        if let Some(b) = self.terms.box_that_splits(octant) {
             return Reason::Settled(format!(
                 "section 3: it meets the box {:?} to {:?}, so it has level >= {}",
                 b.min, b.max, b.level
             ));
         }
-        let Some((word, undisputed)) = self.witness(who, octant) else { return Reason::None };
+        let Some((word, undisputed)) = self.witness(mesh, octant) else { return Reason::None };
         let source = word::octant(word);
         let why =
-            format!("{}, by the leaf {source}", self.asks(&source, octant).unwrap_or_default());
+            format!("{}, by the leaf {source}", self.requires(&source, octant).unwrap_or_default());
         match undisputed {
             true => Reason::Settled(format!("{why}, which both have")),
             false => Reason::Disputed(why, source),
@@ -218,7 +223,7 @@ impl Dispute<'_> {
     }
 }
 
-/// The first facet that crosses an octant.
+/// Index of the first facet that crosses an octant.
 fn crossed_by(octant: &Octant, case: &Case) -> Option<usize> {
     case.facets_lattice.iter().position(|facet| {
         let (low, high) = octant.bounds();
@@ -226,11 +231,11 @@ fn crossed_by(octant: &Octant, case: &Case) -> Option<usize> {
     })
 }
 
-/// Both sides of the first difference, for people.
+/// The words of both meshes at the first difference, as text.
 pub fn sides(a: Option<u64>, b: Option<u64>, root: &contract::lattice::Root) -> String {
-    let told =
-        |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| tell(word, root));
-    format!("first difference:\n  A has {}\n  B has {}", told(a), told(b))
+    let text =
+        |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| describe(word, root));
+    format!("first difference:\n  A has {}\n  B has {}", text(a), text(b))
 }
 
 #[cfg(test)]
@@ -250,7 +255,7 @@ mod tests {
         }
     }
 
-    /// Sorted words of octants given by paths, all outside.
+    /// Sorted words of octants that are given by their paths, all with side outside.
     fn mesh(paths: &[&[u8]]) -> Vec<u64> {
         let octant =
             |path: &&[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
@@ -267,51 +272,52 @@ mod tests {
         dispute.rule(a.get(first).copied(), b.get(first).copied()).join("\n")
     }
 
-    /// The root's child 0 with its own children; child 1 whole or split.
+    /// Two meshes with the octant `fine`, one with the octant 1 as a leaf, and one with three of its children
+    /// instead.
     fn pair(fine: &[u8]) -> (Vec<u64>, Vec<u64>) {
-        let whole = mesh(&[fine, &[1]]);
+        let unsplit = mesh(&[fine, &[1]]);
         let split = mesh(&[fine, &[1, 0], &[1, 1], &[1, 2]]);
-        (whole, split)
+        (unsplit, split)
     }
 
     #[test]
-    fn layer_and_balance_are_told_with_their_witness() {
-        let (whole, split) = pair(&[0, 1]);
-        let told = rule(&whole, &split, 2);
+    fn rules_of_layer_and_balance_name_their_witness() {
+        let (unsplit, split) = pair(&[0, 1]);
+        let text = rule(&unsplit, &split, 2);
         assert!(
-            told.contains("step 2 (layer)")
-                && told.ends_with("by the leaf octant 0.1 (level 2), which both have: B is right"),
-            "{told}"
+            text.contains("step 2 (layer)")
+                && text.ends_with("by the leaf octant 0.1 (level 2), which both have: B is right"),
+            "{text}"
         );
-        let told = rule(&whole, &split, 1);
+        let text = rule(&unsplit, &split, 1);
         assert!(
-            told.contains("nothing in either mesh asks") && told.contains("A is right"),
-            "{told}"
+            text.contains("nothing in either mesh asks") && text.contains("A is right"),
+            "{text}"
         );
-        let (whole, split) = pair(&[0, 1, 1]);
-        let told = rule(&split, &whole, 1);
-        assert!(told.contains("step 3 (balance)") && told.contains("A is right"), "{told}");
+        let (unsplit, split) = pair(&[0, 1, 1]);
+        let text = rule(&split, &unsplit, 1);
+        assert!(text.contains("step 3 (balance)") && text.contains("A is right"), "{text}");
     }
 
     #[test]
-    fn a_disputed_witness_is_followed() {
-        // 1.1 is split in B alone, for no reason; its children ask for the split of 3.
+    fn the_search_continues_at_a_disputed_witness() {
+        // Octant 1.2 is needlessly split in B only. Its children require the split of octant 3.
         let a = mesh(&[&[1, 2], &[3]]);
         let b = mesh(&[&[1, 2, 2], &[3, 0], &[3, 1]]);
         let (first_a, first_b) = (mesh(&[&[3]])[0], mesh(&[&[3, 0]])[0]);
         let terms = terms(1);
-        let told =
+        let text =
             Dispute { a: &a, b: &b, terms: &terms, case: None }.rule(Some(first_a), Some(first_b));
-        assert_eq!(told.len(), 2, "{told:?}");
-        assert!(told[0].contains("octant 1.2.2 (level 3), which A does not have"), "{told:?}");
+        assert_eq!(text.len(), 2, "{text:?}");
+        assert!(text[0].contains("octant 1.2.2 (level 3), which A does not have"), "{text:?}");
         assert!(
-            told[1].contains("leaf octant 1.2 (level 2)") && told[1].contains("A is right"),
-            "{told:?}"
+            text[1].contains("leaf octant 1.2 (level 2)") && text[1].contains("A is right"),
+            "{text:?}"
         );
     }
 
     #[test]
-    fn sides_and_absences_have_their_sections() {
+    fn sides_missing_leaves_and_invalid_words_have_their_sections() {
         let outside = mesh(&[&[0], &[1]]);
         let inside = vec![outside[0] | 1, outside[1]];
         assert!(rule(&outside, &inside, 1).starts_with("section 4"));
@@ -320,21 +326,21 @@ mod tests {
     }
 
     #[test]
-    fn a_case_decides_about_facets_and_rays() {
+    fn with_a_case_facets_and_rays_decide() {
         let cube =
             "spacing_min = 1.0\nkeep = 'all'\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
         let facet = [[-1.5, -1.5, -1.5], [-1.2, -1.5, -1.5], [-1.5, -1.2, -1.5]];
         let case = Case::from_parts(cube, vec![facet]).unwrap();
         let terms = Terms::of_case(&case);
-        let told = |a: &[u64], b: &[u64]| {
+        let rule = |a: &[u64], b: &[u64]| {
             Dispute { a, b, terms: &terms, case: Some(&case) }
                 .rule(a.first().copied(), b.first().copied())
                 .join("")
         };
         let (coarse, fine) = (mesh(&[&[0]]), mesh(&[&[0, 0]]));
-        assert!(told(&coarse, &fine).contains("section 3: facet 0 crosses it"));
-        assert!(told(&[coarse[0] | 2], &coarse).contains("crossing: A is right"));
+        assert!(rule(&coarse, &fine).contains("section 3: facet 0 crosses it"));
+        assert!(rule(&[coarse[0] | 2], &coarse).contains("crossing: A is right"));
         let far = mesh(&[&[7]]);
-        assert!(told(&[far[0] | 1], &far).contains("0 of its 6 rays say inside: B is right"));
+        assert!(rule(&[far[0] | 1], &far).contains("0 of its 6 rays are inside: B is right"));
     }
 }

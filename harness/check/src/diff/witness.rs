@@ -1,38 +1,39 @@
-//! Who asks for an octant to be split, and who holds what where: what a ruling is found with.
+//! Searches in two meshes: the leaf that requires a split, and the leaves at an octant.
 
-use super::rule::{Dispute, Who};
+use super::rule::{Dispute, Mesh};
 use contract::octant::Octant;
 use contract::word::{self, Leaf};
 
 impl Dispute<'_> {
-    /// The leaf that asks for the octant's split: one that both meshes have before any other, then the deepest.
-    pub(super) fn witness(&self, who: Who, octant: &Octant) -> Option<(u64, bool)> {
-        let (own, other) = match who {
-            Who::A => (self.a, self.b),
-            Who::B => (self.b, self.a),
+    /// The leaf of the other mesh that requires an octant of this mesh to be split, and whether both meshes
+    /// have it. A leaf that both have takes precedence, then the finest.
+    pub(super) fn witness(&self, mesh: Mesh, octant: &Octant) -> Option<(u64, bool)> {
+        let (own, other) = match mesh {
+            Mesh::A => (self.a, self.b),
+            Mesh::B => (self.b, self.a),
         };
         let sources = other.iter().copied().filter(|&w| word::fault(w).is_none());
-        let asking = sources.filter(|&w| self.asks(&word::octant(w), octant).is_some());
+        let asking = sources.filter(|&w| self.requires(&word::octant(w), octant).is_some());
         let ranked = asking.map(|w| (own.binary_search(&w).is_ok(), word::level(w), w));
         ranked
             .max_by_key(|&(both, level, w)| (both, level, std::cmp::Reverse(w)))
             .map(|(both, _, w)| (w, both))
     }
 
-    /// The rule by which a leaf asks for an octant to be split, if it does.
-    pub(super) fn asks(&self, source: &Octant, octant: &Octant) -> Option<String> {
+    /// The rule by which a leaf requires an octant to be split, as text; `None` if it does not.
+    pub(super) fn requires(&self, source: &Octant, octant: &Octant) -> Option<String> {
         let n = self.terms.layer_cells_min;
-        let (l, apart) = (source.level, gap(source, octant));
+        let (l, distance) = (source.level, source.distance(octant));
         if octant.contains(source) || l <= octant.level {
             return None;
         }
-        if apart < u64::from(n - 1) * u64::from(source.edge()) {
+        if distance < i64::from(n - 1) * i64::from(source.edge()) {
             return Some(format!(
                 "section 6, step 2 (layer): it is nearer than n - 1 = {} cells of level {l}, so it has level >= {l}",
                 n - 1
             ));
         }
-        if apart == 0 && l >= octant.level + 2 {
+        if distance == 0 && l >= octant.level + 2 {
             return Some(format!(
                 "section 6, step 3 (balance): it touches a leaf of level {l}, so it has level >= {}",
                 l - 1
@@ -41,9 +42,9 @@ impl Dispute<'_> {
         None
     }
 
-    /// The leaf of a mesh that is this octant's strict ancestor.
-    pub(super) fn holder(&self, who: Who, octant: &Octant) -> Option<Leaf> {
-        let words = if who == Who::A { self.a } else { self.b };
+    /// The leaf of a mesh that is a strict ancestor of an octant.
+    pub(super) fn ancestor_leaf(&self, mesh: Mesh, octant: &Octant) -> Option<Leaf> {
+        let words = if mesh == Mesh::A { self.a } else { self.b };
         let key = word::key_of(octant.corner);
         let after = words.partition_point(|&w| word::key(w) <= key);
         let leaf = word::decode(*words[..after].last()?).ok()?;
@@ -51,19 +52,10 @@ impl Dispute<'_> {
     }
 
     /// Whether a mesh has leaves within an octant.
-    pub(super) fn has_within(&self, who: Who, octant: &Octant) -> bool {
-        let words = if who == Who::A { self.a } else { self.b };
+    pub(super) fn has_within(&self, mesh: Mesh, octant: &Octant) -> bool {
+        let words = if mesh == Mesh::A { self.a } else { self.b };
         let key = word::key_of(octant.corner);
         let first = words.partition_point(|&w| word::key(w) < key);
         words.get(first).is_some_and(|&w| word::key(w) < key + word::span(octant.level))
     }
-}
-
-/// Distance by Chebyshev, in level-19 cells.
-fn gap(a: &Octant, b: &Octant) -> u64 {
-    let along = |axis: usize| {
-        let (low_a, low_b) = (i64::from(a.corner[axis]), i64::from(b.corner[axis]));
-        (low_a - low_b - i64::from(b.edge())).max(low_b - low_a - i64::from(a.edge())).max(0)
-    };
-    (0..3).map(along).max().unwrap_or(0) as u64
 }

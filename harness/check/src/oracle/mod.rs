@@ -1,8 +1,8 @@
-//! Sides against outside oracles: trimesh, open3d and pyvista say on which side the centroids of base-tree
-//! leaves lie; the harness's own exact rays say who is right where somebody differs.
+//! Comparison of sides with external oracles. trimesh, open3d and pyvista determine the side of the centroids
+//! of base-tree leaves; the harness's own exact rays decide where they differ.
 //!
-//! The order of things: [`sample`] chooses the points, the crate `run` puts them to the oracles, [`vote`] compares the
-//! answers with the mesh and with the exact rays, and says what fails and what is only worth telling.
+//! [`sample`] chooses the points, the crate `run` passes them to the oracles, and [`vote`] compares the answers
+//! with the mesh and with the exact rays. [`watertight`] decides whether a difference is an error.
 
 pub mod sample;
 pub mod vote;

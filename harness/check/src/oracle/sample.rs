@@ -1,7 +1,7 @@
-//! The points that are put to the oracles: centroids of leaves of the base tree.
+//! The points for which the oracles are asked: centroids of leaves of the base tree.
 //!
-//! Invariants: no point lies within [`Sample::band`] of the surface as the oracles see it; which points are
-//! chosen depends on the leaves and the seed alone.
+//! Invariants: no point lies within [`Sample::band`] of the surface that the oracles read; the choice of points
+//! depends on the leaves and the seed only.
 
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
@@ -14,36 +14,36 @@ pub struct Sample {
     pub words: Vec<u64>,
     /// Their centroids in the user's units.
     pub points: Vec<[f64; 3]>,
-    /// Half-width of the band around the surface that is left out, in the user's units.
+    /// Half-width of the band around the surface that is excluded, in the user's units.
     pub band: f64,
-    /// Leaves that the band leaves out.
+    /// Number of leaves that the band excludes.
     pub in_band: u64,
-    /// Non-crossing leaves in all.
+    /// Number of all leaves that are not crossing.
     pub candidates: u64,
 }
 
-/// Chooses among the leaves of a base tree: all that the band leaves over where they are at most `most`,
-/// otherwise `most` of them.
-pub fn choose(case: &Case, base: &[u64], most: usize, seed: u64) -> Sample {
+/// Chooses at most `points_max` leaves of a base tree outside the band; all of them, if they are no more than that.
+pub fn choose(case: &Case, base: &[u64], points_max: usize, seed: u64) -> Sample {
     let band = band(case);
     let candidates = base.iter().copied().filter(|&leaf| word::side(leaf) != Side::Crossing);
     let count = candidates.clone().count();
-    // No facet touches the closed octant of a non-crossing leaf, so its centroid is at least half an
-    // edge away from all of them.
+    // No facet meets the closed octant of a leaf that is not crossing, so its centroid is at least half an edge
+    // away from the surface.
     let clear = |leaf: &u64| case.root.edge / f64::from(1u32 << word::level(*leaf)) / 2.0 >= band;
     let mut words: Vec<u64> = candidates.filter(clear).collect();
     let in_band = count - words.len();
-    if words.len() > most {
-        words.select_nth_unstable_by_key(most, |&leaf| mixed(leaf ^ seed));
-        words.truncate(most);
+    if words.len() > points_max {
+        words.select_nth_unstable_by_key(points_max, |&leaf| shuffle_key(leaf ^ seed));
+        words.truncate(points_max);
         words.sort_unstable();
     }
     let points = words.iter().map(|&leaf| case.root.to_user(word::octant(leaf).centre())).collect();
     Sample { words, points, band, in_band: in_band as u64, candidates: count as u64 }
 }
 
-/// What single precision and the lattice may move a surface by, with room to spare. The oracles are
-/// given coordinates around the body's centre, but the STL that they read is f32 about the origin.
+/// A generous bound of the displacement of the surface by single precision and by the lattice. The oracles
+/// compute with coordinates relative to the centre of the body, but they read an STL file of f32 coordinates
+/// relative to the origin.
 fn band(case: &Case) -> f64 {
     let coordinates = case.facets.iter().flatten().flatten();
     let largest = coordinates.fold(0.0, |most: f64, &c| most.max(f64::from(c).abs()));
@@ -52,8 +52,8 @@ fn band(case: &Case) -> f64 {
     single.max(lattice)
 }
 
-/// The finaliser of splitmix64: a fixed shuffle of all words.
-fn mixed(word: u64) -> u64 {
+/// One step of SplitMix64, a fixed permutation of all words.
+fn shuffle_key(word: u64) -> u64 {
     let mut x = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
     x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn all_where_they_are_few_and_never_a_crossing_one() {
+    fn all_leaves_are_chosen_if_they_are_few_except_crossing_ones() {
         let sample = choose(&case(8.0, -4.0, BODY), &leaves(), 1000, 0);
         assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
         assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_depends_on_leaves_and_seed_alone() {
+    fn a_sample_depends_on_the_leaves_and_the_seed_only() {
         let case = case(8.0, -4.0, BODY);
         let sample = choose(&case, &leaves(), 100, 1);
         assert_eq!(sample.words.len(), 100);
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn far_from_the_origin_the_band_grows_and_is_counted() {
+    fn the_band_is_wider_far_from_the_origin_and_its_leaves_are_counted() {
         let far = BODY.map(|vertex| vertex.map(|c| c + 4.0e6));
         let sample = choose(&case(8.0, 4.0e6 - 4.0, far), &leaves(), 1000, 0);
         assert!(sample.band > 1.0);

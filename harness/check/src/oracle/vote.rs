@@ -1,25 +1,25 @@
-//! Who says what, and who is right.
+//! Comparison of the mesh with the oracles and with exact rays.
 //!
-//! Each point has the mesh's side, each oracle's answer, and the harness's own six exact rays, which
-//! decide where they agree. On a watertight body they always do, and then neither they nor three
-//! agreeing oracles may be against the mesh. On any other body a side is a component's, not a point's: there,
-//! disagreement is told and not held against the mesh.
+//! Every point has a side in the mesh, an answer of each oracle, and the result of the harness's own six exact
+//! rays, which decide if they agree. On a watertight body they always agree, and the mesh fails if the rays or
+//! three unanimous oracles contradict it. On any other body the side belongs to a component and not to a point,
+//! so contradictions are reported only.
 
 /// One oracle's answers.
 #[derive(Clone, Debug)]
 pub struct Answer {
     /// The oracle's name.
     pub name: String,
-    /// For each point, whether it lies inside.
+    /// Whether each point lies inside.
     pub inside: Vec<bool>,
 }
 
-/// What is known of the points.
+/// All answers about the points.
 #[derive(Debug)]
 pub struct Ballot<'a> {
-    /// The mesh's answers.
+    /// Whether each point lies inside by the mesh.
     pub mesh: &'a [bool],
-    /// The six exact rays' answer; none where they differ.
+    /// Whether each point lies inside by the six exact rays; `None` if they disagree.
     pub exact: &'a [Option<bool>],
     /// The oracles' answers.
     pub oracles: &'a [Answer],
@@ -27,39 +27,39 @@ pub struct Ballot<'a> {
     pub watertight: bool,
 }
 
-/// Where one oracle differed from the mesh.
+/// The contradictions between one oracle and the mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Dissent {
     /// The oracle's name.
     pub name: String,
-    /// Points where it differed.
+    /// Number of points where they differ.
     pub points: u64,
-    /// Of these, points where all exact rays are with the oracle.
+    /// Number of these points where all exact rays agree with the oracle.
     pub right: u64,
-    /// Of these, points where all exact rays are with the mesh.
+    /// Number of these points where all exact rays agree with the mesh.
     pub wrong: u64,
 }
 
 /// The result of a vote.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Count {
+pub struct Tally {
     /// One entry per oracle.
     pub dissents: Vec<Dissent>,
-    /// Points at which the oracles are not of one mind.
+    /// Number of points where the oracles disagree with each other.
     pub disputed: u64,
-    /// Points at which all six exact rays are against the mesh.
+    /// Indices of points where all six exact rays contradict the mesh.
     pub exact_against: Vec<usize>,
-    /// Points at which all oracles are against the mesh.
+    /// Indices of points where all oracles contradict the mesh.
     pub all_against: Vec<usize>,
-    /// Points at which the exact rays differ among themselves.
+    /// Number of points where the exact rays disagree with each other.
     pub exact_undecided: u64,
 }
 
 /// Counts the votes.
-pub fn count(ballot: &Ballot) -> Count {
+pub fn count(ballot: &Ballot) -> Tally {
     let dissent = |answer: &Answer| Dissent { name: answer.name.clone(), ..Dissent::default() };
     let mut count =
-        Count { dissents: ballot.oracles.iter().map(dissent).collect(), ..Count::default() };
+        Tally { dissents: ballot.oracles.iter().map(dissent).collect(), ..Tally::default() };
     for (point, (&mesh, &exact)) in ballot.mesh.iter().zip(ballot.exact).enumerate() {
         count.exact_undecided += u64::from(exact.is_none());
         if exact == Some(!mesh) {
@@ -82,46 +82,47 @@ pub fn count(ballot: &Ballot) -> Count {
     count
 }
 
-/// How many oracles it takes for "all of them" to mean anything.
+/// Minimum number of oracles whose unanimity counts.
 const MAJORITY: usize = 3;
 
-impl Count {
-    /// Why the mesh fails the vote; nothing if it does not. Points are named by their coordinates.
+impl Tally {
+    /// The reason why the mesh fails; `None` if it does not. `points` are the coordinates of the points.
     pub fn failure(&self, ballot: &Ballot, points: &[[f64; 3]]) -> Option<String> {
         if !ballot.watertight {
             return None;
         }
-        let named = |who: &str, at: &[usize]| {
-            let first = points[*at.first()?];
-            let side = if ballot.mesh[at[0]] { "inside" } else { "outside" };
+        let sentence = |subject: &str, against: &[usize]| {
+            let first = *against.first()?;
+            let side = if ballot.mesh[first] { "inside" } else { "outside" };
             Some(format!(
-                "{who} against the mesh at {} points, first at {first:?}, there {side}",
-                at.len()
+                "{subject} contradict the mesh at {} points, first at {:?}, which is {side} in the mesh",
+                against.len(),
+                points[first]
             ))
         };
-        let exact = named("all six exact rays", &self.exact_against);
-        let oracles = named("all oracles", &self.all_against);
+        let exact = sentence("all six exact rays", &self.exact_against);
+        let oracles = sentence("all oracles", &self.all_against);
         let reasons: Vec<String> = exact.into_iter().chain(oracles).collect();
         (!reasons.is_empty()).then(|| reasons.join("; "))
     }
 
-    /// What is worth telling, a sentence each.
+    /// Remarks that are no failures, one sentence each.
     pub fn notes(&self, ballot: &Ballot) -> Vec<String> {
         let all = ballot.mesh.len();
-        let told = |dissent: &Dissent| {
+        let sentence = |dissent: &Dissent| {
             let Dissent { name, points, right, wrong } = dissent;
             let undecided = points - right - wrong;
             format!(
-                "{name} differs from the mesh at {points} of {all} points: by exact rays right at {right}, \
-                 wrong at {wrong}, rays differ at {undecided}"
+                "{name} differs from the mesh at {points} of {all} points; by exact rays it is right at {right}, \
+                 wrong at {wrong}, undecided at {undecided}"
             )
         };
         let mut notes: Vec<String> =
-            self.dissents.iter().filter(|d| d.points > 0).map(told).collect();
+            self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
         if !ballot.watertight && !self.exact_against.is_empty() {
             notes.push(format!(
-                "the body is not watertight: at {} points all six rays differ from the side of the \
-                 component, which another leaf decides",
+                "the body is not watertight: at {} points all six rays contradict the side of the \
+                 component, which another leaf determines",
                 self.exact_against.len()
             ));
         }
@@ -141,12 +142,12 @@ mod tests {
         all.iter().enumerate().map(answer).collect()
     }
 
-    /// The mesh says outside, inside, inside; what the count and the failure are.
+    /// Evaluates a ballot on three points which the mesh places outside, inside, inside.
     fn vote(
         exact: [Option<bool>; 3],
         all: [&[u8]; 3],
         watertight: bool,
-    ) -> (Count, Option<String>, Vec<String>) {
+    ) -> (Tally, Option<String>, Vec<String>) {
         let oracles = answers(all);
         let ballot =
             Ballot { mesh: &[false, true, true], exact: &exact, oracles: &oracles, watertight };
@@ -160,13 +161,13 @@ mod tests {
     const YES: &[u8] = &[0, 1, 1];
 
     #[test]
-    fn unanimity_is_silent() {
+    fn unanimous_answers_have_no_failure_and_no_notes() {
         let (count, failure, notes) = vote(TRUE, [YES, YES, YES], true);
         assert_eq!((count.disputed, failure, notes), (0, None, vec![]));
     }
 
     #[test]
-    fn one_oracle_that_is_wrong_is_told_and_does_no_harm() {
+    fn one_wrong_oracle_is_noted_and_is_no_failure() {
         let (count, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
         let dissent = Dissent { name: "oracle 1".into(), points: 2, right: 0, wrong: 2 };
         assert_eq!((&count.dissents[1], count.disputed, failure), (&dissent, 2, None));
@@ -179,31 +180,31 @@ mod tests {
     }
 
     #[test]
-    fn exact_rays_against_the_mesh_fail_it() {
+    fn exact_rays_that_contradict_the_mesh_are_a_failure() {
         let exact = [Some(false), Some(false), Some(true)];
         let (count, failure, _) = vote(exact, [YES, &[0, 0, 1], YES], true);
         assert_eq!((count.exact_against, count.dissents[1].right), (vec![1], 1));
         assert_eq!(
             failure.unwrap(),
-            "all six exact rays against the mesh at 1 points, first at [1.0, 1.0, 1.0], there inside"
+            "all six exact rays contradict the mesh at 1 points, first at [1.0, 1.0, 1.0], which is inside in the mesh"
         );
     }
 
     #[test]
-    fn three_oracles_against_the_mesh_fail_it_and_two_do_not() {
+    fn three_unanimous_oracles_that_contradict_the_mesh_are_a_failure_and_two_are_not() {
         let no: &[u8] = &[1, 1, 1];
         let undecided = [None, Some(true), Some(true)];
         let (_, failure, _) = vote(undecided, [no, no, no], true);
-        assert!(failure.unwrap().starts_with("all oracles against the mesh at 1 points"));
+        assert!(failure.unwrap().starts_with("all oracles contradict the mesh at 1 points"));
         assert_eq!(vote(undecided, [no, no, YES], true).1, None);
     }
 
     #[test]
-    fn on_a_leaky_body_everything_is_told_and_nothing_fails() {
+    fn on_a_body_that_is_not_watertight_contradictions_are_noted_and_are_no_failure() {
         let exact = [Some(true), Some(true), None];
         let no: &[u8] = &[1, 1, 0];
         let (count, failure, notes) = vote(exact, [no, no, no], false);
         assert_eq!((failure, count.exact_undecided, notes.len()), (None, 1, 4));
-        assert!(notes[0].ends_with("right at 1, wrong at 0, rays differ at 1"), "{}", notes[0]);
+        assert!(notes[0].ends_with("right at 1, wrong at 0, undecided at 1"), "{}", notes[0]);
     }
 }

@@ -1,11 +1,11 @@
-//! Whether parity means anything on a body.
+//! Whether the parity of rays determines the sides of a body.
 
 use contract::lattice::FacetLattice;
 
-/// Whether every edge belongs to an even number of facets, on the lattice and whatever their winding.
+/// Whether every edge belongs to an even number of facets on the lattice, regardless of their winding.
 ///
-/// Where it holds, all rays from a point off the surface have the same parity. Degenerate facets count
-/// here though no ray counts them: they close what would otherwise look like slits of no width.
+/// If so, all rays from a point off the surface have the same parity. Degenerate facets count here, although no
+/// ray crosses them, because they close slits of zero width.
 pub fn is_watertight(facets: &[FacetLattice]) -> bool {
     let sides = |facet: &FacetLattice| {
         let [a, b, c] = *facet;
@@ -34,7 +34,7 @@ mod tests {
     }
 
     #[test]
-    fn closed_and_open() {
+    fn a_tetrahedron_is_watertight_until_a_facet_is_removed() {
         let mut body = tetrahedron();
         assert!(is_watertight(&body));
         assert!(is_watertight(&[]));
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn a_facet_twice_is_no_facet() {
+    fn two_copies_of_a_facet_cancel() {
         let mut body = tetrahedron();
         body.push(body[0]);
         assert!(!is_watertight(&body));
@@ -52,9 +52,9 @@ mod tests {
     }
 
     #[test]
-    fn a_facet_that_is_a_segment_closes_a_slit() {
+    fn a_degenerate_facet_closes_a_slit() {
         let mut body = tetrahedron();
-        // One edge of facet 0 is halved, on that side only, so that a neighbour's edge has no partner.
+        // An edge of facet 0 is bisected, but not the same edge of its neighbour.
         let [a, b, c] = body[0];
         let middle = std::array::from_fn(|axis| (a[axis] + b[axis]) / 2);
         body[0] = [a, middle, c];
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_facet_that_is_a_point_is_nothing() {
+    fn a_facet_that_is_a_point_has_no_effect() {
         let mut body = tetrahedron();
         body.push([CORNERS[0]; 3]);
         assert!(is_watertight(&body));

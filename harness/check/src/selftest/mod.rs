@@ -1,9 +1,9 @@
-//! The checks put to the test: corruptions of a correct mesh, each of which the check meant for it
-//! must report.
+//! Tests of the checks: correct meshes are corrupted, and the check that is responsible for a corruption must
+//! report it.
 //!
-//! A corruption that the check meant for it lets pass is a hole in that check, even where another one
-//! notices: the next corruption may be seen by that check alone. A finding on a mesh that nobody
-//! corrupted is a false alarm and fails the self test as well.
+//! A corruption that the responsible check misses is a gap in that check, even if another check reports it,
+//! because the next corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a
+//! false alarm and fails the self test, too.
 
 use std::fmt;
 use std::fs;
@@ -15,89 +15,89 @@ use contract::case::Case;
 use contract::leafset::{self, LeafSet};
 
 mod base;
-mod claims;
+mod edit;
 mod files;
 mod grading;
 mod leaves;
+mod manifests;
 mod mutant;
 pub mod scale;
 mod sides;
-mod surgery;
 mod table;
 
 pub use mutant::{Mutant, Mutation};
 
-/// All corruptions there are.
+/// All corruptions.
 pub fn catalogue() -> Vec<Mutant> {
     [
         leaves::MUTANTS,
         sides::MUTANTS,
         base::MUTANTS,
         grading::MUTANTS,
-        claims::MUTANTS,
+        manifests::MUTANTS,
         files::MUTANTS,
     ]
     .concat()
 }
 
-/// A correct result: what corruptions start from.
+/// A correct mesh with its case and T0: the starting point of corruptions.
 #[derive(Clone, Debug)]
-pub struct Specimen {
-    /// What was meshed.
+pub struct SelftestCase {
+    /// The case.
     pub case: Case,
-    /// Its final mesh.
+    /// The final mesh.
     pub mesh: LeafSet,
-    /// Its T0.
+    /// The base tree T0.
     pub base: LeafSet,
 }
 
-/// What became of one corruption.
+/// The result of one trial: a corruption of one mesh.
 #[derive(Clone, Debug)]
 pub struct Kill {
-    /// What was done to the mesh.
+    /// Name of the corruption.
     pub mutant: &'static str,
-    /// The case it was done to.
+    /// Name of the case.
     pub case: String,
-    /// The check meant for it.
-    pub meant: &'static str,
+    /// The check that must report it.
+    pub expected: &'static str,
     /// Checks that reported it.
     pub caught_by: Vec<&'static str>,
-    /// Whether the audit, too, must report it: the leaves alone show it.
-    pub audit_meant: bool,
+    /// Whether the audit must report it, too, because the leaves alone show it.
+    pub audit_expected: bool,
     /// Checks of the audit that reported it.
     pub audit_caught_by: Vec<&'static str>,
-    /// First finding of the check meant for it.
+    /// First finding of the check that must report it.
     pub finding: Option<String>,
 }
 
 impl Kill {
-    /// Whether the check meant for it reported it, in the audit as well where that is meant.
+    /// Whether the expected check reported it, in the audit as well if that is expected.
     pub fn killed(&self) -> bool {
-        let audited = !self.audit_meant || self.audit_caught_by.contains(&self.meant);
-        self.caught_by.contains(&self.meant) && audited
+        let audited = !self.audit_expected || self.audit_caught_by.contains(&self.expected);
+        self.caught_by.contains(&self.expected) && audited
     }
 }
 
-/// What the self test found.
+/// The result of the self test.
 #[derive(Clone, Debug, Default)]
 pub struct SelftestReport {
-    /// One for each corruption and specimen that it applies to.
+    /// One entry per corruption and mesh to which it applies.
     pub kills: Vec<Kill>,
-    /// Findings on correct meshes: false alarms.
+    /// Findings on correct meshes, which are false alarms.
     pub alarms: Vec<String>,
-    /// Corruptions that applied to no specimen.
+    /// Corruptions that applied to no mesh.
     pub unused: Vec<&'static str>,
-    /// Corruptions that were not tried, and why.
+    /// Corruptions that were not tried, with the reason.
     pub left_out: Vec<(&'static str, String)>,
 }
 
 impl SelftestReport {
-    /// Whether every corruption applied and was reported, and no correct mesh was.
+    /// Whether every corruption applied and was reported, and there were no false alarms.
     pub fn holds(&self) -> bool {
         self.alarms.is_empty() && self.unused.is_empty() && self.kills.iter().all(Kill::killed)
     }
 
-    /// Trials in which the audit reported something.
+    /// Number of trials in which the audit reported a finding.
     pub fn found_by_audit(&self) -> usize {
         self.kills.iter().filter(|kill| !kill.audit_caught_by.is_empty()).count()
     }
@@ -109,24 +109,26 @@ impl fmt::Display for SelftestReport {
     }
 }
 
-/// Corrupts each specimen in every way that applies to it; `scratch` is an existing empty directory.
-/// Each corruption must apply to at least one specimen.
-pub fn run(specimens: &[Specimen], scratch: &Path) -> std::io::Result<SelftestReport> {
+/// Applies every corruption to every mesh to which it applies. `scratch` is an existing empty directory.
+///
+/// # Errors
+/// If a file in `scratch` cannot be written or read.
+pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestReport> {
     let mut report = SelftestReport::default();
-    let whole: Vec<Specimen> = specimens.iter().map(surgery::in_parts).collect();
-    for specimen in &whole {
-        let nothing = Mutation::of(specimen);
-        let examined = examine(specimen, &nothing, &scratch.join("unharmed"))?;
+    let cases: Vec<SelftestCase> = cases.iter().map(edit::in_parts).collect();
+    for correct in &cases {
+        let unchanged = Mutation::of(correct);
+        let examined = examine(correct, &unchanged, &scratch.join("unchanged"))?;
         let results = examined.checks.into_iter().chain(examined.audit);
         let alarms = results.filter(|r| !r.holds());
-        report.alarms.extend(alarms.map(|r| format!("{}: {r}", specimen.case.name)));
+        report.alarms.extend(alarms.map(|r| format!("{}: {r}", correct.case.name)));
     }
     for mutant in catalogue() {
         let kills = report.kills.len();
-        for specimen in &whole {
-            if let Some(mutation) = (mutant.make)(specimen) {
-                let examined = examine(specimen, &mutation, &scratch.join("mutant"))?;
-                report.kills.push(kill(&mutant, specimen, &examined));
+        for correct in &cases {
+            if let Some(mutation) = (mutant.make)(correct) {
+                let examined = examine(correct, &mutation, &scratch.join("mutant"))?;
+                report.kills.push(kill(&mutant, correct, &examined));
             }
         }
         if report.kills.len() == kills {
@@ -136,14 +138,14 @@ pub fn run(specimens: &[Specimen], scratch: &Path) -> std::io::Result<SelftestRe
     Ok(report)
 }
 
-/// What checks and audit say of one mutation.
+/// The results of checks and audit for one mutation.
 struct Examined {
     checks: Vec<CheckResult>,
     audit: Vec<CheckResult>,
 }
 
-/// Writes a mutation into `dir`, has it checked, and removes it.
-fn examine(specimen: &Specimen, mutation: &Mutation, dir: &Path) -> std::io::Result<Examined> {
+/// Writes a mutation into `dir`, checks and audits it, and removes `dir`.
+fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::Result<Examined> {
     fs::create_dir(dir)?;
     mutation.mesh.write(dir)?;
     if let Some(tamper) = mutation.tamper {
@@ -152,8 +154,8 @@ fn examine(specimen: &Specimen, mutation: &Mutation, dir: &Path) -> std::io::Res
     let checks = match leafset::read(dir) {
         Err(e) => vec![CheckResult::unreadable(&e)],
         Ok(mesh) => {
-            let subject = Subject::new(&specimen.case, &mesh).with_base(&mutation.base);
-            checks::all(&subject.with_reference(&specimen.mesh))
+            let subject = Subject::new(&correct.case, &mesh).with_base(&mutation.base);
+            checks::all(&subject.with_reference(&correct.mesh))
         }
     };
     let audit = audit::audit(dir, &AuditOptions::default()).checks;
@@ -161,18 +163,18 @@ fn examine(specimen: &Specimen, mutation: &Mutation, dir: &Path) -> std::io::Res
     Ok(Examined { checks, audit })
 }
 
-fn kill(mutant: &Mutant, specimen: &Specimen, examined: &Examined) -> Kill {
+fn kill(mutant: &Mutant, correct: &SelftestCase, examined: &Examined) -> Kill {
     let failed = |results: &[CheckResult]| -> Vec<&'static str> {
         results.iter().filter(|r| !r.holds()).map(|r| r.name).collect()
     };
-    let meant = examined.checks.iter().find(|r| r.name == mutant.meant);
+    let expected = examined.checks.iter().find(|r| r.name == mutant.expected);
     Kill {
         mutant: mutant.name,
-        case: specimen.case.name.clone(),
-        meant: mutant.meant,
+        case: correct.case.name.clone(),
+        expected: mutant.expected,
         caught_by: failed(&examined.checks),
-        audit_meant: mutant.audit,
+        audit_expected: mutant.audit,
         audit_caught_by: failed(&examined.audit),
-        finding: meant.and_then(|r| r.findings.first()).map(|f| f.detail.clone()),
+        finding: expected.and_then(|r| r.findings.first()).map(|f| f.detail.clone()),
     }
 }

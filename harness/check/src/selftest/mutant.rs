@@ -1,66 +1,69 @@
-//! A corruption: its name, the check meant for it, and how it is made.
+//! A corruption: its name, the check that must detect it, and a function that makes it.
 
 use std::path::Path;
 
-use super::Specimen;
+use super::SelftestCase;
 use contract::leafset::LeafSet;
 
 /// A way to corrupt a correct mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct Mutant {
-    /// What is done.
+    /// Description of the change.
     pub name: &'static str,
     /// The check that must report it.
-    pub meant: &'static str,
-    /// Whether the audit's check of that name must report it too.
+    pub expected: &'static str,
+    /// Whether the check of that name in the audit must report it, too.
     pub audit: bool,
-    /// Makes the corruption, or nothing where it does not apply.
-    pub make: fn(&Specimen) -> Option<Mutation>,
+    /// Makes the corruption; `None` if it does not apply.
+    pub make: fn(&SelftestCase) -> Option<Mutation>,
 }
 
 /// A corrupted mesh.
 #[derive(Clone, Debug)]
 pub struct Mutation {
-    /// The mesh as it is to be written.
+    /// The mesh to write.
     pub mesh: LeafSet,
-    /// The T0 that goes with it.
+    /// Its T0.
     pub base: LeafSet,
-    /// What is done to the files afterwards.
+    /// A change of the files after they were written.
     pub tamper: Option<fn(&Path) -> std::io::Result<()>>,
 }
 
 impl Mutation {
-    /// Nothing corrupted yet.
-    pub fn of(specimen: &Specimen) -> Self {
-        Self { mesh: specimen.mesh.clone(), base: specimen.base.clone(), tamper: None }
+    /// The mesh without a change.
+    pub fn of(correct: &SelftestCase) -> Self {
+        Self { mesh: correct.mesh.clone(), base: correct.base.clone(), tamper: None }
     }
 
-    /// Other leaves, with a manifest true to them: no check is to be helped by a digest.
-    pub(super) fn with_words(specimen: &Specimen, words: Vec<u64>) -> Self {
-        let mesh = super::surgery::with_words(&specimen.mesh, words);
-        Self { mesh, ..Self::of(specimen) }
+    /// Other leaves, with a manifest that agrees with them: no check shall detect the change by a digest.
+    pub(super) fn with_words(correct: &SelftestCase, words: Vec<u64>) -> Self {
+        let mesh = super::edit::with_words(&correct.mesh, words);
+        Self { mesh, ..Self::of(correct) }
     }
 
-    /// The same mesh, its files tampered with.
-    pub(super) fn tampered(specimen: &Specimen, tamper: fn(&Path) -> std::io::Result<()>) -> Self {
-        Self { tamper: Some(tamper), ..Self::of(specimen) }
+    /// The same mesh with changed files.
+    pub(super) fn tampered(
+        correct: &SelftestCase,
+        tamper: fn(&Path) -> std::io::Result<()>,
+    ) -> Self {
+        Self { tamper: Some(tamper), ..Self::of(correct) }
     }
 }
 
-/// Seen by the leaves alone: the audit must report it too.
+/// A corruption that the leaves alone show: the audit must report it, too.
 pub(super) const fn audited(
     name: &'static str,
-    meant: &'static str,
-    make: fn(&Specimen) -> Option<Mutation>,
+    expected: &'static str,
+    make: fn(&SelftestCase) -> Option<Mutation>,
 ) -> Mutant {
-    Mutant { name, meant, audit: true, make }
+    Mutant { name, expected, audit: true, make }
 }
 
-/// Seen only with the case, T0 or another mesh.
+/// A corruption that only the case, T0 or another mesh shows.
 pub(super) const fn informed(
     name: &'static str,
-    meant: &'static str,
-    make: fn(&Specimen) -> Option<Mutation>,
+    expected: &'static str,
+    make: fn(&SelftestCase) -> Option<Mutation>,
 ) -> Mutant {
-    Mutant { name, meant, audit: false, make }
+    Mutant { name, expected, audit: false, make }
 }

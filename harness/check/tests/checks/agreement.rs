@@ -1,11 +1,11 @@
-//! What checks stand on gives the same answers as the reference's own, which goes other ways.
+//! The exact predicates of the harness agree with those of the reference, which use other algorithms.
 
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::parity::Parity;
 use contract::triangle::Triangle;
 use proptest::prelude::*;
 
-/// Lattice coordinates at every scale, or in a small range where coincidences are common.
+/// Lattice coordinates of every magnitude, or in a small range, where coincidences are common.
 fn lattice() -> impl Strategy<Value = i64> {
     prop_oneof![
         -8i64..=8,
@@ -21,16 +21,15 @@ fn lattice_facet() -> impl Strategy<Value = FacetLattice> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
 
-    /// Containment here, cutting there: the same answer.
     #[test]
-    fn crossing_agrees(facet in lattice_facet(), min in prop::array::uniform3(-8i64..=6), size in 1i64..=6) {
+    fn crossing_tests_agree_on_small_boxes(facet in lattice_facet(), min in prop::array::uniform3(-8i64..=6), size in 1i64..=6) {
         let max = min.map(|c| c + size);
         let want = reference::crossing::crosses(&facet, &reference::octant::Extent { min, max });
         prop_assert_eq!(Triangle::new(&facet).meets(min, max), want);
     }
 
     #[test]
-    fn crossing_agrees_on_octants(facet in lattice_facet(), at in prop::array::uniform3(0i64..16), level in 0u32..=4) {
+    fn crossing_tests_agree_on_octants(facet in lattice_facet(), at in prop::array::uniform3(0i64..16), level in 0u32..=4) {
         let edge = UNITS_PER_EDGE >> level;
         let min = at.map(|c| c % (1 << level) * edge);
         let max = min.map(|c| c + edge);
@@ -43,7 +42,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4_000))]
 
     #[test]
-    fn parity_agrees(facets in prop::collection::vec(lattice_facet(), 0..12), point in prop::array::uniform3(lattice())) {
+    fn ray_parities_agree(facets in prop::collection::vec(lattice_facet(), 0..12), point in prop::array::uniform3(lattice())) {
         let on_a_facet = facets.iter().any(|f| Triangle::new(f).meets(point, point));
         prop_assume!(!on_a_facet);
         let found = Parity::new(&facets).inside(point);

@@ -1,4 +1,4 @@
-//! The checks on meshes that the reference makes, and the contract that all programs share.
+//! Tests of the checks on meshes of the reference.
 
 mod agreement;
 mod no_false_alarms;

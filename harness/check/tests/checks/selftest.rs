@@ -1,9 +1,9 @@
-//! The self test on meshes of the reference: every corruption is caught by the check meant for it.
+//! The self test on meshes of the reference: the responsible check reports every corruption.
 
 use crate::support;
 use check::selftest;
 
-const SPECIMENS: [(&str, &str); 4] = [
+const CASES: [(&str, &str); 4] = [
     ("outside", include_str!("../../../selftest-cases/outside.toml")),
     ("inside", include_str!("../../../selftest-cases/inside.toml")),
     ("all", include_str!("../../../selftest-cases/all.toml")),
@@ -11,10 +11,10 @@ const SPECIMENS: [(&str, &str); 4] = [
 ];
 
 #[test]
-fn every_corruption_is_killed_and_no_correct_mesh_is_accused() {
-    let specimens = SPECIMENS.map(|(name, text)| support::specimen(name, text));
+fn every_corruption_is_reported_and_no_correct_mesh_fails() {
+    let cases = CASES.map(|(name, text)| support::selftest_case(name, text));
     let scratch = tempfile::tempdir().unwrap();
-    let report = selftest::run(&specimens, scratch.path()).unwrap();
+    let report = selftest::run(&cases, scratch.path()).unwrap();
     println!("{report}");
     assert!(report.holds(), "{report}");
     assert!(selftest::catalogue().len() >= 40);

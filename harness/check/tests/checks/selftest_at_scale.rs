@@ -1,13 +1,14 @@
-//! The self test at scale, on meshes small enough for every test run: the same corruptions, planted in files.
+//! The self test at scale, with meshes that are small enough for every test run.
 
 use crate::support;
 use check::selftest::scale::{self, Options, Source};
-use check::selftest::{self, SelftestReport, Specimen};
+use check::selftest::{self, SelftestCase, SelftestReport};
 use std::path::Path;
 
-/// Between them every corruption applies that a mesh can hold; the first has some 10^4 leaves.
+/// Every corruption that a mesh can have applies to at least one of these cases. The first has more than 20 000
+/// leaves.
 const CASES: [(&str, &str); 4] = [
-    // Faces lie in the middle of octants, so that eight siblings cross.
+    // The faces of the cube bisect octants, so that eight siblings are crossing.
     (
         "outside",
         "spacing_min = 0.05\nlayer_cells_min = 3\n[root]\norigin = [-3.45, -3.45, -3.45]\nedge = 6.4\n\
@@ -18,14 +19,14 @@ const CASES: [(&str, &str); 4] = [
     ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
 ];
 
-fn written(name: &str, specimen: &Specimen, place: &Path) -> Source {
+fn written(name: &str, correct: &SelftestCase, place: &Path) -> Source {
     let write = |what: &str, set: &contract::leafset::LeafSet| {
         let dir = place.join(format!("{name}-{what}"));
         std::fs::create_dir(&dir).unwrap();
         set.write(&dir).unwrap();
         dir
     };
-    let (mesh, base) = (write("mesh", &specimen.mesh), write("base", &specimen.base));
+    let (mesh, base) = (write("mesh", &correct.mesh), write("base", &correct.base));
     Source { name: name.to_owned(), mesh, base: Some(base) }
 }
 
@@ -34,18 +35,18 @@ fn run(sources: &[Source], seed: u64, jobs: usize) -> SelftestReport {
     let options = Options { seed, jobs, interrupted: || false };
     let report = scale::run(sources, &options, scratch.path(), &|_, _| {}).unwrap();
     let left: Vec<_> = std::fs::read_dir(scratch.path()).unwrap().collect();
-    assert!(left.is_empty(), "scratch files are left behind: {left:?}");
+    assert!(left.is_empty(), "scratch files remain: {left:?}");
     report
 }
 
 #[test]
-fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
+fn every_corruption_that_a_mesh_can_have_is_planted_and_reported() {
     let place = tempfile::tempdir().unwrap();
     let sources = CASES.map(|(name, text)| {
-        let specimen = support::specimen(name, text);
-        let leaves = specimen.mesh.words.len();
+        let correct = support::selftest_case(name, text);
+        let leaves = correct.mesh.words.len();
         assert!(name != "outside" || leaves > 20_000, "{leaves}");
-        written(name, &specimen, place.path())
+        written(name, &correct, place.path())
     });
     let report = run(&sources, 1, 2);
     println!("{report}");
@@ -57,9 +58,9 @@ fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
             mutant.name.contains("T0") && report.left_out.iter().any(|l| l.0 == mutant.name);
         assert!(planted || of_base, "{} was left out", mutant.name);
     }
-    // Leaves are corrupted behind a manifest that is true to them, so that no digest helps.
+    // Manifests agree with corrupted leaves, so no digest shows the corruption.
     let of_leaves = |kill: &&selftest::Kill| {
-        !["manifest", "files"].contains(&kill.meant) && !kill.mutant.starts_with("part ")
+        !["manifest", "files"].contains(&kill.expected) && !kill.mutant.starts_with("part ")
     };
     for kill in report.kills.iter().filter(of_leaves).filter(|k| !k.mutant.starts_with("manifest"))
     {
@@ -68,28 +69,28 @@ fn every_corruption_that_a_mesh_can_hold_is_planted_and_found() {
 }
 
 #[test]
-fn the_seed_decides_places_and_the_number_of_jobs_does_not() {
+fn windows_depend_on_the_seed_and_not_on_the_number_of_jobs() {
     let place = tempfile::tempdir().unwrap();
     let (name, text) = CASES[0];
-    let source = [written(name, &support::specimen(name, text), place.path())];
+    let source = [written(name, &support::selftest_case(name, text), place.path())];
     let (one, two, other) = (run(&source, 1, 1), run(&source, 1, 2), run(&source, 2, 2));
     assert_eq!(one.to_string(), two.to_string());
     assert_ne!(one.to_string(), other.to_string());
 }
 
 #[test]
-fn a_mesh_that_is_wrong_before_is_a_false_alarm_and_no_success() {
+fn a_mesh_that_is_already_wrong_fails_the_self_test() {
     let place = tempfile::tempdir().unwrap();
     let (name, text) = CASES[2];
-    let sound = support::specimen(name, text);
-    let mut lying = sound.clone();
-    lying.mesh.manifest.leaves_by_side.crossing += 1;
-    let mut disordered = sound;
-    disordered.mesh.parts[0].reverse();
-    for (name, specimen, check) in
-        [("lying", lying, "manifest"), ("disordered", disordered, "linear")]
+    let correct = support::selftest_case(name, text);
+    let mut wrong_manifest = correct.clone();
+    wrong_manifest.mesh.manifest.leaves_by_side.crossing += 1;
+    let mut unsorted = correct;
+    unsorted.mesh.parts[0].reverse();
+    for (name, correct, check) in
+        [("wrong-manifest", wrong_manifest, "manifest"), ("unsorted", unsorted, "linear")]
     {
-        let report = run(&[written(name, &specimen, place.path())], 1, 1);
+        let report = run(&[written(name, &correct, place.path())], 1, 1);
         assert!(!report.holds() && report.kills.is_empty());
         assert!(report.alarms.iter().any(|alarm| alarm.contains(check)), "{:?}", report.alarms);
     }

@@ -1,38 +1,38 @@
-//! Correct meshes for tests: the reference makes them, file contract and all.
+//! Correct meshes for tests, made by the reference and passed through files.
 
 use std::path::Path;
 
-use check::selftest::Specimen;
+use check::selftest::SelftestCase;
 use contract::case::Case;
 use contract::leafset;
 use reference::write::Which;
 
-/// Final mesh and T0 of a case, through files as a user would have them. `text` names its own geometry.
-pub fn specimen(name: &str, text: &str) -> Specimen {
+/// Final mesh and T0 of a case file with this text, which includes the geometry.
+pub fn selftest_case(name: &str, text: &str) -> SelftestCase {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(format!("{name}.toml"));
     std::fs::write(&path, text).unwrap();
-    specimen_of(&path, dir.path())
+    read_meshes(&path, dir.path())
 }
 
-/// The same for a body given as facets: `text` says all but the geometry.
-pub fn specimen_of_facets(text: &str, facets: &[geometries::Facet]) -> Specimen {
+/// Final mesh and T0 of a body given as facets. `text` is the case file without the geometry.
+pub fn selftest_case_of_facets(text: &str, facets: &[geometries::Facet]) -> SelftestCase {
     let dir = tempfile::tempdir().unwrap();
     let stl = std::fs::File::create(dir.path().join("body.stl")).unwrap();
     geometries::write_stl_binary(facets, stl).unwrap();
     let path = dir.path().join("body.toml");
     std::fs::write(&path, format!("geometry = \"body.stl\"\n{text}")).unwrap();
-    specimen_of(&path, dir.path())
+    read_meshes(&path, dir.path())
 }
 
-fn specimen_of(path: &Path, dir: &Path) -> Specimen {
+fn read_meshes(path: &Path, dir: &Path) -> SelftestCase {
     let given = reference::case_file::read(path).unwrap();
     let write = |which, name: &str, mesh| {
         let dir = dir.join(name);
         reference::write::leaf_set(&dir, which, &given, &mesh).unwrap();
         leafset::read(&dir).unwrap()
     };
-    Specimen {
+    SelftestCase {
         case: Case::read(path).unwrap(),
         mesh: write(Which::Final, "mesh", reference::mesh(&given).unwrap()),
         base: write(Which::Base, "base", reference::base_tree(&given).unwrap()),

@@ -5,7 +5,7 @@ use super::values::cell_count;
 use bench::experiments::execute::Failed;
 use bench::selftest::source as made_by_mesher;
 use check::selftest::scale::{self, Options, Source};
-use check::selftest::{self, Specimen};
+use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
 use contract::leafset;
@@ -93,7 +93,7 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
         let place = scratch.path().join(format!("specimen-{index}"));
         specimen(&programs, case, &place, limit)
     });
-    let specimens = made.collect::<Result<Vec<Specimen>, Failure>>()?;
+    let specimens = made.collect::<Result<Vec<SelftestCase>, Failure>>()?;
     let mutants = scratch.path().join("mutants");
     let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&specimens, &mutants));
     let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
@@ -186,7 +186,7 @@ fn specimen(
     path: &Path,
     place: &Path,
     limit: Duration,
-) -> Result<Specimen, Failure> {
+) -> Result<SelftestCase, Failure> {
     let case = Case::read(path).map_err(|error| (EXIT_INPUT, error.to_string()))?;
     let mut meshes = Vec::new();
     for (name, ungraded) in [("mesh", false), ("base", true)] {
@@ -209,5 +209,5 @@ fn specimen(
     }
     let base = meshes.pop().expect("two were made");
     let mesh = meshes.pop().expect("two were made");
-    Ok(Specimen { case, mesh, base })
+    Ok(SelftestCase { case, mesh, base })
 }

@@ -5,12 +5,11 @@ use bench::shrink::leave::{Repeat, leave};
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{Budget, shrink};
 use clap::Args;
-use contract::catalogue;
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail.
@@ -67,10 +66,7 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
         Some(ranks) => Ranks::Simulated { ranks: ranks as usize, seed: arguments.seed },
     };
-    let case = match arguments.case.ends_with(".toml") {
-        true => PathBuf::from(&arguments.case),
-        false => catalogue::named(&arguments.case, &programs.paths.catalogue)?.path,
-    };
+    let case = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
     if arguments.check {
         let failure = probe.failure(&Trial { case: PlainCase::read(&case)?, ranks })?;

@@ -1,38 +1,41 @@
-//! From sorted leaves to a tree, in one pass.
+//! Construction of a tree from sorted leaves, in one pass.
 
 use super::store::Store;
 use super::{Handle, Kind, Tree};
 use crate::octant::LEVEL_MAX;
 use crate::word::{self, WordError};
 
-/// Takes leaves in ascending order of their keys.
+/// Builds a tree from leaves in ascending order of their keys.
 ///
-/// Open are the octants between the root and the last leaf's parent, one per level; an octant is
-/// closed, and its node found or made, when the next leaf lies beyond it.
+/// The octants from the root to the parent of the last leaf are open, one per level. An octant is closed, and
+/// its node is stored, as soon as a leaf follows that lies outside it.
 #[derive(Debug, Default)]
 pub struct Builder {
     store: Store,
     path: [[Handle; 8]; LEVEL_MAX as usize],
-    /// Levels open: `path[..open]` are in use.
+    /// Number of open octants: `path[..open]` is in use.
     open: usize,
-    /// Key of the last leaf, which says where the open octants are.
+    /// Key of the last leaf, which determines the open octants.
     key: u64,
-    /// Where the last leaf ends.
+    /// End of the key range of the last leaf.
     end: u64,
     root: Handle,
 }
 
-/// Why a leaf was left out.
+/// Why a leaf was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// Not a leaf word.
+    /// The word is not a leaf.
     Fault(WordError),
-    /// Overlaps an earlier leaf, or comes before it.
+    /// The leaf overlaps an earlier leaf, or is not in ascending order.
     Overlap,
 }
 
 impl Builder {
     /// Adds a leaf word.
+    ///
+    /// # Errors
+    /// If it is rejected; the tree is unchanged.
     pub fn push(&mut self, word: u64) -> Result<(), Refusal> {
         match word::fault(word) {
             Some(why) => Err(Refusal::Fault(why)),
@@ -40,7 +43,10 @@ impl Builder {
         }
     }
 
-    /// Adds a leaf of any kind, ghosts among them.
+    /// Adds a leaf of any kind, [`DELETED`](super::DELETED) included.
+    ///
+    /// # Errors
+    /// If it is rejected; the tree is unchanged.
     pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), Refusal> {
         if key < self.end {
             return Err(Refusal::Overlap);
@@ -62,7 +68,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Closes open octants until at most `levels` of them are left.
+    /// Closes open octants until at most `levels` are open.
     fn close_down_to(&mut self, levels: usize) {
         while self.open > levels {
             self.open -= 1;
@@ -74,7 +80,7 @@ impl Builder {
         }
     }
 
-    /// Distinct nodes so far.
+    /// Number of distinct nodes so far.
     pub fn nodes(&self) -> usize {
         self.store.len()
     }
@@ -86,7 +92,7 @@ impl Builder {
     }
 }
 
-/// How many octants, from the root down, two level-19 cells share, not counting the cells themselves.
+/// Number of common ancestors of two level-19 cells, themselves excluded.
 fn shared_levels(a: u64, b: u64) -> usize {
     match (a ^ b).checked_ilog2() {
         Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
@@ -94,7 +100,7 @@ fn shared_levels(a: u64, b: u64) -> usize {
     }
 }
 
-/// Which child of the level-`level` octant above it holds this cell.
+/// The digit of the child that contains this cell, among the children of its ancestor at `level`.
 fn digit(key: u64, level: usize) -> usize {
     (key >> (3 * (usize::from(LEVEL_MAX) - 1 - level)) & 7) as usize
 }

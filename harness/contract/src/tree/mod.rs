@@ -1,21 +1,20 @@
-//! Leaves as a tree in which equal subtrees are stored once.
+//! The leaves of a mesh as a tree that stores equal subtrees once.
 //!
-//! Built in one pass over sorted words. A node is nothing but its eight children; it knows neither
-//! its place nor its level, so that a billion leaves around a smooth surface, most of them in
-//! uniform runs, fit in a small part of the memory that one node per octant would take. Walking it
-//! with a [`Hood`] (an octant and what surrounds it) gives every leaf its neighbours without any
-//! search.
+//! The tree is built in one pass over sorted words. A node consists of its eight children only and has neither
+//! a position nor a level. Most leaves around a smooth surface lie in uniform runs, so a billion of them need a
+//! small fraction of the memory of one node per octant. A walk that carries a [`Neighbourhood`] (an octant and
+//! its 26 neighbours) finds the neighbours of every leaf without a search.
 //!
-//! Invariants: a node has at least one child that is not a hole; children precede parents.
+//! Invariants: a node has at least one child that is not a hole; children are stored before their parents.
 
 mod build;
-mod hood;
+mod neighbourhood;
 mod region;
 mod store;
 mod walk;
 
 pub use build::{Builder, Refusal};
-pub use hood::{Hood, OFFSETS};
+pub use neighbourhood::{Neighbourhood, OFFSETS};
 pub use region::{Coarsest, Region};
 use store::Store;
 pub use walk::walk;
@@ -23,55 +22,55 @@ pub use walk::walk;
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word;
 
-/// What is at a place of the tree: nothing, a leaf, or a node.
+/// The content of an octant: a hole, a leaf, part of a coarser leaf, a node, or outside the root.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct Handle(u32);
 
-/// What sort of leaf: the side's code, or [`GHOST`].
+/// Kind of a leaf: the code of its side, or [`DELETED`].
 pub type Kind = u8;
-/// A deleted crossing leaf that may have been refined before it was deleted: at least this fine.
-pub const GHOST: Kind = 3;
-/// Set of kinds, one bit each; [`HOLES`] stands for holes.
+/// A deleted crossing leaf whose level is a lower bound, because it may have been refined before it was deleted.
+pub const DELETED: Kind = 3;
+/// Set of kinds, one bit each, and [`HOLES`].
 pub type Kinds = u8;
-/// The bit of holes in [`Kinds`].
+/// Bit of [`Kinds`] that represents holes.
 pub const HOLES: Kinds = 1 << 4;
 
 const FIRST_LEAF: u32 = 4;
-const FIRST_WIDE: u32 = 16;
+const FIRST_COARSER: u32 = 16;
 const FIRST_NODE: u32 = 128;
 
 impl Handle {
-    /// No leaf here.
+    /// No leaf.
     pub const HOLE: Self = Self(0);
-    /// Not in the root.
-    pub const BEYOND: Self = Self(1);
+    /// Outside the root.
+    pub const OUTSIDE_ROOT: Self = Self(1);
 
-    /// A leaf that is exactly here.
+    /// A leaf that coincides with the octant.
     pub fn leaf(kind: Kind) -> Self {
         Self(FIRST_LEAF + u32::from(kind))
     }
 
     /// Part of a leaf of a coarser level.
-    fn wide(kind: Kind, level: u8) -> Self {
-        Self(FIRST_WIDE + 4 * u32::from(level) + u32::from(kind))
+    fn coarser_leaf(kind: Kind, level: u8) -> Self {
+        Self(FIRST_COARSER + 4 * u32::from(level) + u32::from(kind))
     }
 
     fn node(index: usize) -> Self {
         Self(FIRST_NODE + u32::try_from(index).expect("fewer than 2^32 distinct nodes"))
     }
 
-    /// The kind, if this is a leaf that is exactly here.
+    /// The kind, if a leaf coincides with the octant.
     pub fn as_leaf(self) -> Option<Kind> {
-        (FIRST_LEAF..FIRST_WIDE).contains(&self.0).then(|| (self.0 - FIRST_LEAF) as Kind)
+        (FIRST_LEAF..FIRST_COARSER).contains(&self.0).then(|| (self.0 - FIRST_LEAF) as Kind)
     }
 
-    /// Kind and level, if this is part of a coarser leaf.
-    pub fn as_wide(self) -> Option<(Kind, u8)> {
-        let code = self.0.wrapping_sub(FIRST_WIDE);
-        (code < FIRST_NODE - FIRST_WIDE).then_some(((code & 3) as Kind, (code >> 2) as u8))
+    /// Kind and level of the leaf, if the octant is part of a coarser leaf.
+    pub fn as_coarser_leaf(self) -> Option<(Kind, u8)> {
+        let code = self.0.wrapping_sub(FIRST_COARSER);
+        (code < FIRST_NODE - FIRST_COARSER).then_some(((code & 3) as Kind, (code >> 2) as u8))
     }
 
-    /// Whether this is split further.
+    /// Whether the octant is split.
     pub fn is_node(self) -> bool {
         self.0 >= FIRST_NODE
     }
@@ -81,17 +80,17 @@ impl Handle {
     }
 }
 
-/// What is below a node, in one look.
+/// Summary of the leaves below a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Summary {
-    /// Most levels from here down to a leaf.
+    /// Largest number of levels from the node down to a leaf.
     finest: u8,
-    /// Fewest levels from here down to a leaf other than a ghost; `NO_LEAF` if there is none.
+    /// Smallest number of levels from the node down to a leaf that is not deleted; `NO_LEAF` if there is none.
     coarsest: u8,
     kinds: Kinds,
 }
 
-/// A level (or number of levels) that no leaf has.
+/// A level, or number of levels, greater than that of any leaf.
 pub const NO_LEAF: u8 = 100;
 
 /// The leaves of a mesh as a tree.
@@ -102,8 +101,8 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// The tree of sorted words. Words that are no leaves or overlap one before them are left out:
-    /// they are for `linear` to report.
+    /// The tree of sorted words. Words that are not leaves or that overlap an earlier leaf are omitted; the
+    /// check `linear` reports them.
     pub fn of_words(words: &[u64]) -> Self {
         let mut builder = Builder::default();
         for &w in words {
@@ -112,74 +111,74 @@ impl Tree {
         builder.finish()
     }
 
-    /// The whole.
+    /// The content of the root.
     pub fn root(&self) -> Handle {
         self.root
     }
 
-    /// Distinct nodes stored.
+    /// Number of distinct nodes.
     pub fn nodes(&self) -> usize {
         self.store.len()
     }
 
-    /// The child of whatever is at an octant of this level.
+    /// The content of a child of an octant with content `of` at this level.
     pub fn child(&self, of: Handle, digit: u8, level: u8) -> Handle {
         if of.is_node() {
             self.store.children(of)[usize::from(digit)]
         } else if let Some(kind) = of.as_leaf() {
-            Handle::wide(kind, level)
+            Handle::coarser_leaf(kind, level)
         } else {
             of
         }
     }
 
-    /// Deepest level of a leaf in `of`, which is at an octant of this level; 0 if there is none.
+    /// Level of the finest leaf in an octant with content `of` at this level; 0 if there is none.
     pub fn finest_level(&self, of: Handle, level: u8) -> u8 {
         if of.is_node() {
             level + self.store.summary(of).finest
         } else if of.as_leaf().is_some() {
             level
         } else {
-            of.as_wide().map_or(0, |(_, level)| level)
+            of.as_coarser_leaf().map_or(0, |(_, level)| level)
         }
     }
 
-    /// Level of the coarsest leaf other than a ghost in `of`; [`NO_LEAF`] or more if there is none.
+    /// Level of the coarsest leaf in an octant with content `of` at this level, deleted leaves excluded; at
+    /// least [`NO_LEAF`] if there is none.
     pub fn coarsest_level(&self, of: Handle, level: u8) -> u8 {
         if of.is_node() {
             return level + self.store.summary(of).coarsest;
         }
-        match (of.as_leaf(), of.as_wide()) {
-            (Some(kind), _) if kind != GHOST => level,
-            (_, Some((kind, level))) if kind != GHOST => level,
+        match (of.as_leaf(), of.as_coarser_leaf()) {
+            (Some(kind), _) if kind != DELETED => level,
+            (_, Some((kind, level))) if kind != DELETED => level,
             _ => NO_LEAF,
         }
     }
 
-    /// The kinds of leaves in `of`, and whether there are holes. Beyond the root there is nothing
-    /// at all.
+    /// The kinds of leaves in `of`, and [`HOLES`] if it has holes; the empty set outside the root.
     pub fn kinds(&self, of: Handle) -> Kinds {
         if of.is_node() {
             return self.store.summary(of).kinds;
         }
-        match (of.as_leaf(), of.as_wide()) {
+        match (of.as_leaf(), of.as_coarser_leaf()) {
             (Some(kind), _) | (_, Some((kind, _))) => 1 << kind,
             _ if of == Handle::HOLE => HOLES,
             _ => 0,
         }
     }
 
-    /// The leaf that holds a level-19 cell, and its kind.
+    /// The leaf that contains a level-19 cell, and its kind.
     pub fn locate(&self, cell: [u32; 3]) -> Option<(Octant, Kind)> {
         debug_assert!(cell.iter().all(|&c| c < CELLS_PER_EDGE));
         let key = word::key_of(cell);
-        let (mut at, mut octant) = (self.root, Octant::ROOT);
-        while at.is_node() {
+        let (mut handle, mut octant) = (self.root, Octant::ROOT);
+        while handle.is_node() {
             let digit = ((key / word::span(octant.level + 1)) & 7) as u8;
-            at = self.store.children(at)[usize::from(digit)];
+            handle = self.store.children(handle)[usize::from(digit)];
             octant = octant.child(digit);
         }
-        at.as_leaf().map(|kind| (octant, kind))
+        handle.as_leaf().map(|kind| (octant, kind))
     }
 }
 
@@ -200,35 +199,34 @@ mod tests {
     }
 
     proptest! {
-        /// Every cell is found in the leaf that a linear search finds.
         #[test]
-        fn cells_are_found_where_they_are(words in random_words(4), cells in prop::collection::vec(any::<[u32; 3]>(), 50)) {
+        fn locating_a_cell_agrees_with_a_linear_search(words in random_words(4), cells in prop::collection::vec(any::<[u32; 3]>(), 50)) {
             let tree = Tree::of_words(&words);
             for cell in cells {
                 let cell = cell.map(|c| c % CELLS_PER_EDGE);
-                let holds = |w: &&u64| word::octant(**w).contains(&Octant { corner: cell, level: 19 });
-                let want = words.iter().find(holds).map(|&w| (word::octant(w), (w & 3) as Kind));
+                let contains = |w: &&u64| word::octant(**w).contains(&Octant { corner: cell, level: 19 });
+                let want = words.iter().find(contains).map(|&w| (word::octant(w), (w & 3) as Kind));
                 prop_assert_eq!(tree.locate(cell), want);
             }
         }
 
-        /// A hood's 27 handles are what a search for each neighbour finds.
+
         #[test]
-        fn hoods_hold_the_neighbours(words in random_words(3)) {
+        fn neighbourhoods_agree_with_a_search_for_each_neighbour(words in random_words(3)) {
             let tree = Tree::of_words(&words);
             for octant in octants_of(&words) {
-                let hood = Hood::at(&tree, octant);
-                for (i, by) in OFFSETS.iter().enumerate() {
-                    let handle = hood.around[i];
-                    let Some(neighbour) = octant.neighbour(*by) else {
-                        prop_assert_eq!(handle, Handle::BEYOND);
+                let neighbourhood = Neighbourhood::of(&tree, octant);
+                for (i, offset) in OFFSETS.iter().enumerate() {
+                    let handle = neighbourhood.handles[i];
+                    let Some(neighbour) = octant.neighbour(*offset) else {
+                        prop_assert_eq!(handle, Handle::OUTSIDE_ROOT);
                         continue;
                     };
                     let inside: Vec<_> = words.iter().filter(|&&w| neighbour.contains(&word::octant(w))).collect();
                     let above = words.iter().find(|&&w| word::octant(w).contains(&neighbour));
                     if let Some(&w) = above {
                         let (level, kind) = (word::level(w), (w & 3) as Kind);
-                        let want = if level == octant.level { Handle::leaf(kind) } else { Handle::wide(kind, level) };
+                        let want = if level == octant.level { Handle::leaf(kind) } else { Handle::coarser_leaf(kind, level) };
                         prop_assert_eq!(handle, want);
                     } else if inside.is_empty() {
                         prop_assert_eq!(handle, Handle::HOLE);

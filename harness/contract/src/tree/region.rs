@@ -1,6 +1,6 @@
-//! How coarse the leaves near an octant are.
+//! Search for the coarsest leaf near an octant.
 
-use super::{Handle, Hood, OFFSETS, Tree};
+use super::{Handle, Neighbourhood, OFFSETS, Tree};
 use crate::octant::Octant;
 
 /// An open box, in level-19 cells.
@@ -11,85 +11,87 @@ pub struct Region {
 }
 
 impl Region {
-    /// An octant enlarged on every side.
+    /// An octant enlarged by `margin` on every side.
     pub fn around(octant: &Octant, margin: i64) -> Self {
         let edge = i64::from(octant.edge());
         let low = octant.corner.map(|c| i64::from(c) - margin);
         Self { low, high: low.map(|c| c + edge + 2 * margin) }
     }
 
-    /// The smallest box around some children of an octant, enlarged on every side. Bit `d` of `digits`
-    /// stands for the child with that digit.
-    pub fn around_children(of: &Octant, digits: u8, margin: i64) -> Self {
-        let half = i64::from(of.edge()) / 2;
+    /// The bounding box of some children of an octant, enlarged by `margin` on every side. Bit `d` of `digits`
+    /// selects the child with digit `d`.
+    pub fn around_children(parent: &Octant, digits: u8, margin: i64) -> Self {
+        let half = i64::from(parent.edge()) / 2;
         // Children on the low and on the high side of each axis.
         const LOW: [u8; 3] = [0x55, 0x33, 0x0f];
         let skip = |side: u8| if digits & side == 0 { half } else { 0 };
-        let Self { low, high } = Self::around(of, margin);
+        let Self { low, high } = Self::around(parent, margin);
         Self {
             low: std::array::from_fn(|a| low[a] + skip(LOW[a])),
             high: std::array::from_fn(|a| high[a] - skip(!LOW[a])),
         }
     }
 
-    /// Whether an octant's inside meets the box.
+    /// Whether the interior of an octant meets the box.
     fn meets(&self, corner: [i64; 3], edge: i64) -> bool {
         (0..3).all(|a| corner[a] < self.high[a] && self.low[a] < corner[a] + edge)
     }
 }
 
-/// The coarsest leaf found, by level and by a level-19 cell of it.
+/// Result of a search for the coarsest leaf.
 #[derive(Clone, Copy, Debug)]
 pub struct Coarsest {
-    /// Its level, or that which is enough.
+    /// Level of the leaf, or the bound of the search if there is no coarser leaf.
     pub level: u8,
+    /// A level-19 cell of the leaf.
     cell: Option<[i64; 3]>,
 }
 
 impl Coarsest {
-    /// The leaf itself.
+    /// The leaf; `None` if no leaf is coarser than the bound of the search.
     pub fn leaf(&self, tree: &Tree) -> Option<Octant> {
         let cell = self.cell?.map(|c| u32::try_from(c).expect("a leaf lies in the root"));
         tree.locate(cell).map(|(octant, _)| octant)
     }
 }
 
-impl Hood {
-    /// The coarsest leaf, ghosts aside, whose inside meets the region, if it is coarser than level
-    /// `enough`; else a level of `enough` and no leaf. Exact where the region lies within the 27
-    /// places, or this is the root.
-    pub fn coarsest_within(&self, tree: &Tree, region: &Region, enough: u8) -> Coarsest {
-        let mut found = Coarsest { level: enough, cell: None };
+impl Neighbourhood {
+    /// The coarsest leaf that is coarser than level `bound` and whose interior meets the region, deleted leaves
+    /// excluded. The result is exact if the region lies within the 27 octants, or if this is the neighbourhood
+    /// of the root.
+    pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Coarsest {
+        let mut found = Coarsest { level: bound, cell: None };
         let edge = i64::from(self.octant.edge());
-        for (&at, by) in self.around.iter().zip(&OFFSETS) {
-            let corner: [i64; 3] =
-                std::array::from_fn(|a| i64::from(self.octant.corner[a]) + i64::from(by[a]) * edge);
-            search(tree, at, corner, self.octant.level, region, &mut found);
+        for (&handle, offset) in self.handles.iter().zip(&OFFSETS) {
+            let corner: [i64; 3] = std::array::from_fn(|a| {
+                i64::from(self.octant.corner[a]) + i64::from(offset[a]) * edge
+            });
+            search(tree, handle, corner, self.octant.level, region, &mut found);
         }
         found
     }
 }
 
-/// Looks for a leaf coarser than the one found so far.
+/// Searches an octant for a leaf that is coarser than the one found so far.
 fn search(
     tree: &Tree,
-    at: Handle,
+    handle: Handle,
     corner: [i64; 3],
     level: u8,
     region: &Region,
     found: &mut Coarsest,
 ) {
-    let coarsest = tree.coarsest_level(at, level);
+    let coarsest = tree.coarsest_level(handle, level);
     let edge = i64::from(crate::octant::CELLS_PER_EDGE >> level);
     if coarsest >= found.level || !region.meets(corner, edge) {
         return;
     }
-    if !at.is_node() {
+    if !handle.is_node() {
         *found = Coarsest { level: coarsest, cell: Some(corner) };
         return;
     }
     for digit in 0..8u8 {
         let corner = std::array::from_fn(|a| corner[a] + edge / 2 * i64::from(digit >> a & 1));
-        search(tree, tree.child(at, digit, level), corner, level + 1, region, found);
+        search(tree, tree.child(handle, digit, level), corner, level + 1, region, found);
     }
 }

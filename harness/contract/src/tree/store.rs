@@ -1,13 +1,16 @@
-//! Distinct nodes, and the hash table that keeps them distinct.
+//! Distinct nodes, and the hash table that finds equal ones.
+//!
+//! The table is our own because its entries are indices into `children`: a standard map would store every node
+//! twice.
 
-use super::{GHOST, HOLES, Handle, NO_LEAF, Summary};
+use super::{DELETED, HOLES, Handle, NO_LEAF, Summary};
 
 /// All nodes of a tree.
 #[derive(Debug, Default)]
 pub(super) struct Store {
     children: Vec<[Handle; 8]>,
     summaries: Vec<Summary>,
-    /// Open addressing: node number + 1, or 0 for a free slot. At most half full.
+    /// Open addressing: node index + 1, or 0 for a free slot. At most half full.
     slots: Vec<u32>,
 }
 
@@ -24,7 +27,7 @@ impl Store {
         self.summaries[of.index()]
     }
 
-    /// The node with these children, new or known.
+    /// The node with these children, which is stored if it is new.
     pub(super) fn intern(&mut self, children: [Handle; 8]) -> Handle {
         if self.slots.len() <= 2 * self.children.len() {
             self.grow();
@@ -38,7 +41,7 @@ impl Store {
         Handle::node(self.slots[slot] as usize - 1)
     }
 
-    /// The slot that holds this node, or the free one where it belongs.
+    /// The slot that contains this node, or else the free slot for it.
     fn slot(&self, children: &[Handle; 8]) -> usize {
         let mask = self.slots.len() - 1;
         let mut slot = hash(children) as usize & mask;
@@ -70,7 +73,7 @@ impl Store {
         all
     }
 
-    /// A child's summary as its parent sees it: one level further down.
+    /// The contribution of a child to its parent's summary, one level deeper.
     fn summary_of_child(&self, child: Handle) -> Summary {
         if child.is_node() {
             let Summary { finest, coarsest, kinds } = self.summary(child);
@@ -78,14 +81,14 @@ impl Store {
             return Summary { finest: finest + 1, coarsest, kinds };
         }
         match child.as_leaf() {
-            Some(GHOST) => Summary { finest: 1, coarsest: NO_LEAF, kinds: 1 << GHOST },
+            Some(DELETED) => Summary { finest: 1, coarsest: NO_LEAF, kinds: 1 << DELETED },
             Some(kind) => Summary { finest: 1, coarsest: 1, kinds: 1 << kind },
             None => Summary { finest: 0, coarsest: NO_LEAF, kinds: HOLES },
         }
     }
 }
 
-/// Four multiplications, folded; equal children are common, so every child must reach every bit.
+/// Four multiplications, folded. Equal children are common, so every child must affect every bit.
 fn hash(children: &[Handle; 8]) -> u64 {
     let mut h = 0x9e37_79b9_7f4a_7c15u64;
     for pair in children.chunks_exact(2) {

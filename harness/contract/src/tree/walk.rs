@@ -1,22 +1,17 @@
-//! Depth-first over all leaves, in Morton order.
+//! Depth-first traversal of all leaves, in Morton order.
 
-use super::{Hood, Kind, Tree};
+use super::{Kind, Neighbourhood, Tree};
 
-/// Visits every leaf with its hood, except below octants that `enter` declines.
-pub fn walk(tree: &Tree, enter: &mut dyn FnMut(&Hood) -> bool, leaf: &mut dyn FnMut(&Hood, Kind)) {
-    visit(tree, &Hood::root(tree), enter, leaf);
+/// Visits every leaf with its neighbourhood.
+pub fn walk(tree: &Tree, leaf: &mut dyn FnMut(&Neighbourhood, Kind)) {
+    visit(tree, &Neighbourhood::root(tree), leaf);
 }
 
-fn visit(
-    tree: &Tree,
-    hood: &Hood,
-    enter: &mut dyn FnMut(&Hood) -> bool,
-    leaf: &mut dyn FnMut(&Hood, Kind),
-) {
-    let at = hood.centre();
-    if let Some(kind) = at.as_leaf() {
-        leaf(hood, kind);
-    } else if at.is_node() && enter(hood) {
-        (0..8).for_each(|d| visit(tree, &hood.child(tree, d), enter, leaf));
+fn visit(tree: &Tree, neighbourhood: &Neighbourhood, leaf: &mut dyn FnMut(&Neighbourhood, Kind)) {
+    let handle = neighbourhood.centre();
+    if let Some(kind) = handle.as_leaf() {
+        leaf(neighbourhood, kind);
+    } else if handle.is_node() {
+        (0..8).for_each(|d| visit(tree, &neighbourhood.child(tree, d), leaf));
     }
 }

@@ -1,5 +1,6 @@
 //! Where programs and data are on this machine.
 
+use contract::catalogue::Catalogue;
 use std::env;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +17,7 @@ pub struct Paths {
     /// repository.
     pub p4est: PathBuf,
     /// The catalogue of cases.
-    pub catalogue: PathBuf,
+    pub catalogue: Catalogue,
     /// Directory of the engine files.
     pub engines: PathBuf,
     /// The repository.
@@ -39,7 +40,7 @@ impl Paths {
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
             oracles: root.join("harness/oracles"),
             p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| p4est_below(&target, &root)),
-            catalogue: root.join("geometries/catalogue.toml"),
+            catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
             engines: root.join("harness/engines"),
             root,
             harness,

@@ -19,7 +19,7 @@ pub mod workplace;
 use crate::engine::interrupt;
 use crate::engine::programs::Programs;
 use case::CaseRun;
-use contract::catalogue::{self, Selected};
+use contract::catalogue::Selected;
 use needs::Needs;
 use options::Options;
 use progress::Progress;
@@ -53,7 +53,10 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
             )));
         }
     }
-    let selected = catalogue::select(&options.cases, &options.sizes, &programs.paths.catalogue)
+    let selected = programs
+        .paths
+        .catalogue
+        .select(&options.cases, &options.sizes)
         .map_err(VerifyError::Input)?;
     let mut workplace = Workplace::new(options)?;
     let mut needs = Needs::probe(options, programs, workplace.root());

@@ -1,139 +1,142 @@
-//! The self test on a mesh of any size: corruptions of the catalogue planted in a few leaves of it, or in
-//! its manifest or files, for the streaming audit to find.
+//! The self test for meshes of any size: the corruptions are planted in a few leaves, in the manifest or in the
+//! files, and the streaming audit must find them.
 //!
-//! The mesh is dealt to many parts once (`whole`). A corruption is made by the catalogue's own functions in
-//! a *window*, the leaves of one octant somewhere in the mesh, as if it were a mesh by itself; what comes of
-//! it is spliced into a copy of the one part that changes, all others being hard links (`plant`). So
-//! a trial costs a part's worth of disk and an audit, and memory that of a window and an audit. The few
-//! corruptions that concern every leaf go through the parts one by one (`everywhere`).
+//! The mesh is distributed to many parts once (`distributed`). The functions of the self test corrupt a
+//! *window*, the leaves of one octant, as if it were a complete mesh. The result replaces the window in a copy
+//! of the one part that contains it; all other parts are hard links (`plant`). So a trial needs disk space for
+//! one part, and memory for a window and an audit. The few corruptions that change every leaf process the parts
+//! one by one (`global`).
 //!
-//! Corruptions that the leaves alone do not show are held against the untouched mesh, as `harness verify`
-//! holds meshes of ranks against the serial one: by the digests and terms of the manifest.
+//! If the leaves alone do not show a corruption, the corrupted mesh is compared with the original by the
+//! digests and inputs in their manifests, as `harness verify` compares parallel meshes with the serial one.
 
-mod everywhere;
+mod distributed;
+mod global;
 mod plant;
 mod trial;
-mod whole;
 
 use super::{Mutant, SelftestReport, catalogue};
 use crate::audit::{self, AuditOptions};
 use crate::checks::CheckResult;
+use distributed::DistributedMesh;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use trial::{Trial, Tried};
-use whole::Whole;
+use trial::{Outcome, Trial};
 
 /// A mesh to corrupt.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// What to call it.
+    /// Its name in the report.
     pub name: String,
     /// Its leaf-set directory, which is only read.
     pub mesh: PathBuf,
-    /// That of its T0, which some corruptions need to know what to corrupt.
+    /// The leaf-set directory of its T0, without which some corruptions do not apply.
     pub base: Option<PathBuf>,
 }
 
-/// How it is done.
+/// Options of the self test at scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Chooses the places.
+    /// Seed of the pseudorandom windows.
     pub seed: u64,
-    /// Trials at a time; each takes the memory of an audit.
+    /// Number of concurrent trials. Each needs the memory of an audit.
     pub jobs: usize,
-    /// Whether the user has asked to end.
+    /// Whether the user has interrupted the program.
     pub interrupted: fn() -> bool,
 }
 
-/// Corrupts every mesh in every way that applies to it. `scratch` is an existing empty directory with
-/// room for a copy of a mesh and of one for each job; `say` is told how many trials are done, of how many.
+/// Applies every corruption to every mesh to which it applies. `scratch` is an existing empty directory with
+/// room for a copy of the largest mesh and another one per job. `progress` is called with the numbers of
+/// finished and of all trials.
 ///
 /// # Errors
-/// Where a mesh cannot be read or scratch files cannot be written; `Interrupted` where the user wished so.
+/// If a mesh cannot be read, or a scratch file cannot be written; `Interrupted` if the user interrupted the
+/// program.
 pub fn run(
     sources: &[Source],
     options: &Options,
     scratch: &Path,
-    say: &(dyn Fn(usize, usize) + Sync),
+    progress: &(dyn Fn(usize, usize) + Sync),
 ) -> io::Result<SelftestReport> {
     let mut report = SelftestReport::default();
-    let mut why: Vec<Option<String>> = vec![None; catalogue().len()];
-    let (done, all) = (AtomicUsize::new(0), sources.len() * catalogue().len());
+    let mutants = catalogue();
+    let mut reasons: Vec<Option<String>> = vec![None; mutants.len()];
+    let (done, all) = (AtomicUsize::new(0), sources.len() * mutants.len());
+    let finished = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, all);
     for (i, source) in sources.iter().enumerate() {
         let place = scratch.join(format!("mesh-{i}"));
         std::fs::create_dir(&place)?;
-        let whole = Whole::deal(source, &place)?;
-        let before = alarms(&whole).collect::<Vec<_>>();
-        if !before.is_empty() {
-            // Places are looked for in leaves that are in order; and what is found already proves nothing.
-            report.alarms.extend(before);
-            why.iter_mut().for_each(|why| *why = Some("the mesh itself does not hold".to_owned()));
-            std::fs::remove_dir_all(&place)?;
-            continue;
-        }
-        let tell = || say(done.fetch_add(1, Ordering::Relaxed) + 1, all);
-        for (m, tried) in trials(&whole, options, &place, &tell)?.into_iter().enumerate() {
-            match tried {
-                Tried::Planted(kill) => report.kills.push(kill),
-                Tried::LeftOut(reason) => why[m] = Some(reason),
+        let original = DistributedMesh::new(source, &place)?;
+        let alarms_before: Vec<String> = alarms(&original).collect();
+        if alarms_before.is_empty() {
+            for (m, outcome) in
+                trials(&original, options, &place, &finished)?.into_iter().enumerate()
+            {
+                match outcome {
+                    Outcome::Planted(kill) => report.kills.push(kill),
+                    Outcome::LeftOut(reason) => reasons[m] = Some(reason),
+                }
             }
+            // A trial that damaged the original would make all later corruptions easy to detect.
+            report.alarms.extend(alarms(&original).map(|alarm| format!("afterwards, {alarm}")));
+        } else {
+            // Windows need sorted leaves, and in a wrong mesh a finding proves nothing.
+            report.alarms.extend(alarms_before);
+            reasons.fill(Some("the mesh itself fails the audit".to_owned()));
         }
-        // A trial that harmed the mesh itself would make the next ones easy to find.
-        report.alarms.extend(alarms(&whole).map(|alarm| format!("afterwards, {alarm}")));
         std::fs::remove_dir_all(&place)?;
     }
-    let order = catalogue();
-    let place_of = |name: &str| order.iter().position(|m| m.name == name);
-    report.kills.sort_by_key(|kill| place_of(kill.mutant));
+    let index = |name: &str| mutants.iter().position(|m| m.name == name);
+    report.kills.sort_by_key(|kill| index(kill.mutant));
     let planted = |m: &Mutant| report.kills.iter().any(|kill| kill.mutant == m.name);
-    let left_out = order.iter().zip(why).filter(|(m, _)| !planted(m));
-    report.left_out = left_out.filter_map(|(m, why)| Some((m.name, why?))).collect();
+    let left_out = mutants.iter().zip(reasons).filter(|(m, _)| !planted(m));
+    report.left_out = left_out.filter_map(|(m, reason)| Some((m.name, reason?))).collect();
     Ok(report)
 }
 
-/// Findings on the mesh as it is.
-fn alarms(whole: &Whole) -> impl Iterator<Item = String> {
-    let checks = audit::audit(whole.dir(), &AuditOptions::default()).checks;
+/// Findings of the audit on the original mesh.
+fn alarms(original: &DistributedMesh) -> impl Iterator<Item = String> {
+    let checks = audit::audit(original.dir(), &AuditOptions::default()).checks;
     let found: Vec<CheckResult> = checks.into_iter().filter(|c| !c.holds()).collect();
-    let name = whole.name().to_owned();
+    let name = original.name().to_owned();
     found.into_iter().map(move |check| format!("{name}: {check}"))
 }
 
-/// Every corruption on one mesh, in the catalogue's order, so many at a time.
+/// The outcome of every corruption of one mesh, in the order of [`catalogue`].
 fn trials(
-    whole: &Whole,
+    original: &DistributedMesh,
     options: &Options,
     place: &Path,
-    tell: &(dyn Fn() + Sync),
-) -> io::Result<Vec<Tried>> {
+    finished: &(dyn Fn() + Sync),
+) -> io::Result<Vec<Outcome>> {
     let mutants = catalogue();
     let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<Option<io::Result<Tried>>>> =
+    let results: Mutex<Vec<Option<io::Result<Outcome>>>> =
         Mutex::new(mutants.iter().map(|_| None).collect());
     let work = || {
         loop {
             let i = next.fetch_add(1, Ordering::Relaxed);
             let Some(mutant) = mutants.get(i) else { return };
-            let tried = match (options.interrupted)() {
+            let outcome = match (options.interrupted)() {
                 true => Err(io::ErrorKind::Interrupted.into()),
                 false => {
                     let dir = place.join(format!("trial-{i}"));
-                    Trial { whole, mutant, seed: options.seed ^ i as u64, dir: &dir }.run()
+                    Trial { original, mutant, seed: options.seed ^ i as u64, dir: &dir }.run()
                 }
             };
-            let failed = tried.is_err();
-            results.lock().expect("no trial panics with the lock")[i] = Some(tried);
-            tell();
+            let failed = outcome.is_err();
+            results.lock().expect("no trial panics with the lock")[i] = Some(outcome);
+            finished();
             if failed {
-                // The others need not begin what nobody will read.
+                // The result is an error, so no further trial is started.
                 next.store(mutants.len(), Ordering::Relaxed);
             }
         }
     };
     std::thread::scope(|scope| (0..options.jobs.max(1)).for_each(|_| drop(scope.spawn(work))));
     let results = results.into_inner().expect("no trial panics with the lock");
-    // Whatever was not begun was so for an error that stands elsewhere in the list.
+    // A trial that was not started implies an error elsewhere in the list.
     results.into_iter().flatten().collect()
 }

@@ -1,8 +1,8 @@
-//! One corruption in one mesh: looked for a place, planted, audited.
+//! One trial: a corruption is planted in a mesh, and the result is audited.
 
-use super::everywhere::Everywhere;
+use super::distributed::{DistributedMesh, Window};
+use super::global::GlobalChange;
 use super::plant::{self, Plan};
-use super::whole::{Whole, Window};
 use crate::audit::{self, AuditOptions};
 use crate::checks::CheckResult;
 use crate::diff;
@@ -13,63 +13,67 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Places that are tried before a corruption is left out.
-const PLACES: u64 = 100;
-/// What the comparison with the untouched mesh is called: the check of that name in `harness verify`.
+/// Number of windows that are tried before a corruption is left out.
+const WINDOWS: u64 = 100;
+/// Name of the comparison with the original mesh, after the check in `harness verify`.
 const IDENTICAL: &str = "identical";
 
-/// What is to be tried.
+/// A corruption of a mesh.
 pub(super) struct Trial<'a> {
-    pub(super) whole: &'a Whole,
+    pub(super) original: &'a DistributedMesh,
     pub(super) mutant: &'a Mutant,
     pub(super) seed: u64,
-    /// Does not exist before or after.
+    /// Directory for the corrupted mesh, which exists only during the trial.
     pub(super) dir: &'a Path,
 }
 
-/// What came of it.
+/// The outcome of a trial.
 #[derive(Debug)]
-pub(super) enum Tried {
-    /// It was planted.
+pub(super) enum Outcome {
+    /// The corruption was planted and audited.
     Planted(Kill),
-    /// It was not, and why.
+    /// The corruption was left out, with the reason.
     LeftOut(String),
 }
 
 impl Trial<'_> {
-    pub(super) fn run(&self) -> io::Result<Tried> {
-        if let Some(change) = Everywhere::named(self.mutant.name, self.whole)? {
+    /// Runs the trial.
+    pub(super) fn run(&self) -> io::Result<Outcome> {
+        if let Some(change) = GlobalChange::named(self.mutant.name, self.original)? {
             let planted = match change {
-                Some(change) => plant::everywhere(self.whole, &change, self.dir)?,
+                Some(change) => plant::apply_globally(self.original, &change, self.dir)?,
                 None => false,
             };
-            return if planted { self.examine() } else { Ok(self.nowhere("this mesh")) };
+            return if planted { self.examine() } else { Ok(self.not_applicable("this mesh")) };
         }
-        match self.place()? {
-            None => Ok(self.nowhere(&format!("{PLACES} places of this mesh"))),
+        match self.find_window()? {
+            None => Ok(self.not_applicable(&format!("{WINDOWS} windows of this mesh"))),
             Some((_, Plan::Nothing)) => {
-                Ok(Tried::LeftOut("it corrupts T0 only, which a mesh does not hold".to_owned()))
+                Ok(Outcome::LeftOut("it changes T0 only, which is not part of a mesh".to_owned()))
             }
             Some((window, plan)) => {
-                plan.carry_out(self.whole, &window, self.dir)?;
+                plan.apply(self.original, &window, self.dir)?;
                 self.examine()
             }
         }
     }
 
-    fn nowhere(&self, places: &str) -> Tried {
-        let without =
-            if self.whole.has_base() { "" } else { "; some need T0, which is not known here" };
-        Tried::LeftOut(format!("{places} offered no occasion for it{without}"))
+    fn not_applicable(&self, subject: &str) -> Outcome {
+        let without_base = if self.original.has_base() {
+            ""
+        } else {
+            "; some corruptions need T0, which is unknown here"
+        };
+        Outcome::LeftOut(format!("it does not apply to {subject}{without_base}"))
     }
 
-    /// The first place, in an order that the seed decides, where the corruption applies.
-    fn place(&self) -> io::Result<Option<(Window, Plan)>> {
-        for attempt in 0..PLACES {
-            let index =
-                mix(self.seed.wrapping_mul(PLACES) + attempt) as u64 % self.whole.leaves().max(1);
-            let Some(window) = self.whole.window(index)? else { continue };
-            if let Some(mutation) = (self.mutant.make)(&window.specimen) {
+    /// The first window, in an order that depends on the seed, to which the corruption applies.
+    fn find_window(&self) -> io::Result<Option<(Window, Plan)>> {
+        for attempt in 0..WINDOWS {
+            let index = mix(self.seed.wrapping_mul(WINDOWS) + attempt) as u64
+                % self.original.leaves().max(1);
+            let Some(window) = self.original.window(index)? else { continue };
+            if let Some(mutation) = (self.mutant.make)(&window.correct) {
                 let plan = Plan::of(&window, mutation);
                 return Ok(Some((window, plan)));
             }
@@ -77,36 +81,44 @@ impl Trial<'_> {
         Ok(None)
     }
 
-    /// Audits what was planted, and holds it against the untouched mesh where the audit alone cannot tell.
-    fn examine(&self) -> io::Result<Tried> {
+    /// Audits the corrupted mesh and, if the leaves alone do not show the corruption, compares it with the
+    /// original.
+    fn examine(&self) -> io::Result<Outcome> {
         let audited = audit::audit(self.dir, &AuditOptions::default()).checks;
         let failed: Vec<&CheckResult> = audited.iter().filter(|c| !c.holds()).collect();
         let audit_caught_by: Vec<&'static str> = failed.iter().map(|c| c.name).collect();
         let mut caught_by = audit_caught_by.clone();
-        let mut finding = failed.iter().find(|c| c.name == self.mutant.meant);
+        let mut finding = failed.iter().find(|c| c.name == self.mutant.expected);
         finding = finding.or(failed.first());
-        // Where the trial's files were is nobody's concern any more.
-        let place = format!("{}/", self.dir.display());
-        let told = finding.and_then(|c| c.findings.first());
-        let mut finding = told.map(|f| f.detail.replace(&place, ""));
-        if let (false, Ok(manifest)) = (self.mutant.audit, leafset::read_manifest(self.dir)) {
-            let differs = diff::manifests(self.whole.manifest(), &manifest);
-            let octants = differs.octants.len();
-            if !differs.fields.is_empty() || octants > 0 {
-                caught_by.push(IDENTICAL);
-                let digests = format!("the digests of {octants} of 512 level-3 octants differ");
-                finding = finding.or(Some(differs.fields.first().cloned().unwrap_or(digests)));
-            }
+        // The directory no longer exists when the finding is printed.
+        let directory = format!("{}/", self.dir.display());
+        let first = finding.and_then(|c| c.findings.first());
+        let mut finding = first.map(|f| f.detail.replace(&directory, ""));
+        if !self.mutant.audit
+            && let Some(difference) = self.difference()
+        {
+            caught_by.push(IDENTICAL);
+            finding = finding.or(Some(difference));
         }
         fs::remove_dir_all(self.dir)?;
-        Ok(Tried::Planted(Kill {
+        Ok(Outcome::Planted(Kill {
             mutant: self.mutant.name,
-            case: self.whole.name().to_owned(),
-            meant: if self.mutant.audit { self.mutant.meant } else { IDENTICAL },
+            case: self.original.name().to_owned(),
+            expected: if self.mutant.audit { self.mutant.expected } else { IDENTICAL },
             caught_by,
-            audit_meant: self.mutant.audit,
+            audit_expected: self.mutant.audit,
             audit_caught_by,
             finding,
         }))
+    }
+
+    /// The first difference from the original by the manifests alone.
+    fn difference(&self) -> Option<String> {
+        let manifest = leafset::read_manifest(self.dir).ok()?;
+        let differs = diff::manifests(self.original.manifest(), &manifest);
+        let octants = differs.octants.len();
+        let digests = (octants > 0)
+            .then(|| format!("the digests of {octants} of 512 level-3 octants differ"));
+        differs.fields.into_iter().next().or(digests)
     }
 }

@@ -1,16 +1,16 @@
-//! The mesh to be corrupted: dealt to parts, and read by places.
+//! The mesh to be corrupted, distributed to parts.
 //!
-//! Invariants: stretches of equal length, in ascending order of leaves, go to the parts in turn, so that
-//! parts interleave and the leaf of any index is found without a search; at least [`PARTS_MIN`] parts;
-//! files are never written to after [`Whole::deal`].
+//! Invariants: intervals of equal length, in ascending order of leaves, are assigned to the parts in turn, so
+//! that parts interleave and the leaf with any index is found without a search; there are at least
+//! [`PARTS_MIN`] parts; files do not change after [`DistributedMesh::new`].
 
 use super::Source;
 use crate::audit::merge::merge;
-use crate::selftest::Specimen;
+use crate::selftest::SelftestCase;
 use contract::case::Case;
 use contract::digest::{Digest, mix};
 use contract::leafset::{self, LeafDir, LeafSet};
-use contract::manifest::{self, Manifest, Part};
+use contract::manifest::{Manifest, Part, part_name};
 use contract::npy::{self, PartFile};
 use contract::octant::Octant;
 use contract::word;
@@ -18,67 +18,71 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Parts have about so many leaves: what a trial copies.
+/// Approximate number of leaves of a part, which is what a trial copies.
 const PART_LEAVES: u64 = 1 << 21;
-/// The catalogue corrupts the second and third.
+/// The corruptions change the second and third part.
 const PARTS_MIN: u64 = 4;
-/// More would cost the audit more than they save.
+/// More parts would slow down the audit by more than they save in copying.
 const PARTS_MAX: u64 = 64;
-/// Most leaves of a window: the catalogue looks at all pairs of some.
+/// Maximum number of leaves of a window. Some corruptions compare all pairs of them.
 const WINDOW_LEAVES: u64 = 20_000;
-/// Most leaves of T0 in one.
+/// Maximum number of leaves of T0 in a window, per part of T0.
 const WINDOW_BASE_LEAVES: u64 = 1 << 20;
 
-/// A mesh, dealt.
+/// A mesh, distributed to parts.
 #[derive(Debug)]
-pub(super) struct Whole {
+pub(super) struct DistributedMesh {
     name: String,
     dir: PathBuf,
     set: LeafDir,
     base: Option<LeafDir>,
     leaves: u64,
-    stretch: u64,
+    /// Leaves of an interval.
+    interval: u64,
 }
 
-/// The leaves of an octant, all of which one part has.
+/// All leaves of an octant, which are in one part.
 #[derive(Debug)]
 pub(super) struct Window {
-    /// That part.
+    /// Index of the part.
     pub(super) part: usize,
-    /// Index of the first of them in it.
+    /// Index of the first leaf in the part.
     pub(super) from: u64,
-    /// The leaves as a mesh by itself, with the manifest of the whole.
-    pub(super) specimen: Specimen,
+    /// The leaves as a separate mesh, with the manifest of the original.
+    pub(super) correct: SelftestCase,
 }
 
 fn unreadable(error: leafset::ReadError) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, error.to_string())
 }
 
-impl Whole {
-    /// Reads a mesh once and deals it to parts below `place`.
-    pub(super) fn deal(source: &Source, place: &Path) -> io::Result<Self> {
+impl DistributedMesh {
+    /// Reads a mesh once and distributes it to parts in a new subdirectory of `place`.
+    ///
+    /// # Errors
+    /// If the mesh cannot be read, or a part cannot be written.
+    pub(super) fn new(source: &Source, place: &Path) -> io::Result<Self> {
         let given = leafset::open(&source.mesh).map_err(unreadable)?;
         let base = source.base.as_ref().map(|dir| leafset::open(dir).map_err(unreadable));
         let base = base.transpose()?;
         let leaves: u64 = given.parts.iter().map(PartFile::len).sum();
         let parts = (leaves / PART_LEAVES).clamp(PARTS_MIN, PARTS_MAX);
-        // Two stretches each, so that parts interleave.
-        let stretch = leaves.div_ceil(2 * parts).max(1);
-        let dir = place.join("whole");
+        // Two intervals per part, so that parts interleave.
+        let interval = leaves.div_ceil(2 * parts).max(1);
+        let dir = place.join("original");
         std::fs::create_dir(&dir)?;
-        let mut dealer = Dealer::new(&dir, leaves, parts, stretch)?;
-        let mut failed = Ok(());
+        let mut writer = PartWriter::new(&dir, leaves, parts, interval)?;
+        let mut written = Ok(());
         merge(&given.parts, &mut |_, run| {
-            failed = dealer.take(run);
-            failed.is_ok()
+            written = writer.write(run);
+            written.is_ok()
         })
         .map_err(|(_, error)| error)?;
-        failed?;
-        let manifest = Manifest { parts: dealer.finish()?, ..given.manifest };
-        write_manifest(&dir, &manifest)?;
+        written?;
+        let manifest = Manifest { parts: writer.finish()?, ..given.manifest };
+        manifest.write(&dir)?;
         let set = leafset::open(&dir).map_err(unreadable)?;
-        Ok(Self { name: source.name.clone(), dir, set, base, leaves, stretch })
+        Ok(Self { name: source.name.clone(), dir, set, base, leaves, interval })
     }
 
     pub(super) fn name(&self) -> &str {
@@ -105,17 +109,18 @@ impl Whole {
         self.base.is_some()
     }
 
-    /// The leaf of this index in ascending order, and its part.
+    /// The part of the leaf with this index in ascending order, and the leaf.
     pub(super) fn leaf(&self, index: u64) -> io::Result<(usize, u64)> {
-        let (stretch, within) = (index / self.stretch, index % self.stretch);
+        let (interval, within) = (index / self.interval, index % self.interval);
         let parts = self.set.parts.len() as u64;
-        let (part, turn) = ((stretch % parts) as usize, stretch / parts);
+        let (part, turn) = ((interval % parts) as usize, interval / parts);
         let mut word = [0];
-        self.set.parts[part].read_at(turn * self.stretch + within, &mut word)?;
+        self.set.parts[part].read_at(turn * self.interval + within, &mut word)?;
         Ok((part, word[0]))
     }
 
-    /// The window around a leaf: the largest octant whose leaves are few enough and in one part.
+    /// The window around the leaf with this index: the largest octant whose leaves are few enough and all in
+    /// one part. `None` if the word at the index is not a leaf.
     pub(super) fn window(&self, index: u64) -> io::Result<Option<Window>> {
         let (part, leaf) = self.leaf(index)?;
         let Ok(leaf) = word::decode(leaf) else { return Ok(None) };
@@ -133,9 +138,10 @@ impl Whole {
         let mesh = LeafSet { parts: thirds(&words), words, manifest: self.set.manifest.clone() };
         let of_base = self.base.as_ref().map_or(&self.set.manifest, |base| &base.manifest);
         let base = LeafSet { parts: vec![base.clone()], words: base, manifest: of_base.clone() };
-        Ok(Some(Window { part, from, specimen: Specimen { case, mesh, base } }))
+        Ok(Some(Window { part, from, correct: SelftestCase { case, mesh, base } }))
     }
 
+    /// Whether all leaves of an octant are in one part, and few enough for a window.
     fn suits(&self, part: usize, octant: &Octant) -> io::Result<bool> {
         for (i, file) in self.set.parts.iter().enumerate() {
             let (from, until) = range(file, octant)?;
@@ -146,7 +152,7 @@ impl Whole {
         Ok(true)
     }
 
-    /// The leaves of T0 in an octant; none where T0 is not known, or one leaf of it holds the octant.
+    /// The leaves of T0 in an octant; empty if T0 is unknown, or if one leaf of T0 contains the octant.
     fn base_within(&self, octant: &Octant) -> io::Result<Vec<u64>> {
         let mut words = Vec::new();
         for file in self.base.iter().flat_map(|base| &base.parts) {
@@ -159,7 +165,7 @@ impl Whole {
         Ok(words)
     }
 
-    /// What was asked for, as far as a manifest tells.
+    /// The case, as far as the manifest determines it.
     fn case(&self) -> Case {
         let m = &self.set.manifest;
         Case {
@@ -176,14 +182,14 @@ impl Whole {
     }
 }
 
-/// Three parts in order, as the catalogue expects several.
+/// The words in three parts, because some corruptions need several.
 fn thirds(words: &[u64]) -> Vec<Vec<u64>> {
     let (a, rest) = words.split_at(words.len() / 3);
     let (b, c) = rest.split_at(rest.len() / 2);
     [a, b, c].map(<[u64]>::to_vec).to_vec()
 }
 
-/// Indices of an octant's leaves in a sorted part.
+/// Range of the indices of an octant's leaves in a sorted part.
 fn range(file: &PartFile, octant: &Octant) -> io::Result<(u64, u64)> {
     let key = word::key_of(octant.corner);
     let end = key + word::span(octant.level);
@@ -203,54 +209,43 @@ fn read_octant(file: &PartFile, octant: &Octant) -> io::Result<(u64, Vec<u64>)> 
     Ok((from, words))
 }
 
-/// Writes a manifest into a directory of the self test's own.
-pub(super) fn write_manifest(dir: &Path, manifest: &Manifest) -> io::Result<()> {
-    let text = serde_json::to_string(manifest).expect("a manifest is plain data");
-    std::fs::write(dir.join(manifest::FILE), text)
-}
-
-/// The name of a part.
-pub(super) fn part_name(part: usize) -> String {
-    format!("leaves-{part:05}.npy")
-}
-
-/// Part files being written by turns.
-struct Dealer {
+/// Writes words in ascending order to part files, in intervals by turns.
+struct PartWriter {
     files: Vec<(BufWriter<File>, Part)>,
-    stretch: u64,
-    taken: u64,
+    interval: u64,
+    written: u64,
 }
 
-impl Dealer {
-    fn new(dir: &Path, leaves: u64, parts: u64, stretch: u64) -> io::Result<Self> {
+impl PartWriter {
+    fn new(dir: &Path, leaves: u64, parts: u64, interval: u64) -> io::Result<Self> {
         let open = |part: u64| -> io::Result<(BufWriter<File>, Part)> {
-            // Of the stretches part, part + parts, ... all are whole but perhaps the last of the mesh.
-            let starts = (part..).step_by(parts as usize).map(|s| s * stretch);
+            // The part has the intervals part, part + parts, ... All but the last one of the mesh have full length.
+            let starts = (part..).step_by(parts as usize).map(|i| i * interval);
             let leaves: u64 =
-                starts.take_while(|&start| start < leaves).map(|s| stretch.min(leaves - s)).sum();
+                starts.take_while(|&start| start < leaves).map(|s| interval.min(leaves - s)).sum();
             let file = part_name(part as usize);
             let mut out = BufWriter::new(File::create(dir.join(&file))?);
             out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
             Ok((out, Part { file, leaves, digest: Digest::default() }))
         };
         let files = (0..parts).map(open).collect::<io::Result<Vec<_>>>()?;
-        Ok(Self { files, stretch, taken: 0 })
+        Ok(Self { files, interval, written: 0 })
     }
 
-    fn take(&mut self, mut run: &[u64]) -> io::Result<()> {
+    fn write(&mut self, mut run: &[u64]) -> io::Result<()> {
         while !run.is_empty() {
-            let (stretch, within) = (self.taken / self.stretch, self.taken % self.stretch);
-            let room = usize::try_from(self.stretch - within).unwrap_or(usize::MAX);
+            let (interval, within) = (self.written / self.interval, self.written % self.interval);
+            let room = usize::try_from(self.interval - within).unwrap_or(usize::MAX);
             let (now, later) = run.split_at(room.min(run.len()));
             let parts = self.files.len() as u64;
-            let (out, part) = &mut self.files[(stretch % parts) as usize];
+            let (out, part) = &mut self.files[(interval % parts) as usize];
             let mut sum = 0u128;
             for &w in now {
                 sum = sum.wrapping_add(mix(w));
                 out.write_all(&w.to_le_bytes())?;
             }
             part.digest.merge(Digest(sum));
-            (self.taken, run) = (self.taken + now.len() as u64, later);
+            (self.written, run) = (self.written + now.len() as u64, later);
         }
         Ok(())
     }
@@ -266,27 +261,27 @@ mod tests {
     use super::*;
     use contract::testing::{leaf_set, words_of};
 
-    /// Finer towards a corner; in two parts that interleave.
-    fn dealt(place: &Path) -> (Whole, Vec<u64>) {
+    /// A mesh that is refined towards a face and given in two interleaved parts, distributed; and its words.
+    fn distributed(place: &Path) -> (DistributedMesh, Vec<u64>) {
         let words = words_of(|o| o.level < 4 || o.level < 6 && o.corner[0] == 0);
         let parts = [0, 1].map(|p| words.iter().copied().skip(p).step_by(2).collect()).to_vec();
         let mesh = place.join("given");
         std::fs::create_dir(&mesh).unwrap();
         leaf_set(parts).write(&mesh).unwrap();
         let source = Source { name: "given".into(), mesh, base: None };
-        (Whole::deal(&source, place).unwrap(), words)
+        (DistributedMesh::new(&source, place).unwrap(), words)
     }
 
     #[test]
-    fn dealing_keeps_every_leaf_and_finds_it_by_its_index() {
+    fn distribution_keeps_every_leaf_and_finds_it_by_its_index() {
         let place = tempfile::tempdir().unwrap();
-        let (whole, words) = dealt(place.path());
-        assert_eq!((whole.leaves(), whole.parts().len()), (words.len() as u64, 4));
+        let (original, words) = distributed(place.path());
+        assert_eq!((original.leaves(), original.parts().len()), (words.len() as u64, 4));
         for (i, &word) in words.iter().enumerate() {
-            let (part, found) = whole.leaf(i as u64).unwrap();
-            assert_eq!((found, part), (word, i / whole.stretch as usize % 4));
+            let (part, found) = original.leaf(i as u64).unwrap();
+            assert_eq!((found, part), (word, i / original.interval as usize % 4));
         }
-        let read = leafset::read(whole.dir()).unwrap();
+        let read = leafset::read(original.dir()).unwrap();
         assert_eq!(read.words, words);
         assert_eq!(read.manifest, read.with_parts(read.parts.clone()).manifest);
     }
@@ -294,17 +289,17 @@ mod tests {
     #[test]
     fn a_window_is_an_octant_of_one_part() {
         let place = tempfile::tempdir().unwrap();
-        let (whole, words) = dealt(place.path());
+        let (original, words) = distributed(place.path());
         for index in (0..words.len()).step_by(97) {
-            let window = whole.window(index as u64).unwrap().unwrap();
-            let leaves = &window.specimen.mesh.words;
+            let window = original.window(index as u64).unwrap().unwrap();
+            let leaves = &window.correct.mesh.words;
             assert!(leaves.contains(&words[index]));
             let at = words.binary_search(&leaves[0]).unwrap();
             assert_eq!(words[at..at + leaves.len()], leaves[..]);
             let mut of_part = vec![0; leaves.len()];
-            whole.parts()[window.part].read_at(window.from, &mut of_part).unwrap();
+            original.parts()[window.part].read_at(window.from, &mut of_part).unwrap();
             assert_eq!(of_part, leaves[..]);
-            // Nothing beside them is in their octant: they are as many cells as some octant has.
+            // The leaves fill an octant: together they have as many cells as an octant of some level.
             let cells: u64 = leaves.iter().map(|&w| word::span(word::level(w))).sum();
             assert!((0..=19).any(|level| word::span(level) == cells), "{cells}");
         }

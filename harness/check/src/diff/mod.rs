@@ -1,7 +1,8 @@
-//! Where two meshes differ: by their manifests first, then leaf by leaf in the first octant that
-//! differs. Neither mesh is read as a whole, so a mesh of any size is compared in no time.
+//! The differences of two meshes: first of their manifests, then of the leaves in the first octant that
+//! differs. Only that octant is read, so meshes of any size are compared quickly.
 //!
-//! Trusts the manifests' digests: that they are true to the leaves is for the check `manifest`.
+//! The comparison trusts the digests in the manifests; the check `manifest` establishes that they agree with
+//! the leaves.
 
 pub mod rule;
 mod witness;
@@ -16,20 +17,20 @@ use contract::manifest::{Manifest, octant_index};
 use contract::octant::Octant;
 use contract::word;
 
-/// How two leaf-set directories differ.
+/// The differences of two leaf sets.
 #[derive(Clone, Debug, Default)]
 pub struct DiffReport {
     /// Manifest fields that differ, with both values.
     pub fields: Vec<String>,
     /// Level-3 octants whose digests differ.
     pub octants: Vec<Octant>,
-    /// The first leaf that differs, both sides told.
+    /// The first difference of the leaves, with the leaves of both meshes.
     pub leaf: Option<String>,
-    /// Which rule of the definition decides, and for whom.
+    /// The rules of the definition that decide which mesh is right.
     pub rules: Vec<String>,
 }
 
-/// Rules are looked for in meshes of up to so many leaves: that holds both in memory.
+/// Maximum number of leaves of both meshes together for which rules are sought: the search needs both in memory.
 const LEAVES_RULED: u64 = 200_000_000;
 
 impl DiffReport {
@@ -39,8 +40,8 @@ impl DiffReport {
     }
 }
 
-/// Octants told by path; the rest are counted.
-const OCTANTS_TOLD: usize = 8;
+/// Number of octants whose paths are listed; the others are counted only.
+const OCTANTS_LISTED: usize = 8;
 
 impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -50,8 +51,8 @@ impl fmt::Display for DiffReport {
         if self.same_leaves() {
             return write!(f, "the leaves are the same");
         }
-        let paths: Vec<_> = self.octants.iter().take(OCTANTS_TOLD).map(Octant::path).collect();
-        let more = if self.octants.len() > OCTANTS_TOLD { ", ..." } else { "" };
+        let paths: Vec<_> = self.octants.iter().take(OCTANTS_LISTED).map(Octant::path).collect();
+        let more = if self.octants.len() > OCTANTS_LISTED { ", ..." } else { "" };
         let (count, paths) = (self.octants.len(), paths.join(", "));
         write!(f, "the leaves differ in {count} of 512 level-3 octants: {paths}{more}")?;
         match &self.leaf {
@@ -60,13 +61,16 @@ impl fmt::Display for DiffReport {
                 self.rules.iter().try_for_each(|rule| write!(f, "\n  rule: {rule}"))
             }
             None => {
-                write!(f, "\nthe leaves there are the same: a manifest is not true to its files")
+                write!(f, "\nbut the leaves in them are the same: a manifest contradicts its files")
             }
         }
     }
 }
 
-/// Compares two leaf-set directories. With the case that both are meshes of, facets and rays help to decide.
+/// Compares two leaf-set directories. If their common case is given, facets and rays help to decide which is right.
+///
+/// # Errors
+/// If a directory cannot be read.
 pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadError> {
     let (a, b) = (leafset::open(a)?, leafset::open(b)?);
     let mut report = manifests(&a.manifest, &b.manifest);
@@ -80,7 +84,7 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadE
     Ok(report)
 }
 
-/// Compares what two manifests say, digests included, and reads no leaf.
+/// Compares two manifests, digests included.
 pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
     let octants = octants_differing(a, b).into_iter().map(level_3).collect();
     DiffReport { fields: fields(a, b), octants, ..DiffReport::default() }
@@ -97,7 +101,7 @@ fn level_3(index: usize) -> Octant {
     Octant { corner: word::corner_of((index as u64) << 48), level: 3 }
 }
 
-/// What was asked for, and what there is of it.
+/// The differences of inputs and counts.
 fn fields(a: &Manifest, b: &Manifest) -> Vec<String> {
     let mut fields = Vec::new();
     let mut same = |name: &str, x: &dyn Debug, y: &dyn Debug| {
@@ -122,10 +126,10 @@ fn fields(a: &Manifest, b: &Manifest) -> Vec<String> {
     fields
 }
 
-/// What two meshes hold where they differ first; nothing where one has no more leaves.
+/// The first words of two meshes that differ; `None` for a mesh that has no more leaves.
 type Differing = (Option<u64>, Option<u64>);
 
-/// The words that differ first in a level-3 octant, if any do.
+/// The first words that differ in a level-3 octant; `None` if the leaves are the same.
 fn first_difference(
     a: &LeafDir,
     b: &LeafDir,
@@ -139,7 +143,7 @@ fn first_difference(
     Ok(Some((words_a.get(first).copied(), words_b.get(first).copied())))
 }
 
-/// The rules that decide, for what was asked of mesh A.
+/// The rules that decide which mesh is right.
 fn rules(
     a: &LeafDir,
     b: &LeafDir,
@@ -147,17 +151,15 @@ fn rules(
     x: Option<u64>,
     y: Option<u64>,
 ) -> Result<Vec<String>, ReadError> {
-    let wrong = |what: &str| Ok(vec![what.to_owned()]);
+    let undecided = |why: &str| Ok(vec![why.to_owned()]);
     if a.manifest.tree != b.manifest.tree {
-        return wrong("nothing: one is a base tree, the other a final mesh");
+        return undecided("none: one is a base tree, the other a final mesh");
     }
     if Terms::of_manifest(&a.manifest) != Terms::of_manifest(&b.manifest) {
-        return wrong("section 1: the inputs were not the same");
+        return undecided("section 1: the inputs differ");
     }
     if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
-        return wrong(
-            "a rule that is not looked for: the meshes are too large to be held in memory",
-        );
+        return undecided("unknown: the meshes are too large to be held in memory");
     }
     let (words_a, words_b) = (all_words(a)?, all_words(b)?);
     let terms = Terms::of_manifest(&a.manifest);
@@ -168,10 +170,7 @@ fn rules(
 fn all_words(set: &LeafDir) -> Result<Vec<u64>, ReadError> {
     let mut words = Vec::new();
     for part in &set.parts {
-        let read = part.read_all();
-        words.extend(
-            read.map_err(|e| ReadError::Part { path: part.path().to_owned(), source: e.into() })?,
-        );
+        words.extend(part.read_all().map_err(|error| ReadError::part(part, error))?);
     }
     words.sort_unstable();
     Ok(words)
@@ -191,8 +190,7 @@ fn octant_words(set: &LeafDir, index: usize) -> Result<Vec<u64>, ReadError> {
             part.read_at(from, &mut words)?;
             Ok(words)
         };
-        let path = || part.path().to_owned();
-        words.extend(read().map_err(|e| ReadError::Part { path: path(), source: e.into() })?);
+        words.extend(read().map_err(|error| ReadError::part(part, error))?);
     }
     debug_assert!(words.iter().all(|&w| octant_index(w) == index));
     words.sort_unstable();

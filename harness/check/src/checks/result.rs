@@ -1,0 +1,89 @@
+//! The result of a check.
+
+use std::fmt;
+
+use contract::leafset::ReadError;
+
+/// Findings that are listed in full; further ones are counted only.
+pub const FINDINGS_LISTED: usize = 20;
+
+/// Name of the check that a directory can be read as a leaf set.
+pub const FILES: &str = "files";
+
+/// One violation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// Name of the check.
+    pub check: &'static str,
+    /// The violation and its position: octant path and coordinates.
+    pub detail: String,
+}
+
+/// The result of a check on one mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CheckResult {
+    /// Name of the check.
+    pub name: &'static str,
+    /// Number of objects examined: leaves, unless the note names something else.
+    pub examined: u64,
+    /// The first [`FINDINGS_LISTED`] findings.
+    pub findings: Vec<Finding>,
+    /// Number of all findings.
+    pub findings_total: u64,
+    /// Numbers and limitations that are of interest even if the check passes.
+    pub note: String,
+}
+
+impl CheckResult {
+    /// A result without findings.
+    pub fn new(name: &'static str) -> Self {
+        Self { name, examined: 0, findings: Vec::new(), findings_total: 0, note: String::new() }
+    }
+
+    /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
+    pub fn unreadable(error: &ReadError) -> Self {
+        let mut result = Self::new(FILES);
+        result.report(error.to_string());
+        result
+    }
+
+    /// Whether there are no findings.
+    pub fn holds(&self) -> bool {
+        self.findings_total == 0
+    }
+
+    /// Adds a finding.
+    pub fn report(&mut self, detail: String) {
+        self.report_with(|| detail);
+    }
+
+    /// Adds a finding whose text is computed only if it will be listed.
+    pub fn report_with(&mut self, detail: impl FnOnce() -> String) {
+        self.findings_total += 1;
+        if self.findings.len() < FINDINGS_LISTED {
+            self.findings.push(Finding { check: self.name, detail: detail() });
+        }
+    }
+}
+
+impl fmt::Display for CheckResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = match self.findings_total {
+            0 => "holds".to_owned(),
+            1 => "1 finding".to_owned(),
+            n => format!("{n} findings"),
+        };
+        write!(f, "{:<10} {verdict}, {} examined", self.name, self.examined)?;
+        if !self.note.is_empty() {
+            write!(f, "; {}", self.note)?;
+        }
+        for finding in &self.findings {
+            write!(f, "\n    {}", finding.detail)?;
+        }
+        let unlisted = self.findings_total - self.findings.len() as u64;
+        if unlisted > 0 {
+            write!(f, "\n    and {unlisted} more")?;
+        }
+        Ok(())
+    }
+}

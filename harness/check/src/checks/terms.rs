@@ -1,0 +1,77 @@
+//! The properties that a mesh must have, as numbers.
+
+use contract::case::Case;
+use contract::lattice::Root;
+use contract::manifest::{ExtentBox, Keep, Manifest};
+use contract::octant::Octant;
+use contract::tree::Kind;
+use contract::word::Side;
+
+/// The required properties of a mesh, from its case or, in an audit, from its manifest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Terms {
+    /// The root cube, for coordinates in findings.
+    pub root: Root,
+    /// D: the level of crossing leaves.
+    pub level_surface: u8,
+    /// n: minimum thickness of a layer, in cells.
+    pub layer_cells_min: u32,
+    /// The side that is kept.
+    pub keep: Keep,
+    /// Whether crossing leaves are kept.
+    pub keep_crossing: bool,
+    /// Extent boxes on the lattice.
+    pub boxes: Vec<ExtentBox>,
+}
+
+impl Terms {
+    /// The requirements of a case.
+    pub fn of_case(case: &Case) -> Self {
+        Self {
+            root: case.root,
+            level_surface: case.level_surface,
+            layer_cells_min: case.layer_cells_min,
+            keep: case.keep,
+            keep_crossing: case.keep_crossing,
+            boxes: case.boxes.clone(),
+        }
+    }
+
+    /// The requirements that a manifest states.
+    pub fn of_manifest(manifest: &Manifest) -> Self {
+        Self {
+            root: manifest.root,
+            level_surface: manifest.level_surface,
+            layer_cells_min: manifest.layer_cells_min,
+            keep: manifest.keep,
+            keep_crossing: manifest.keep_crossing,
+            boxes: manifest.boxes.clone(),
+        }
+    }
+
+    /// Whether leaves of this kind belong in the final mesh.
+    pub fn keeps(&self, kind: Kind) -> bool {
+        match self.keep {
+            _ if kind == Side::Crossing as Kind => self.keep_crossing,
+            Keep::Outside => kind == Side::Outside as Kind,
+            Keep::Inside => kind == Side::Inside as Kind,
+            Keep::All => true,
+        }
+    }
+
+    /// Whether a box requires leaves finer than the surface. Gradation may then refine crossing leaves.
+    pub fn has_box_finer_than_surface(&self) -> bool {
+        self.boxes.iter().any(|b| b.level > self.level_surface)
+    }
+
+    /// A box that requires the octant to be split.
+    pub fn box_that_splits(&self, octant: &Octant) -> Option<&ExtentBox> {
+        self.boxes.iter().find(|b| b.level > octant.level && interiors_meet(octant, b))
+    }
+}
+
+/// Whether the interiors of an octant and a box meet.
+pub(crate) fn interiors_meet(octant: &Octant, extent: &ExtentBox) -> bool {
+    let (low, high) = octant.bounds();
+    (0..3).all(|a| low[a].max(extent.min[a]) < high[a].min(extent.max[a]))
+}
