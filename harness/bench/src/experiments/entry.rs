@@ -1,15 +1,15 @@
-//! What a line of a benchmark record says: schema `octree-bench/1`, described in reports/README.md.
+//! A line of a benchmark record: schema `octree-bench/1`, described in reports/README.md.
 //!
-//! Invariants: a line stands by itself but for its session, whose first line describes the machine; seconds,
-//! bytes and counts are plain numbers in the units of their names; ranks are told by sum and greatest value,
-//! and one by one only in useful times, up to [`BY_RANK_MAX`] ranks, so that a record stays small.
+//! Invariants: a line depends on no other line but the first of its session, which describes the machine; seconds, bytes
+//! and counts are plain numbers in the units of their names; values over the ranks are stored as sum and maximum, and
+//! rank by rank only for useful times on up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-bench/1";
-/// Most ranks whose values are kept one by one.
+/// The greatest number of ranks whose values are stored rank by rank.
 pub const BY_RANK_MAX: usize = 1024;
 
 /// One line of a record.
@@ -17,11 +17,11 @@ pub const BY_RANK_MAX: usize = 1024;
 pub struct Line {
     /// [`SCHEMA`].
     pub schema: String,
-    /// The invocation of `harness bench` that wrote it.
+    /// Identifier of the invocation of `harness bench` that wrote it.
     pub session: String,
-    /// When it was written, as `2026-01-31T12:00:00Z`.
+    /// Time of writing, such as `2026-01-31T12:00:00Z`.
     pub time_utc: String,
-    /// What it says.
+    /// The content.
     #[serde(flatten)]
     pub what: What,
 }
@@ -32,30 +32,30 @@ pub struct Line {
 pub enum What {
     /// A session begins.
     Session(Box<Session>),
-    /// What a message costs.
+    /// The cost of messages.
     Network(Network),
     /// A program ran.
     Run(Box<Run>),
-    /// A program ran and did not do what it should.
+    /// A program failed.
     Failure(Failure),
     /// A mesh was written and `harness audit` read it.
     Audit(Audited),
-    /// A target was held against what was measured.
+    /// A target was compared with measurements.
     Target(Judged),
 }
 
-/// What stays the same in a session.
+/// The circumstances of a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// The harness's command line.
     pub command: Vec<String>,
-    /// Where it ran.
+    /// The machine.
     pub machine: Machine,
-    /// Runs that other work on the machine may have disturbed: load average when it began.
+    /// Load average at the beginning: a high value means that other work may have disturbed the runs.
     pub load_average: f64,
 }
 
-/// A machine and the software that matters for what was measured on it.
+/// A machine, and the software that affects measurements on it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// Model of the processor.
@@ -66,11 +66,11 @@ pub struct Machine {
     pub memory_bytes: u64,
     /// Operating system and kernel.
     pub kernel: String,
-    /// The MPI library; empty where there is none.
+    /// The MPI library; empty if there is none.
     pub mpi: String,
-    /// The compiler on the path; the programs were built with it unless they were brought from elsewhere.
+    /// The compiler on the path; the programs were built with it unless they come from another machine.
     pub compiler: String,
-    /// The repository's commit, `-dirty` if files differ from it.
+    /// The repository's commit, with `-dirty` if files differ from it.
     pub commit: String,
 }
 
@@ -79,13 +79,13 @@ pub struct Machine {
 pub struct Network {
     /// Time of an empty message, one way.
     pub latency_s: f64,
-    /// Bytes per second of a long message.
+    /// Bandwidth of a long message, in bytes per second.
     pub bandwidth_bytes_per_s: f64,
-    /// Whether a ping-pong measured them; otherwise they were given.
+    /// Whether a ping-pong measured them; otherwise the user gave them.
     pub measured: bool,
 }
 
-/// How ranks of a run talked to each other.
+/// How the ranks of a run communicate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Comm {
@@ -93,7 +93,7 @@ pub enum Comm {
     Solo,
     /// Ranks started by a launcher.
     Mpi,
-    /// Ranks in one process, one at a time: CPU times are clean, wall times mean nothing.
+    /// Ranks in one process, of which one runs at a time: CPU times are undisturbed, wall times are meaningless.
     Sim,
 }
 
@@ -102,17 +102,17 @@ pub enum Comm {
 pub struct Spread {
     /// Over all ranks.
     pub sum: f64,
-    /// Of the rank that has most.
+    /// Maximum over the ranks.
     pub max: f64,
-    /// That rank.
+    /// The rank with the maximum.
     pub at: usize,
-    /// Rank by rank, where that is kept.
+    /// Values rank by rank, if they are stored.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub by_rank: Vec<f64>,
 }
 
 impl Spread {
-    /// Of the values of ranks 0, 1, ... To six digits behind the point: a microsecond where it is time.
+    /// The spread of the values of ranks 0, 1, ..., rounded to six decimals: a microsecond for times.
     pub fn of(values: &[f64]) -> Self {
         let round = |v: f64| (v * 1e6).round() / 1e6;
         let at = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
@@ -130,7 +130,7 @@ impl Spread {
         Self { by_rank: Vec::new(), ..Self::of(values) }
     }
 
-    /// Greatest over mean: 1 where all ranks have the same, and where none has anything.
+    /// Maximum over mean: 1 if all values are equal, also if all are 0.
     pub fn lambda(&self, ranks: usize) -> f64 {
         if self.sum > 0.0 { self.max * ranks as f64 / self.sum } else { 1.0 }
     }
@@ -143,9 +143,9 @@ pub struct Phase {
     pub name: String,
     /// CPU time outside calls to other ranks, in seconds.
     pub useful_s: Spread,
-    /// Wall time, in seconds; meaningless where ranks take turns.
+    /// Wall time, in seconds; meaningless for simulated ranks.
     pub wall_s: Spread,
-    /// Wall time in calls to other ranks, waiting included, in seconds; as meaningless.
+    /// Wall time in calls to other ranks, including waiting, in seconds; meaningless for simulated ranks.
     pub comm_s: Spread,
     /// Messages sent.
     pub messages: Spread,
@@ -153,14 +153,14 @@ pub struct Phase {
     pub message_bytes: Spread,
 }
 
-/// What was run.
+/// A run's parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
-    /// Which experiment it belongs to: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
+    /// The experiment: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
     pub experiment: String,
     /// The program.
     pub engine: String,
-    /// The case that was varied.
+    /// The case from which the run's case was derived.
     pub case: String,
     /// Edge length of the finest cell at the surface.
     pub spacing_min: f64,
@@ -168,24 +168,24 @@ pub struct Setup {
     pub layer_cells_min: u32,
     /// Number of ranks.
     pub ranks: usize,
-    /// How they talked.
+    /// How they communicate.
     pub comm: Comm,
-    /// `metis` or `morton`; empty for a program that has no choice.
+    /// `metis` or `morton`; empty if the choice was left to the program.
     pub partitioner: String,
-    /// `unit`, `area`, `rehearsal` or `rebalance`; empty likewise.
+    /// `unit`, `area`, `rehearsal` or `rebalance`; empty if the choice was left to the program.
     pub weights: String,
 }
 
-/// A run and what it took.
+/// A run and its measurements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// What was run.
+    /// A run's parameters.
     pub setup: Setup,
     /// Repetition, from 0.
     pub repeat: usize,
-    /// Left out of statistics: it fills caches.
+    /// Whether it only fills caches and is left out of statistics.
     pub warm_up: bool,
-    /// More ranks than cores: wall times are those of a crowd.
+    /// Whether there were more ranks than cores, so that wall times are not those of parallel ranks.
     pub oversubscribed: bool,
     /// The command line.
     pub command: String,
@@ -195,11 +195,11 @@ pub struct Run {
     pub cells: u64,
     /// The mesh's digest.
     pub digest: String,
-    /// Wall time by the program's own clock, reading included, starting and ending of processes not.
+    /// Wall time by the program's own clock, including reading but not the start and end of processes.
     pub time_wall_s: f64,
-    /// Wall time as the harness saw it, from the launcher's start to its end.
+    /// Wall time by the harness's clock, from the start of the launcher to its end.
     pub time_launch_s: f64,
-    /// Peak resident memory by rank; of the whole process where ranks are simulated, told by rank 0.
+    /// Peak resident memory per rank, or of the whole process if ranks are simulated.
     pub peak_rss_bytes: Spread,
     /// CPU time outside calls to other ranks, over all phases.
     pub useful_s: Spread,
@@ -207,27 +207,27 @@ pub struct Run {
     pub phases: Vec<Phase>,
     /// The program's counters.
     pub counters: BTreeMap<String, Spread>,
-    /// Who sent how much to whom in exchanges, where that was asked for: sender, receiver, messages and
-    /// bytes of every pair that exchanged anything.
+    /// The message matrix, if it was requested: sender, receiver, messages and bytes of every pair of ranks that
+    /// communicated in sparse all-to-alls.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub message_matrix: Vec<[u64; 4]>,
 }
 
-/// A run that came to nothing.
+/// A run without a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// What was run.
+    /// A run's parameters.
     pub setup: Setup,
     /// The command line.
     pub command: String,
-    /// In a sentence.
+    /// The failure in a sentence.
     pub why: String,
 }
 
 /// A mesh that was written to disk and audited.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audited {
-    /// What was meshed.
+    /// The parameters of the run.
     pub setup: Setup,
     /// The audit's command line.
     pub command: String,
@@ -235,7 +235,7 @@ pub struct Audited {
     pub cells: u64,
     /// Whether every check of the audit holds.
     pub holds: bool,
-    /// Checks that found something.
+    /// Names of the checks with findings.
     pub found: Vec<String>,
     /// CPU time of the audit's process.
     pub time_cpu_s: f64,
@@ -250,44 +250,44 @@ pub struct Audited {
 pub struct Judged {
     /// The row's name.
     pub name: String,
-    /// The runs that it is about, by their names in the file of targets.
+    /// Its runs, by their names in the file of targets.
     pub runs: Vec<String>,
-    /// The run that they are held against, where the measure has one.
+    /// The run with which they are compared, if the measure has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub against: Option<String>,
-    /// What is measured.
+    /// The measure.
     pub measure: String,
-    /// Least value wanted.
+    /// Lower bound.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_least: Option<f64>,
-    /// Greatest value wanted.
+    /// Upper bound.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_most: Option<f64>,
-    /// What was measured; nothing where the row was left out.
+    /// The measured value; `None` if the row was left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured: Option<f64>,
-    /// `measured`, `oversubscribed`, `projected` or `audited`; empty where the row was left out.
+    /// `measured`, `oversubscribed`, `projected` or `audited`; empty if the row was left out.
     pub how: String,
-    /// What came of it.
+    /// The verdict.
     pub verdict: Verdict,
     /// Why it was left out or failed.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
 }
 
-/// What came of a row.
+/// The verdict on a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Within its bounds.
     Met,
-    /// Measured and not within them.
+    /// Outside its bounds.
     Missed,
-    /// It has no bounds: it is there for comparison.
+    /// It has no bounds and serves for comparison.
     Told,
-    /// It was to be measured, and a run failed.
+    /// A run failed.
     Failed,
-    /// It was not measured, by the user's wish or for want of something.
+    /// It was not measured, because the user excluded it or a prerequisite is missing.
     LeftOut,
 }
 
@@ -296,7 +296,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_keeps_ranks_up_to_a_number() {
+    fn a_spread_stores_single_ranks_up_to_a_limit() {
         let few = Spread::of(&[1.0, 3.0, 2.0]);
         assert_eq!((few.sum, few.max, few.at, few.by_rank.len()), (6.0, 3.0, 1, 3));
         assert_eq!(few.lambda(3), 1.5);
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_say_their_kind_and_survive_the_journey() {
+    fn a_line_has_its_kind_and_is_read_back_unchanged() {
         let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
         let line = Line {
             schema: SCHEMA.into(),

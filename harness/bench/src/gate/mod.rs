@@ -101,8 +101,8 @@ pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError>
         candidate: candidate.engine.clone(),
         place: place.path(),
     };
-    let mut report = Report::new(baseline.told(), candidate.told.clone());
-    report.candidate_measures = Measures::of_program(candidate.told);
+    let mut report = Report::new(baseline.measured(), candidate.measured.clone());
+    report.candidate_measures = Measures::of_program(candidate.measured);
     run_layers(&bench, &baseline, &mut report)?;
     report.interrupted = interrupt::requested();
     report.time_s = start.elapsed().as_secs_f64();

@@ -24,7 +24,7 @@ pub struct Subject {
     /// How it is run.
     pub engine: Engine,
     /// Its name in the report.
-    pub told: Measured,
+    pub measured: Measured,
 }
 
 /// What the candidate is compared with.
@@ -56,19 +56,19 @@ impl Baseline {
             if start.first() == Some(&b'{') {
                 let measures = Measures::parse(&start)
                     .map_err(|why| GateError::Input(format!("{named}: {why}")))?;
-                let told =
+                let measured =
                     Measured { named: named.clone(), revision: measures.of.revision.clone() };
-                return Ok(Self::Record(told, measures));
+                return Ok(Self::Record(measured, measures));
             }
         }
         Ok(Self::Program(Box::new(Subject::find(named, options, engine, programs)?)))
     }
 
     /// Its name in the report.
-    pub fn told(&self) -> Option<Measured> {
+    pub fn measured(&self) -> Option<Measured> {
         match self {
-            Self::Program(subject) => Some(subject.told.clone()),
-            Self::Record(told, _) => Some(told.clone()),
+            Self::Program(subject) => Some(subject.measured.clone()),
+            Self::Record(measured, _) => Some(measured.clone()),
             Self::None => None,
         }
     }
@@ -87,7 +87,7 @@ impl Subject {
         programs: &Programs,
     ) -> Result<Self, GateError> {
         let built =
-            matches!(baseline, Baseline::Program(subject) if subject.told.revision.is_some());
+            matches!(baseline, Baseline::Program(subject) if subject.measured.revision.is_some());
         let named = options.candidate.clone();
         match named.or(built.then(|| ".".to_owned())) {
             Some(named) => Self::find(&named, options, engine, programs),
@@ -100,8 +100,8 @@ impl Subject {
                     )));
                 }
                 let revision = revision_of("HEAD", &programs.paths.root).ok();
-                let told = Measured { named: program.to_string_lossy().into_owned(), revision };
-                Ok(Self { engine: engine.clone(), told })
+                let measured = Measured { named: program.to_string_lossy().into_owned(), revision };
+                Ok(Self { engine: engine.clone(), measured })
             }
         }
     }
@@ -115,8 +115,8 @@ impl Subject {
         if Path::new(named).is_file() {
             let program =
                 fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
-            let told = Measured { named: named.to_owned(), revision: None };
-            return Ok(Self { engine: engine.with_program(program), told });
+            let measured = Measured { named: named.to_owned(), revision: None };
+            return Ok(Self { engine: engine.with_program(program), measured });
         }
         let name = &engine.description().name;
         let build = engine.description().build.as_ref().ok_or_else(|| {
@@ -128,25 +128,32 @@ impl Subject {
         let revision = revision_of(head, &programs.paths.root).map_err(|why| {
             GateError::Input(format!("{named} is neither a file nor a revision: {why}"))
         })?;
+        let root = &programs.paths.root;
         let program = match named {
-            "." => make(build, &programs.paths.root, "working-tree", options, false)?,
-            _ => {
-                let tree = options.cache.join("trees").join(&revision);
-                let kept = options.cache.join("programs").join(&revision).join("program");
-                match kept.is_file() {
-                    true => kept,
-                    false => {
-                        unpack(&revision, &programs.paths.root, &tree)?;
-                        let made = make(build, &tree, &revision, options, true);
-                        let _ = fs::remove_dir_all(&tree);
-                        made?
-                    }
-                }
-            }
+            "." => make(build, root, "working-tree", options, false)?,
+            _ => built(build, &revision, root, options)?,
         };
-        let told = Measured { named: named.to_owned(), revision: Some(revision) };
-        Ok(Self { engine: engine.with_program(program), told })
+        let measured = Measured { named: named.to_owned(), revision: Some(revision) };
+        Ok(Self { engine: engine.with_program(program), measured })
     }
+}
+
+/// The program of a revision, built unless an earlier gate has kept it.
+fn built(
+    build: &Build,
+    revision: &str,
+    repository: &Path,
+    options: &Options,
+) -> Result<PathBuf, GateError> {
+    let kept = options.cache.join("programs").join(revision).join("program");
+    if kept.is_file() {
+        return Ok(kept);
+    }
+    let tree = options.cache.join("trees").join(revision);
+    unpack(revision, repository, &tree)?;
+    let made = make(build, &tree, revision, options, true);
+    let _ = fs::remove_dir_all(&tree);
+    made
 }
 
 /// The full name of a revision.
@@ -177,8 +184,8 @@ fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateErro
     for mut command in [git, tar] {
         let output = command.output().map_err(wrong)?;
         if !output.status.success() {
-            let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            return Err(GateError::Input(format!("{revision} cannot be unpacked: {said}")));
+            let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+            return Err(GateError::Input(format!("{revision} cannot be unpacked: {error}")));
         }
     }
     fs::remove_file(&archive).map_err(wrong)

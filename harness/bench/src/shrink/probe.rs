@@ -36,12 +36,12 @@ pub struct Failure {
     /// The kind.
     pub kind: Kind,
     /// The failure in a sentence.
-    pub told: String,
+    pub sentence: String,
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&self.told)
+        f.write_str(&self.sentence)
     }
 }
 
@@ -96,18 +96,19 @@ impl Probe {
                     End::TimedOut { .. } => Kind::Hangs,
                     End::Exited { .. } | End::Signalled(_) | End::Unusable(_) => Kind::Fails,
                 };
-                return Ok(Some(Failure { kind, told: format!("{}: {failure}", trial.ranks) }));
+                let sentence = format!("{}: {failure}", trial.ranks);
+                return Ok(Some(Failure { kind, sentence }));
             }
         };
         let mesh = |report: &RunReport| format!("{} cells, digest {}", report.cells, report.digest);
-        let told = format!(
+        let sentence = format!(
             "{}: {}; {}: {}",
             trial.ranks,
             mesh(&report),
             self.truth_name(),
             mesh(&expected)
         );
-        Ok(Some(Failure { kind: Kind::Differs, told }))
+        Ok(Some(Failure { kind: Kind::Differs, sentence }))
     }
 
     /// Both meshes of a trial, for `harness diff`: that of the engine, and the expected one.
