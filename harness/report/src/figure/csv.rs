@@ -55,7 +55,7 @@ pub fn csv(figure: &Figure) -> String {
 /// If a row has not as many fields as the head.
 pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
-    let mut write = || -> Result<(), ::csv::Error> {
+    let write = || -> Result<(), ::csv::Error> {
         writer.write_record(columns)?;
         rows.into_iter().try_for_each(|row| writer.write_record(row))
     };
