@@ -53,8 +53,7 @@ pub fn cells_label(cells: u64) -> String {
 
 /// The groups of one provenance, by ranks.
 fn with_provenance<'a>(all: &[&'a Group], wanted: Provenance) -> Vec<&'a Group> {
-    let mut found: Vec<&Group> =
-        all.iter().copied().filter(|g| provenance(g) == wanted).collect();
+    let mut found: Vec<&Group> = all.iter().copied().filter(|g| provenance(g) == wanted).collect();
     found.sort_by_key(|g| g.setup.ranks);
     found
 }
@@ -178,8 +177,11 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
         "weak" => format!("{} cells per rank", grouped(last.cells() / last.setup.ranks as u64)),
         _ => format!("{} cells", grouped(last.cells())),
     };
-    let suffix =
-        if experiment == "weak" { String::new() } else { format!("-{}", cells_label(last.cells())) };
+    let suffix = if experiment == "weak" {
+        String::new()
+    } else {
+        format!("-{}", cells_label(last.cells()))
+    };
     Some(Figure {
         id: format!("efficiency-{experiment}-{case}{suffix}"),
         title: format!("Efficiency in {experiment} scaling: {case}, {size}"),
