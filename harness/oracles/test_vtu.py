@@ -38,8 +38,11 @@ class VtuTest(unittest.TestCase):
             at = pathlib.Path(directory)
             case = (ROOT / "geometries/cube-small.toml").read_text()
             (at / "case.toml").write_text(f'keep = "{keep}"\n' + case)
-            subprocess.run([PROGRAMS / "reference", at / "case.toml", "--out", at / "mesh"], check=True)
-            subprocess.run([PROGRAMS / "harness", "export", at / "mesh", at / "mesh.vtu"], check=True)
+            for program, *arguments in [
+                ("reference", at / "case.toml", "--out", at / "mesh"),
+                ("harness", "export", at / "mesh", at / "mesh.vtu"),
+            ]:
+                subprocess.run([PROGRAMS / program, *arguments], check=True, capture_output=True)
             words = np.concatenate([np.load(path) for path in sorted((at / "mesh").glob("leaves-*.npy"))])
             return words, json.loads((at / "mesh/mesh.json").read_text())["root"], pyvista.read(at / "mesh.vtu")
 

@@ -57,6 +57,8 @@ pub fn png(order: usize, layer: &Layer) -> Vec<u8> {
     encoder.set_color(png::ColorType::Indexed);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_palette(palette);
+    encoder.set_compression(png::Compression::Best);
+    encoder.set_filter(png::FilterType::Up);
     let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&image));
     written.expect("memory accepts an image of the stated size");
     bytes
