@@ -112,7 +112,7 @@ fn frame(canvas: &mut Canvas, figure: &Figure, entries: &[(&str, Symbol)]) -> Fr
     let (left, right) = (190.0, f64::from(WIDTH) - 40.0);
     let (mut x, mut y) = (left, 36.0);
     for (name, symbol) in entries {
-        let entry = SYMBOL + width(name) + 40.0;
+        let entry = SYMBOL + width(name) + 60.0;
         if x > left && x + entry > right {
             (x, y) = (left, y + SIZE + 14.0);
         }
