@@ -109,7 +109,7 @@ const SYMBOL: f64 = 80.0;
 
 /// Draws the legend above the data, in as many rows as it needs, and returns the rectangle that is left for the data.
 fn frame(canvas: &mut Canvas, figure: &Figure, entries: &[(&str, Symbol)]) -> Frame {
-    let (left, right) = (190.0, f64::from(WIDTH) - 40.0);
+    let (left, right) = (230.0, f64::from(WIDTH) - 40.0);
     let (mut x, mut y) = (left, 36.0);
     for (name, symbol) in entries {
         let entry = SYMBOL + width(name) + 60.0;
@@ -171,7 +171,7 @@ fn axes(canvas: &mut Canvas, frame: &Frame, x: (&Axis, &Scale), y: (&Axis, &Scal
     canvas.frame((frame.left, frame.top), (frame.right, frame.bottom));
     let middle = ((frame.left + frame.right) / 2.0, (frame.top + frame.bottom) / 2.0);
     canvas.text(&x.0.label, (middle.0, frame.bottom + frame.below + 82.0), Anchor::Below);
-    canvas.text(&y.0.label, (62.0, middle.1), Anchor::Turned);
+    canvas.text(&y.0.label, (50.0, middle.1), Anchor::Turned);
 }
 
 fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
