@@ -47,7 +47,8 @@ pub fn markdown(report: &Report) -> String {
         }));
     }
     let align = |column: usize| if (4..7).contains(&column) { "---:" } else { "---" };
-    let head = format!("## harness gate\n\n{}: **{}**\n\n", escaped(&heading(report)), verdict(report));
+    let head =
+        format!("## harness gate\n\n{}: **{}**\n\n", escaped(&heading(report)), verdict(report));
     head + &table(&COLUMNS, align, rows)
 }
 

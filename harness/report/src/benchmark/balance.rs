@@ -18,8 +18,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
         for ranks in SHOWN {
             let sims = all.iter().filter(|g| g.setup.ranks == ranks && g.setup.comm == Comm::Sim);
             // Of several meshes, the one whose size is nearest to the paper's.
-            let distance =
-                |g: &&&Group| (g.cells() as f64 / paper::CELLS_OF_BALANCE).ln().abs();
+            let distance = |g: &&&Group| (g.cells() as f64 / paper::CELLS_OF_BALANCE).ln().abs();
             let nearest = sims.min_by(|a, b| distance(a).total_cmp(&distance(b)));
             out.extend(nearest.and_then(|g| per_rank(case, g)));
         }

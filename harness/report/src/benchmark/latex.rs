@@ -41,12 +41,13 @@ pub fn commands(lines: &[Line]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for line in lines {
         if let What::Session(s) = &line.what {
-            let word = |w: &String| {
-                let name = w.rsplit('/').next().unwrap_or(w);
-                let shown = if w.starts_with('/') { name } else { w };
-                if shown.contains([' ', '{']) { format!("'{shown}'") } else { shown.to_owned() }
+            let without_directory = |w: &'_ String| match w.starts_with('/') {
+                true => w.rsplit('/').next().unwrap_or(w).to_owned(),
+                false => w.clone(),
             };
-            let command = s.command.iter().map(word).collect::<Vec<_>>().join(" ");
+            let words: Vec<String> = s.command.iter().map(without_directory).collect();
+            let command = shlex::try_join(words.iter().map(String::as_str))
+                .expect("an argument of a process has no zero bytes");
             if !out.contains(&command) {
                 out.push(command);
             }

@@ -53,8 +53,7 @@ pub fn cells_label(cells: u64) -> String {
 
 /// The groups of one provenance, by ranks.
 fn with_provenance<'a>(all: &[&'a Group], wanted: Provenance) -> Vec<&'a Group> {
-    let mut found: Vec<&Group> =
-        all.iter().copied().filter(|g| provenance(g) == wanted).collect();
+    let mut found: Vec<&Group> = all.iter().copied().filter(|g| provenance(g) == wanted).collect();
     found.sort_by_key(|g| g.setup.ranks);
     found
 }
@@ -93,7 +92,7 @@ fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
     if is_of_the_papers_size {
         series.push(cited("the paper, 50 M cells", paper::speedups()));
     }
-    let bases: Vec<String> = base_cases(groups, mesh);
+    let base_case = base_cases(groups, mesh);
     Figure {
         id: format!("speedup-{case}-{}", cells_label(cells)),
         title: format!("Speedup: {case}, {} cells", grouped(cells)),
@@ -103,7 +102,7 @@ fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
              cores.{} Lines join powers of two.",
             grouped(cells),
             mesh[0].setup.layer_cells_min,
-            bases.join("; "),
+            base_case,
             repetitions(mesh),
             groups.network.latency_s * 1e6,
             groups.network.bandwidth_bytes_per_s / 1e9,
@@ -118,7 +117,7 @@ fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
         body: Body::points(series),
         height: svg::HEIGHT,
         claims: Claims {
-            base_case: Some(bases.join("; ")),
+            base_case: Some(base_case.clone()),
             shows_ratios: true,
             shows_scaling: true,
             ..Claims::default()
@@ -126,22 +125,23 @@ fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
     }
 }
 
-/// The base cases of the speedups with their run times.
-fn base_cases(groups: &Groups, mesh: &[&Group]) -> Vec<String> {
+/// The base cases of a mesh's efficiencies with their run times, without repetitions.
+fn base_cases(groups: &Groups, mesh: &[&Group]) -> String {
     let mut out: Vec<String> = Vec::new();
     for group in mesh {
         let base = groups.reference(group);
+        let s = if base.setup.ranks == 1 { "" } else { "s" };
         let how = match base.setup.comm {
-            Comm::Solo => "serial",
-            Comm::Mpi => "1 rank on MPI",
-            Comm::Sim => "1 simulated rank",
+            Comm::Solo => "serial".to_owned(),
+            Comm::Mpi => format!("{} rank{s} on MPI", base.setup.ranks),
+            Comm::Sim => format!("{} simulated rank{s}", base.setup.ranks),
         };
         let text = format!("{how}, {:.3} s", base.time_s.value);
         if !out.contains(&text) {
             out.push(text);
         }
     }
-    out
+    out.join("; ")
 }
 
 /// One factor of an efficiency.
@@ -172,23 +172,23 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
     // In weak scaling, computation scaling exceeds 1: the fixed costs per cell fall as the mesh grows.
     let efficiency_max = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
     let last = simulated.last()?;
-    let base = groups.reference(last);
+    let base_case = base_cases(groups, &[last]);
     let size = match experiment {
         "weak" => format!("{} cells per rank", grouped(last.cells() / last.setup.ranks as u64)),
         _ => format!("{} cells", grouped(last.cells())),
     };
-    let suffix =
-        if experiment == "weak" { String::new() } else { format!("-{}", cells_label(last.cells())) };
+    let suffix = if experiment == "weak" {
+        String::new()
+    } else {
+        format!("-{}", cells_label(last.cells()))
+    };
     Some(Figure {
         id: format!("efficiency-{experiment}-{case}{suffix}"),
         title: format!("Efficiency in {experiment} scaling: {case}, {size}"),
         caption: format!(
-            "Efficiencies by the POP definitions in {experiment} scaling of {case}, {size}, n = {}. The base case is {} {}, {:.3} s. \
-             {}, projected from simulated ranks. Lines join powers of two.",
+            "Efficiencies by the POP definitions in {experiment} scaling of {case}, {size}, n = {}. The base case is {base_case}. {}, \
+             projected from simulated ranks. Lines join powers of two.",
             last.setup.layer_cells_min,
-            base.setup.ranks,
-            if base.setup.ranks == 1 { "simulated rank" } else { "simulated ranks" },
-            base.time_s.value,
             last.ranks_told()
         ),
         x: ranks_axis(&simulated),
@@ -196,7 +196,7 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
         body: Body::points(series),
         height: svg::HEIGHT,
         claims: Claims {
-            base_case: Some(format!("1 simulated rank, {:.3} s", base.time_s.value)),
+            base_case: Some(base_case.clone()),
             shows_ratios: true,
             shows_scaling: true,
             ..Claims::default()

@@ -123,14 +123,7 @@ pub struct Series {
 impl Series {
     /// A joined series without notes.
     pub fn new(name: &str, provenance: Provenance, style: usize, points: Vec<Point>) -> Self {
-        Self {
-            name: name.to_owned(),
-            provenance,
-            joined: true,
-            points,
-            notes: Vec::new(),
-            style,
-        }
+        Self { name: name.to_owned(), provenance, joined: true, points, notes: Vec::new(), style }
     }
 
     /// The same series without lines between its points.
@@ -280,10 +273,8 @@ pub(crate) mod samples {
     }
 
     pub(crate) fn heat_map() -> Figure {
-        let layer = Layer {
-            label: "bytes".into(),
-            entries: vec![(0, 1, 10.0), (0, 2, 11.0), (2, 0, 1e6)],
-        };
+        let layer =
+            Layer { label: "bytes".into(), entries: vec![(0, 1, 10.0), (0, 2, 11.0), (2, 0, 1e6)] };
         let map = HeatMap { order: 3, layers: vec![layer], command: "mesher a,b".into() };
         Figure {
             id: "messages".into(),

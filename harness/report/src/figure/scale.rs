@@ -144,7 +144,10 @@ mod tests {
     fn axes_of_less_than_a_decade_have_three_ticks() {
         assert_eq!(Scale::of(&Axis::log(""), [10.0, 60.0]).ticks, [10.0, 20.0, 50.0]);
         let narrow = Scale::of(&Axis::log(""), [0.15, 0.42]).ticks;
-        assert_eq!(narrow.iter().map(|t| tick_label(*t)).collect::<Vec<_>>(), ["0.2", "0.3", "0.4"]);
+        assert_eq!(
+            narrow.iter().map(|t| tick_label(*t)).collect::<Vec<_>>(),
+            ["0.2", "0.3", "0.4"]
+        );
         assert!(Scale::of(&Axis::log(""), [9.0, 10.0]).ticks.len() > 2);
     }
 
@@ -165,7 +168,8 @@ mod tests {
     #[test]
     fn tick_labels_are_short() {
         let numbers = [0.0, 1.0, 0.05, 2.5, 1024.0, 1e6, 5e7, 1e-6, 0.001, 1.15, 0.1 + 0.2];
-        let labels = ["0", "1", "0.05", "2.5", "1024", "10⁶", "5·10⁷", "10⁻⁶", "0.001", "1.15", "0.3"];
+        let labels =
+            ["0", "1", "0.05", "2.5", "1024", "10⁶", "5·10⁷", "10⁻⁶", "0.001", "1.15", "0.3"];
         assert_eq!(numbers.map(tick_label), labels);
     }
 }

@@ -109,10 +109,10 @@ const SYMBOL: f64 = 80.0;
 
 /// Draws the legend above the data, in as many rows as it needs, and returns the rectangle that is left for the data.
 fn frame(canvas: &mut Canvas, figure: &Figure, entries: &[(&str, Symbol)]) -> Frame {
-    let (left, right) = (190.0, f64::from(WIDTH) - 40.0);
+    let (left, right) = (230.0, f64::from(WIDTH) - 40.0);
     let (mut x, mut y) = (left, 36.0);
     for (name, symbol) in entries {
-        let entry = SYMBOL + width(name) + 40.0;
+        let entry = SYMBOL + width(name) + 60.0;
         if x > left && x + entry > right {
             (x, y) = (left, y + SIZE + 14.0);
         }
@@ -171,7 +171,7 @@ fn axes(canvas: &mut Canvas, frame: &Frame, x: (&Axis, &Scale), y: (&Axis, &Scal
     canvas.frame((frame.left, frame.top), (frame.right, frame.bottom));
     let middle = ((frame.left + frame.right) / 2.0, (frame.top + frame.bottom) / 2.0);
     canvas.text(&x.0.label, (middle.0, frame.bottom + frame.below + 82.0), Anchor::Below);
-    canvas.text(&y.0.label, (62.0, middle.1), Anchor::Turned);
+    canvas.text(&y.0.label, (50.0, middle.1), Anchor::Turned);
 }
 
 fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
@@ -189,8 +189,7 @@ fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
     frame.below = labels.iter().map(Vec::len).max().unwrap_or(1).saturating_sub(1) as f64 * LINE;
     frame.bottom -= frame.below;
     let total = |i: usize| bars.segments.iter().map(|s| s.1[i]).sum::<f64>();
-    let y =
-        Scale::of(&figure.y, (0..count).map(total).chain(bars.references.iter().map(|r| r.1)));
+    let y = Scale::of(&figure.y, (0..count).map(total).chain(bars.references.iter().map(|r| r.1)));
     let categories = Scale::of(&figure.x, []).without_ticks();
     axes(canvas, &frame, (&figure.x, &categories), (&figure.y, &y));
     let gap = if count > 20 { 0.1 } else { 0.2 };
@@ -199,8 +198,7 @@ fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
         let right = frame.left + step * (i as f64 + 1.0 - gap);
         let mut sum = 0.0;
         for (style, (_, values)) in bars.segments.iter().enumerate() {
-            let (top, bottom) =
-                (frame.y(y.position(sum + values[i])), frame.y(y.position(sum)));
+            let (top, bottom) = (frame.y(y.position(sum + values[i])), frame.y(y.position(sum)));
             if bottom > top {
                 canvas.bar((left, top), (right, bottom), style);
             }
@@ -246,7 +244,8 @@ mod tests {
             svg.lines().filter(|l| l.starts_with("<circle") && l.contains(kind)).count()
         };
         // Three points and the legend.
-        let counts = |provenance| (circles(provenance, "fill=\"#"), circles(provenance, "fill=\"none\""));
+        let counts =
+            |provenance| (circles(provenance, "fill=\"#"), circles(provenance, "fill=\"none\""));
         assert_eq!(counts(Provenance::Measured), (4, 0));
         assert_eq!(counts(Provenance::Projected), (0, 4));
     }
@@ -257,14 +256,21 @@ mod tests {
         noted.name = "a < b".into();
         noted.notes = vec!["first & <best>".into()];
         let svg = svg(&figure(Body::points(vec![noted])));
-        assert!(svg.contains("a &lt; b") && svg.contains("<title>first &amp; &lt;best&gt;</title>"));
-        assert!(svg.contains("viewBox=\"0 0 1600 1040\"") && svg.contains("aria-label=\"Speedup\""));
+        assert!(
+            svg.contains("a &lt; b") && svg.contains("<title>first &amp; &lt;best&gt;</title>")
+        );
+        assert!(
+            svg.contains("viewBox=\"0 0 1600 1040\"") && svg.contains("aria-label=\"Speedup\"")
+        );
     }
 
     #[test]
     fn marks_of_one_name_share_an_entry_of_the_legend() {
         let mark = |x| Mark { name: "increase".into(), x, style: 1 };
-        let body = Body::Points { series: vec![series(Provenance::Measured)], marks: vec![mark(1.5), mark(3.0)] };
+        let body = Body::Points {
+            series: vec![series(Provenance::Measured)],
+            marks: vec![mark(1.5), mark(3.0)],
+        };
         let svg = svg(&figure(body));
         assert_eq!(svg.matches("increase").count(), 1);
         assert_eq!(svg.matches("stroke=\"#D55E00\"").count(), 3);

@@ -51,7 +51,13 @@ fn begin(out: &mut String, options: &[String]) {
     let _ = writeln!(out, "\\begin{{axis}}[\n  {}\n]", options.join(",\n  "));
 }
 
-fn points(out: &mut String, mut options: Vec<String>, figure: &Figure, series: &[Series], marks: &[Mark]) {
+fn points(
+    out: &mut String,
+    mut options: Vec<String>,
+    figure: &Figure,
+    series: &[Series],
+    marks: &[Mark],
+) {
     let all = || series.iter().flat_map(|s| &s.points);
     options.extend(axis_options("x", &figure.x, all().map(|p| p.x)));
     options.extend(axis_options("y", &figure.y, all().flat_map(|p| [p.y, p.low, p.high])));
@@ -59,7 +65,10 @@ fn points(out: &mut String, mut options: Vec<String>, figure: &Figure, series: &
     series.iter().for_each(|s| plot(out, s));
     for mark in marks {
         let (style, x) = (mark.style % COLOURS.len(), mark.x);
-        let _ = writeln!(out, "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});");
+        let _ = writeln!(
+            out,
+            "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});"
+        );
     }
     out.push_str("\\end{axis}\n");
 }
@@ -91,7 +100,9 @@ fn axis_options(name: &str, axis: &Axis, values: impl Iterator<Item = f64>) -> V
 fn number(value: f64) -> String {
     match Number::of(value) {
         Number::Decimal(text) => text,
-        Number::Scientific(mantissa, exponent) if mantissa.is_empty() => format!("$10^{{{exponent}}}$"),
+        Number::Scientific(mantissa, exponent) if mantissa.is_empty() => {
+            format!("$10^{{{exponent}}}$")
+        }
         Number::Scientific(mantissa, exponent) => format!("${mantissa}\\cdot10^{{{exponent}}}$"),
     }
 }
@@ -114,7 +125,9 @@ fn plot(out: &mut String, s: &Series) {
     for p in &s.points {
         let _ = match s.provenance {
             Provenance::Bound => writeln!(out, "  ({},{})", p.x, p.y),
-            _ => writeln!(out, "  ({},{}) += (0,{}) -= (0,{})", p.x, p.y, p.high - p.y, p.y - p.low),
+            _ => {
+                writeln!(out, "  ({},{}) += (0,{}) -= (0,{})", p.x, p.y, p.high - p.y, p.y - p.low)
+            }
         };
     }
     let _ = writeln!(out, "}};\n\\addlegendentry{{{}}}", escape(&s.name));
@@ -262,8 +275,15 @@ mod tests {
     #[test]
     fn numbers_of_axes_are_short() {
         let all = [0.3, 200.0, 0.01, 1e-4, 5e6, 1e9, 2.5e-4].map(number);
-        let expected =
-            ["0.3", "200", "0.01", "$10^{-4}$", "$5\\cdot10^{6}$", "$10^{9}$", "$2.5\\cdot10^{-4}$"];
+        let expected = [
+            "0.3",
+            "200",
+            "0.01",
+            "$10^{-4}$",
+            "$5\\cdot10^{6}$",
+            "$10^{9}$",
+            "$2.5\\cdot10^{-4}$",
+        ];
         assert_eq!(all, expected);
     }
 

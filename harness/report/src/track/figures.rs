@@ -101,8 +101,12 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
         Mark { name: name.to_owned(), x, style }
     };
     let values = series.points.iter().map(|p| p.1);
-    let range = range(values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max));
-    let plotted = Plotted::new(case_and_metric(series).1, Provenance::Measured, 0, points.collect());
+    let range = range(
+        values.clone().fold(f64::INFINITY, f64::min),
+        values.fold(f64::NEG_INFINITY, f64::max),
+    );
+    let plotted =
+        Plotted::new(case_and_metric(series).1, Provenance::Measured, 0, points.collect());
     let notes = series.points.iter().map(note).collect();
     Figure {
         id: format!("metric-{}", series.name.replace(['/', ' '], "-")),

@@ -13,7 +13,8 @@ use std::cmp::Reverse;
 pub fn page(records: &[Record], all: &[Series]) -> String {
     let (changed, constant): (Vec<&Series>, Vec<&Series>) =
         all.iter().partition(|series| !series.changes.is_empty());
-    let sections = [("Metrics with change points", changed), ("Metrics without change points", constant)];
+    let sections =
+        [("Metrics with change points", changed), ("Metrics without change points", constant)];
     let content = html! {
         p { (span(records)) }
         (changes(records, all))
@@ -69,7 +70,8 @@ fn changes(records: &[Record], all: &[Series]) -> Markup {
             html! { (records[first_new(both)].subject) },
         ]
     };
-    let columns = ["metric", "median before", "median after", "change", "commits", "first commit after"];
+    let columns =
+        ["metric", "median before", "median after", "change", "commits", "first commit after"];
     let rows: Vec<Vec<Markup>> = found.iter().map(row).collect();
     html! { h2 { "Change points" } (table(None, &columns, &rows)) }
 }

@@ -24,7 +24,8 @@ pub fn findings(f: &Figure) -> Vec<Finding> {
         check(11, bound, "an ideal line is drawn", "no ideal line is drawn");
     }
     if let Body::HeatMap(_) = f.body {
-        let stated = ["ranks", "simulated", "ollective calls"].iter().all(|w| f.caption.contains(w));
+        let stated =
+            ["ranks", "simulated", "ollective calls"].iter().all(|w| f.caption.contains(w));
         check(
             9,
             stated,
@@ -63,7 +64,11 @@ fn intervals(f: &Figure) -> (bool, String) {
     }
     let stated = f.caption.contains("median");
     if let Body::Bars(_) = f.body {
-        return (stated, "bars are of medians per rank or of the run of median time; they have no intervals".to_owned());
+        return (
+            stated,
+            "bars are of medians per rank or of the run of median time; they have no intervals"
+                .to_owned(),
+        );
     }
     let is_ours = |p: Provenance| !matches!(p, Provenance::Cited | Provenance::Bound);
     let points: Vec<_> = f.points().into_iter().filter(|(p, _)| is_ours(*p)).map(|p| p.1).collect();

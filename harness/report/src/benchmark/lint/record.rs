@@ -53,10 +53,8 @@ fn setup(lines: &[Line]) -> Vec<Finding> {
 /// Rule 2: no run is missing without a reason.
 fn completeness(lines: &[Line]) -> Finding {
     let failures = lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
-    let oversubscribed =
-        lines.iter().any(|l| matches!(&l.what, What::Run(r) if r.oversubscribed));
-    let suffix =
-        if oversubscribed { "; runs with more ranks than cores are marked" } else { "" };
+    let oversubscribed = lines.iter().any(|l| matches!(&l.what, What::Run(r) if r.oversubscribed));
+    let suffix = if oversubscribed { "; runs with more ranks than cores are marked" } else { "" };
     match failures {
         0 => {
             let why = format!("the record has every run that was started, on all cores{suffix}");
