@@ -10,6 +10,7 @@ pub mod experiments;
 pub mod gate;
 pub mod selftest;
 pub mod shrink;
+pub mod statistics;
 pub mod targets;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

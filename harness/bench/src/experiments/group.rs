@@ -3,7 +3,7 @@
 use super::entry::{Comm, Line, Network, Phase, Run, Setup, Spread, What};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
-use super::stats::{Median, median};
+use crate::statistics::{Median, median};
 
 /// The repetitions of one run.
 #[derive(Clone, Debug)]

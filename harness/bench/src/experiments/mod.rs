@@ -20,7 +20,6 @@ pub mod pop;
 pub mod record;
 pub mod session;
 pub mod sizing;
-pub mod stats;
 pub mod table;
 pub mod variant;
 

@@ -5,10 +5,10 @@
 //! readers report and pass over; nothing is ever rewritten.
 
 use super::entry::{Line, SCHEMA, What};
+use jiff::Timestamp;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A record opened for appending.
 #[derive(Debug)]
@@ -28,7 +28,7 @@ impl Record {
             std::fs::create_dir_all(directory)?;
         }
         let file = OpenOptions::new().create(true).append(true).read(true).open(path)?;
-        let session = format!("{}-{}", utc(SystemTime::now()), std::process::id());
+        let session = format!("{}-{}", now_utc(), std::process::id());
         Ok(Self { file, path: path.to_owned(), session })
     }
 
@@ -45,7 +45,7 @@ impl Record {
         let line = Line {
             schema: SCHEMA.to_owned(),
             session: self.session.clone(),
-            time_utc: utc(SystemTime::now()),
+            time_utc: now_utc(),
             what,
         };
         let mut text = serde_json::to_vec(&line)?;
@@ -102,26 +102,9 @@ pub fn read(path: &Path) -> io::Result<Content> {
     Ok(content)
 }
 
-/// A time as `2026-01-31T12:00:00Z`.
-fn utc(time: SystemTime) -> String {
-    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let (days, of_day) = (seconds / 86_400, seconds % 86_400);
-    let (year, month, day) = civil(days);
-    let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
-}
-
-/// Year, month and day of a day since 1970, in the Gregorian calendar. Years begin in March here, so that
-/// the leap day comes last (Hinnant, "chrono-Compatible Low-Level Date Algorithms").
-fn civil(days: u64) -> (u64, u64, u64) {
-    let z = days + 719_468;
-    let (era, of_era) = (z / 146_097, z % 146_097);
-    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let march_based = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * march_based + 2) / 5 + 1;
-    let month = if march_based < 10 { march_based + 3 } else { march_based - 9 };
-    (year_of_era + era * 400 + u64::from(month <= 2), month, day)
+/// Returns the current time, as `2026-01-31T12:00:00Z`.
+fn now_utc() -> String {
+    Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
 #[cfg(test)]
@@ -184,13 +167,10 @@ mod tests {
     }
 
     #[test]
-    fn days_are_those_of_the_calendar() {
-        assert_eq!(civil(0), (1970, 1, 1));
-        assert_eq!(civil(11_016), (2000, 2, 29));
-        assert_eq!(civil(20_777), (2026, 11, 20));
-        assert_eq!(
-            utc(UNIX_EPOCH + std::time::Duration::from_secs(86_399)),
-            "1970-01-01T23:59:59Z"
-        );
+    fn times_are_utc_without_fractions_of_a_second() {
+        let now = now_utc();
+        let read: Timestamp = now.parse().unwrap();
+        assert_eq!((read.to_string(), read.subsec_nanosecond()), (now, 0));
+        assert!(read.duration_until(Timestamp::now()).as_secs() < 60);
     }
 }

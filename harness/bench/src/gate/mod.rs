@@ -14,7 +14,6 @@ pub mod instructions;
 pub mod measures;
 pub mod report;
 pub mod rules;
-pub mod stats;
 pub mod subject;
 pub mod time;
 

@@ -2,9 +2,11 @@
 
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
-use super::stats::{Comparison, Random, Round, compare};
 use super::subject::Baseline;
 use super::{Bench, left_out};
+use crate::statistics::comparison::{Comparison, Round, compare};
+use crate::statistics::random::Random;
+use crate::statistics::trimmed_mean;
 use run::engine::interrupt;
 use run::engine::runner::{Engine, NoResult, Ranks, Told};
 use std::path::Path;
@@ -106,7 +108,7 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
     let verdict = verdict(&found, rules);
     let mean = |of: &dyn Fn(&Round) -> f64| {
         let times: Vec<f64> = timed.rounds.iter().map(of).collect();
-        super::stats::middle(&times).exp()
+        trimmed_mean(&times).exp()
     };
     let percent = |ratio: f64| ratio * 100.0;
     let mut note = format!(
@@ -154,7 +156,7 @@ fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
 fn phases(timed: &Timed) -> String {
     let told =
         timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
-            format!("{name} {:+.0} %", super::stats::middle(ratios).exp_m1() * 100.0)
+            format!("{name} {:+.0} %", trimmed_mean(ratios).exp_m1() * 100.0)
         });
     told.collect::<Vec<_>>().join(", ")
 }

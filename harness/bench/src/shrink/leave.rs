@@ -22,7 +22,7 @@ pub struct Repeat {
 impl Repeat {
     /// One line that a shell takes: whether the failure is still there.
     pub fn line(&self, case: &Path, ranks: Ranks) -> String {
-        let mut words =
+        let mut words: Vec<String> =
             vec!["harness".into(), "shrink".into(), case.display().to_string(), "--check".into()];
         words.extend(["--engine".into(), self.engine.clone()]);
         if let Some(program) = &self.program {
@@ -42,11 +42,8 @@ impl Repeat {
                 ]);
             }
         }
-        let quoted = words.iter().map(|word: &String| {
-            let plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c));
-            if plain { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-        });
-        quoted.collect::<Vec<_>>().join(" ")
+        // Arguments of a process contain no NUL, the one character that a shell cannot quote.
+        shlex::try_join(words.iter().map(String::as_str)).expect("no argument contains NUL")
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::experiments::entry::{Audited, Comm, Network, Phase};
 use crate::experiments::group::Group;
 use crate::experiments::pop;
-use crate::experiments::stats::median;
+use crate::statistics::median;
 use crate::experiments::table::grouped;
 use serde::Deserialize;
 use std::fmt;

@@ -5,10 +5,10 @@
 //!
 //! Invariant: the same history and options give the same answer on every machine.
 
-pub mod divisive;
 pub mod history;
 
-use divisive::{Rules, change_points};
+use crate::statistics::change_points::{Rules, change_points};
+use crate::statistics::median_of;
 use history::Record;
 use serde::Serialize;
 
@@ -79,18 +79,11 @@ fn series(name: &str, records: &[Record], rules: &Rules) -> Series {
         let (at, p) = found[i];
         let from = if i == 0 { 0 } else { found[i - 1].0 };
         let until = found.get(i + 1).map_or(values.len(), |next| next.0);
-        let (before, after) = (median(&values[from..at]), median(&values[at..until]));
+        let (before, after) = (median_of(&values[from..at]), median_of(&values[at..until]));
         let percent = (before != 0.0).then(|| (after / before - 1.0) * 100.0);
         Change { at, last_old: commit(at - 1), first_new: commit(at), before, after, percent, p }
     });
     Series { name: name.to_owned(), changes: changes.collect(), points }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let half = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[half] } else { (sorted[half - 1] + sorted[half]) / 2.0 }
 }
 
 /// Change points in words, one to a line.
@@ -142,10 +135,5 @@ mod tests {
         assert!(better.worse_recently(10).is_none());
         let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
         assert!(neutral.worse_recently(10).is_none());
-    }
-
-    #[test]
-    fn medians() {
-        assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
     }
 }

@@ -1,7 +1,7 @@
 //! `harness track`: numbers into the history, change points out.
 
 use super::files::put;
-use bench::track::divisive::Rules;
+use bench::statistics::change_points::Rules;
 use bench::track::history::{self, Record};
 use bench::track::{Series, analyse, told};
 use clap::Args;

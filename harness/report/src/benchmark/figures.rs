@@ -8,7 +8,7 @@ use super::paper;
 use super::scaling;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::stats::Median;
+use bench::statistics::Median;
 
 /// All figures that the runs suffice for.
 pub fn figures(groups: &Groups) -> Vec<Figure> {

@@ -3,7 +3,7 @@
 use super::figure::{How, Point};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::stats::Median;
+use bench::statistics::Median;
 
 /// How a group's times were come by.
 pub fn how(group: &Group) -> How {

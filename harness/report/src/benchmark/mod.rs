@@ -23,7 +23,7 @@ pub mod trend;
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use bench::track::analyse;
-use bench::track::divisive::Rules;
+use bench::statistics::change_points::Rules;
 use bench::track::history::Record;
 use html::Drawn;
 use lint::{Finding, Verdict};

@@ -6,7 +6,7 @@ use super::paper;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::pop::{Efficiency, messages_s};
-use bench::experiments::stats::Median;
+use bench::statistics::Median;
 use bench::experiments::table::grouped;
 
 /// Most phases that a figure tells apart.

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
     use crate::benchmark::lint::{Verdict, lint};
     use bench::track::analyse;
-    use bench::track::divisive::Rules;
+    use bench::statistics::change_points::Rules;
 
     #[test]
     fn what_moved_is_shown_over_its_first_value() {

@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use bench::track::divisive::Rules;
+    use bench::statistics::change_points::Rules;
 
     #[test]
     fn forms_are_those_that_the_tools_document() {

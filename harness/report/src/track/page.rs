@@ -218,7 +218,7 @@ mod tests {
     use super::*;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use bench::track::divisive::Rules;
+    use bench::statistics::change_points::Rules;
 
     #[test]
     fn the_page_stands_alone_and_shows_every_change() {
