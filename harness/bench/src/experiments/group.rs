@@ -43,7 +43,7 @@ impl Group {
     }
 
     /// Where times of single ranks are from, for a caption.
-    pub fn ranks_told(&self) -> String {
+    pub fn rank_times_caption(&self) -> String {
         let n = self.runs.len();
         match self.by_rank {
             true => format!("Times of a rank in a phase are medians of {n} runs"),
@@ -311,7 +311,7 @@ mod tests {
             [free(), line_of(brief.clone()), line_of(run(Comm::Sim, 9, &[("a", &[3.0, 2.0])]))];
         let group = Groups::of(&lines).all.remove(0);
         assert!(!group.by_rank && group.runs.contains(&group.typical));
-        assert!(group.ranks_told().starts_with("Run of median time"));
+        assert!(group.rank_times_caption().starts_with("Run of median time"));
     }
 
     #[test]

@@ -72,7 +72,7 @@ pub struct Study {
 
 /// What the command line may change in the studies of a preset.
 #[derive(Clone, Debug, Default)]
-pub struct Wishes {
+pub struct Overrides {
     /// Cases instead of the preset's.
     pub cases: Vec<String>,
     /// Experiments instead of all.
@@ -104,23 +104,24 @@ pub struct Wishes {
 const MILLION: u64 = 1_000_000;
 
 /// The studies of a preset as the command line changes them.
-pub fn studies(preset: Preset, wishes: &Wishes) -> Vec<Study> {
-    let wanted =
-        |s: &Study| wishes.experiments.is_empty() || wishes.experiments.contains(&s.experiment);
+pub fn studies(preset: Preset, overrides: &Overrides) -> Vec<Study> {
+    let wanted = |s: &Study| {
+        overrides.experiments.is_empty() || overrides.experiments.contains(&s.experiment)
+    };
     let mut of_preset: Vec<Study> = match preset {
         Preset::Small => small(),
         Preset::Full => full(),
     };
     of_preset.retain(wanted);
-    of_preset.retain(|s| !(wishes.no_choice && s.experiment == Experiment::Weights));
-    if !wishes.cases.is_empty() {
-        of_preset = on_cases(of_preset, &wishes.cases);
+    of_preset.retain(|s| !(overrides.no_choice && s.experiment == Experiment::Weights));
+    if !overrides.cases.is_empty() {
+        of_preset = on_cases(of_preset, &overrides.cases);
     }
-    if !wishes.cells.is_empty() {
-        of_preset = with_cells(of_preset, &wishes.cells);
+    if !overrides.cells.is_empty() {
+        of_preset = with_cells(of_preset, &overrides.cells);
     }
     for study in &mut of_preset {
-        change(study, wishes);
+        change(study, overrides);
     }
     // What is left without runs asks nothing.
     of_preset.retain(|study| !study.layouts.is_empty());
@@ -157,40 +158,40 @@ fn with_cells(studies: Vec<Study>, cells: &[u64]) -> Vec<Study> {
     out
 }
 
-fn change(study: &mut Study, wishes: &Wishes) {
-    if !wishes.ranks.is_empty() || !wishes.ranks_mpi.is_empty() {
+fn change(study: &mut Study, overrides: &Overrides) {
+    if !overrides.ranks.is_empty() || !overrides.ranks_mpi.is_empty() {
         let scales = matches!(study.experiment, Experiment::Strong | Experiment::Weak);
         if scales {
-            study.layouts = layouts(&wishes.ranks, &wishes.ranks_mpi);
-        } else if study.experiment == Experiment::Weights && !wishes.ranks.is_empty() {
-            study.layouts = layouts(&wishes.ranks, &[]);
+            study.layouts = layouts(&overrides.ranks, &overrides.ranks_mpi);
+        } else if study.experiment == Experiment::Weights && !overrides.ranks.is_empty() {
+            study.layouts = layouts(&overrides.ranks, &[]);
         }
     }
-    if wishes.no_mpi {
+    if overrides.no_mpi {
         // A serial run stands for the measured one.
         let serial = study.layouts.iter().any(|l| l.comm == Comm::Mpi);
         study.layouts.retain(|l| l.comm != Comm::Mpi);
         study.layouts.extend(serial.then_some(Layout { comm: Comm::Solo, ranks: 1 }));
     }
-    if wishes.no_sim {
+    if overrides.no_sim {
         study.layouts.retain(|l| l.comm != Comm::Sim);
     }
-    if wishes.serial {
+    if overrides.serial {
         study.layouts = vec![Layout { comm: Comm::Solo, ranks: 1 }];
         if matches!(study.experiment, Experiment::Weak | Experiment::Weights) {
             study.layouts.clear();
         }
     }
-    if !wishes.layers.is_empty() && study.experiment == Experiment::Layers {
-        study.layers.clone_from(&wishes.layers);
+    if !overrides.layers.is_empty() && study.experiment == Experiment::Layers {
+        study.layers.clone_from(&overrides.layers);
     }
-    if !wishes.weights.is_empty() {
-        study.weights.clone_from(&wishes.weights);
+    if !overrides.weights.is_empty() {
+        study.weights.clone_from(&overrides.weights);
     }
-    if !wishes.partitioners.is_empty() {
-        study.partitioners.clone_from(&wishes.partitioners);
+    if !overrides.partitioners.is_empty() {
+        study.partitioners.clone_from(&overrides.partitioners);
     }
-    study.repeats = wishes.repeats.unwrap_or(study.repeats);
+    study.repeats = overrides.repeats.unwrap_or(study.repeats);
 }
 
 fn small() -> Vec<Study> {
@@ -291,15 +292,15 @@ mod tests {
 
     #[test]
     fn wishes_change_a_preset() {
-        let wishes = Wishes {
+        let overrides = Overrides {
             experiments: vec![Experiment::Strong],
             cases: vec!["cube".into(), "ball".into()],
             cells: vec![1000, 2000],
             ranks: vec![1, 3],
             repeats: Some(9),
-            ..Wishes::default()
+            ..Overrides::default()
         };
-        let all = studies(Preset::Full, &wishes);
+        let all = studies(Preset::Full, &overrides);
         assert_eq!(all.len(), 4);
         assert_eq!((all[0].case.as_str(), all[0].cells), ("cube", Some(1000)));
         assert_eq!(all[0].layouts, layouts(&[1, 3], &[]));
@@ -308,15 +309,15 @@ mod tests {
 
     #[test]
     fn without_mpi_a_serial_run_stands_for_it() {
-        let no_mpi = Wishes { no_mpi: true, ..Wishes::default() };
+        let no_mpi = Overrides { no_mpi: true, ..Overrides::default() };
         let all = studies(Preset::Small, &no_mpi);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm != Comm::Mpi));
         assert!(all.iter().all(|s| !s.layouts.is_empty()));
-        let serial = Wishes { serial: true, ..Wishes::default() };
+        let serial = Overrides { serial: true, ..Overrides::default() };
         let all = studies(Preset::Small, &serial);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Solo && l.ranks == 1));
         assert!(all.iter().all(|s| s.experiment != Experiment::Weights));
-        let real = Wishes { no_sim: true, no_choice: true, ..Wishes::default() };
+        let real = Overrides { no_sim: true, no_choice: true, ..Overrides::default() };
         let all = studies(Preset::Small, &real);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Mpi));
         assert!(!all.is_empty() && all.iter().all(|s| s.experiment != Experiment::Weights));
@@ -326,7 +327,7 @@ mod tests {
     fn presets_ask_every_question() {
         for preset in [Preset::Small, Preset::Full] {
             let mut asked: Vec<Experiment> =
-                studies(preset, &Wishes::default()).iter().map(|s| s.experiment).collect();
+                studies(preset, &Overrides::default()).iter().map(|s| s.experiment).collect();
             asked.sort();
             asked.dedup();
             assert_eq!(asked.len(), 5);

@@ -17,7 +17,7 @@ pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     for case in bench.cases_of(LayerName::Correctness) {
         match &case.path {
             Ok(path) => cases.push(path.to_string_lossy().into_owned()),
-            Err(why) => layer.findings.push(Finding::told(
+            Err(why) => layer.findings.push(Finding::without_numbers(
                 &case.rule.name,
                 "checks",
                 Verdict::Inconclusive,
@@ -54,5 +54,5 @@ fn finding(case: &CaseReport) -> Finding {
         Some(why) => (Verdict::Regression, format!("{} checks fail, the first: {why}", tally.fail)),
         None => (Verdict::Unchanged, format!("{} checks hold", tally.pass)),
     };
-    Finding::told(&case.name, "checks", verdict, note)
+    Finding::without_numbers(&case.name, "checks", verdict, note)
 }

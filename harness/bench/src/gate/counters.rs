@@ -20,7 +20,7 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
         }
         let name = &case.rule.name;
         if let Err(why) = &case.path {
-            layer.findings.push(Finding::told(name, "runs", Verdict::Inconclusive, why));
+            layer.findings.push(Finding::without_numbers(name, "runs", Verdict::Inconclusive, why));
             continue;
         }
         let findings = match count(bench, &bench.candidate, case) {
@@ -31,13 +31,20 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
                 against(bench, baseline, case, &candidate)
             }
             Err(NoResult::Missing(why)) => return left_out(LayerName::Counters, why),
-            Err(why) => vec![Finding::told(name, "runs", Verdict::Regression, why.to_string())],
+            Err(why) => {
+                vec![Finding::without_numbers(name, "runs", Verdict::Regression, why.to_string())]
+            }
         };
         layer.findings.extend(findings);
         let engine = bench.candidate.description();
         if !case.rule.ranks.is_empty() && engine.run.simulated.is_none() {
             let why = format!("{} does not say how it is run on simulated ranks", engine.name);
-            layer.findings.push(Finding::told(name, "ranks", Verdict::Inconclusive, why));
+            layer.findings.push(Finding::without_numbers(
+                name,
+                "ranks",
+                Verdict::Inconclusive,
+                why,
+            ));
         }
     }
     layer
@@ -51,7 +58,7 @@ fn against(
 ) -> Vec<Finding> {
     let name = &case.rule.name;
     let inconclusive =
-        |why: String| vec![Finding::told(name, "baseline", Verdict::Inconclusive, why)];
+        |why: String| vec![Finding::without_numbers(name, "baseline", Verdict::Inconclusive, why)];
     let counted;
     let old = match baseline {
         Baseline::None => return Vec::new(),
@@ -121,7 +128,7 @@ fn compare(
             format!("another mesh: {} was {}", told(&new.digest), told(&old.digest)),
         ),
     };
-    findings.push(Finding::told(name, "digest", verdict, note));
+    findings.push(Finding::without_numbers(name, "digest", verdict, note));
     let mut names: Vec<&String> = old.exact.keys().chain(new.exact.keys()).collect();
     names.sort();
     names.dedup();
@@ -141,10 +148,10 @@ fn compare(
                 }
             }
             (None, Some(new)) => {
-                Finding::told(name, metric, Verdict::Changed, format!("new, {new}"))
+                Finding::without_numbers(name, metric, Verdict::Changed, format!("new, {new}"))
             }
             (Some(old), _) => {
-                Finding::told(name, metric, Verdict::Changed, format!("gone, was {old}"))
+                Finding::without_numbers(name, metric, Verdict::Changed, format!("gone, was {old}"))
             }
             (None, None) => continue,
         };

@@ -29,7 +29,9 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
             break;
         }
         let name = &case.rule.name;
-        let told = |verdict, why: String| vec![Finding::told(name, "instructions", verdict, why)];
+        let told = |verdict, why: String| {
+            vec![Finding::without_numbers(name, "instructions", verdict, why)]
+        };
         layer.findings.extend(match count(bench, &bench.candidate, case) {
             Ok(new) => {
                 measures.case(name).counted = numbers(&new).into();

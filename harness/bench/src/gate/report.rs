@@ -86,7 +86,12 @@ pub struct Finding {
 
 impl Finding {
     /// A finding without numbers.
-    pub fn told(case: &str, metric: &str, verdict: Verdict, note: impl Into<String>) -> Self {
+    pub fn without_numbers(
+        case: &str,
+        metric: &str,
+        verdict: Verdict,
+        note: impl Into<String>,
+    ) -> Self {
         Self {
             case: case.to_owned(),
             metric: metric.to_owned(),
@@ -121,7 +126,7 @@ impl Finding {
             baseline: Some(baseline as f64),
             candidate: Some(candidate as f64),
             change_percent: Some(change).filter(|change| change.is_finite()),
-            ..Self::told(case, metric, verdict, note)
+            ..Self::without_numbers(case, metric, verdict, note)
         }
     }
 }
@@ -216,7 +221,7 @@ mod tests {
         let mut layer = Layer::new(LayerName::Time);
         assert_eq!(layer.verdict(), Verdict::Unchanged);
         for verdict in [Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed] {
-            layer.findings.push(Finding::told("c", "m", verdict, ""));
+            layer.findings.push(Finding::without_numbers("c", "m", verdict, ""));
         }
         assert_eq!(layer.verdict(), Verdict::Inconclusive);
     }

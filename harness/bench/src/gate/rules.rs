@@ -111,7 +111,9 @@ impl Rules {
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let time = &rules.time;
-        if time.rounds_min < crate::statistics::comparison::ROUNDS_MIN || time.rounds_max < time.rounds_min {
+        if time.rounds_min < crate::statistics::comparison::ROUNDS_MIN
+            || time.rounds_max < time.rounds_min
+        {
             let least = crate::statistics::comparison::ROUNDS_MIN;
             return Err(wrong(format!("rounds_min is at least {least}, rounds_max not below it")));
         }

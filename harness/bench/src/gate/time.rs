@@ -31,9 +31,12 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
         let found = match rounds(bench, &subject.engine, case) {
             Ok(timed) => judge(bench, case, &timed),
             Err(NoResult::Interrupted) => break,
-            Err(why) => {
-                Finding::told(&case.rule.name, "time", Verdict::Inconclusive, why.to_string())
-            }
+            Err(why) => Finding::without_numbers(
+                &case.rule.name,
+                "time",
+                Verdict::Inconclusive,
+                why.to_string(),
+            ),
         };
         layer.findings.push(found);
     }
@@ -128,7 +131,7 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
         baseline: Some(mean(&|round| (round.a + round.a_again) / 2.0)),
         candidate: Some(mean(&|round| round.b)),
         change_percent: Some(percent(found.effect)),
-        ..Finding::told(&case.rule.name, "time", verdict, note)
+        ..Finding::without_numbers(&case.rule.name, "time", verdict, note)
     }
 }
 

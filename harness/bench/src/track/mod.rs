@@ -87,7 +87,7 @@ fn series(name: &str, records: &[Record], rules: &Rules) -> Series {
 }
 
 /// Change points in words, one to a line.
-pub fn told(all: &[Series]) -> String {
+pub fn summary(all: &[Series]) -> String {
     let short = |commit: &str| commit.chars().take(12).collect::<String>();
     let mut text = String::new();
     for series in all {
@@ -123,7 +123,7 @@ mod tests {
         let [change] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
         assert_eq!((change.at, &change.first_new), (20, &format!("{:040x}", 20)));
         assert!((9.0..11.0).contains(&change.percent.unwrap()), "{change:?}");
-        assert!(told(&all).starts_with("uav/words: 100"), "{}", told(&all));
+        assert!(summary(&all).starts_with("uav/words: 100"), "{}", summary(&all));
     }
 
     #[test]

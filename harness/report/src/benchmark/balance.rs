@@ -60,7 +60,7 @@ fn per_rank(case: &str, group: &Group) -> Option<Figure> {
             "CPU time outside calls to other ranks, by rank: {case}, {} cells on {ranks} simulated ranks (the paper's Figures 21 to 23). λ = \
              max/mean = {lambda:.3} by time, {cells:.3} by cells. {}.",
             grouped(run.cells),
-            group.ranks_told()
+            group.rank_times_caption()
         ),
         x: Axis::linear("rank"),
         y: Axis::linear("time working / s"),

@@ -203,7 +203,7 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
             base.setup.ranks,
             if base.setup.ranks == 1 { "simulated rank" } else { "simulated ranks" },
             base.time_s.value,
-            last.ranks_told()
+            last.rank_times_caption()
         ),
         x: ranks_axis(&of),
         y: Axis { range: Some((0.0, most * 1.1)), ..Axis::linear("efficiency") },
@@ -252,7 +252,7 @@ fn phases(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Opti
              projected from simulated ranks.",
             grouped(cells),
             last.setup.ranks,
-            of[0].ranks_told()
+            of[0].rank_times_caption()
         ),
         x: Axis::linear("ranks"),
         y: Axis::linear(unit),

@@ -21,7 +21,7 @@ pub fn figures(records: &[Record], all: &[Series]) -> Vec<Figure> {
 
 /// Where numbers changed, a line each; as `harness track` tells it.
 pub fn told(records: &[Record], all: &[Series]) -> String {
-    format!("{} commits, {} metrics\n{}", records.len(), all.len(), track::told(all))
+    format!("{} commits, {} metrics\n{}", records.len(), all.len(), track::summary(all))
 }
 
 /// Case and metric.

@@ -2,7 +2,7 @@
 
 use crate::verification::junit::to_text;
 use bench::track::history::Record;
-use bench::track::{Series, told};
+use bench::track::{Series, summary};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use serde_json::{Map, Value, json};
 
@@ -69,14 +69,14 @@ pub fn junit(all: &[Series], recent: usize) -> String {
         let status = match series.worse_recently(recent) {
             Some(_) => {
                 let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-                status.set_message(told(std::slice::from_ref(series)).trim_end().to_owned());
+                status.set_message(summary(std::slice::from_ref(series)).trim_end().to_owned());
                 status
             }
             None => TestCaseStatus::success(),
         };
         let mut test = TestCase::new(series.name.as_str(), status);
         if !series.changes.is_empty() {
-            test.set_system_out(told(std::slice::from_ref(series)));
+            test.set_system_out(summary(std::slice::from_ref(series)));
         }
         suite.add_test_case(test);
     }
