@@ -1,20 +1,20 @@
-//! What is run: experiments, and the two presets.
+//! The experiments and the two presets of studies.
 
 use super::entry::Comm;
 use std::fmt;
 
-/// A question that a set of runs answers.
+/// A kind of experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Experiment {
-    /// The same mesh on more and more ranks.
+    /// The same mesh on increasingly many ranks.
     Strong,
-    /// As many cells per rank on more and more ranks; the spacing is chosen so.
+    /// The same number of cells per rank on increasingly many ranks; the spacing is chosen accordingly.
     Weak,
-    /// The spacing halved again and again.
+    /// Spacings that differ by factors of two.
     Spacing,
-    /// The same spacing with more and more cells per layer.
+    /// The same spacing with increasing minimum layer thickness n.
     Layers,
-    /// What a base leaf weighs, and who cuts the base tree.
+    /// Weights of base leaves and partitioners.
     Weights,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Experiment {
     }
 }
 
-/// How much time may be spent.
+/// The extent of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Preset {
     /// Every experiment and every figure, in minutes on 2 cores.
@@ -39,30 +39,30 @@ pub enum Preset {
     Full,
 }
 
-/// A number of ranks and how they talk.
+/// A number of ranks and their means of communication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Layout {
-    /// How they talk.
+    /// How ranks communicate.
     pub comm: Comm,
-    /// How many.
+    /// Number of ranks.
     pub ranks: usize,
 }
 
 /// One experiment on one case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
-    /// The question.
+    /// The kind of experiment.
     pub experiment: Experiment,
     /// The case's name in the catalogue, or a case file.
     pub case: String,
     /// Cells to choose the spacing for: of the mesh (strong, weights), per rank (weak), of the largest mesh
     /// (spacing), at n = 4 (layers). None: the case's own spacing.
     pub cells: Option<u64>,
-    /// Values of n; empty for the case's own.
+    /// Values of n; empty for the n of the case.
     pub layers: Vec<u32>,
     /// Ranks of the runs.
     pub layouts: Vec<Layout>,
-    /// Weights and partitioners, each with each.
+    /// Weights of base leaves; every combination with `partitioners` is run.
     pub weights: Vec<String>,
     /// See `weights`.
     pub partitioners: Vec<String>,
@@ -70,7 +70,7 @@ pub struct Study {
     pub repeats: usize,
 }
 
-/// What the command line may change in the studies of a preset.
+/// Changes of a preset by the command line.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// Cases instead of the preset's.
@@ -87,23 +87,23 @@ pub struct Overrides {
     pub layers: Vec<u32>,
     /// Weights of the experiment of that name.
     pub weights: Vec<String>,
-    /// Partitioners of it.
+    /// Partitioners of the experiment `weights`.
     pub partitioners: Vec<String>,
     /// Repetitions.
     pub repeats: Option<usize>,
     /// No runs on MPI.
     pub no_mpi: bool,
-    /// No runs on simulated ranks, for a program that has none.
+    /// No runs on simulated ranks, for a program without them.
     pub no_sim: bool,
-    /// Serial runs only, for a program that knows no ranks.
+    /// Serial runs only, for a serial program.
     pub serial: bool,
-    /// The program has no choice of weights and partitioners.
+    /// The program does not offer weights and partitioners.
     pub no_choice: bool,
 }
 
 const MILLION: u64 = 1_000_000;
 
-/// The studies of a preset as the command line changes them.
+/// Returns the studies of a preset with the overrides applied.
 pub fn studies(preset: Preset, overrides: &Overrides) -> Vec<Study> {
     let wanted = |s: &Study| {
         overrides.experiments.is_empty() || overrides.experiments.contains(&s.experiment)
@@ -123,7 +123,7 @@ pub fn studies(preset: Preset, overrides: &Overrides) -> Vec<Study> {
     for study in &mut of_preset {
         change(study, overrides);
     }
-    // What is left without runs asks nothing.
+    // A study without runs is dropped.
     of_preset.retain(|study| !study.layouts.is_empty());
     of_preset
 }
@@ -168,7 +168,7 @@ fn change(study: &mut Study, overrides: &Overrides) {
         }
     }
     if overrides.no_mpi {
-        // A serial run stands for the measured one.
+        // A serial run replaces the measured ones.
         let serial = study.layouts.iter().any(|l| l.comm == Comm::Mpi);
         study.layouts.retain(|l| l.comm != Comm::Mpi);
         study.layouts.extend(serial.then_some(Layout { comm: Comm::Solo, ranks: 1 }));
@@ -240,26 +240,26 @@ fn study(
     };
     let (weights, partitioners) = match experiment {
         Experiment::Weights => {
-            let weights = words(&["unit", "area", "rehearsal", "rebalance"]);
+            let weights = words(&["unit", "area", "rebalance"]);
             (weights, words(&["metis", "morton"]))
         }
-        // The mesher's own choice.
+        // The default of the mesher.
         _ => (words(&[""]), words(&[""])),
     };
     let (case, layouts) = (case.to_owned(), layouts.to_vec());
     Study { experiment, case, cells: Some(cells), layers, layouts, weights, partitioners, repeats }
 }
 
-/// Simulated runs, then runs on MPI.
+/// Returns layouts of simulated runs followed by runs on MPI.
 fn layouts(sim: &[usize], mpi: &[usize]) -> Vec<Layout> {
     let of = |comm: Comm| move |&ranks: &usize| Layout { comm, ranks };
     sim.iter().map(of(Comm::Sim)).chain(mpi.iter().map(of(Comm::Mpi))).collect()
 }
 
-/// Reads rank counts: `1,2,7`, or `1..64` for the powers of two.
+/// Parses rank counts: `1,2,7`, or `1..64` for the powers of two.
 ///
 /// # Errors
-/// What should have been given.
+/// The expected format.
 pub fn ranks(text: &str) -> Result<Vec<usize>, String> {
     let wrong = || "give rank counts as in 1,2,7 or 1..64, the latter for powers of two".to_owned();
     let number =
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn wishes_change_a_preset() {
+    fn overrides_change_a_preset() {
         let overrides = Overrides {
             experiments: vec![Experiment::Strong],
             cases: vec!["cube".into(), "ball".into()],
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn without_mpi_a_serial_run_stands_for_it() {
+    fn without_mpi_serial_runs_replace_the_measured_ones() {
         let no_mpi = Overrides { no_mpi: true, ..Overrides::default() };
         let all = studies(Preset::Small, &no_mpi);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm != Comm::Mpi));
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn presets_ask_every_question() {
+    fn presets_contain_every_experiment() {
         for preset in [Preset::Small, Preset::Full] {
             let mut asked: Vec<Experiment> =
                 studies(preset, &Overrides::default()).iter().map(|s| s.experiment).collect();

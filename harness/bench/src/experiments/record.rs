@@ -1,8 +1,8 @@
-//! The record: a file of JSON lines to which every result is appended at once.
+//! The record: a file of JSON lines to which every result is appended immediately.
 //!
-//! Invariants: a line is written with one call under an exclusive lock, so that two runs at a time do not
-//! mix; what an interruption or a full disk cut short is one broken line, which the next writer ends and
-//! readers report and pass over; nothing is ever rewritten.
+//! Invariants: a line is written with one call under an exclusive lock, so that concurrent sessions do not interleave.
+//! An interruption or a full disk leaves at most one broken line, which the next writer terminates and readers report and
+//! skip. Lines are never rewritten.
 
 use super::entry::{Line, SCHEMA, What};
 use jiff::Timestamp;
@@ -19,10 +19,10 @@ pub struct Record {
 }
 
 impl Record {
-    /// Opens a record, making it and its directory where they are absent, for a session of its own.
+    /// Opens a record for a new session; creates the file and its directory if necessary.
     ///
     /// # Errors
-    /// Where that is not possible.
+    /// If the file cannot be opened.
     pub fn open(path: &Path) -> io::Result<Self> {
         if let Some(directory) = path.parent() {
             std::fs::create_dir_all(directory)?;
@@ -32,7 +32,7 @@ impl Record {
         Ok(Self { file, path: path.to_owned(), session })
     }
 
-    /// Where it is.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -40,7 +40,7 @@ impl Record {
     /// Appends a line, and returns it.
     ///
     /// # Errors
-    /// Where it could not be written whole.
+    /// If the line could not be written completely.
     pub fn append(&mut self, what: What) -> io::Result<Line> {
         let line = Line {
             schema: SCHEMA.to_owned(),
@@ -64,7 +64,7 @@ impl Record {
         self.file.sync_data()
     }
 
-    /// Whether the file is empty or ends with a line's end.
+    /// Whether the file is empty or ends with a newline.
     fn ends_with_line(&mut self) -> io::Result<bool> {
         if self.file.seek(SeekFrom::End(0))? == 0 {
             return Ok(true);
@@ -76,19 +76,19 @@ impl Record {
     }
 }
 
-/// What a record says.
+/// The content of a record.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
-    /// Its lines, in the order in which they were written.
+    /// The lines in chronological order.
     pub lines: Vec<Line>,
-    /// Lines, from 1, that are not of the schema, and why.
+    /// Numbers (from 1) of invalid lines, with the reason.
     pub broken: Vec<(usize, String)>,
 }
 
 /// Reads a record.
 ///
 /// # Errors
-/// Where it cannot be read at all.
+/// If the file cannot be read.
 pub fn read(path: &Path) -> io::Result<Content> {
     let mut content = Content::default();
     for (i, text) in std::fs::read_to_string(path)?.lines().enumerate() {
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn two_writers_at_a_time_lose_and_mix_nothing() {
+    fn concurrent_writers_do_not_interleave() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("deeper/record.jsonl");
         std::thread::scope(|scope| {
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_line_costs_itself_only() {
+    fn an_interrupted_line_does_not_damage_others() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("record.jsonl");
         Record::open(&path).unwrap().append(network(1.0)).unwrap();
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn another_schema_is_not_guessed_at() {
+    fn a_line_of_another_schema_is_reported() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("record.jsonl");
         Record::open(&path).unwrap().append(network(1.0)).unwrap();

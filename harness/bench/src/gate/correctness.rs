@@ -1,4 +1,4 @@
-//! The candidate's meshes are right: what `harness verify` says of the gate's cases.
+//! The layer of correctness: `harness verify` on the candidate and the gate's cases.
 
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::{Bench, GateError};
@@ -7,10 +7,10 @@ use run::verify::report::{CaseReport, Outcome};
 use run::verify::{VerifyError, verify};
 
 /// Verifies the candidate serially on the cases of this layer: reference, and every check of the leaves.
-/// Ranks, oracles and p4est are `harness verify`'s own affair.
+/// Ranks, oracles and p4est are left to `harness verify`.
 ///
 /// # Errors
-/// Where verification could not begin.
+/// If verification cannot start.
 pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     let mut layer = Layer::new(LayerName::Correctness);
     let mut cases = Vec::new();

@@ -1,4 +1,4 @@
-//! Numbers that repeat exactly: what the program counts, and the mesh's digest, serially and on simulated ranks.
+//! The layer of exact counters: the counters of the program and the digest, serially and on simulated ranks.
 
 use super::measures::{CaseMeasures, Measures};
 use super::report::{Finding, Layer, LayerName, Verdict};
@@ -8,10 +8,10 @@ use super::{Bench, left_out};
 use run::engine::interrupt;
 use run::engine::runner::{Engine, NoResult, Ranks};
 
-/// A schedule like any other: counters may not depend on it, and the same one is used for both.
+/// Any seed will do: counters must not depend on the schedule, and both programs run with the same one.
 const SEED: u64 = 1;
 
-/// Counts on both sides and compares.
+/// Compares the counters of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Layer {
     let mut layer = Layer::new(LayerName::Counters);
     for case in bench.cases_of(LayerName::Counters) {
@@ -38,7 +38,8 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
         layer.findings.extend(findings);
         let engine = bench.candidate.description();
         if !case.rule.ranks.is_empty() && engine.run.simulated.is_none() {
-            let why = format!("{} does not say how it is run on simulated ranks", engine.name);
+            let why =
+                format!("the description of {} has no command for simulated ranks", engine.name);
             layer.findings.push(Finding::without_numbers(
                 name,
                 "ranks",
@@ -64,7 +65,7 @@ fn against(
         Baseline::None => return Vec::new(),
         Baseline::Record(_, record) => match record.cases.get(name) {
             Some(old) => old,
-            None => return inconclusive("the record does not have this case".into()),
+            None => return inconclusive("the record does not contain this case".into()),
         },
         Baseline::Program(subject) => match count(bench, &subject.engine, case) {
             Ok(old) => {
@@ -77,7 +78,7 @@ fn against(
     compare(case, old, candidate, &bench.rules.tolerance)
 }
 
-/// Counts of one program on one case. Digests of all rank counts must be the same.
+/// Returns the counters of one program on one case. All rank counts must give the same digest.
 fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures, NoResult> {
     let path = case.path.clone().map_err(NoResult::Failed)?;
     let place = bench.enter("counters").map_err(NoResult::Failed)?;
@@ -86,8 +87,8 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures
     let mut measures = CaseMeasures::default();
     for ranks in std::iter::once(Ranks::Serial).chain(simulated) {
         let place = bench.enter("counters/run").map_err(NoResult::Failed)?;
-        let told = match engine.run(&path, ranks, &place, false) {
-            Ok((told, _)) => told,
+        let reported = match engine.run(&path, ranks, &place, false) {
+            Ok((reported, _)) => reported,
             // An engine without simulated ranks still has a serial run to be counted.
             Err(NoResult::Missing(_)) if ranks != Ranks::Serial => continue,
             Err(why) => return Err(why),
@@ -96,22 +97,22 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures
             Ranks::Serial => String::new(),
             Ranks::Simulated { ranks, .. } | Ranks::Mpi(ranks) => format!("{ranks} ranks/"),
         };
-        if *measures.digest.get_or_insert(told.digest.clone()) != told.digest {
-            let why = format!("{ranks}: digest {}, serially it is another", told.digest);
+        if *measures.digest.get_or_insert(reported.digest.clone()) != reported.digest {
+            let why = format!("{ranks}: digest {} differs from the serial one", reported.digest);
             return Err(NoResult::Failed(why));
         }
         if ranks == Ranks::Serial {
-            measures.exact.insert("cells".into(), told.cells);
+            measures.exact.insert("cells".into(), reported.cells);
         }
         measures
             .exact
-            .extend(told.counters.into_iter().map(|(name, n)| (format!("{prefix}{name}"), n)));
+            .extend(reported.counters.into_iter().map(|(name, n)| (format!("{prefix}{name}"), n)));
     }
     Ok(measures)
 }
 
-/// Every counter that either side has. A digest or a number of cells that changes is another mesh: that is
-/// shown, and whether it is right is for the layer of correctness.
+/// Compares all counters of both sides. A different digest or number of cells means a different mesh; the layer of
+/// correctness decides whether it is correct.
 fn compare(
     case: &Selected,
     old: &CaseMeasures,
@@ -120,12 +121,12 @@ fn compare(
 ) -> Vec<Finding> {
     let name = &case.rule.name;
     let mut findings = Vec::new();
-    let told = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
+    let shown = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
     let (verdict, note) = match old.digest == new.digest {
-        true => (Verdict::Unchanged, told(&new.digest)),
+        true => (Verdict::Unchanged, shown(&new.digest)),
         false => (
             Verdict::Changed,
-            format!("another mesh: {} was {}", told(&new.digest), told(&old.digest)),
+            format!("different mesh: {} was {}", shown(&new.digest), shown(&old.digest)),
         ),
     };
     findings.push(Finding::without_numbers(name, "digest", verdict, note));
@@ -150,9 +151,12 @@ fn compare(
             (None, Some(new)) => {
                 Finding::without_numbers(name, metric, Verdict::Changed, format!("new, {new}"))
             }
-            (Some(old), _) => {
-                Finding::without_numbers(name, metric, Verdict::Changed, format!("gone, was {old}"))
-            }
+            (Some(old), _) => Finding::without_numbers(
+                name,
+                metric,
+                Verdict::Changed,
+                format!("removed, was {old}"),
+            ),
             (None, None) => continue,
         };
         findings.push(finding);
@@ -160,11 +164,11 @@ fn compare(
     findings
 }
 
-/// The size of the mesh is a result: more or less of it is neither better nor worse.
+/// The size of the mesh is a result, not a cost: a change is neither better nor worse.
 fn not_work(finding: Finding) -> Finding {
     match finding.verdict {
         Verdict::Unchanged => finding,
-        _ => Finding { verdict: Verdict::Changed, note: "another mesh".into(), ..finding },
+        _ => Finding { verdict: Verdict::Changed, note: "different mesh".into(), ..finding },
     }
 }
 
@@ -179,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_is_shown_and_growth_alone_fails() {
+    fn every_change_is_shown_and_only_growth_fails() {
         let text = "name = 'c'\nlayers = []\ntolerance = { messages = 10.0 }";
         let rule: CaseRule = toml::from_str(text).unwrap();
         let case = Selected { rule, path: Ok("c.toml".into()) };

@@ -1,4 +1,4 @@
-//! Seconds: baseline and candidate in one run, interleaved, so that whatever the machine does it does to both.
+//! The layer of time: baseline and candidate run interleaved, so that the load of the machine affects both equally.
 
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
@@ -11,14 +11,14 @@ use run::engine::interrupt;
 use run::engine::runner::{Engine, NoResult, Ranks, Told};
 use std::path::Path;
 
-/// Times both sides and compares.
+/// Compares the times of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
     let subject = match baseline {
         Baseline::Program(subject) => subject,
         Baseline::Record(..) => {
             return left_out(
                 LayerName::Time,
-                "a record cannot be run: seconds of another run prove nothing",
+                "a record cannot be run, and times of different sessions are not comparable",
             );
         }
         Baseline::None => return left_out(LayerName::Time, "there is no baseline"),
@@ -46,9 +46,9 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
 /// All rounds of a case.
 struct Timed {
     rounds: Vec<Round>,
-    /// What was timed.
+    /// The kind of time.
     what: &'static str,
-    /// Phase by phase, logarithms of candidate against baseline.
+    /// Logarithms of the ratio of candidate to baseline, by phase.
     phases: Vec<(String, Vec<f64>)>,
 }
 
@@ -62,7 +62,7 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, No
     let place = bench.enter("time").map_err(NoResult::Failed)?;
     let path = baseline.prepare(&path, &place.join("case")).map_err(NoResult::Failed)?;
     let engines = [baseline, baseline, &bench.candidate];
-    // The first run of a program reads it and the geometry from disk.
+    // The first run reads program and geometry from disk and is not counted.
     let first = run(bench, baseline, &path)?;
     let also = run(bench, &bench.candidate, &path)?;
     let cpu = first.time_cpu_s.is_some() && also.time_cpu_s.is_some();
@@ -79,11 +79,11 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, No
     for _ in 0..count {
         let mut order = [BASELINE, AGAIN, CANDIDATE];
         random.shuffle(&mut order);
-        let mut told = [const { None }; 3];
-        for who in order {
-            told[who] = Some(run(bench, engines[who], &path)?);
+        let mut reports = [const { None }; 3];
+        for index in order {
+            reports[index] = Some(run(bench, engines[index], &path)?);
         }
-        let [Some(a), Some(a_again), Some(b)] = told else { unreachable!("each was run") };
+        let [Some(a), Some(a_again), Some(b)] = reports else { unreachable!("each was run") };
         let time = |told: &Told| {
             told.time_cpu_s.filter(|_| cpu).unwrap_or(told.time_process_s).max(1e-9).ln()
         };
@@ -115,7 +115,7 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
     };
     let percent = |ratio: f64| ratio * 100.0;
     let mut note = format!(
-        "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; baseline against itself reaches {:.1} %, smallest effect that would be seen {:.1} %",
+        "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; noise floor {:.1} %, minimum detectable effect {:.1} %",
         timed.rounds.len(),
         timed.what,
         percent(found.low),
@@ -135,15 +135,15 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
     }
 }
 
-/// A change that looks real, but not with the certainty that is asked for, is not called unchanged.
+/// An effect with a p-value below this is not reported as unchanged.
 const SUSPICIOUS: f64 = 0.01;
 
-/// A change needs both: chance does not explain it, and it is larger than the baseline against itself and than
-/// what code costs that lies elsewhere in memory. To be unchanged needs as much: what matters would have
-/// been seen, is not within the interval, and nothing looks like it.
+/// A change must be significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
+/// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was
+/// seen.
 fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
     let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
-    // As ratios, a third less time is as much as half as much again.
+    // As a ratio, 1/3 less time equals 1/2 more time.
     let size = |effect: f64| if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect };
     if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
         return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
