@@ -1,8 +1,8 @@
-//! Measurements of meshers, and what is computed from them.
+//! Measurements of meshers and their analysis.
 //!
-//! - [`experiments`]: scaling, spacing, layers, weights; every result goes to a record;
+//! - [`experiments`]: scaling, spacing, layers, weights; every result is appended to a record;
 //! - [`targets`]: a table of targets, met or missed;
-//! - [`gate`](mod@gate): candidate against baseline; [`track`]: numbers by commit;
+//! - [`gate`](mod@gate): candidate against baseline; [`track`]: metrics by commit; [`statistics`] for all of them;
 //! - [`shrink`](mod@shrink): the smallest case that still fails;
 //! - [`selftest`]: meshes of a wanted size for the self test.
 
@@ -10,6 +10,7 @@ pub mod experiments;
 pub mod gate;
 pub mod selftest;
 pub mod shrink;
+pub mod statistics;
 pub mod targets;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

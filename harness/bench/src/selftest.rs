@@ -1,4 +1,4 @@
-//! A mesh of a wanted size for the self test, and its T0, made by the mesher.
+//! Generates a mesh of a wanted size and its T0 for the self test.
 
 use crate::experiments::entry::{Comm, Setup};
 use crate::experiments::execute::{Failed, Runner};
@@ -12,11 +12,11 @@ use run::engine::runner::RunOptions;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Meshes a case file, at a spacing for about so many cells if they are given, and its T0 too; both lie in `place`
-/// afterwards.
+/// Writes the mesh of a case file and its T0 into `place`. If `cells` is given, the spacing is chosen for about that many
+/// cells.
 ///
 /// # Errors
-/// Where the case is at fault or the mesher fails.
+/// If the case is invalid or the mesher fails.
 pub fn source(
     programs: &Programs,
     case: &Path,
@@ -43,11 +43,11 @@ pub fn source(
         programs.mesher.run(&path, &SERIAL, &options)?;
         made.push(out);
     }
-    let [mesh, base_tree] = <[PathBuf; 2]>::try_from(made).expect("two were made");
+    let [mesh, base_tree] = <[PathBuf; 2]>::try_from(made).expect("two meshes were made");
     Ok(Source { name: base.name, mesh, base: Some(base_tree) })
 }
 
-/// The spacing that gives about so many cells.
+/// Returns the spacing that gives about `cells` cells.
 fn spacing(
     programs: &Programs,
     base: &Base,
@@ -55,7 +55,7 @@ fn spacing(
     place: &Path,
     limit: Duration,
 ) -> Result<f64, Failed> {
-    let launcher = Launcher::parse("mpirun -n {ranks}").expect("it says where ranks go");
+    let launcher = Launcher::parse("mpirun -n {ranks}").expect("the template contains {ranks}");
     let runner = Runner { programs, launcher: &launcher, limit, place };
     let count = |spacing_min: f64| {
         let layer_cells_min = base.layer_cells_min;

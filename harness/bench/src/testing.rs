@@ -5,7 +5,7 @@ use crate::targets::Targets;
 use crate::track::history::Record;
 use std::collections::BTreeMap;
 
-/// A run with the given useful times, by phase and rank, of so many cells.
+/// Returns a run with the given number of cells and useful times by phase and rank.
 pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
     let ranks = useful[0].1.len();
     let total: Vec<f64> = (0..ranks).map(|r| useful.iter().map(|p| p.1[r]).sum()).collect();
@@ -47,12 +47,12 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
     }
 }
 
-/// A line of a record.
+/// Returns a line of a record.
 pub fn line(what: What) -> Line {
     Line { schema: SCHEMA.into(), session: "s".into(), time_utc: "t".into(), what }
 }
 
-/// A history of 30 commits in which `uav/words` grows by a tenth at commit 20, with noise below one percent.
+/// Returns a history of 30 commits in which `uav/words` grows by a tenth at commit 20, with noise below one percent.
 pub fn history() -> Vec<Record> {
     let record = |i: usize| {
         let noise = (i * 7919 % 13) as f64 / 13.0;
@@ -70,7 +70,7 @@ pub fn history() -> Vec<Record> {
     (0..30).map(record).collect()
 }
 
-/// The targets that a file with this text declares.
+/// Returns the targets declared by a file with this text.
 ///
 /// # Errors
 /// As [`Targets::read`], with `FILE` in the place of the path.

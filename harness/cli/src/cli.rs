@@ -1,45 +1,49 @@
-//! What may be said on the command line.
+//! The command line.
 
 use crate::commands;
 use clap::{Parser, Subcommand};
 
-/// Verifies oct-tree meshes and the programs that make them.
+/// Verifies and benchmarks oct-tree meshers.
 ///
-/// Exit codes: 0 all holds; 1 a check failed; 2 the user's input is at fault; 3 something that was asked for
-/// is missing; 130 ended by Ctrl-C.
+/// Exit codes: 0 success; 1 a check failed, two meshes differ or a target was missed; 2 invalid input; 3 a required program or
+/// file is missing; 130 interrupted by Ctrl-C.
 #[derive(Debug, Parser)]
-#[command(version, verbatim_doc_comment)]
+#[command(version = env!("HARNESS_VERSION"), verbatim_doc_comment)]
 pub struct Arguments {
-    /// What is to be done.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// The programs of the harness.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Runs reference and mesher on cases, on every layout of ranks, and checks what comes out
+    /// Run mesher and reference on cases, serially and on MPI ranks, and check the meshes
     Verify(Box<commands::verify::Arguments>),
-    /// Corrupts correct meshes in every way of a catalogue; each must be caught by the check meant for it
+    /// Corrupt correct meshes in every catalogued way and test that the intended check detects it
     Selftest(commands::selftest::Arguments),
-    /// Holds a candidate against a baseline: correctness, exact counters, instructions, time
+    /// Compare a candidate with a baseline: correctness, exact counters, instructions, time
     Gate(Box<commands::gate::Arguments>),
-    /// Measures: strong and weak scaling, spacing, layers, weights; every result is appended to a record
+    /// Measure strong and weak scaling, spacing, layers and weights; append every result to a record
     Bench(Box<commands::bench::Arguments>),
-    /// Makes the runs that a table of targets needs, and reports which targets are met
+    /// Make the runs that a table of targets needs, and report which targets are met
     Targets(Box<commands::targets::Arguments>),
-    /// Makes figures, a page, a LaTeX fragment and an artifact description from records of bench
+    /// Make figures, a web page, a LaTeX fragment and an artifact description from benchmark records
     Report(commands::report::Arguments),
-    /// Keeps a history of numbers by commit and finds where they changed
+    /// Keep a history of metrics by commit and detect where they changed
     Track(Box<commands::track::Arguments>),
-    /// Reduces a case that fails to the smallest that still does
+    /// Reduce a failing case to the smallest one that fails in the same way
     Shrink(Box<commands::shrink::Arguments>),
-    /// Checks a leaf-set directory of any size by itself
+    /// Check a leaf-set directory of any size by itself
     Audit(commands::audit::Arguments),
-    /// Writes a leaf-set directory as a VTK unstructured grid, to look at in ParaView or pyvista
+    /// Write a leaf-set directory as a VTK unstructured grid for ParaView or pyvista
     Export(commands::export::Arguments),
-    /// Tells where two leaf-set directories differ, and which rule of the definition decides
+    /// Report where two leaf-set directories differ and which rule of the definition decides
     Diff(commands::diff::Arguments),
+    /// Print a completion script for a shell
+    Completions(commands::completions::Arguments),
+    /// Print the manual page, or write one page per command into a directory
+    Man(commands::man::Arguments),
 }
 
 #[cfg(test)]
@@ -49,7 +53,7 @@ mod tests {
     use run::verify::options::Need;
 
     #[test]
-    fn the_definition_has_no_contradiction() {
+    fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
     }
 
@@ -65,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn ranks_launcher_and_cells_are_read() {
+    fn ranks_launcher_and_cells_are_parsed() {
         let words = [
             "harness",
             "bench",
@@ -87,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn targets_is_a_command_with_the_options_of_a_measuring_session() {
+    fn targets_takes_the_options_of_a_session() {
         let words = ["harness", "targets", "t.toml", "--only", "a,b", "--repeat", "2", "--show"];
         let Command::Targets(targets) = Arguments::try_parse_from(words).unwrap().command else {
             panic!()

@@ -1,4 +1,4 @@
-//! harness: verifies meshes and the programs that make them. `harness --help` says how.
+//! The command `harness`; see `harness --help`.
 
 mod cli;
 mod commands;
@@ -23,6 +23,8 @@ fn main() -> ExitCode {
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
+        Command::Completions(arguments) => commands::completions::run(&arguments),
+        Command::Man(arguments) => commands::man::run(&arguments),
     };
     ExitCode::from(code)
 }

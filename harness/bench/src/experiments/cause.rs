@@ -1,12 +1,12 @@
-//! Why a run is not faster: one sentence that names the largest loss.
+//! The largest loss of efficiency of a run, explained in one sentence.
 
 use super::entry::{Network, Phase, Run};
 use super::pop::{self, Efficiency, messages_s};
 
-/// Losses below this are not worth a cause.
-const SLIGHT: f64 = 0.03;
+/// Losses below this fraction are not explained.
+const LOSS_MIN: f64 = 0.03;
 
-/// The sentence for a run against its reference run.
+/// Returns the sentence for a run relative to its reference run.
 pub fn sentence(run: &Run, reference: &Run, network: &Network) -> String {
     let e = pop::efficiency(run, reference, network);
     let ranks = run.setup.ranks;
@@ -22,9 +22,9 @@ pub fn sentence(run: &Run, reference: &Run, network: &Network) -> String {
         (e.computation_scaling, more_work(run, reference)),
     ];
     let worst = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let (factor, why) = worst.expect("there are four");
-    if factor > 1.0 - SLIGHT {
-        return head + "no single cause takes more than 3 %";
+    let (factor, why) = worst.expect("four losses are compared");
+    if factor > 1.0 - LOSS_MIN {
+        return head + "no single cause costs more than 3 %";
     }
     head + &why
 }
@@ -33,37 +33,37 @@ fn percent(fraction: f64) -> String {
     format!("{:.0} %", fraction * 100.0)
 }
 
-/// The phase that `weight` finds heaviest.
+/// Returns the phase with the greatest `weight`.
 fn worst_phase(run: &Run, weight: impl Fn(&Phase) -> f64) -> Option<&Phase> {
     run.phases.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))
 }
 
-/// Work lies unevenly: on which rank, in which phase, and whether a single base leaf is to blame.
+/// Describes load imbalance: the rank, the phase, and whether a single base leaf causes it.
 fn imbalance(run: &Run) -> String {
     let ranks = run.setup.ranks as f64;
     let waits = |p: &Phase| p.useful_s.max - p.useful_s.sum / ranks;
     let Some(phase) = worst_phase(run, waits) else { return "the work is uneven".to_owned() };
-    let share = phase.useful_s.max / phase.useful_s.sum.max(1e-12);
+    let fraction = phase.useful_s.max / phase.useful_s.sum.max(1e-12);
     if let Some(leaf) = heaviest_base_leaf(run)
         && leaf * ranks > 0.7 * run.useful_s.lambda(run.setup.ranks)
         && leaf * ranks > 1.0
     {
         return format!(
-            "one base leaf alone holds {:.1} % of the cells, more than a rank's share",
+            "a single base leaf holds {:.1} % of the cells, more than the mean load of a rank",
             leaf * 100.0
         );
     }
     format!(
-        "work is uneven (lambda {:.2}): rank {} does {:.1} % of `{}` where a share is {:.1} %",
+        "work is uneven (lambda {:.2}): rank {} does {:.1} % of `{}`, the mean is {:.1} %",
         run.useful_s.lambda(run.setup.ranks),
         phase.useful_s.at,
-        share * 100.0,
+        fraction * 100.0,
         phase.name,
         100.0 / ranks
     )
 }
 
-/// The fraction of all cells in the heaviest base leaf, where the program tells it.
+/// Returns the fraction of all cells in the largest base leaf, if the program reports it.
 pub fn heaviest_base_leaf(run: &Run) -> Option<f64> {
     let heaviest = run.counters.get("base_leaf_cells_max")?.max;
     (run.cells > 0).then(|| heaviest / run.cells as f64)
@@ -74,12 +74,12 @@ fn serial(run: &Run) -> String {
     let waits = |p: &Phase| p.useful_s.max - p.useful_s.sum / ranks;
     match worst_phase(run, waits) {
         Some(p) => format!(
-            "ranks have equal work in total but not within phases; `{}` waits longest, for rank {} (lambda {:.2})",
+            "work is balanced in total but not within phases; in `{}` ranks wait longest, for rank {} (lambda {:.2})",
             p.name,
             p.useful_s.at,
             p.useful_s.lambda(run.setup.ranks)
         ),
-        None => "ranks wait for each other at the ends of phases".to_owned(),
+        None => "ranks wait for each other at the end of phases".to_owned(),
     }
 }
 
@@ -87,18 +87,18 @@ fn transfer(run: &Run, network: &Network, e: &Efficiency) -> String {
     if run.setup.comm != super::entry::Comm::Sim {
         let lost = |p: &Phase| p.wall_s.max - p.useful_s.max;
         let Some(p) = worst_phase(run, lost) else {
-            return "ranks do not compute all the time".to_owned();
+            return "ranks are idle part of the time".to_owned();
         };
-        let crowd = if run.oversubscribed { ", with more ranks than cores" } else { "" };
+        let crowd = if run.oversubscribed { ", oversubscribed" } else { "" };
         return format!(
-            "{} of the time is no computing of any rank{crowd}, most of it in `{}`",
+            "{} of the time no rank computes{crowd}, mostly in `{}`",
             percent(1.0 - e.transfer),
             p.name
         );
     }
     match worst_phase(run, |p| messages_s(p, network)) {
         Some(p) => format!(
-            "messages take {} of the time by the model, most of it `{}` with {:.0} messages and {:.1} MB on a rank",
+            "messages take {} of the modelled time, mostly in `{}` with {:.0} messages and {:.1} MB per rank",
             percent(1.0 - e.transfer),
             p.name,
             p.messages.max,
@@ -108,15 +108,16 @@ fn transfer(run: &Run, network: &Network, e: &Efficiency) -> String {
     }
 }
 
-/// More is computed in total than on the reference's ranks: by which phase.
+/// Describes redundant work relative to the reference run, and the phase that adds most.
 fn more_work(run: &Run, reference: &Run) -> String {
     let per_cell = |p: &Phase, r: &Run| p.useful_s.sum / r.cells.max(1) as f64;
-    let before = |p: &Phase| reference.phases.iter().find(|b| b.name == p.name);
-    let grown = |p: &Phase| per_cell(p, run) - before(p).map_or(0.0, |b| per_cell(b, reference));
+    let in_reference = |p: &Phase| reference.phases.iter().find(|b| b.name == p.name);
+    let grown =
+        |p: &Phase| per_cell(p, run) - in_reference(p).map_or(0.0, |b| per_cell(b, reference));
     let all = run.useful_s.sum / run.cells.max(1) as f64;
     match worst_phase(run, grown) {
         Some(p) => format!(
-            "the ranks together compute {:.2} times as much as {}, `{}` adding most ({} of all)",
+            "the ranks together compute {:.2} times as much as {}, mostly in `{}` ({} of the total)",
             all * reference.cells.max(1) as f64 / reference.useful_s.sum.max(1e-12),
             if reference.setup.ranks == 1 {
                 "one".to_owned()
@@ -126,7 +127,7 @@ fn more_work(run: &Run, reference: &Run) -> String {
             p.name,
             percent(grown(p) / all)
         ),
-        None => "more is computed in total".to_owned(),
+        None => "the total work grows".to_owned(),
     }
 }
 
@@ -146,13 +147,13 @@ mod tests {
     fn the_largest_loss_is_named() {
         let one = run(Comm::Sim, 100, &[("read", &[0.1]), ("grade", &[4.0])]);
         let mut two = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[3.0, 1.0])]);
-        let told = why(&two, &one, &FREE);
+        let text = why(&two, &one, &FREE);
         assert!(
-            told.starts_with("67 % at 2 ranks: ") && told.contains("rank 0 does 75.0 % of `grade`"),
-            "{told}"
+            text.starts_with("67 % at 2 ranks: ") && text.contains("rank 0 does 75.0 % of `grade`"),
+            "{text}"
         );
         two.counters.insert("base_leaf_cells_max".into(), Spread::of(&[70.0, 10.0]));
-        assert!(why(&two, &one, &FREE).contains("one base leaf alone holds 70.0 %"));
+        assert!(why(&two, &one, &FREE).contains("a single base leaf holds 70.0 %"));
 
         let mut fine = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[2.0, 2.0])]);
         assert!(why(&fine, &one, &FREE).contains("no single cause"));
@@ -161,7 +162,7 @@ mod tests {
         assert!(why(&fine, &one, &slow).contains("`grade` with 10 messages"));
 
         let redundant = run(Comm::Sim, 100, &[("read", &[2.05, 2.05]), ("grade", &[2.0, 2.0])]);
-        assert!(why(&redundant, &one, &FREE).contains("`read` adding most"));
+        assert!(why(&redundant, &one, &FREE).contains("mostly in `read`"));
 
         let crossed = run(Comm::Sim, 100, &[("read", &[0.05, 2.0]), ("grade", &[2.0, 0.05])]);
         assert!(why(&crossed, &one, &FREE).contains("not within phases"));

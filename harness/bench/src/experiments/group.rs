@@ -1,29 +1,29 @@
-//! Runs of the same setup together: what is said of a measurement is said of all its repetitions.
+//! Repetitions of the same setup, and the statistics of each such group.
 
 use super::entry::{Comm, Line, Network, Phase, Run, Setup, Spread, What};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
-use super::stats::{Median, median};
+use crate::statistics::{Median, median};
 
 /// The repetitions of one run.
 #[derive(Clone, Debug)]
 pub struct Group {
     /// What was run.
     pub setup: Setup,
-    /// The runs, warm-ups left out, in the order in which they were made.
+    /// The runs without warm-ups, in chronological order.
     pub runs: Vec<Run>,
-    /// Time, measured or projected (see [`pop::time_s`]). Where it is projected and ranks are told one by one, it
-    /// is the typical run's; the interval is that of the repetitions' own projections, reaching to it.
+    /// Time in seconds, measured or projected (see [`pop::time_s`]). A projected time with values by rank is that of the
+    /// typical run; the interval of the repetitions' projections is then extended to include it.
     pub time_s: Median,
-    /// What is said of single ranks is said of it: the run whose time is nearest to the median, with every
-    /// rank's useful time in every phase replaced by its median over the repetitions where they tell it.
+    /// Represents single ranks: the run whose time is closest to the median, with every rank's useful time in every phase
+    /// replaced by its median over the repetitions if all repetitions report it.
     pub typical: Run,
-    /// Whether they do, and there are several.
+    /// Whether the typical run consists of such medians.
     pub by_rank: bool,
 }
 
 impl Group {
-    /// Of repetitions of one setup; nothing of none.
+    /// Groups the repetitions of one setup; `None` for no repetitions.
     fn of(setup: Setup, runs: Vec<Run>, network: &Network) -> Option<Self> {
         let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, network)).collect();
         let mut time_s = median(&times)?;
@@ -42,38 +42,38 @@ impl Group {
         Some(Self { setup, runs, time_s, typical, by_rank })
     }
 
-    /// Where times of single ranks are from, for a caption.
-    pub fn ranks_told(&self) -> String {
+    /// Returns the origin of the times of single ranks, for a caption.
+    pub fn rank_times_caption(&self) -> String {
         let n = self.runs.len();
         match self.by_rank {
             true => format!("Times of a rank in a phase are medians of {n} runs"),
-            false => format!("Run of median time of {n}"),
+            false => format!("Run of median time among {n}"),
         }
     }
 
-    /// Cells of the mesh.
+    /// Returns the number of cells of the mesh.
     pub fn cells(&self) -> u64 {
         self.runs[0].cells
     }
 
-    /// Cells per second and rank.
+    /// Returns cells per second and rank.
     pub fn rate(&self) -> f64 {
         self.cells() as f64 / self.time_s.value / self.setup.ranks as f64
     }
 
-    /// Median of peak memory over cells.
+    /// Returns the median of peak memory per cell, in bytes.
     pub fn bytes_per_cell(&self) -> Median {
         let values: Vec<f64> =
             self.runs.iter().map(|r| r.peak_rss_bytes.sum / r.cells.max(1) as f64).collect();
         median(&values).expect("a group has runs")
     }
 
-    /// Whether more ranks than cores shared the machine.
+    /// Whether more ranks than cores ran.
     pub fn oversubscribed(&self) -> bool {
         self.runs.iter().any(|r| r.oversubscribed)
     }
 
-    /// How the time was come by, in a word.
+    /// Returns `projected`, `oversubscribed` or `measured`.
     pub fn how(&self) -> &'static str {
         match self.setup.comm {
             Comm::Sim => "projected",
@@ -82,12 +82,12 @@ impl Group {
         }
     }
 
-    /// Efficiencies of the typical run against the typical one of `reference`.
+    /// Returns the efficiencies of the typical run relative to that of `reference`.
     pub fn efficiency(&self, reference: &Group, network: &Network) -> Efficiency {
         pop::efficiency(&self.typical, &reference.typical, network)
     }
 
-    /// The critical path of CPU times alone.
+    /// Returns the critical path of CPU times without messages, in seconds.
     fn path_s(&self) -> f64 {
         if self.by_rank {
             return pop::path_s(&self.typical);
@@ -97,16 +97,17 @@ impl Group {
     }
 }
 
-/// Useful time by phase and rank, each the median over runs; nothing where there is one run only, or one of them
-/// does not tell them all.
+/// Returns the median over runs of the useful time by phase and rank; `None` for a single run, or if a run does not report
+/// every rank.
 fn medians_by_rank(runs: &[Run]) -> Option<Vec<Vec<f64>>> {
     let (first, rest) = runs.split_first()?;
     if rest.is_empty() || first.phases.is_empty() {
         return None;
     }
-    let told = |r: &Run| r.phases.iter().all(|p| p.useful_s.by_rank.len() == r.setup.ranks);
+    let reports_ranks =
+        |r: &Run| r.phases.iter().all(|p| p.useful_s.by_rank.len() == r.setup.ranks);
     let names = |r: &Run| r.phases.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
-    if !runs.iter().all(|r| told(r) && names(r) == names(first)) {
+    if !runs.iter().all(|r| reports_ranks(r) && names(r) == names(first)) {
         return None;
     }
     let of = |phase: usize, rank: usize| {
@@ -126,19 +127,19 @@ fn quiet(run: &mut Run, useful_s: &[Vec<f64>]) {
     run.useful_s = Spread::of(&(0..run.setup.ranks).map(of_rank).collect::<Vec<f64>>());
 }
 
-/// What lines say, in groups.
+/// The runs of a record, grouped.
 #[derive(Clone, Debug)]
 pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
-    /// Runs that tell who sent how much to whom, warm-ups among them; the last one of every setup.
+    /// The last run of every setup that contains a message matrix, including warm-ups.
     pub matrices: Vec<Run>,
-    /// The last network that was measured or given.
+    /// The network of the last line that has one.
     pub network: Network,
 }
 
 impl Groups {
-    /// Groups the runs among lines.
+    /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
         let mut network = ASSUMED;
         let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
@@ -155,11 +156,11 @@ impl Groups {
                 _ => {}
             }
         }
-        let told = lines.iter().filter_map(|line| match &line.what {
+        let with_matrix = lines.iter().filter_map(|line| match &line.what {
             What::Run(run) if !run.message_matrix.is_empty() => Some(&**run),
             _ => None,
         });
-        for run in told {
+        for run in with_matrix {
             matrices.retain(|other| other.setup != run.setup);
             matrices.push(run.clone());
         }
@@ -167,7 +168,7 @@ impl Groups {
         Self { all: by_setup.into_iter().filter_map(group).collect(), matrices, network }
     }
 
-    /// The groups of an experiment on one case, in the order of `key`.
+    /// Returns the groups whose setup is `wanted`, in ascending order of `key`.
     pub fn series<K: PartialOrd>(
         &self,
         wanted: impl Fn(&Setup) -> bool,
@@ -178,7 +179,7 @@ impl Groups {
         found
     }
 
-    /// What a group's efficiency is against: the same on fewest ranks; in weak scaling with another spacing.
+    /// Returns the reference of a group's efficiency: the same mesh on the fewest ranks, or in weak scaling the smallest mesh.
     pub fn reference(&self, group: &Group) -> &Group {
         let (s, weak) = (&group.setup, group.setup.experiment == "weak");
         let same = |o: &&Group| {
@@ -189,7 +190,7 @@ impl Groups {
             mesh && size
         };
         let rank = |o: &&Group| {
-            // The same way of running if there is one on as few ranks, then the same experiment.
+            // Fewest ranks first; among those the same communication, then the same experiment.
             (o.setup.ranks, o.setup.comm != s.comm, o.setup.experiment != s.experiment)
         };
         let candidates = self.all.iter().filter(same).filter(|o| {
@@ -201,7 +202,7 @@ impl Groups {
         })
     }
 
-    /// Projection against measurement: pairs of the same mesh on as many ranks, both on cores of their own.
+    /// Returns pairs of simulated and MPI runs of the same mesh on equally many ranks, without oversubscription.
     pub fn projections(&self) -> Vec<Projection<'_>> {
         let pair = |sim: &'_ Group| {
             let found = self.all.iter().find(|m| {
@@ -231,13 +232,12 @@ pub struct Projection<'a> {
 }
 
 impl Projection<'_> {
-    /// How much longer the projection is, as a fraction; negative where it is shorter.
+    /// Returns the relative error of the projected time; negative if it is too short.
     pub fn error(&self) -> f64 {
         self.sim.time_s.value / self.measured.time_s.value - 1.0
     }
 
-    /// The same for CPU times alone: how much longer the simulated ranks' critical path is than the one of
-    /// the real ranks' CPU times. Medians of both.
+    /// Returns the relative error of the critical path of CPU times, simulated versus MPI ranks; medians of both.
     pub fn path_error(&self) -> f64 {
         self.sim.path_s() / self.measured.path_s() - 1.0
     }
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn repetitions_come_together_and_warm_ups_stay_out() {
+    fn repetitions_form_a_group_without_warm_ups() {
         let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
         cold.warm_up = true;
         let lines = [
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_in_one_repetition_changes_nothing() {
+    fn noise_in_a_single_repetition_has_no_effect() {
         let quiet: &[(&str, &[f64])] = &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])];
         let of = |disturbed: [&[(&str, &[f64])]; 3]| {
             let mut lines = vec![free()];
@@ -299,23 +299,23 @@ mod tests {
         assert_eq!(noisy.typical.useful_s, clean.typical.useful_s);
         assert_eq!(noisy.typical.useful_s.lambda(3), 5.5 * 3.0 / 12.5);
         assert_eq!((noisy.time_s.value, noisy.path_s()), (5.5, 5.5));
-        // The repetitions' own critical paths are all longer; the bar says so, and reaches the point.
+        // The repetitions' own critical paths are all longer; the interval shows that and includes the value.
         assert_eq!((noisy.time_s.low, noisy.time_s.high), (5.5, 15.0));
     }
 
     #[test]
-    fn records_without_ranks_by_phase_are_told_by_a_run() {
+    fn without_times_by_rank_a_real_run_is_typical() {
         let mut brief = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
         brief.phases[0].useful_s.by_rank.clear();
         let lines =
             [free(), line_of(brief.clone()), line_of(run(Comm::Sim, 9, &[("a", &[3.0, 2.0])]))];
         let group = Groups::of(&lines).all.remove(0);
         assert!(!group.by_rank && group.runs.contains(&group.typical));
-        assert!(group.ranks_told().starts_with("Run of median time"));
+        assert!(group.rank_times_caption().starts_with("Run of median time"));
     }
 
     #[test]
-    fn message_matrices_are_taken_from_warm_ups() {
+    fn message_matrices_come_from_warm_ups() {
         let mut warm = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
         (warm.warm_up, warm.message_matrix) = (true, vec![[0, 1, 1, 8]]);
         let groups = Groups::of(&[line_of(warm.clone()), line_of(warm)]);
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn projections_are_held_against_the_same_mesh_on_as_many_ranks() {
+    fn projections_are_compared_with_the_same_mesh_on_equally_many_ranks() {
         let mut crowd = run(Comm::Mpi, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])]);
         crowd.oversubscribed = true;
         let lines = [

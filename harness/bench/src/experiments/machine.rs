@@ -1,4 +1,4 @@
-//! The machine that numbers come from, as far as it tells.
+//! The description of the machine that runs the measurements.
 
 use super::entry::Machine;
 use std::fs;
@@ -19,12 +19,12 @@ pub fn describe(mpirun: &Path, place: &Path) -> Machine {
     }
 }
 
-/// Cores that this process may use.
+/// Returns the number of cores that this process may use.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
-/// Runnable processes, averaged over the last minute; nothing where the system does not tell.
+/// Returns the number of runnable processes, averaged over the last minute; 0 if the system does not report it.
 pub fn load_average() -> f64 {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split(' ').next().and_then(|w| w.parse().ok()).unwrap_or(0.0)
@@ -36,7 +36,7 @@ fn cpu(cpuinfo: &str) -> String {
             cpuinfo.lines().find(|l| l.split(':').next().is_some_and(|k| k.trim() == key))?;
         Some(line.split_once(':')?.1.trim().to_owned())
     };
-    // A virtual machine may hide the name; family and model still tell the generation.
+    // A virtual machine may hide the name; family and model still identify the generation.
     let number = |key| value(key).unwrap_or_else(|| "?".into());
     match value("model name") {
         Some(name) if !name.eq_ignore_ascii_case("unknown") => {
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_processor_is_named_as_well_as_possible() {
+    fn an_unnamed_processor_is_described_by_family_and_model() {
         let text = "processor\t: 0\ncpu family\t: 6\nmodel\t\t: 85\nmodel name\t: A Chip @ 2 GHz\n";
         assert_eq!(cpu(text), "A Chip @ 2 GHz (family 6, model 85)");
         assert_eq!(cpu(&text.replace("A Chip @ 2 GHz", "unknown")), "unnamed (family 6, model 85)");
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn this_machine_says_something() {
+    fn this_machine_is_described_even_without_a_launcher() {
         let machine = describe(Path::new("no-such-launcher"), Path::new("."));
         assert!(machine.cores > 0 && machine.mpi.is_empty() && !machine.kernel.is_empty());
     }

@@ -1,10 +1,10 @@
-//! Measurements: how long, why, and how it scales.
+//! Performance experiments: run times, their causes and their scaling.
 //!
-//! [`bench()`] runs the studies of a [`plan`] and appends every result to a [`record`] at once. What is said
-//! of them is computed from the record alone, by [`group`], [`pop`], [`cause`] and [`table`] here and by
-//! the crate `report`, so that it can be said again at any time, on any machine.
+//! [`bench()`] runs the studies of a [`plan`] and appends every result to a [`record`] immediately. All tables and figures are
+//! computed from the record alone, by [`group`], [`pop`], [`cause`] and [`table`] here and by the crate `report`. They can
+//! therefore be reproduced at any time on any machine.
 //!
-//! Repetitions are the outer loop: what drifts on a machine drifts through all setups alike.
+//! Repetitions are the outer loop, so that a drift of the machine affects all setups equally.
 
 pub mod cause;
 pub mod entry;
@@ -19,7 +19,6 @@ pub mod pop;
 pub mod record;
 pub mod session;
 pub mod sizing;
-pub mod stats;
 pub mod table;
 pub mod variant;
 
@@ -31,19 +30,19 @@ use session::{Bench, BenchError, Options, Point};
 use std::path::Path;
 use variant::Base;
 
-/// What a session gave.
+/// The result of a session.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Its lines in the record.
+    /// The lines it appended to the record.
     pub lines: Vec<Line>,
     /// Number of failures among them.
     pub failures: usize,
 }
 
-/// Measures. `say` is told what is being done.
+/// Runs a session. `say` receives progress messages.
 ///
 /// # Errors
-/// Where the input is at fault, something is missing, or the user interrupts.
+/// If the input is invalid, a program is missing, or the user interrupts.
 pub fn bench(
     options: &Options,
     programs: &Programs,
@@ -62,7 +61,7 @@ pub fn bench(
 }
 
 impl Bench<'_> {
-    /// Runs an experiment.
+    /// Runs a study.
     fn study(&mut self, study: &Study) -> Result<(), BenchError> {
         let base = self.base(&study.case)?;
         (self.say)(&format!("{} scaling of {}: choosing spacings", study.experiment, base.name));
@@ -76,17 +75,17 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// The case by its name in the catalogue or its path, with its geometry written out.
+    /// Reads a case by its name in the catalogue or its path, and writes its geometry as an STL file.
     fn base(&self, case: &str) -> Result<Base, BenchError> {
         let catalogue = &self.runner.programs.paths.catalogue;
         let path = catalogue.case_file(case, Path::new("")).map_err(BenchError::Input)?;
         Base::read(&path, self.runner.place).map_err(BenchError::Input)
     }
 
-    /// Every mesh once, unrecorded in statistics: it brings files into memory.
+    /// Meshes every case once, excluded from statistics, to fill the file cache.
     fn warm_up(&mut self, points: &mut [Point]) -> Result<(), BenchError> {
-        for at in warmers(points) {
-            self.run(&mut points[at], 0, true)?;
+        for index in warmers(points) {
+            self.run(&mut points[index], 0, true)?;
         }
         Ok(())
     }

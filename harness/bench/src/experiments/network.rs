@@ -1,18 +1,18 @@
-//! What a message costs: measured by a ping-pong through the launcher, or given.
+//! Latency and bandwidth of messages: measured by a ping-pong through the launcher, or given.
 
 use super::entry::Network;
 use serde::Deserialize;
 
-/// Assumed where nothing was measured or given: a current cluster interconnect.
+/// The default: a current cluster interconnect.
 pub const ASSUMED: Network =
     Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
 
-/// What the program `pingpong` prints.
+/// The output of the program `pingpong`.
 #[derive(Debug, Deserialize)]
 struct PingPong {
     /// `octree-pingpong/1`.
     schema: String,
-    /// Sizes, and the median time of one way.
+    /// Message sizes with their median one-way times.
     points: Vec<Point>,
 }
 
@@ -22,18 +22,18 @@ struct Point {
     time_s: f64,
 }
 
-/// Reads what the ping-pong printed: latency from the smallest message, bandwidth from the largest.
+/// Parses the output of `pingpong`: latency from the smallest message, bandwidth from the largest.
 ///
 /// # Errors
-/// One sentence, where it is not what it should be.
+/// One sentence, if the output is malformed or the times do not grow.
 pub fn parse(text: &str) -> Result<Network, String> {
-    let told: PingPong = serde_json::from_str(text)
+    let result: PingPong = serde_json::from_str(text)
         .map_err(|error| format!("the ping-pong printed no result: {error}"))?;
-    if told.schema != "octree-pingpong/1" {
-        return Err(format!("the ping-pong's schema is {}", told.schema));
+    if result.schema != "octree-pingpong/1" {
+        return Err(format!("the ping-pong's schema is {}", result.schema));
     }
-    let smallest = told.points.iter().min_by(|a, b| a.bytes.total_cmp(&b.bytes));
-    let largest = told.points.iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes));
+    let smallest = result.points.iter().min_by(|a, b| a.bytes.total_cmp(&b.bytes));
+    let largest = result.points.iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes));
     match (smallest, largest) {
         (Some(s), Some(l)) if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => {
             Ok(Network {
@@ -46,10 +46,10 @@ pub fn parse(text: &str) -> Result<Network, String> {
     }
 }
 
-/// Reads `LATENCY_SECONDS,BYTES_PER_SECOND`.
+/// Parses `LATENCY_SECONDS,BYTES_PER_SECOND`.
 ///
 /// # Errors
-/// What should have been given.
+/// The expected format.
 pub fn given(text: &str) -> Result<Network, String> {
     let values: Vec<f64> = text.split(',').filter_map(|w| w.trim().parse().ok()).collect();
     match values[..] {
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ping_pong_is_read() {
+    fn ping_pong_output_is_parsed() {
         let text = r#"{"schema": "octree-pingpong/1", "points": [{"bytes": 0, "time_s": 1e-6}, {"bytes": 1000000, "time_s": 1.01e-4}]}"#;
         let n = parse(text).unwrap();
         assert_eq!(n.latency_s, 1e-6);
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_may_be_given() {
+    fn a_given_network_is_parsed() {
         assert_eq!(given("1e-6, 2e9").unwrap().bandwidth_bytes_per_s, 2e9);
         assert!(given("1e-6").is_err() && given("1,0").is_err());
     }

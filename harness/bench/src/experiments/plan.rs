@@ -1,20 +1,20 @@
-//! What is run: experiments, and the two presets.
+//! The experiments and the two presets of studies.
 
 use super::entry::Comm;
 use std::fmt;
 
-/// A question that a set of runs answers.
+/// A kind of experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Experiment {
-    /// The same mesh on more and more ranks.
+    /// The same mesh on increasingly many ranks.
     Strong,
-    /// As many cells per rank on more and more ranks; the spacing is chosen so.
+    /// The same number of cells per rank on increasingly many ranks; the spacing is chosen accordingly.
     Weak,
-    /// The spacing halved again and again.
+    /// Spacings that differ by factors of two.
     Spacing,
-    /// The same spacing with more and more cells per layer.
+    /// The same spacing with increasing minimum layer thickness n.
     Layers,
-    /// What a base leaf weighs, and who cuts the base tree.
+    /// Weights of base leaves and partitioners.
     Weights,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Experiment {
     }
 }
 
-/// How much time may be spent.
+/// The extent of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Preset {
     /// Every experiment and every figure, in minutes on 2 cores.
@@ -39,30 +39,30 @@ pub enum Preset {
     Full,
 }
 
-/// A number of ranks and how they talk.
+/// A number of ranks and their means of communication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Layout {
-    /// How they talk.
+    /// How ranks communicate.
     pub comm: Comm,
-    /// How many.
+    /// Number of ranks.
     pub ranks: usize,
 }
 
 /// One experiment on one case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
-    /// The question.
+    /// The kind of experiment.
     pub experiment: Experiment,
     /// The case's name in the catalogue, or a case file.
     pub case: String,
     /// Cells to choose the spacing for: of the mesh (strong, weights), per rank (weak), of the largest mesh
     /// (spacing), at n = 4 (layers). None: the case's own spacing.
     pub cells: Option<u64>,
-    /// Values of n; empty for the case's own.
+    /// Values of n; empty for the n of the case.
     pub layers: Vec<u32>,
     /// Ranks of the runs.
     pub layouts: Vec<Layout>,
-    /// Weights and partitioners, each with each.
+    /// Weights of base leaves; every combination with `partitioners` is run.
     pub weights: Vec<String>,
     /// See `weights`.
     pub partitioners: Vec<String>,
@@ -70,9 +70,9 @@ pub struct Study {
     pub repeats: usize,
 }
 
-/// What the command line may change in the studies of a preset.
+/// Changes of a preset by the command line.
 #[derive(Clone, Debug, Default)]
-pub struct Wishes {
+pub struct Overrides {
     /// Cases instead of the preset's.
     pub cases: Vec<String>,
     /// Experiments instead of all.
@@ -87,42 +87,43 @@ pub struct Wishes {
     pub layers: Vec<u32>,
     /// Weights of the experiment of that name.
     pub weights: Vec<String>,
-    /// Partitioners of it.
+    /// Partitioners of the experiment `weights`.
     pub partitioners: Vec<String>,
     /// Repetitions.
     pub repeats: Option<usize>,
     /// No runs on MPI.
     pub no_mpi: bool,
-    /// No runs on simulated ranks, for a program that has none.
+    /// No runs on simulated ranks, for a program without them.
     pub no_sim: bool,
-    /// Serial runs only, for a program that knows no ranks.
+    /// Serial runs only, for a serial program.
     pub serial: bool,
-    /// The program has no choice of weights and partitioners.
+    /// The program does not offer weights and partitioners.
     pub no_choice: bool,
 }
 
 const MILLION: u64 = 1_000_000;
 
-/// The studies of a preset as the command line changes them.
-pub fn studies(preset: Preset, wishes: &Wishes) -> Vec<Study> {
-    let wanted =
-        |s: &Study| wishes.experiments.is_empty() || wishes.experiments.contains(&s.experiment);
+/// Returns the studies of a preset with the overrides applied.
+pub fn studies(preset: Preset, overrides: &Overrides) -> Vec<Study> {
+    let wanted = |s: &Study| {
+        overrides.experiments.is_empty() || overrides.experiments.contains(&s.experiment)
+    };
     let mut of_preset: Vec<Study> = match preset {
         Preset::Small => small(),
         Preset::Full => full(),
     };
     of_preset.retain(wanted);
-    of_preset.retain(|s| !(wishes.no_choice && s.experiment == Experiment::Weights));
-    if !wishes.cases.is_empty() {
-        of_preset = on_cases(of_preset, &wishes.cases);
+    of_preset.retain(|s| !(overrides.no_choice && s.experiment == Experiment::Weights));
+    if !overrides.cases.is_empty() {
+        of_preset = on_cases(of_preset, &overrides.cases);
     }
-    if !wishes.cells.is_empty() {
-        of_preset = with_cells(of_preset, &wishes.cells);
+    if !overrides.cells.is_empty() {
+        of_preset = with_cells(of_preset, &overrides.cells);
     }
     for study in &mut of_preset {
-        change(study, wishes);
+        change(study, overrides);
     }
-    // What is left without runs asks nothing.
+    // A study without runs is dropped.
     of_preset.retain(|study| !study.layouts.is_empty());
     of_preset
 }
@@ -157,40 +158,40 @@ fn with_cells(studies: Vec<Study>, cells: &[u64]) -> Vec<Study> {
     out
 }
 
-fn change(study: &mut Study, wishes: &Wishes) {
-    if !wishes.ranks.is_empty() || !wishes.ranks_mpi.is_empty() {
+fn change(study: &mut Study, overrides: &Overrides) {
+    if !overrides.ranks.is_empty() || !overrides.ranks_mpi.is_empty() {
         let scales = matches!(study.experiment, Experiment::Strong | Experiment::Weak);
         if scales {
-            study.layouts = layouts(&wishes.ranks, &wishes.ranks_mpi);
-        } else if study.experiment == Experiment::Weights && !wishes.ranks.is_empty() {
-            study.layouts = layouts(&wishes.ranks, &[]);
+            study.layouts = layouts(&overrides.ranks, &overrides.ranks_mpi);
+        } else if study.experiment == Experiment::Weights && !overrides.ranks.is_empty() {
+            study.layouts = layouts(&overrides.ranks, &[]);
         }
     }
-    if wishes.no_mpi {
-        // A serial run stands for the measured one.
+    if overrides.no_mpi {
+        // A serial run replaces the measured ones.
         let serial = study.layouts.iter().any(|l| l.comm == Comm::Mpi);
         study.layouts.retain(|l| l.comm != Comm::Mpi);
         study.layouts.extend(serial.then_some(Layout { comm: Comm::Solo, ranks: 1 }));
     }
-    if wishes.no_sim {
+    if overrides.no_sim {
         study.layouts.retain(|l| l.comm != Comm::Sim);
     }
-    if wishes.serial {
+    if overrides.serial {
         study.layouts = vec![Layout { comm: Comm::Solo, ranks: 1 }];
         if matches!(study.experiment, Experiment::Weak | Experiment::Weights) {
             study.layouts.clear();
         }
     }
-    if !wishes.layers.is_empty() && study.experiment == Experiment::Layers {
-        study.layers.clone_from(&wishes.layers);
+    if !overrides.layers.is_empty() && study.experiment == Experiment::Layers {
+        study.layers.clone_from(&overrides.layers);
     }
-    if !wishes.weights.is_empty() {
-        study.weights.clone_from(&wishes.weights);
+    if !overrides.weights.is_empty() {
+        study.weights.clone_from(&overrides.weights);
     }
-    if !wishes.partitioners.is_empty() {
-        study.partitioners.clone_from(&wishes.partitioners);
+    if !overrides.partitioners.is_empty() {
+        study.partitioners.clone_from(&overrides.partitioners);
     }
-    study.repeats = wishes.repeats.unwrap_or(study.repeats);
+    study.repeats = overrides.repeats.unwrap_or(study.repeats);
 }
 
 fn small() -> Vec<Study> {
@@ -239,26 +240,26 @@ fn study(
     };
     let (weights, partitioners) = match experiment {
         Experiment::Weights => {
-            let weights = words(&["unit", "area", "rehearsal", "rebalance"]);
+            let weights = words(&["unit", "area", "rebalance"]);
             (weights, words(&["metis", "morton"]))
         }
-        // The mesher's own choice.
+        // The default of the mesher.
         _ => (words(&[""]), words(&[""])),
     };
     let (case, layouts) = (case.to_owned(), layouts.to_vec());
     Study { experiment, case, cells: Some(cells), layers, layouts, weights, partitioners, repeats }
 }
 
-/// Simulated runs, then runs on MPI.
+/// Returns layouts of simulated runs followed by runs on MPI.
 fn layouts(sim: &[usize], mpi: &[usize]) -> Vec<Layout> {
     let of = |comm: Comm| move |&ranks: &usize| Layout { comm, ranks };
     sim.iter().map(of(Comm::Sim)).chain(mpi.iter().map(of(Comm::Mpi))).collect()
 }
 
-/// Reads rank counts: `1,2,7`, or `1..64` for the powers of two.
+/// Parses rank counts: `1,2,7`, or `1..64` for the powers of two.
 ///
 /// # Errors
-/// What should have been given.
+/// The expected format.
 pub fn ranks(text: &str) -> Result<Vec<usize>, String> {
     let wrong = || "give rank counts as in 1,2,7 or 1..64, the latter for powers of two".to_owned();
     let number =
@@ -290,16 +291,16 @@ mod tests {
     }
 
     #[test]
-    fn wishes_change_a_preset() {
-        let wishes = Wishes {
+    fn overrides_change_a_preset() {
+        let overrides = Overrides {
             experiments: vec![Experiment::Strong],
             cases: vec!["cube".into(), "ball".into()],
             cells: vec![1000, 2000],
             ranks: vec![1, 3],
             repeats: Some(9),
-            ..Wishes::default()
+            ..Overrides::default()
         };
-        let all = studies(Preset::Full, &wishes);
+        let all = studies(Preset::Full, &overrides);
         assert_eq!(all.len(), 4);
         assert_eq!((all[0].case.as_str(), all[0].cells), ("cube", Some(1000)));
         assert_eq!(all[0].layouts, layouts(&[1, 3], &[]));
@@ -307,26 +308,26 @@ mod tests {
     }
 
     #[test]
-    fn without_mpi_a_serial_run_stands_for_it() {
-        let no_mpi = Wishes { no_mpi: true, ..Wishes::default() };
+    fn without_mpi_serial_runs_replace_the_measured_ones() {
+        let no_mpi = Overrides { no_mpi: true, ..Overrides::default() };
         let all = studies(Preset::Small, &no_mpi);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm != Comm::Mpi));
         assert!(all.iter().all(|s| !s.layouts.is_empty()));
-        let serial = Wishes { serial: true, ..Wishes::default() };
+        let serial = Overrides { serial: true, ..Overrides::default() };
         let all = studies(Preset::Small, &serial);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Solo && l.ranks == 1));
         assert!(all.iter().all(|s| s.experiment != Experiment::Weights));
-        let real = Wishes { no_sim: true, no_choice: true, ..Wishes::default() };
+        let real = Overrides { no_sim: true, no_choice: true, ..Overrides::default() };
         let all = studies(Preset::Small, &real);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Mpi));
         assert!(!all.is_empty() && all.iter().all(|s| s.experiment != Experiment::Weights));
     }
 
     #[test]
-    fn presets_ask_every_question() {
+    fn presets_contain_every_experiment() {
         for preset in [Preset::Small, Preset::Full] {
             let mut asked: Vec<Experiment> =
-                studies(preset, &Wishes::default()).iter().map(|s| s.experiment).collect();
+                studies(preset, &Overrides::default()).iter().map(|s| s.experiment).collect();
             asked.sort();
             asked.dedup();
             assert_eq!(asked.len(), 5);

@@ -1,4 +1,4 @@
-//! What a study's runs are: meshes by spacing and n, divided in all the ways asked for.
+//! The runs of a study: meshes by spacing and n, with every requested partition.
 
 use super::execute::{self, Failed};
 use super::plan::{Experiment, Layout, Study};
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 impl Bench<'_> {
-    /// The runs of a study.
+    /// Returns the runs of a study.
     pub(crate) fn points(&mut self, study: &Study, base: &Base) -> Result<Vec<Point>, BenchError> {
         let mut sizes: BTreeMap<u32, Sizes> = BTreeMap::new();
         let own = [base.layer_cells_min];
@@ -45,7 +45,7 @@ impl Bench<'_> {
         Ok(points)
     }
 
-    /// Why the engine is not run on a case, by its description.
+    /// Returns the reason in the engine's description for which it is not run on a case.
     fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
         let engine = self.runner.programs.labelled(&self.options.engine);
         let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
@@ -74,7 +74,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The spacings of a study's meshes for a number of ranks.
+    /// Returns the spacings of a study's meshes for a number of ranks.
     fn spacings(
         &mut self,
         study: &Study,
@@ -101,7 +101,7 @@ impl Bench<'_> {
         })
     }
 
-    /// Cells of a mesh, made on one rank.
+    /// Returns the number of cells of a mesh, generated on one rank.
     pub(crate) fn count(&self, base: &Base, spacing: f64, n: u32) -> Result<u64, BenchError> {
         let case = base.variant(spacing, n).map_err(BenchError::Input)?;
         let setup = Setup {
@@ -123,25 +123,25 @@ impl Bench<'_> {
     }
 }
 
-/// The setup of every mesh that warms it up: the one whose message matrix is wanted, on most ranks where
-/// there are several; else the first.
+/// Returns, for every mesh, the index of the point that warms it up: the one on the most ranks that reports a message matrix,
+/// otherwise the first.
 pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
     let worth = |point: &Point| match execute::has_message_matrix(&point.setup) {
         true => point.setup.ranks,
         false => 0,
     };
     let mut best: Vec<usize> = Vec::new();
-    for (at, point) in points.iter().enumerate() {
+    for (index, point) in points.iter().enumerate() {
         match best.iter_mut().find(|b| points[**b].case == point.case) {
-            Some(before) if worth(point) > worth(&points[*before]) => *before = at,
+            Some(chosen) if worth(point) > worth(&points[*chosen]) => *chosen = index,
             Some(_) => {}
-            None => best.push(at),
+            None => best.push(index),
         }
     }
     best
 }
 
-/// Each with each, but for rebalancing by METIS, which does not do that: it would be `area` once more.
+/// Returns all combinations except `rebalance` with METIS, which is identical to `area`.
 fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<(&'a str, &'a str)> {
     let all =
         weights.iter().flat_map(|w| partitioners.iter().map(move |p| (w.as_str(), p.as_str())));
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn meshes_are_warmed_up_once_where_messages_can_be_told() {
+    fn a_mesh_is_warmed_up_once_on_the_layout_with_a_message_matrix() {
         let points = [
             point(Comm::Sim, 1, "a"),
             point(Comm::Sim, 64, "a"),

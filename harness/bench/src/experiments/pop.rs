@@ -13,24 +13,23 @@
 //!   global            = parallel * computation scaling
 //! ```
 //!
-//! What a rank does is the same in every repetition, only the time that the machine takes for it wavers. So
-//! where runs tell it rank by rank, `u[p][r]` is the median over the repetitions (see [`Group`](super::group::Group)),
-//! taken before any maximum over ranks: the greatest of many wavering times is the most disturbed rank's.
+//! The work of a rank is the same in every repetition; only its time varies. If runs report times by rank, `u[p][r]` is
+//! therefore the median over the repetitions (see [`Group`](super::group::Group)), taken before any maximum over ranks: the
+//! maximum of many noisy times would select the most disturbed rank.
 //!
-//! C is what the phases would take on a network that costs nothing, as ranks wait for each other at the
-//! end of a phase. Where ranks are simulated, T is projected: C plus what a latency-bandwidth model says
-//! of the counted messages.
+//! C is the time on an ideal network, as ranks wait for each other at the end of a phase. For simulated ranks T is projected:
+//! C plus the cost of the counted messages in a latency-bandwidth model.
 
 use super::entry::{Comm, Network, Phase, Run};
 
-/// How a time splits into causes. All are fractions, 1 being perfect.
+/// The factors of efficiency; 1 is ideal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Efficiency {
     /// Mean useful time over the greatest.
     pub load_balance: f64,
-    /// Lost to ranks that wait at the ends of phases although all have as much to do in total.
+    /// Loss to ranks that wait at the end of phases although the total work is balanced.
     pub serialisation: f64,
-    /// Lost to messages (and, on real MPI, to everything else that is no CPU time of the rank).
+    /// Loss to messages and, on MPI, to everything else that is not CPU time of the rank.
     pub transfer: f64,
     /// Useful work per cell of the reference run over that of this one.
     pub computation_scaling: f64,
@@ -57,18 +56,18 @@ impl Efficiency {
     }
 }
 
-/// What a rank's messages cost by the model.
+/// Returns the modelled time of a phase's messages on one rank, in seconds.
 pub fn messages_s(phase: &Phase, network: &Network) -> f64 {
     phase.messages.max * network.latency_s + phase.message_bytes.max / network.bandwidth_bytes_per_s
 }
 
-/// The critical path: phases end when their slowest rank ends, and messages cost what the model says.
+/// Returns the projected time in seconds: every phase takes as long as its slowest rank, plus the modelled messages.
 pub fn projected_s(run: &Run, network: &Network) -> f64 {
     run.phases.iter().map(|p| p.useful_s.max + messages_s(p, network)).sum()
 }
 
-/// The critical path on a network that costs nothing: what simulated and real ranks must have in common,
-/// also on a machine that is busy with other work. A program that tells no phases has one.
+/// Returns the critical path on an ideal network, in seconds. It must agree between simulated and MPI ranks, even on a busy
+/// machine. A program that reports no phases has a single one.
 pub fn path_s(run: &Run) -> f64 {
     if run.phases.is_empty() {
         return run.useful_s.max;
@@ -76,7 +75,7 @@ pub fn path_s(run: &Run) -> f64 {
     run.phases.iter().map(|p| p.useful_s.max).sum()
 }
 
-/// Time that a run took: measured where that means something, projected where ranks took turns.
+/// Returns the time of a run in seconds: measured, or projected for simulated ranks.
 pub fn time_s(run: &Run, network: &Network) -> f64 {
     match run.setup.comm {
         Comm::Sim => projected_s(run, network),
@@ -84,7 +83,7 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
     }
 }
 
-/// The efficiencies of a run against a reference run, usually the one on fewest ranks.
+/// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     let time_s = time_s(run, network);
     let path_s = path_s(run);
@@ -100,7 +99,7 @@ pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     }
 }
 
-/// The efficiencies of one phase against the same one of the reference run, if that has it.
+/// Returns the efficiencies of one phase relative to the same phase of the reference run, if it exists.
 pub fn phase_efficiency(
     run: &Run,
     phase: &Phase,
@@ -125,7 +124,7 @@ pub fn phase_efficiency(
     }
 }
 
-/// 1 where both are nothing, as nothing was lost.
+/// Returns a / b, or 1 for b = 0: nothing was lost.
 fn ratio(a: f64, b: f64) -> f64 {
     if b > 0.0 { a / b } else { 1.0 }
 }
@@ -143,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_worked_example() {
+    fn efficiencies_match_a_worked_example() {
         // Rank 0 works 3 then 1, rank 1 works 1 then 3: balanced in total, each phase waits for its slowest.
         let one = run(Comm::Sim, 100, &[("a", &[3.5]), ("b", &[3.5])]);
         let mut two = run(Comm::Sim, 100, &[("a", &[3.0, 1.0]), ("b", &[1.0, 3.0])]);
@@ -182,15 +181,15 @@ mod tests {
 
     #[test]
     fn a_program_without_phases_loses_nothing_between_them() {
-        let mut silent = run(Comm::Solo, 100, &[("all", &[3.0])]);
-        silent.phases.clear();
-        let e = efficiency(&silent, &silent.clone(), &FREE);
+        let mut without_phases = run(Comm::Solo, 100, &[("all", &[3.0])]);
+        without_phases.phases.clear();
+        let e = efficiency(&without_phases, &without_phases.clone(), &FREE);
         close(e.serialisation * e.transfer, 1.0);
         close(e.global(), 1.0);
     }
 
     #[test]
-    fn real_time_is_not_projected() {
+    fn times_on_mpi_are_not_projected() {
         let mut two = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0])]);
         two.time_wall_s = 5.0;
         let e = efficiency(&two, &two.clone(), &FREE);

@@ -1,14 +1,14 @@
-//! The record: a file of JSON lines to which every result is appended at once.
+//! The record: a file of JSON lines to which every result is appended immediately.
 //!
-//! Invariants: a line is written with one call under an exclusive lock, so that two runs at a time do not
-//! mix; what an interruption or a full disk cut short is one broken line, which the next writer ends and
-//! readers report and pass over; nothing is ever rewritten.
+//! Invariants: a line is written with one call under an exclusive lock, so that concurrent sessions do not interleave.
+//! An interruption or a full disk leaves at most one broken line, which the next writer terminates and readers report and
+//! skip. Lines are never rewritten.
 
 use super::entry::{Line, SCHEMA, What};
+use jiff::Timestamp;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A record opened for appending.
 #[derive(Debug)]
@@ -19,20 +19,20 @@ pub struct Record {
 }
 
 impl Record {
-    /// Opens a record, making it and its directory where they are absent, for a session of its own.
+    /// Opens a record for a new session; creates the file and its directory if necessary.
     ///
     /// # Errors
-    /// Where that is not possible.
+    /// If the file cannot be opened.
     pub fn open(path: &Path) -> io::Result<Self> {
         if let Some(directory) = path.parent() {
             std::fs::create_dir_all(directory)?;
         }
         let file = OpenOptions::new().create(true).append(true).read(true).open(path)?;
-        let session = format!("{}-{}", utc(SystemTime::now()), std::process::id());
+        let session = format!("{}-{}", now_utc(), std::process::id());
         Ok(Self { file, path: path.to_owned(), session })
     }
 
-    /// Where it is.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -40,12 +40,12 @@ impl Record {
     /// Appends a line, and returns it.
     ///
     /// # Errors
-    /// Where it could not be written whole.
+    /// If the line could not be written completely.
     pub fn append(&mut self, what: What) -> io::Result<Line> {
         let line = Line {
             schema: SCHEMA.to_owned(),
             session: self.session.clone(),
-            time_utc: utc(SystemTime::now()),
+            time_utc: now_utc(),
             what,
         };
         let mut text = serde_json::to_vec(&line)?;
@@ -64,7 +64,7 @@ impl Record {
         self.file.sync_data()
     }
 
-    /// Whether the file is empty or ends with a line's end.
+    /// Whether the file is empty or ends with a newline.
     fn ends_with_line(&mut self) -> io::Result<bool> {
         if self.file.seek(SeekFrom::End(0))? == 0 {
             return Ok(true);
@@ -76,19 +76,19 @@ impl Record {
     }
 }
 
-/// What a record says.
+/// The content of a record.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
-    /// Its lines, in the order in which they were written.
+    /// The lines in chronological order.
     pub lines: Vec<Line>,
-    /// Lines, from 1, that are not of the schema, and why.
+    /// Numbers (from 1) of invalid lines, with the reason.
     pub broken: Vec<(usize, String)>,
 }
 
 /// Reads a record.
 ///
 /// # Errors
-/// Where it cannot be read at all.
+/// If the file cannot be read.
 pub fn read(path: &Path) -> io::Result<Content> {
     let mut content = Content::default();
     for (i, text) in std::fs::read_to_string(path)?.lines().enumerate() {
@@ -102,26 +102,9 @@ pub fn read(path: &Path) -> io::Result<Content> {
     Ok(content)
 }
 
-/// A time as `2026-01-31T12:00:00Z`.
-fn utc(time: SystemTime) -> String {
-    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let (days, of_day) = (seconds / 86_400, seconds % 86_400);
-    let (year, month, day) = civil(days);
-    let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
-}
-
-/// Year, month and day of a day since 1970, in the Gregorian calendar. Years begin in March here, so that
-/// the leap day comes last (Hinnant, "chrono-Compatible Low-Level Date Algorithms").
-fn civil(days: u64) -> (u64, u64, u64) {
-    let z = days + 719_468;
-    let (era, of_era) = (z / 146_097, z % 146_097);
-    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let march_based = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * march_based + 2) / 5 + 1;
-    let month = if march_based < 10 { march_based + 3 } else { march_based - 9 };
-    (year_of_era + era * 400 + u64::from(month <= 2), month, day)
+/// Returns the current time, as `2026-01-31T12:00:00Z`.
+fn now_utc() -> String {
+    Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
 #[cfg(test)]
@@ -134,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn two_writers_at_a_time_lose_and_mix_nothing() {
+    fn concurrent_writers_do_not_interleave() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("deeper/record.jsonl");
         std::thread::scope(|scope| {
@@ -160,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_line_costs_itself_only() {
+    fn an_interrupted_line_does_not_damage_others() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("record.jsonl");
         Record::open(&path).unwrap().append(network(1.0)).unwrap();
@@ -174,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn another_schema_is_not_guessed_at() {
+    fn a_line_of_another_schema_is_reported() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("record.jsonl");
         Record::open(&path).unwrap().append(network(1.0)).unwrap();
@@ -184,13 +167,10 @@ mod tests {
     }
 
     #[test]
-    fn days_are_those_of_the_calendar() {
-        assert_eq!(civil(0), (1970, 1, 1));
-        assert_eq!(civil(11_016), (2000, 2, 29));
-        assert_eq!(civil(20_777), (2026, 11, 20));
-        assert_eq!(
-            utc(UNIX_EPOCH + std::time::Duration::from_secs(86_399)),
-            "1970-01-01T23:59:59Z"
-        );
+    fn times_are_utc_without_fractions_of_a_second() {
+        let now = now_utc();
+        let read: Timestamp = now.parse().unwrap();
+        assert_eq!((read.to_string(), read.subsec_nanosecond()), (now, 0));
+        assert!(read.duration_until(Timestamp::now()).as_secs() < 60);
     }
 }

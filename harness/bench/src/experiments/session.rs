@@ -1,4 +1,4 @@
-//! A session of measurements under way: runs, checks that equal meshes have equal digests, and appends to the record.
+//! A measurement session: makes runs, checks that equal meshes have equal digests, and appends to the record.
 
 use super::entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
 use super::execute::{Failed, Runner};
@@ -11,16 +11,16 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What is asked for.
+/// The options of a session.
 #[derive(Debug)]
 pub struct Options {
     /// The studies, in order.
     pub studies: Vec<Study>,
-    /// `mesher`, `reference`, or what the record calls the engine of `Programs`.
+    /// `mesher`, `reference`, or the name of the engine in the record.
     pub engine: String,
     /// How ranks are started.
     pub launcher: Launcher,
-    /// Latency and bandwidth; measured if not given and the launcher is there.
+    /// Latency and bandwidth; measured by default if the launcher exists.
     pub network: Option<Network>,
     /// The record.
     pub record: PathBuf,
@@ -30,17 +30,17 @@ pub struct Options {
     pub command: Vec<String>,
 }
 
-/// Why measuring ended early.
+/// Why a session ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// The user's input.
+    /// Invalid input.
     #[error("{0}")]
     Input(String),
-    /// Something is missing that was asked for.
+    /// A required program or file is missing.
     #[error("{0}")]
     Missing(String),
-    /// Ctrl-C; what was measured is in the record.
-    #[error("interrupted: what was measured so far is in the record")]
+    /// Ctrl-C; the record contains all results so far.
+    #[error("interrupted: the record contains all results so far")]
     Interrupted,
 }
 
@@ -51,16 +51,16 @@ pub(crate) struct Point {
     pub failed: bool,
 }
 
-/// A directory for the files of runs.
+/// Creates a directory for the files of runs.
 pub(crate) fn temporary_directory() -> Result<tempfile::TempDir, BenchError> {
     let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
     place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))
 }
 
-/// What a mesh depends on, as text; its digest must depend on nothing else.
+/// Everything that a mesh, and so its digest, depends on.
 type Mesh = (String, String, u32);
 
-/// A session under way.
+/// A running session.
 pub(crate) struct Bench<'a> {
     pub(crate) options: &'a Options,
     pub(crate) runner: Runner<'a>,
@@ -115,7 +115,7 @@ impl Bench<'_> {
             None => match self.runner.ping_pong().and_then(|text| network::parse(&text)) {
                 Ok(measured) => measured,
                 Err(why) => {
-                    (self.say)(&format!("messages are assumed to cost 2 us and 10 GB/s: {why}"));
+                    (self.say)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
                     network::ASSUMED
                 }
             },
@@ -166,7 +166,7 @@ impl Bench<'_> {
         self.append(What::Failure(Failure { setup: point.setup.clone(), command, why }))
     }
 
-    /// Has a mesh written beside the record and audited.
+    /// Writes a mesh to the record's file system and audits it.
     pub(crate) fn audit(&mut self, point: &mut Point) -> Result<(), BenchError> {
         let s = &point.setup;
         (self.say)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
@@ -179,7 +179,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The time of a wrong mesh is no result: all runs of a mesh have one digest.
+    /// Requires all runs of a mesh to have the same digest: the time of a wrong mesh is not a result.
     fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
         let s = &run.setup;
         let mesh = (s.case.clone(), format!("{:e}", s.spacing_min), s.layer_cells_min);

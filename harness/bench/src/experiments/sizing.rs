@@ -1,28 +1,28 @@
-//! The spacing that gives a wanted number of cells, found by meshing coarser.
+//! Finds the spacing that gives a wanted number of cells by extrapolation from coarser meshes.
 //!
-//! Cells follow a power of the spacing, close to -2 where they fill layers around a surface. The power is
-//! taken from the two finest meshes so far, each a few times finer than the last.
+//! The number of cells follows a power of the spacing, close to -2 if cells fill layers around a surface. The exponent is
+//! estimated from the two nearest meshes so far, each a few times finer than the previous one.
 
-/// Close enough, as a fraction of the cells wanted.
+/// Tolerated relative deviation of the number of cells.
 const TOLERANCE: f64 = 0.02;
-/// Two meshes within this factor of the wanted one tell enough.
+/// Two meshes within this factor of the wanted size determine the exponent.
 const NEAR: f64 = 4.0;
-/// What the next mesh aims at, as a fraction of the wanted one: meshes beyond it cost more than it does.
+/// Target of the next mesh as a fraction of the wanted size: an overshooting mesh would cost more than the wanted one.
 const AIM: f64 = 0.5;
-/// Finer by this factor in cells at most, as a guess from afar may be far off.
+/// Maximum growth of cells from mesh to mesh: a distant extrapolation may be far off.
 const STEP: f64 = 40.0;
 
-/// What is known of one case at one n.
+/// Known sizes of one case at one n.
 #[derive(Clone, Debug, Default)]
 pub struct Sizes {
-    /// Meshes made so far: spacing and cells, coarser ones first.
+    /// Spacing and cells of the meshes so far, coarsest first.
     meshes: Vec<(f64, f64)>,
-    /// Cells that were asked for, and the answer: asked again, it stays the same.
+    /// Requested cells and the spacing returned, so that a repeated request returns the same spacing.
     answers: Vec<(f64, f64)>,
 }
 
 impl Sizes {
-    /// The spacing for about `cells`. `mesh` makes a mesh and counts its cells; `coarse` is a spacing to begin with.
+    /// Returns the spacing for about `cells`. `mesh` returns the number of cells at a spacing; `coarse` is the first spacing.
     ///
     /// # Errors
     /// Those of `mesh`.
@@ -44,7 +44,7 @@ impl Sizes {
                 Some((spacing, count)) => {
                     let more = AIM * cells / count;
                     let more = if count < cells { more.clamp(1.5, STEP) } else { more.min(0.8) };
-                    // The power grows with fineness up to about 2: less would overshoot.
+                    // The exponent grows with refinement up to about 2; a smaller one would overshoot.
                     spacing / more.powf(1.0 / self.power(cells).max(2.0))
                 }
             };
@@ -57,7 +57,7 @@ impl Sizes {
         Ok(answer)
     }
 
-    /// Whether a mesh is close, or two are near enough to tell the power there.
+    /// Whether one mesh is close enough, or two determine the exponent.
     fn is_known(&self, cells: f64) -> bool {
         let off = |m: &&(f64, f64)| (m.1 / cells).ln().abs();
         let close = self.meshes.iter().any(|m| off(&m) < TOLERANCE);
@@ -76,7 +76,7 @@ impl Sizes {
         self.meshes.iter().rev().find(|m| m.1 < cells).copied().or(self.meshes.first().copied())
     }
 
-    /// Power p in cells ~ spacing^-p, from the two meshes nearest to the wanted one.
+    /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the wanted one.
     fn power(&self, cells: f64) -> f64 {
         let mut near = self.meshes.clone();
         near.sort_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spacing_is_found_by_meshes_that_are_smaller() {
+    fn a_spacing_is_found_from_coarser_meshes() {
         let truth = |s: f64| (3.0 / (s * s) + 50.0 / s + 700.0) as u64;
         for wanted in [5e4, 3e6, 1e9] {
             let mut sizes = Sizes::default();
@@ -104,13 +104,13 @@ mod tests {
             let spacing = sizes.spacing(wanted, 0.2, mesh).unwrap();
             let error = truth(spacing) as f64 / wanted - 1.0;
             assert!(error.abs() < 0.08, "{wanted}: {error}");
-            // Overshooting matters where meshes take time.
+            // Overshooting would be expensive.
             assert!(most as f64 <= wanted.max(1e5) * 1.1, "{most}");
         }
     }
 
     #[test]
-    fn what_is_known_is_not_meshed_again() {
+    fn known_sizes_are_not_meshed_again() {
         let mut sizes = Sizes::default();
         let mut count = 0;
         let mut ask = |cells| {

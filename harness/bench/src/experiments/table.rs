@@ -1,4 +1,4 @@
-//! Measurements as tables for people.
+//! Text tables of a record.
 
 use super::cause::sentence;
 use super::entry::{Comm, Network, Setup};
@@ -6,7 +6,7 @@ use super::group::{Group, Groups};
 use super::pop;
 use std::fmt::Write;
 
-/// Everything that is to be said of a record's runs.
+/// Returns all tables of a record's runs.
 pub fn tables(groups: &Groups) -> String {
     let mut out = String::new();
     let n = groups.network;
@@ -61,8 +61,8 @@ fn experiment_table(out: &mut String, groups: &Groups, experiment: &str) {
     let last: Vec<&Group> = groups.all.iter().filter(of).filter(|g| g.setup.ranks > 1).collect();
     for group in last {
         let (run, reference) = (&group.typical, groups.reference(group));
-        let told = sentence(run, &reference.typical, &groups.network);
-        let _ = writeln!(out, "  {}, {}: {told}", group.setup.case, group.how());
+        let cause = sentence(run, &reference.typical, &groups.network);
+        let _ = writeln!(out, "  {}, {}: {cause}", group.setup.case, group.how());
     }
 }
 
@@ -93,7 +93,7 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
     );
 }
 
-/// How the work was divided, in words.
+/// Returns partitioner and weights, or `default`.
 pub fn division(s: &Setup) -> String {
     match (s.partitioner.as_str(), s.weights.as_str()) {
         ("", "") => "default".to_owned(),
@@ -101,7 +101,7 @@ pub fn division(s: &Setup) -> String {
     }
 }
 
-/// Phases of a group's typical run: useful time, balance, messages, share.
+/// Returns the phases of a group's typical run: useful time, efficiencies, messages.
 pub fn phases(group: &Group, reference: &Group, network: &Network) -> String {
     let (run, one) = (&group.typical, &reference.typical);
     let mut out = String::new();
@@ -134,7 +134,7 @@ fn projections(out: &mut String, groups: &Groups) {
     if pairs.is_empty() {
         return;
     }
-    let _ = writeln!(out, "\nprojection against MPI, on as many cores as ranks");
+    let _ = writeln!(out, "\nprojection compared with MPI, on as many cores as ranks");
     for p in pairs {
         let _ = writeln!(
             out,
@@ -160,7 +160,7 @@ fn projections(out: &mut String, groups: &Groups) {
     }
 }
 
-/// A number with its digits in threes.
+/// Returns a number with thousands separators.
 pub fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
@@ -181,7 +181,7 @@ mod tests {
     use crate::testing::run;
 
     #[test]
-    fn a_table_says_it_all() {
+    fn a_table_shows_times_intervals_causes_and_errors() {
         let lines = [
             line(What::Run(Box::new(run(Comm::Sim, 1_000_000, &[("grade", &[4.0])])))),
             line(What::Run(Box::new(run(Comm::Sim, 1_000_000, &[("grade", &[3.0, 1.0])])))),

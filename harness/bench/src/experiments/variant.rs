@@ -1,9 +1,9 @@
-//! Cases with another spacing or another n, and their geometry as a binary STL file, so that every program
-//! and every rank reads its share of the same bytes.
+//! Variants of a case with a different spacing or n. Their geometry is a binary STL file, so that all programs and ranks
+//! read the same bytes.
 //!
-//! Levels halve the edge length, so a given root only knows edges of factors of two. A variant therefore
-//! has a root of its own, at least as large as the case's and less than twice, whose level-D edge is
-//! exactly the spacing asked for: cell counts follow the spacing smoothly, which weak scaling needs.
+//! Each level halves the edge length, so a given root offers only spacings that differ by factors of two. A variant therefore
+//! has its own root, between one and two times as large as the case's, whose edge at the surface level is
+//! exactly the requested spacing. Cell counts then follow the spacing smoothly, as weak scaling requires.
 
 use contract::case::Case;
 use std::fs;
@@ -11,14 +11,14 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-/// A case to vary: read once, its geometry written out once.
+/// A case to vary; its geometry is written once.
 #[derive(Clone, Debug)]
 pub struct Base {
     /// The case's name.
     pub name: String,
-    /// Edge length of the finest cell at the surface in the case as it stands.
+    /// Edge length of the finest cell at the surface in the unchanged case.
     pub spacing_min: f64,
-    /// n of the case as it stands.
+    /// n of the unchanged case.
     pub layer_cells_min: u32,
     /// Facets of its geometry.
     pub facets: u64,
@@ -32,7 +32,7 @@ impl Base {
     /// Reads a case file; writes its geometry into `directory`.
     ///
     /// # Errors
-    /// One sentence, where the case is at fault or the directory cannot be written.
+    /// One sentence, if the case is invalid or the directory cannot be written.
     pub fn read(path: &Path, directory: &Path) -> Result<Self, String> {
         let case = Case::read(path).map_err(|error| error.to_string())?;
         let text =
@@ -61,24 +61,24 @@ impl Base {
         })
     }
 
-    /// A spacing that gives a mesh of no more than some thousand cells, to begin with.
+    /// Returns an initial spacing that gives at most some thousand cells.
     pub fn coarse(&self) -> f64 {
         self.spacing_min.max(self.edge / 512.0)
     }
 
-    /// Writes the case with this spacing and n; where it is.
+    /// Writes the case with this spacing and n; returns the path.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If the file cannot be written.
     pub fn variant(&self, spacing_min: f64, layer_cells_min: u32) -> Result<PathBuf, String> {
         self.write(root(self.origin, self.edge, spacing_min), spacing_min, layer_cells_min)
     }
 
-    /// The same with the root as it stands: the finest cells are then those of the level that the spacing
-    /// asks for, up to twice finer than it.
+    /// Writes the case with its own root and this spacing and n; returns the path. The finest cells are then between once and
+    /// twice as fine as the spacing.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If the file cannot be written.
     pub fn in_own_root(&self, spacing_min: f64, layer_cells_min: u32) -> Result<PathBuf, String> {
         self.write((self.origin, self.edge), spacing_min, layer_cells_min)
     }
@@ -104,10 +104,10 @@ impl Base {
     }
 }
 
-/// The smallest root around the same centre that is not smaller and has `spacing` as a level's edge.
+/// Returns the smallest concentric root that is not smaller and has `spacing` as the edge of a level.
 fn root(origin: [f64; 3], edge: f64, spacing: f64) -> ([f64; 3], f64) {
     let mut wider = spacing;
-    // Doubling is exact, so that the level's edge is the spacing bit by bit.
+    // Doubling is exact, so the edge equals the spacing bit by bit.
     while wider < edge {
         wider *= 2.0;
     }
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_roots_level_is_exactly_the_spacing() {
+    fn the_edge_of_a_level_equals_the_spacing() {
         let (origin, edge) = root([-5.0; 3], 10.0, 0.3);
         assert_eq!(edge, 0.3 * 64.0);
         assert_eq!(edge / 64.0, 0.3);
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variant_is_a_case_of_its_own() {
+    fn a_variant_is_a_complete_case() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("ball.toml");
         let text = "spacing_min = 0.1\nroot_scale = 3.0\nkeep = \"all\"\n[generator]\nshape = \"sphere\"\nfacets = 80\n\
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!((made.layer_cells_min, made.boxes.len(), made.keep), (3, 1, original.keep));
         assert_eq!(made.facets, original.facets);
         assert_eq!(made.root.edge / f64::from(1u32 << made.level_surface), 0.07);
-        // As it stands, the case stays what it is.
+        // With its own spacing, the case keeps its root.
         let same = Case::read(&base.variant(base.spacing_min, 4).unwrap()).unwrap();
         assert_eq!((same.root, same.level_surface), (original.root, original.level_surface));
         let kept = Case::read(&base.in_own_root(0.07, 3).unwrap()).unwrap();

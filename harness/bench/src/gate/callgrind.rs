@@ -1,35 +1,35 @@
-//! Reads what valgrind's callgrind writes: instructions by function, and how often a function was called.
+//! Parses the output of valgrind's callgrind: instructions and calls by function.
 //!
 //! The format: `fn=(1) name` opens a function, and later `fn=(1)` is the same; a line that begins with a
-//! place (`12`, `+3`, `-1`, `*`) has the function's own cost; after a `calls=COUNT ...` line the next such line is
+//! position (`12`, `+3`, `-1`, `*`) has the function's own cost; after a `calls=COUNT ...` line the next such line is
 //! the cost of the callee, which is not the function's own.
 
 use std::collections::HashMap;
 
-/// What a program did.
+/// The profile of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Profile {
-    /// Instructions in all.
+    /// Total number of instructions.
     pub instructions: u64,
-    /// Instructions by function, callees not included.
+    /// Instructions by function, excluding callees.
     pub own: HashMap<String, u64>,
-    /// How often functions were called.
+    /// Number of calls by function.
     pub calls: HashMap<String, u64>,
 }
 
-/// Functions that hand out memory.
+/// Functions that allocate memory.
 const ALLOCATORS: [&str; 5] = ["malloc", "calloc", "realloc", "posix_memalign", "aligned_alloc"];
 
 impl Profile {
-    /// How often memory was asked for.
+    /// Returns the number of allocations.
     pub fn allocations(&self) -> u64 {
         ALLOCATORS.iter().filter_map(|name| self.calls.get(*name)).sum()
     }
 
-    /// Reads a file of callgrind.
+    /// Parses a callgrind file.
     ///
     /// # Errors
-    /// Where it has no costs.
+    /// If the file contains no costs.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut profile = Self::default();
         let mut names: HashMap<&str, &str> = HashMap::new();
@@ -54,12 +54,12 @@ impl Profile {
             }
         }
         match profile.instructions {
-            0 => Err("callgrind counted nothing".into()),
+            0 => Err("the callgrind file contains no costs".into()),
             _ => Ok(profile),
         }
     }
 
-    /// Functions whose own instructions differ most from those of another profile, with the difference.
+    /// Returns the differences of instructions by function relative to an older profile, largest first.
     pub fn grown_since(&self, old: &Self) -> Vec<(String, i64)> {
         let mut names: Vec<&String> = self.own.keys().chain(old.own.keys()).collect();
         names.sort();
@@ -73,7 +73,7 @@ impl Profile {
     }
 }
 
-/// Whether a line begins with a place.
+/// Whether a line begins with a position.
 fn is_cost(line: &str) -> bool {
     line.starts_with(|c: char| c.is_ascii_digit() || "+-*".contains(c))
 }
@@ -103,7 +103,7 @@ mod tests {
                         totals: 116\n";
 
     #[test]
-    fn own_costs_add_up_to_the_total_that_callgrind_tells() {
+    fn own_costs_add_up_to_the_reported_total() {
         let profile = Profile::parse(FILE).unwrap();
         assert_eq!(profile.instructions, 116);
         assert_eq!((profile.own["main"], profile.own["malloc@GLIBC"]), (9, 100));
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_grew_most_comes_first() {
+    fn differences_are_sorted_by_size() {
         let old = Profile::parse(FILE).unwrap();
         let new = Profile::parse(
             &FILE.replace("12 3", "12 30").replace("\n0 7\ntotals", "\n0 5\ntotals"),

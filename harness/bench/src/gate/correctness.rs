@@ -1,4 +1,4 @@
-//! The candidate's meshes are right: what `harness verify` says of the gate's cases.
+//! The layer of correctness: `harness verify` on the candidate and the gate's cases.
 
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::{Bench, GateError};
@@ -8,17 +8,17 @@ use run::verify::report::{CaseReport, Outcome};
 use run::verify::{VerifyError, verify};
 
 /// Verifies the candidate serially on the cases of this layer: reference, and every check of the leaves.
-/// Ranks, oracles and p4est are `harness verify`'s own affair.
+/// Ranks, oracles and p4est are left to `harness verify`.
 ///
 /// # Errors
-/// Where verification could not begin.
+/// If verification cannot start.
 pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     let mut layer = Layer::new(LayerName::Correctness);
     let mut cases = Vec::new();
     for case in bench.cases_of(LayerName::Correctness) {
         match &case.path {
             Ok(path) => cases.push(path.to_string_lossy().into_owned()),
-            Err(why) => layer.findings.push(Finding::told(
+            Err(why) => layer.findings.push(Finding::without_numbers(
                 &case.rule.name,
                 "checks",
                 Verdict::Inconclusive,
@@ -53,5 +53,5 @@ fn finding(case: &CaseReport) -> Finding {
         Some(why) => (Verdict::Regression, format!("{} checks fail, the first: {why}", tally.fail)),
         None => (Verdict::Unchanged, format!("{} checks hold", tally.pass)),
     };
-    Finding::told(&case.name, "checks", verdict, note)
+    Finding::without_numbers(&case.name, "checks", verdict, note)
 }

@@ -1,4 +1,4 @@
-//! Numbers that repeat exactly: what the program counts, and the mesh's digest, serially and on simulated ranks.
+//! The layer of exact counters: the counters of the program and the digest, serially and on simulated ranks.
 
 use super::measures::{CaseMeasures, Measures};
 use super::report::{Finding, Layer, LayerName, Verdict};
@@ -10,10 +10,10 @@ use run::engine::interrupt;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::runner::{Engine, RunOptions};
 
-/// A schedule like any other: counters may not depend on it, and the same one is used for both.
+/// Any seed will do: counters must not depend on the schedule, and both programs run with the same one.
 const SEED: u64 = 1;
 
-/// Counts on both sides and compares.
+/// Compares the counters of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Layer {
     let mut layer = Layer::new(LayerName::Counters);
     for case in bench.cases_of(LayerName::Counters) {
@@ -22,7 +22,7 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
         }
         let name = &case.rule.name;
         if let Err(why) = &case.path {
-            layer.findings.push(Finding::told(name, "runs", Verdict::Inconclusive, why));
+            layer.findings.push(Finding::without_numbers(name, "runs", Verdict::Inconclusive, why));
             continue;
         }
         let findings = match count(bench, &bench.candidate, case) {
@@ -35,13 +35,21 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
             Err(why) if matches!(why.end, End::Missing(_)) => {
                 return left_out(LayerName::Counters, why.to_string());
             }
-            Err(why) => vec![Finding::told(name, "runs", Verdict::Regression, why.to_string())],
+            Err(why) => {
+                vec![Finding::without_numbers(name, "runs", Verdict::Regression, why.to_string())]
+            }
         };
         layer.findings.extend(findings);
         let engine = bench.candidate.description();
         if !case.rule.ranks.is_empty() && engine.run.simulated.is_none() {
-            let why = format!("{} does not say how it is run on simulated ranks", engine.name);
-            layer.findings.push(Finding::told(name, "ranks", Verdict::Inconclusive, why));
+            let why =
+                format!("the description of {} has no command for simulated ranks", engine.name);
+            layer.findings.push(Finding::without_numbers(
+                name,
+                "ranks",
+                Verdict::Inconclusive,
+                why,
+            ));
         }
     }
     layer
@@ -55,13 +63,13 @@ fn against(
 ) -> Vec<Finding> {
     let name = &case.rule.name;
     let inconclusive =
-        |why: String| vec![Finding::told(name, "baseline", Verdict::Inconclusive, why)];
+        |why: String| vec![Finding::without_numbers(name, "baseline", Verdict::Inconclusive, why)];
     let counted;
     let old = match baseline {
         Baseline::None => return Vec::new(),
         Baseline::Record(_, record) => match record.cases.get(name) {
             Some(old) => old,
-            None => return inconclusive("the record does not have this case".into()),
+            None => return inconclusive("the record does not contain this case".into()),
         },
         Baseline::Program(subject) => match count(bench, &subject.engine, case) {
             Ok(old) => {
@@ -111,8 +119,8 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures
     Ok(measures)
 }
 
-/// Every counter that either side has. A digest or a number of cells that changes is another mesh: that is
-/// shown, and whether it is right is for the layer of correctness.
+/// Compares all counters of both sides. A different digest or number of cells means a different mesh; the layer of
+/// correctness decides whether it is correct.
 fn compare(
     case: &Selected,
     old: &CaseMeasures,
@@ -121,15 +129,15 @@ fn compare(
 ) -> Vec<Finding> {
     let name = &case.rule.name;
     let mut findings = Vec::new();
-    let told = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
+    let shown = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
     let (verdict, note) = match old.digest == new.digest {
-        true => (Verdict::Unchanged, told(&new.digest)),
+        true => (Verdict::Unchanged, shown(&new.digest)),
         false => (
             Verdict::Changed,
-            format!("another mesh: {} was {}", told(&new.digest), told(&old.digest)),
+            format!("different mesh: {} was {}", shown(&new.digest), shown(&old.digest)),
         ),
     };
-    findings.push(Finding::told(name, "digest", verdict, note));
+    findings.push(Finding::without_numbers(name, "digest", verdict, note));
     let mut names: Vec<&String> = old.exact.keys().chain(new.exact.keys()).collect();
     names.sort();
     names.dedup();
@@ -149,11 +157,14 @@ fn compare(
                 }
             }
             (None, Some(new)) => {
-                Finding::told(name, metric, Verdict::Changed, format!("new, {new}"))
+                Finding::without_numbers(name, metric, Verdict::Changed, format!("new, {new}"))
             }
-            (Some(old), _) => {
-                Finding::told(name, metric, Verdict::Changed, format!("gone, was {old}"))
-            }
+            (Some(old), _) => Finding::without_numbers(
+                name,
+                metric,
+                Verdict::Changed,
+                format!("removed, was {old}"),
+            ),
             (None, None) => continue,
         };
         findings.push(finding);
@@ -161,11 +172,11 @@ fn compare(
     findings
 }
 
-/// The size of the mesh is a result: more or less of it is neither better nor worse.
+/// The size of the mesh is a result, not a cost: a change is neither better nor worse.
 fn not_work(finding: Finding) -> Finding {
     match finding.verdict {
         Verdict::Unchanged => finding,
-        _ => Finding { verdict: Verdict::Changed, note: "another mesh".into(), ..finding },
+        _ => Finding { verdict: Verdict::Changed, note: "different mesh".into(), ..finding },
     }
 }
 
@@ -180,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_is_shown_and_growth_alone_fails() {
+    fn every_change_is_shown_and_only_growth_fails() {
         let text = "name = 'c'\nlayers = []\ntolerance = { messages = 10.0 }";
         let rule: CaseRule = toml::from_str(text).unwrap();
         let case = Selected { rule, path: Ok("c.toml".into()) };

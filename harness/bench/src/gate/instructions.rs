@@ -1,5 +1,5 @@
-//! Instructions and allocations of a serial run, counted by valgrind: they do not know what else the machine is
-//! doing, so a few percent of difference are a fact and not a guess.
+//! The layer of instructions: instructions and allocations of a serial run under valgrind. They do not depend on the load of the
+//! machine, so a difference of a percent is significant.
 
 use super::callgrind::Profile;
 use super::measures::{CaseMeasures, Measures};
@@ -16,13 +16,13 @@ use std::process::Command;
 
 const VALGRIND: &str = "valgrind";
 
-/// Functions named where instructions grew.
-const FUNCTIONS_TOLD: usize = 3;
+/// Number of functions named if instructions grew.
+const FUNCTIONS_SHOWN: usize = 3;
 
-/// Counts on both sides and compares.
+/// Compares the instructions of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Layer {
     if on_path(VALGRIND).is_none() {
-        return left_out(LayerName::Instructions, "there is no valgrind on the PATH");
+        return left_out(LayerName::Instructions, "valgrind is not on the PATH");
     }
     let mut layer = Layer::new(LayerName::Instructions);
     for case in bench.cases_of(LayerName::Instructions) {
@@ -30,7 +30,9 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
             break;
         }
         let name = &case.rule.name;
-        let told = |verdict, why: String| vec![Finding::told(name, "instructions", verdict, why)];
+        let finding = |verdict, why: String| {
+            vec![Finding::without_numbers(name, "instructions", verdict, why)]
+        };
         layer.findings.extend(match count(bench, &bench.candidate, case) {
             Ok(new) => {
                 measures.case(name).counted = numbers(&new).into();
@@ -40,17 +42,20 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures) -> Lay
                         Some(old) if !old.counted.is_empty() => {
                             against_record(bench, case, old, &new)
                         }
-                        _ => told(Verdict::Inconclusive, "the record does not have them".into()),
+                        _ => finding(
+                            Verdict::Inconclusive,
+                            "the record does not contain them".into(),
+                        ),
                     },
                     Baseline::Program(subject) => match count(bench, &subject.engine, case) {
                         Ok(old) => against_program(bench, case, &old, &new),
                         Err(why) => {
-                            told(Verdict::Inconclusive, format!("the baseline has none: {why}"))
+                            finding(Verdict::Inconclusive, format!("the baseline has none: {why}"))
                         }
                     },
                 }
             }
-            Err(why) => told(Verdict::Inconclusive, why),
+            Err(why) => finding(Verdict::Inconclusive, why),
         });
     }
     layer
@@ -69,28 +74,29 @@ fn against_record(
     let numbers = numbers(new);
     let both =
         numbers.iter().filter_map(|(metric, new)| Some((metric, *old.counted.get(metric)?, *new)));
-    both.map(|(metric, old, new)| held(bench, case, metric, old, new)).collect()
+    both.map(|(metric, old, new)| within_tolerance(bench, case, metric, old, new)).collect()
 }
 
 fn against_program(bench: &Bench, case: &Selected, old: &Profile, new: &Profile) -> Vec<Finding> {
     let both = numbers(old).into_iter().zip(numbers(new));
-    let mut findings: Vec<Finding> =
-        both.map(|((metric, old), (_, new))| held(bench, case, &metric, old, new)).collect();
+    let mut findings: Vec<Finding> = both
+        .map(|((metric, old), (_, new))| within_tolerance(bench, case, &metric, old, new))
+        .collect();
     if matches!(findings[0].verdict, Verdict::Regression | Verdict::Improvement) {
-        let grown = new.grown_since(old).into_iter().take(FUNCTIONS_TOLD);
-        let told: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
+        let grown = new.grown_since(old).into_iter().take(FUNCTIONS_SHOWN);
+        let functions: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
         let note = &mut findings[0].note;
         note.push_str(&format!(
-            "{}most: {}",
+            "{}mostly {}",
             if note.is_empty() { "" } else { "; " },
-            told.join(", ")
+            functions.join(", ")
         ));
     }
     findings
 }
 
-/// Within the tolerance either way is unchanged: hash seeds and addresses make a few instructions of difference.
-fn held(bench: &Bench, case: &Selected, metric: &str, old: u64, new: u64) -> Finding {
+/// A change within the tolerance is no change: hash seeds and addresses vary the count slightly.
+fn within_tolerance(bench: &Bench, case: &Selected, metric: &str, old: u64, new: u64) -> Finding {
     let rules = &bench.rules.tolerance;
     let tolerance = rules.of_metric(&case.rule, metric, rules.instructions);
     let found = Finding::exact(&case.rule.name, metric, old, new, tolerance);

@@ -1,5 +1,5 @@
-//! What is exact about one program: counters, digests, instructions. A record of it is a baseline that
-//! needs no build, and a point in the history that `harness track` keeps.
+//! The exact measures of one program: counters, digests, instructions. Recorded, they are a baseline that needs no build,
+//! and a point in the history of `harness track`.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -8,7 +8,7 @@ use std::fmt;
 /// Version of the JSON form.
 pub const SCHEMA: &str = "octree-measures/1";
 
-/// What was measured of one program.
+/// The measures of one program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
     /// [`SCHEMA`].
@@ -22,7 +22,7 @@ pub struct Measures {
 /// A program that was measured or compared.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// As the user named it.
+    /// The name given by the user.
     pub named: String,
     /// The revision it was built from.
     pub revision: Option<String>,
@@ -39,32 +39,32 @@ impl fmt::Display for Measured {
     }
 }
 
-/// What was measured of one case.
+/// The measures of one case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CaseMeasures {
     /// The mesh's digest.
     pub digest: Option<String>,
-    /// Numbers that repeat exactly, by name.
+    /// Deterministic counters by name.
     pub exact: BTreeMap<String, u64>,
-    /// Numbers from valgrind; they repeat but for hash seeds and addresses.
+    /// Counts by valgrind; deterministic except for hash seeds and addresses.
     pub counted: BTreeMap<String, u64>,
 }
 
 impl Measures {
-    /// Nothing measured yet.
+    /// Returns empty measures.
     pub fn of_program(of: Measured) -> Self {
         Self { schema: SCHEMA.to_owned(), of, cases: BTreeMap::new() }
     }
 
-    /// The place for a case's numbers.
+    /// Returns the entry of a case.
     pub fn case(&mut self, name: &str) -> &mut CaseMeasures {
         self.cases.entry(name.to_owned()).or_default()
     }
 
-    /// Reads a record, or the record in a gate's report.
+    /// Parses a record, or the record contained in a gate's report.
     ///
     /// # Errors
-    /// In a sentence, where it is neither.
+    /// One sentence, if it is neither.
     pub fn parse(text: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
         struct Report {
@@ -81,7 +81,7 @@ impl Measures {
         }
     }
 
-    /// As JSON.
+    /// Returns the measures as JSON.
     pub fn json(&self) -> String {
         // Strings and whole numbers only.
         let mut text =

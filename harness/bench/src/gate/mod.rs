@@ -1,11 +1,11 @@
-//! `harness gate`: is the candidate as good as the baseline? Four layers, each reported apart, from what
-//! never lies to what always wavers: correctness, counters, instructions, time.
+//! `harness gate`: compares a candidate with a baseline in four layers, from deterministic to noisy: correctness, counters,
+//! instructions, time.
 //!
-//! [`rules`] is what is run and tolerated; [`subject`] the two programs, built if need be; [`measures`]
-//! what is exact about one; [`counters`], [`instructions`] and [`time`] compare; [`stats`] decides about times;
-//! [`report`] is what was found.
+//! [`rules`] defines cases and tolerances; [`subject`] finds or builds the two programs; [`measures`] holds the exact measures
+//! of one; [`counters`], [`instructions`] and [`time`] compare, the last with [`crate::statistics::comparison`]; [`report`] is
+//! the result.
 //!
-//! Invariant: no verdict is drawn from seconds of another run.
+//! Invariant: times of different sessions are never compared.
 
 pub mod callgrind;
 pub mod correctness;
@@ -14,7 +14,6 @@ pub mod instructions;
 pub mod measures;
 pub mod report;
 pub mod rules;
-pub mod stats;
 pub mod subject;
 pub mod time;
 
@@ -28,10 +27,10 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use subject::{Baseline, Subject};
 
-/// What was asked of a gate.
+/// The options of a gate.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A revision, a program or a record; none if the candidate is only to be recorded.
+    /// A revision, a program or a record; `None` to record the candidate only.
     pub baseline: Option<String>,
     /// A revision, a program, or `.` for the working tree.
     pub candidate: Option<String>,
@@ -41,7 +40,7 @@ pub struct Options {
     pub cases: Vec<String>,
     /// Only these layers.
     pub layers: Vec<LayerName>,
-    /// Chooses the order of runs and the draws of the tests.
+    /// Seed of the order of runs and of the permutations.
     pub seed: u64,
     /// Time limit of every single run.
     pub limit: Duration,
@@ -51,38 +50,38 @@ pub struct Options {
     pub cache: PathBuf,
 }
 
-/// Why a gate could not begin.
+/// Why a gate could not start.
 #[derive(Debug, thiserror::Error)]
 pub enum GateError {
-    /// The user's.
+    /// Invalid input.
     #[error("{0}")]
     Input(String),
-    /// Something without which nothing can be compared.
+    /// A required program is missing.
     #[error("{0}")]
     Missing(String),
 }
 
-/// Everything that a layer needs.
+/// The input of every layer.
 #[derive(Debug)]
 pub struct Bench<'a> {
-    /// What was asked.
+    /// The options.
     pub options: &'a Options,
-    /// What is run and tolerated.
+    /// Cases and tolerances.
     pub rules: &'a Rules,
-    /// The cases, found.
+    /// The selected cases.
     pub cases: Vec<Selected>,
     /// The programs.
     pub programs: &'a Programs,
     /// The candidate.
     pub candidate: Engine,
-    /// A place for runs.
+    /// Directory for the files of runs.
     pub place: &'a std::path::Path,
 }
 
-/// Compares, and reports.
+/// Runs all requested layers and returns the report.
 ///
 /// # Errors
-/// Only where it could not begin; what goes wrong later is in the report.
+/// If the gate cannot start; later failures are in the report.
 pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError> {
     let start = Instant::now();
     let rules =
@@ -132,12 +131,12 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
 }
 
 impl Bench<'_> {
-    /// The cases of a layer.
+    /// Returns the cases of a layer.
     fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
         self.cases.iter().filter(move |case| case.rule.layers.contains(&layer))
     }
 
-    /// A directory for one run, named after what it is for.
+    /// Creates an empty directory for one run.
     fn enter(&self, name: &str) -> Result<PathBuf, String> {
         let place = self.place.join(name);
         let _ = std::fs::remove_dir_all(&place);
@@ -146,7 +145,7 @@ impl Bench<'_> {
     }
 }
 
-/// A layer without findings because it could not be run.
+/// Returns a skipped layer with the reason.
 pub(crate) fn left_out(name: LayerName, why: impl Into<String>) -> Layer {
     Layer { left_out: Some(why.into()), ..Layer::new(name) }
 }

@@ -1,4 +1,4 @@
-//! What a gate found: the one model that every output form prints.
+//! The report of a gate, which every output form prints.
 
 use super::measures::{Measured, Measures};
 use serde::{Deserialize, Serialize};
@@ -11,13 +11,13 @@ pub const SCHEMA: &str = "octree-gate/1";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum LayerName {
-    /// The candidate's meshes are right.
+    /// The checks of the candidate's meshes.
     Correctness,
-    /// Numbers that repeat exactly.
+    /// Deterministic counters.
     Counters,
     /// Instructions and allocations, counted by valgrind.
     Instructions,
-    /// Seconds, of baseline and candidate in one run.
+    /// Run times of baseline and candidate in one session.
     Time,
 }
 
@@ -37,19 +37,19 @@ impl fmt::Display for LayerName {
     }
 }
 
-/// What is to be thought of a finding, the best first.
+/// The assessment of a finding, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Better than the baseline.
     Improvement,
-    /// As the baseline.
+    /// Equal to the baseline.
     Unchanged,
-    /// Other than the baseline, within what is tolerated.
+    /// Different from the baseline, within the tolerance.
     Changed,
-    /// The measurement could not have seen what matters.
+    /// The measurement was not sensitive enough.
     Inconclusive,
-    /// Worse than is tolerated, or wrong.
+    /// Worse than the tolerance, or incorrect.
     Regression,
 }
 
@@ -70,23 +70,28 @@ impl fmt::Display for Verdict {
 pub struct Finding {
     /// The case.
     pub case: String,
-    /// What was measured.
+    /// The metric.
     pub metric: String,
-    /// What is to be thought of it.
+    /// The assessment.
     pub verdict: Verdict,
-    /// Of the baseline.
+    /// Value of the baseline.
     pub baseline: Option<f64>,
-    /// Of the candidate.
+    /// Value of the candidate.
     pub candidate: Option<f64>,
-    /// Candidate against baseline, in percent; positive is more.
+    /// Change relative to the baseline, in percent.
     pub change_percent: Option<f64>,
-    /// In words: why, and how sure.
+    /// The reason and its certainty, as text.
     pub note: String,
 }
 
 impl Finding {
-    /// A finding without numbers.
-    pub fn told(case: &str, metric: &str, verdict: Verdict, note: impl Into<String>) -> Self {
+    /// Returns a finding without numbers.
+    pub fn without_numbers(
+        case: &str,
+        metric: &str,
+        verdict: Verdict,
+        note: impl Into<String>,
+    ) -> Self {
         Self {
             case: case.to_owned(),
             metric: metric.to_owned(),
@@ -98,7 +103,7 @@ impl Finding {
         }
     }
 
-    /// A number that repeats exactly, held to a tolerance.
+    /// Returns the finding for a deterministic number with a tolerance in percent.
     pub fn exact(case: &str, metric: &str, baseline: u64, candidate: u64, tolerance: f64) -> Self {
         let change = match baseline {
             0 if candidate == 0 => 0.0,
@@ -108,20 +113,20 @@ impl Finding {
         let verdict = match candidate.cmp(&baseline) {
             std::cmp::Ordering::Equal => Verdict::Unchanged,
             std::cmp::Ordering::Less => Verdict::Improvement,
-            // Ten percent more than ten is, in binary, a little more than ten percent.
+            // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
             std::cmp::Ordering::Greater if change <= tolerance + 1e-9 => Verdict::Changed,
             std::cmp::Ordering::Greater => Verdict::Regression,
         };
         let note = match verdict {
-            Verdict::Regression => format!("more than the {tolerance} % that are tolerated"),
-            Verdict::Changed => format!("within the {tolerance} % that are tolerated"),
+            Verdict::Regression => format!("exceeds the tolerance of {tolerance} %"),
+            Verdict::Changed => format!("within the tolerance of {tolerance} %"),
             _ => String::new(),
         };
         Self {
             baseline: Some(baseline as f64),
             candidate: Some(candidate as f64),
             change_percent: Some(change).filter(|change| change.is_finite()),
-            ..Self::told(case, metric, verdict, note)
+            ..Self::without_numbers(case, metric, verdict, note)
         }
     }
 }
@@ -131,21 +136,21 @@ impl Finding {
 pub struct Layer {
     /// Which.
     pub name: LayerName,
-    /// Why it was not run.
+    /// Why it was skipped.
     pub left_out: Option<String>,
-    /// What was found.
+    /// The findings.
     pub findings: Vec<Finding>,
     /// Wall time, in seconds.
     pub time_s: f64,
 }
 
 impl Layer {
-    /// Nothing found yet.
+    /// Returns an empty value.
     pub fn new(name: LayerName) -> Self {
         Self { name, left_out: None, findings: Vec::new(), time_s: 0.0 }
     }
 
-    /// The worst of its findings.
+    /// Returns the worst verdict of the findings.
     pub fn verdict(&self) -> Verdict {
         let worst = self.findings.iter().map(|finding| finding.verdict).max();
         worst.unwrap_or(Verdict::Unchanged)
@@ -159,22 +164,22 @@ pub struct Report {
     pub schema: String,
     /// Name and version of the harness.
     pub program: String,
-    /// The baseline; none if the candidate was only recorded.
+    /// The baseline; `None` if the candidate was only recorded.
     pub baseline: Option<Measured>,
     /// The candidate.
     pub candidate: Measured,
     /// The layers that were asked for.
     pub layers: Vec<Layer>,
-    /// What is exact about the candidate: a baseline for later.
+    /// The exact measures of the candidate: a baseline for later.
     pub candidate_measures: Measures,
-    /// The user ended it.
+    /// Whether the user interrupted it.
     pub interrupted: bool,
     /// Wall time, in seconds.
     pub time_s: f64,
 }
 
 impl Report {
-    /// Nothing found yet.
+    /// Returns an empty value.
     pub fn new(baseline: Option<Measured>, candidate: Measured) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
@@ -188,7 +193,7 @@ impl Report {
         }
     }
 
-    /// Whether nothing got worse.
+    /// Whether no layer has a regression.
     pub fn holds(&self) -> bool {
         self.layers.iter().all(|layer| layer.verdict() < Verdict::Regression)
     }
@@ -199,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn growth_beyond_the_tolerance_alone_is_a_regression() {
+    fn only_growth_beyond_the_tolerance_is_a_regression() {
         let verdict = |baseline, candidate, tolerance| {
             Finding::exact("c", "m", baseline, candidate, tolerance).verdict
         };
@@ -212,11 +217,11 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_is_as_bad_as_its_worst() {
+    fn a_layer_has_the_worst_verdict_of_its_findings() {
         let mut layer = Layer::new(LayerName::Time);
         assert_eq!(layer.verdict(), Verdict::Unchanged);
         for verdict in [Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed] {
-            layer.findings.push(Finding::told("c", "m", verdict, ""));
+            layer.findings.push(Finding::without_numbers("c", "m", verdict, ""));
         }
         assert_eq!(layer.verdict(), Verdict::Inconclusive);
     }

@@ -1,4 +1,4 @@
-//! What a gate runs and what it tolerates: `engines/gate.toml`, or a user's own file of the same form.
+//! Cases and tolerances of a gate: `engines/gate.toml`, or a user's file of the same format.
 
 use super::GateError;
 use super::report::LayerName;
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The file as it stands.
+/// The content of the file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rules {
@@ -24,15 +24,15 @@ pub struct Rules {
     directory: PathBuf,
 }
 
-/// Growth that is let pass, in percent.
+/// Tolerated growth, in percent.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tolerance {
-    /// Of any counter that has none of its own.
+    /// Default for counters.
     pub counters: f64,
-    /// Of instructions.
+    /// Default for instructions.
     pub instructions: f64,
-    /// Of single metrics; a case's own come before these.
+    /// By metric; tolerances of a case take precedence.
     pub of: BTreeMap<String, f64>,
 }
 
@@ -46,17 +46,17 @@ impl Default for Tolerance {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TimeRules {
-    /// Rounds at least, however long a run takes.
+    /// Minimum number of rounds, regardless of the time.
     pub rounds_min: usize,
-    /// Rounds at most.
+    /// Maximum number of rounds.
     pub rounds_max: usize,
-    /// Time for one case.
+    /// Time for one case, in seconds.
     pub budget_s: f64,
-    /// Chance of a false alarm per case.
+    /// Significance level: the probability of a false alarm per case.
     pub alpha: f64,
-    /// Smaller effects are no verdict; percent.
+    /// Smaller effects are ignored; percent.
     pub effect_min: f64,
-    /// "Unchanged" means that this would have been seen; percent.
+    /// "Unchanged" requires that an effect of this size would have been detected; percent.
     pub effect_wanted: f64,
 }
 
@@ -79,22 +79,22 @@ impl Default for TimeRules {
 pub struct CaseRule {
     /// Name in the catalogue, or path of a case file.
     pub name: String,
-    /// Layers that it is run for.
+    /// Layers that include the case.
     pub layers: Vec<LayerName>,
-    /// Simulated ranks on which counters are taken too.
+    /// Numbers of simulated ranks on which counters are also compared.
     #[serde(default)]
     pub ranks: Vec<usize>,
-    /// Growth of single counters that is let pass, in percent; a counter's name as reported, or `instructions`.
+    /// Tolerated growth in percent by counter, as named in the report, or `instructions`.
     #[serde(default)]
     pub tolerance: BTreeMap<String, f64>,
 }
 
-/// A case, found.
+/// A selected case.
 #[derive(Clone, Debug)]
 pub struct Selected {
     /// Its rules.
     pub rule: CaseRule,
-    /// Its file; or why there is none.
+    /// Its file, or the reason why it is missing.
     pub path: Result<PathBuf, String>,
 }
 
@@ -102,7 +102,7 @@ impl Rules {
     /// Reads a file of rules.
     ///
     /// # Errors
-    /// Where there is none or it is not what it should be.
+    /// If the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, GateError> {
         let wrong = |why: String| GateError::Input(format!("{}: {why}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
@@ -110,20 +110,24 @@ impl Rules {
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let time = &rules.time;
-        if time.rounds_min < super::stats::ROUNDS_LEAST || time.rounds_max < time.rounds_min {
-            let least = super::stats::ROUNDS_LEAST;
-            return Err(wrong(format!("rounds_min is at least {least}, rounds_max not below it")));
+        if time.rounds_min < crate::statistics::comparison::ROUNDS_MIN
+            || time.rounds_max < time.rounds_min
+        {
+            let least = crate::statistics::comparison::ROUNDS_MIN;
+            return Err(wrong(format!(
+                "rounds_min must be at least {least} and rounds_max at least rounds_min"
+            )));
         }
         if !(time.alpha > 0.0 && time.alpha < 0.5 && time.effect_min >= 0.0) {
-            return Err(wrong("alpha is between 0 and 0.5, effect_min not below 0".into()));
+            return Err(wrong("alpha must be between 0 and 0.5 and effect_min at least 0".into()));
         }
         Ok(rules)
     }
 
-    /// The cases asked for; all if none is named.
+    /// Returns the named cases, or all if no name is given.
     ///
     /// # Errors
-    /// Where a name is not among the rules' or the catalogue's.
+    /// If a name is missing from the rules or the catalogue.
     pub fn select(
         &self,
         names: &[String],
@@ -157,7 +161,7 @@ impl Rules {
 }
 
 impl Tolerance {
-    /// Growth of a case's metric that is let pass, in percent: the case's own, else that of the metric, else that of its kind.
+    /// Returns the tolerated growth of a metric in percent: that of the case, else of the metric, else `kind`.
     pub fn of_metric(&self, case: &CaseRule, metric: &str, kind: f64) -> f64 {
         // "4 ranks/messages" is also known as "messages".
         let plain = metric.rsplit('/').next().unwrap_or(metric);
@@ -180,14 +184,14 @@ mod tests {
     }
 
     #[test]
-    fn the_rules_of_this_repository_are_rules() {
+    fn the_rules_of_this_repository_are_valid() {
         let text = include_str!("../../../engines/gate.toml");
         let rules = read(text).unwrap();
         assert!(LayerName::ALL.iter().all(|l| rules.cases.iter().any(|c| c.layers.contains(l))));
     }
 
     #[test]
-    fn a_case_s_own_tolerance_comes_first_then_the_metric_s() {
+    fn the_tolerance_of_a_case_precedes_that_of_the_metric() {
         let text = "[tolerance.of]\nmessages = 9.0\nhalo = 8.0\n[[case]]\nname = 'a'\nlayers = ['counters']\n\
                     tolerance = { messages = 5.0, '2 ranks/rays' = 1.0 }";
         let rules = read(text).unwrap();
@@ -197,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_that_make_no_sense_are_refused() {
+    fn invalid_rules_are_rejected() {
         assert!(read("[time]\nrounds_min = 3").unwrap_err().contains("rounds_min"));
         assert!(read("[time]\nalpha = 0.0").unwrap_err().contains("alpha"));
         assert!(read("[[case]]\nname = 'a'\nlayers = ['luck']").unwrap_err().contains("luck"));

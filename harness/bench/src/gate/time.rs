@@ -1,10 +1,12 @@
-//! Seconds: baseline and candidate in one run, interleaved, so that whatever the machine does it does to both.
+//! The layer of time: baseline and candidate run interleaved, so that the load of the machine affects both equally.
 
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
-use super::stats::{Comparison, Random, Round, compare};
 use super::subject::Baseline;
 use super::{Bench, left_out};
+use crate::statistics::comparison::{Comparison, Round, compare};
+use crate::statistics::random::Random;
+use crate::statistics::trimmed_mean;
 use run::engine::failure::Failure;
 use run::engine::interrupt;
 use run::engine::layout::SERIAL;
@@ -12,14 +14,14 @@ use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine, RunOptions};
 use std::path::Path;
 
-/// Times both sides and compares.
+/// Compares the times of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
     let subject = match baseline {
         Baseline::Program(subject) => subject,
         Baseline::Record(..) => {
             return left_out(
                 LayerName::Time,
-                "a record cannot be run: seconds of another run prove nothing",
+                "a record cannot be run, and times of different sessions are not comparable",
             );
         }
         Baseline::None => return left_out(LayerName::Time, "there is no baseline"),
@@ -32,9 +34,12 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
         let found = match rounds(bench, &subject.engine, case) {
             Ok(timed) => judge(bench, case, &timed),
             Err(failure) if failure.is_interrupt() => break,
-            Err(why) => {
-                Finding::told(&case.rule.name, "time", Verdict::Inconclusive, why.to_string())
-            }
+            Err(why) => Finding::without_numbers(
+                &case.rule.name,
+                "time",
+                Verdict::Inconclusive,
+                why.to_string(),
+            ),
         };
         layer.findings.push(found);
     }
@@ -44,9 +49,9 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
 /// All rounds of a case.
 struct Timed {
     rounds: Vec<Round>,
-    /// What was timed.
+    /// The kind of time.
     what: &'static str,
-    /// Phase by phase, logarithms of candidate against baseline.
+    /// Logarithms of the ratio of candidate to baseline, by phase.
     phases: Vec<(String, Vec<f64>)>,
 }
 
@@ -61,7 +66,7 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, Fa
     let place = bench.enter("time").map_err(unusable)?;
     let path = baseline.prepare(&path, &place.join("case")).map_err(unusable)?;
     let engines = [baseline, baseline, &bench.candidate];
-    // The first run of a program reads it and the geometry from disk.
+    // The first run reads program and geometry from disk and is not counted.
     let first = run(bench, baseline, &path)?;
     let also = run(bench, &bench.candidate, &path)?;
     let cpu = first.report.time_cpu_s().is_some() && also.report.time_cpu_s().is_some();
@@ -78,11 +83,11 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, Fa
     for _ in 0..count {
         let mut order = [BASELINE, AGAIN, CANDIDATE];
         random.shuffle(&mut order);
-        let mut told = [const { None }; 3];
-        for who in order {
-            told[who] = Some(run(bench, engines[who], &path)?);
+        let mut reports = [const { None }; 3];
+        for index in order {
+            reports[index] = Some(run(bench, engines[index], &path)?);
         }
-        let [Some(a), Some(a_again), Some(b)] = told else { unreachable!("each was run") };
+        let [Some(a), Some(a_again), Some(b)] = reports else { unreachable!("each was run") };
         let time = |run: &Completed| {
             run.report.time_cpu_s().filter(|_| cpu).unwrap_or(run.time_process_s).max(1e-9).ln()
         };
@@ -111,11 +116,11 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
     let verdict = verdict(&found, rules);
     let mean = |of: &dyn Fn(&Round) -> f64| {
         let times: Vec<f64> = timed.rounds.iter().map(of).collect();
-        super::stats::middle(&times).exp()
+        trimmed_mean(&times).exp()
     };
     let percent = |ratio: f64| ratio * 100.0;
     let mut note = format!(
-        "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; baseline against itself reaches {:.1} %, smallest effect that would be seen {:.1} %",
+        "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; noise floor {:.1} %, minimum detectable effect {:.1} %",
         timed.rounds.len(),
         timed.what,
         percent(found.low),
@@ -131,19 +136,19 @@ fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
         baseline: Some(mean(&|round| (round.a + round.a_again) / 2.0)),
         candidate: Some(mean(&|round| round.b)),
         change_percent: Some(percent(found.effect)),
-        ..Finding::told(&case.rule.name, "time", verdict, note)
+        ..Finding::without_numbers(&case.rule.name, "time", verdict, note)
     }
 }
 
-/// A change that looks real, but not with the certainty that is asked for, is not called unchanged.
+/// An effect with a p-value below this is not reported as unchanged.
 const SUSPICIOUS: f64 = 0.01;
 
-/// A change needs both: chance does not explain it, and it is larger than the baseline against itself and than
-/// what code costs that lies elsewhere in memory. To be unchanged needs as much: what matters would have
-/// been seen, is not within the interval, and nothing looks like it.
+/// A change must be significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
+/// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was
+/// seen.
 fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
     let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
-    // As ratios, a third less time is as much as half as much again.
+    // As a ratio, 1/3 less time equals 1/2 more time.
     let size = |effect: f64| if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect };
     if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
         return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
@@ -159,7 +164,7 @@ fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
 fn phases(timed: &Timed) -> String {
     let told =
         timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
-            format!("{name} {:+.0} %", super::stats::middle(ratios).exp_m1() * 100.0)
+            format!("{name} {:+.0} %", trimmed_mean(ratios).exp_m1() * 100.0)
         });
     told.collect::<Vec<_>>().join(", ")
 }

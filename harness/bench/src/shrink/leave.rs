@@ -1,8 +1,8 @@
-//! What a shrunk case leaves behind: a directory to attach to a bug report.
+//! Writes a shrunk case as a directory for a bug report.
 
 use super::Shrunk;
 use super::probe::{Kind, Probe};
-use super::reduce::told;
+use super::reduce::size;
 use check::diff;
 use contract::case::Case;
 use run::engine::layout::Ranks;
@@ -13,16 +13,16 @@ use std::path::Path;
 /// The options that make `harness shrink` repeat a failure.
 #[derive(Clone, Debug)]
 pub struct Repeat {
-    /// Name or path of the engine's description.
+    /// Name or path of the engine description.
     pub engine: String,
-    /// Path of the engine's program, where one was given.
+    /// Path of the program, if given.
     pub program: Option<String>,
 }
 
 impl Repeat {
-    /// One line that a shell takes: whether the failure is still there.
+    /// Returns a shell command that tests whether the case still fails.
     pub fn line(&self, case: &Path, ranks: Ranks) -> String {
-        let mut words =
+        let mut words: Vec<String> =
             vec!["harness".into(), "shrink".into(), case.display().to_string(), "--check".into()];
         words.extend(["--engine".into(), self.engine.clone()]);
         if let Some(program) = &self.program {
@@ -42,18 +42,15 @@ impl Repeat {
                 ]);
             }
         }
-        let quoted = words.iter().map(|word: &String| {
-            let plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c));
-            if plain { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-        });
-        quoted.collect::<Vec<_>>().join(" ")
+        // Arguments of a process contain no NUL, the one character that a shell cannot quote.
+        shlex::try_join(words.iter().map(String::as_str)).expect("no argument contains NUL")
     }
 }
 
-/// Writes `case.toml`, `body.stl` and `README.md` into a directory; what the README says.
+/// Writes `case.toml`, `body.stl` and `README.md` into a directory; returns the text of the README.
 ///
 /// # Errors
-/// Where something cannot be written.
+/// If a file cannot be written.
 pub fn leave(
     shrunk: &Shrunk,
     probe: &Probe,
@@ -64,20 +61,20 @@ pub fn leave(
     let case = shrunk.trial.case.write(directory)?;
     let line = repeat.line(&case, shrunk.trial.ranks);
     let minimal =
-        if shrunk.minimal { "nothing more can be left out" } else { "the budget was spent" };
+        if shrunk.minimal { "nothing more can be removed" } else { "the budget is exhausted" };
     let text = format!(
-        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nWhether it is still there:\n\n    {line}\n{}",
+        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {line}\n{}",
         shrunk.failure,
         shrunk.facets_before,
         shrunk.trials,
-        told(&shrunk.trial),
+        size(&shrunk.trial),
         divergence(shrunk, probe, &case)
     );
     fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
     Ok(text)
 }
 
-/// The first differing leaf and the rule that decides it, where there are two meshes.
+/// Returns the first differing leaf and the rule that decides it, if there are two meshes.
 fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
     if shrunk.failure.kind != Kind::Differs {
         return String::new();

@@ -1,10 +1,9 @@
-//! `harness shrink`: the smallest case that still fails.
+//! `harness shrink`: reduces a failing case.
 //!
-//! [`probe`] says whether a case fails and how; [`reduce`] takes away whatever does not matter: depth, facets, layer
-//! cells, boxes, ranks; [`leave`] writes the tiny case with the one line that repeats the failure.
+//! [`probe`] tests whether and how a case fails; [`reduce`] removes everything that the failure does not need: depth, facets, layer
+//! cells, boxes, ranks; [`leave`] writes the small case with the command that repeats the failure.
 //!
-//! Invariant: what is left fails in the same way as what was given. A case that fails in another way is
-//! another bug.
+//! Invariant: the reduced case fails in the same way as the given one. A different failure is a different bug.
 
 pub mod leave;
 pub mod probe;
@@ -16,16 +15,16 @@ use run::engine::interrupt;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What may be spent.
+/// Limits of a reduction.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
-    /// Trials at most.
+    /// Maximum number of trials.
     pub trials: usize,
-    /// Time at most.
+    /// Maximum time.
     pub time: Duration,
 }
 
-/// What came of it.
+/// The result of a reduction.
 #[derive(Clone, Debug)]
 pub struct Shrunk {
     /// The smallest trial that fails.
@@ -34,16 +33,16 @@ pub struct Shrunk {
     pub failure: Failure,
     /// Facets of the case that was given.
     pub facets_before: usize,
-    /// Trials made.
+    /// Number of trials.
     pub trials: usize,
-    /// Whether nothing more can be taken away; otherwise the budget was spent.
+    /// Whether nothing more can be removed; otherwise the budget is exhausted.
     pub minimal: bool,
 }
 
-/// Shrinks a case; nothing if it does not fail.
+/// Reduces a case; `None` if it does not fail.
 ///
 /// # Errors
-/// One sentence, where the case cannot be read or nothing can be run on it.
+/// One sentence, if the case cannot be read or no program can be run on it.
 pub fn shrink(case: &Path, probe: &Probe, budget: &Budget) -> Result<Option<Shrunk>, String> {
     let start = Instant::now();
     let given = Trial { case: PlainCase::read(case)?, ranks: probe.ranks() };
@@ -59,10 +58,10 @@ pub fn shrink(case: &Path, probe: &Probe, budget: &Budget) -> Result<Option<Shru
             return false;
         }
         trials += 1;
-        // A trial that cannot be made fails in no way, least of all in the same.
+        // A trial that cannot be run does not count as the same failure.
         probe.failure(trial).ok().flatten().is_some_and(|other| other.kind == failure.kind)
     };
-    let trial = reduce::reduce(given, &mut fails, &mut |told| eprintln!("harness shrink: {told}"));
+    let trial = reduce::reduce(given, &mut fails, &mut |text| eprintln!("harness shrink: {text}"));
     let minimal = !spent(trials);
     let failure = probe
         .failure(&trial)?

@@ -1,7 +1,7 @@
-//! Takes away what a failure does not need, until nothing more can be taken.
+//! Removes everything that a failure does not need.
 //!
-//! Depth first, which makes every later trial cheaper; then facets, by delta debugging: halves, quarters and so on are
-//! left out as long as the rest still fails.
+//! Depth is reduced first, as that makes later trials cheaper; then facets, by delta debugging: halves, quarters and so on are
+//! removed as long as the rest still fails.
 
 use super::probe::Trial;
 use contract::case::Facet;
@@ -11,8 +11,8 @@ use toml::Value;
 /// Whether a trial still fails.
 pub type Fails<'a> = &'a mut dyn FnMut(&Trial) -> bool;
 
-/// The smallest trial that can be reached from this one by steps that each still fail.
-pub fn reduce(trial: Trial, fails: Fails, tell: &mut dyn FnMut(String)) -> Trial {
+/// Returns the smallest trial reachable by steps that all fail.
+pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Trial {
     let mut smallest = trial;
     loop {
         let before = smallest.clone();
@@ -22,12 +22,12 @@ pub fn reduce(trial: Trial, fails: Fails, tell: &mut dyn FnMut(String)) -> Trial
         if smallest == before {
             return smallest;
         }
-        tell(told(&smallest));
+        report(size(&smallest));
     }
 }
 
-/// How small a trial is, in a sentence.
-pub fn told(trial: &Trial) -> String {
+/// Returns the size of a trial as text.
+pub fn size(trial: &Trial) -> String {
     let number =
         |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
     let boxes = trial.case.table.get("box").and_then(Value::as_array).map_or(0, Vec::len);
@@ -39,7 +39,7 @@ pub fn told(trial: &Trial) -> String {
     )
 }
 
-/// The first of some changes of a trial that still fails, or the trial itself.
+/// Returns the first changed trial that still fails, or the trial itself.
 fn first(trial: Trial, fails: Fails, changed: impl IntoIterator<Item = Trial>) -> Trial {
     changed.into_iter().find(|smaller| *smaller != trial && fails(smaller)).unwrap_or(trial)
 }
@@ -53,7 +53,7 @@ fn with(trial: &Trial, key: &str, value: Option<Value>) -> Trial {
     changed
 }
 
-/// Coarser by as many levels as possible, boxes with it; in large steps first.
+/// Coarsens surface and boxes by as many levels as possible, in large steps first.
 fn depth(trial: Trial, fails: Fails) -> Trial {
     let mut smallest = trial;
     for levels in [4, 2, 1] {
@@ -68,7 +68,7 @@ fn depth(trial: Trial, fails: Fails) -> Trial {
     smallest
 }
 
-/// The surface, and every box, coarser by a factor; nothing where the surface is as coarse as the root.
+/// Returns the trial with surface and boxes coarsened by a factor; `None` if the surface is as coarse as the root.
 fn coarsened(trial: &Trial, factor: f64) -> Option<Trial> {
     let mut coarser = trial.clone();
     let edge = number(trial.case.table.get("root")?.get("edge")?)?;
@@ -89,7 +89,7 @@ fn number(value: &Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|whole| whole as f64))
 }
 
-/// Delta debugging (Zeller's ddmin, complements only) over facets; in the end none can be left out alone.
+/// Delta debugging (Zeller's ddmin, complements only) over facets. At the end no single facet can be removed.
 fn facets(trial: Trial, fails: Fails) -> Trial {
     let of = |facets: Vec<Facet>| {
         let mut smaller = trial.clone();
@@ -116,7 +116,7 @@ fn facets(trial: Trial, fails: Fails) -> Trial {
     of(kept)
 }
 
-/// Everything kept, crossing leaves too: what is not deleted cannot matter by its absence.
+/// Keeps all leaves, including crossing ones: deletion is then ruled out as a cause.
 fn plainness(trial: Trial, fails: Fails) -> Trial {
     let all = with(&trial, "keep", Some(Value::String("all".into())));
     let trial = first(trial, fails, [all]);
@@ -124,7 +124,7 @@ fn plainness(trial: Trial, fails: Fails) -> Trial {
     first(trial, fails, [crossing])
 }
 
-/// The thinnest layer.
+/// Reduces the layer to the smallest n.
 fn layer(trial: Trial, fails: Fails) -> Trial {
     let now = trial.case.table.get("layer_cells_min").and_then(Value::as_integer).unwrap_or(4);
     let thinner: Vec<Trial> =
@@ -132,7 +132,7 @@ fn layer(trial: Trial, fails: Fails) -> Trial {
     first(trial, fails, thinner)
 }
 
-/// No boxes, or as few as possible.
+/// Removes as many boxes as possible.
 fn boxes(trial: Trial, fails: Fails) -> Trial {
     let none = with(&trial, "box", None);
     let mut smallest = first(trial, fails, [none]);
@@ -151,7 +151,7 @@ fn boxes(trial: Trial, fails: Fails) -> Trial {
     smallest
 }
 
-/// The fewest ranks.
+/// Reduces the number of ranks.
 fn ranks(trial: Trial, fails: Fails) -> Trial {
     let on = |ranks| Trial { ranks, ..trial.clone() };
     let fewer: Vec<Trial> = match trial.ranks {
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn all_that_the_failure_needs_is_left_and_nothing_else() {
+    fn only_what_the_failure_needs_remains() {
         let mut trials = 0;
         let mut fails = |trial: &Trial| {
             trials += 1;
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fails_without_anything_ends_without_anything() {
+    fn a_failure_independent_of_the_case_leaves_an_empty_one() {
         let smallest = reduce(given(), &mut |_| true, &mut |_| ());
         assert!(smallest.case.facets.is_empty() && smallest.case.table.get("box").is_none());
         assert_eq!(smallest.ranks, Ranks::Simulated { ranks: 2, seed: 7 });

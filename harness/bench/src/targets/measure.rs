@@ -3,8 +3,8 @@
 use crate::experiments::entry::{Audited, Comm, Network, Phase};
 use crate::experiments::group::Group;
 use crate::experiments::pop;
-use crate::experiments::stats::median;
 use crate::experiments::table::grouped;
+use crate::statistics::median;
 use serde::Deserialize;
 use std::fmt;
 

@@ -16,4 +16,4 @@ mod session;
 
 pub use declare::Targets;
 pub use judge::judged;
-pub use session::{Outcome, Wishes, measure};
+pub use session::{Outcome, Overrides, measure};

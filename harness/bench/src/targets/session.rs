@@ -33,13 +33,13 @@ pub struct Outcome {
 pub fn measure(
     options: &Options,
     targets: &Targets,
-    wishes: &Wishes,
+    overrides: &Overrides,
     programs: &Programs,
     say: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
     let place = temporary_directory()?;
     let bench = Bench::open(options, programs, place.path(), say)?;
-    let mut session = Session::new(bench, targets, wishes);
+    let mut session = Session::new(bench, targets, overrides);
     let mut rows = Vec::new();
     let mut interrupted = false;
     for (i, row) in targets.row.iter().enumerate() {
@@ -69,7 +69,7 @@ pub fn measure(
 
 /// What the command line changes.
 #[derive(Clone, Debug, Default)]
-pub struct Wishes {
+pub struct Overrides {
     /// Repetitions of every run, instead of the file's.
     pub repeats: Option<usize>,
     /// No runs on MPI, by the user's wish.
@@ -82,7 +82,7 @@ pub struct Wishes {
 struct Session<'a> {
     bench: Bench<'a>,
     targets: &'a Targets,
-    wishes: &'a Wishes,
+    overrides: &'a Overrides,
     /// Geometries that were read, by what they were read from.
     bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
     /// Meshes whose case files are written, or why that failed.
@@ -110,10 +110,10 @@ struct Pending<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(bench: Bench<'a>, targets: &'a Targets, wishes: &'a Wishes) -> Self {
+    fn new(bench: Bench<'a>, targets: &'a Targets, overrides: &'a Overrides) -> Self {
         let (made, warm) = (BTreeSet::new(), BTreeSet::new());
         let (bases, meshes) = (BTreeMap::new(), BTreeMap::new());
-        Self { bench, targets, wishes, bases, meshes, made, warm, network: false }
+        Self { bench, targets, overrides, bases, meshes, made, warm, network: false }
     }
 
     /// Makes the runs of a row that were not made yet; judges it.
@@ -122,7 +122,7 @@ impl<'a> Session<'a> {
         let mut pending = Vec::new();
         for name in targets.runs_of(row) {
             let wanted = &targets.run[name];
-            if let Some(why) = self.without_mpi().filter(|_| wanted.comm == Comm::Mpi) {
+            if let Some(why) = self.mpi_left_out().filter(|_| wanted.comm == Comm::Mpi) {
                 return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
             }
             if self.made.insert(name.clone()) {
@@ -141,8 +141,8 @@ impl<'a> Session<'a> {
     }
 
     /// Why there are no runs on MPI, if that is so.
-    fn without_mpi(&self) -> Option<&'static str> {
-        match (self.wishes.no_mpi, self.wishes.no_launcher) {
+    fn mpi_left_out(&self) -> Option<&'static str> {
+        match (self.overrides.no_mpi, self.overrides.no_launcher) {
             (true, _) => Some("runs on MPI were not wanted"),
             (false, true) => Some("there is nothing to start ranks with"),
             _ => None,
@@ -151,8 +151,8 @@ impl<'a> Session<'a> {
 
     /// Repetitions are the outer loop here too.
     fn make(&mut self, pending: &mut [Pending]) -> Result<(), BenchError> {
-        let wishes = self.wishes;
-        let repeats = |wanted: &WantedRun| wishes.repeats.unwrap_or(wanted.repeats);
+        let overrides = self.overrides;
+        let repeats = |wanted: &WantedRun| overrides.repeats.unwrap_or(wanted.repeats);
         if !self.network && pending.iter().any(|p| p.wanted.comm == Comm::Sim) {
             self.network = true;
             self.bench.measure_network()?;
@@ -246,7 +246,7 @@ impl<'a> Session<'a> {
         let wants_mpi = |row: &Row| {
             self.targets.runs_of(row).iter().any(|n| self.targets.run[*n].comm == Comm::Mpi)
         };
-        let missing = self.wishes.no_launcher && !self.wishes.no_mpi;
+        let missing = self.overrides.no_launcher && !self.overrides.no_mpi;
         let missing = missing && self.targets.row.iter().any(wants_mpi);
         let program = self.bench.options.launcher.program();
         missing.then(|| format!("{} is not there: runs on MPI were left out", program.display()))

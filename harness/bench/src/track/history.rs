@@ -1,6 +1,6 @@
-//! The history: a file of JSON lines, one record per commit, kept in the repository or on a branch of its own.
+//! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
-//! Invariant: lines are only ever appended. Of several records of one commit the numbers of the last count.
+//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts.
 //!
 //! A record: `{"schema": "octree-track/1", "commit": "full name", "time": "2026-01-31T12:00:00Z" (of the commit),
 //! "subject": "first line of its message", "metrics": {"CASE/METRIC": number}}`.
@@ -23,7 +23,7 @@ pub const SCHEMA: &str = "octree-track/1";
 pub struct Record {
     /// [`SCHEMA`].
     pub schema: String,
-    /// Full name of the commit.
+    /// Full hash of the commit.
     pub commit: String,
     /// When it was committed, ISO 8601.
     #[serde(default)]
@@ -36,16 +36,16 @@ pub struct Record {
 }
 
 impl Record {
-    /// A commit without numbers.
+    /// Returns a record without metrics.
     pub fn new(commit: String) -> Self {
         let (time, subject) = (String::new(), String::new());
         Self { schema: SCHEMA.to_owned(), commit, time, subject, metrics: BTreeMap::new() }
     }
 
-    /// What git knows of a commit.
+    /// Returns a record with the time and subject of a commit.
     ///
     /// # Errors
-    /// One sentence, where it knows none.
+    /// One sentence, if git does not find the commit.
     pub fn of_commit(named: &str, repository: &Path) -> Result<Self, String> {
         let mut git = Command::new("git");
         git.arg("-C").arg(repository).args([
@@ -66,11 +66,11 @@ impl Record {
         Ok(Self { time, subject, ..Self::new(commit) })
     }
 
-    /// Takes up the numbers of a record or report of `harness gate`. Seconds come from a report alone; they are worth
-    /// tracking on a machine that does nothing else.
+    /// Adds the metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
+    /// dedicated machine only.
     ///
     /// # Errors
-    /// In a sentence, where it is neither.
+    /// One sentence, if it is neither.
     pub fn add(&mut self, text: &[u8]) -> Result<(), String> {
         for (case, measures) in &Measures::parse(text)?.cases {
             for (metric, value) in measures.exact.iter().chain(&measures.counted) {
@@ -89,10 +89,10 @@ impl Record {
     }
 }
 
-/// Reads a history; one that is not there is empty.
+/// Reads a history; a missing file is an empty history.
 ///
 /// # Errors
-/// One sentence, naming the line that is no record.
+/// One sentence with the number of the invalid line.
 pub fn read(path: &Path) -> Result<Vec<Record>, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
     let text = match fs::read_to_string(path) {
@@ -119,10 +119,10 @@ fn parse(text: &str) -> Result<Vec<Record>, String> {
     Ok(records)
 }
 
-/// Appends a record in one write, so that a line is there as a whole or not at all.
+/// Appends a record in a single write, so that no partial line remains.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn append(path: &Path, record: &Record) -> io::Result<()> {
     if let Some(directory) = path.parent() {
         fs::create_dir_all(directory)?;
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_appended_is_read_and_the_last_of_a_commit_counts() {
+    fn the_last_record_of_a_commit_counts() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("deep/history.jsonl");
         assert_eq!(read(&path).unwrap(), []);
@@ -160,14 +160,14 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_no_record_is_named() {
+    fn an_invalid_line_is_reported_by_number() {
         let line = serde_json::to_string(&record("a", &[])).unwrap();
         assert!(parse(&format!("{line}\n\nx")).unwrap_err().starts_with("line 3"));
         assert!(parse(&line.replace("track/1", "track/2")).unwrap_err().contains("track/2"));
     }
 
     #[test]
-    fn numbers_of_a_gate_become_metrics_by_case() {
+    fn measures_of_a_gate_become_metrics_by_case() {
         let mut measures = Measures::of_program(Measured::default());
         measures.case("cube").exact.insert("rays".into(), 6);
         measures.case("cube").counted.insert("instructions".into(), 7);

@@ -1,17 +1,17 @@
-//! `harness track`: a record per commit in a file, and the commits at which numbers changed.
+//! `harness track`: a history of metrics by commit, and the commits at which they changed.
 //!
-//! [`history`] is the file; [`divisive`] finds change points.
+//! [`history`] is the file; [`crate::statistics::change_points`] finds the changes.
 //!
-//! Invariant: the same history and options give the same answer on every machine.
+//! Invariant: the same history and options give the same result on every machine.
 
-pub mod divisive;
 pub mod history;
 
-use divisive::{Rules, change_points};
+use crate::statistics::change_points::{Rules, change_points};
+use crate::statistics::median_of;
 use history::Record;
 use serde::Serialize;
 
-/// Numbers that are results and not costs: they change, but neither for the better nor the worse.
+/// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];
 
 /// One metric over the history.
@@ -19,39 +19,39 @@ const NEUTRAL: [&str; 2] = ["cells", "leaves"];
 pub struct Series {
     /// `CASE/METRIC`.
     pub name: String,
-    /// Values, each with the index of its record.
+    /// Index of the record and value.
     pub points: Vec<(usize, f64)>,
-    /// Where it changed.
+    /// The change points.
     pub changes: Vec<Change>,
 }
 
 /// A change point.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Index among the points of the first new value.
+    /// Index of the first new value in `points`.
     pub at: usize,
     /// The last commit with the old values.
     pub last_old: String,
     /// The first commit with the new ones.
     pub first_new: String,
-    /// Median of the values since the change before.
+    /// Median of the values since the previous change.
     pub before: f64,
     /// Median of the values up to the next change.
     pub after: f64,
-    /// From the one to the other, in percent; nothing where it was 0.
+    /// Relative change in percent; `None` if it was 0.
     pub percent: Option<f64>,
-    /// Chance of as clear a change in values without one.
+    /// The p-value of the permutation test.
     pub p: f64,
 }
 
 impl Series {
-    /// Whether more of it is worse.
+    /// Whether an increase is worse.
     pub fn is_cost(&self) -> bool {
         let plain = self.name.rsplit('/').next().unwrap_or(&self.name);
         !NEUTRAL.contains(&plain)
     }
 
-    /// The last change, if it is for the worse and its first new value is among the last `recent`.
+    /// Returns the last change if it is for the worse and its first new value is among the last `recent`.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
         let last = self.changes.last()?;
         let new = self.points.len() - last.at <= recent;
@@ -59,7 +59,7 @@ impl Series {
     }
 }
 
-/// Every metric of the history, with its change points.
+/// Returns every metric of the history with its change points.
 pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
     let mut names: Vec<&String> = records.iter().flat_map(|record| record.metrics.keys()).collect();
     names.sort();
@@ -78,28 +78,20 @@ fn series(name: &str, records: &[Record], rules: &Rules) -> Series {
         let (at, p) = found[i];
         let from = if i == 0 { 0 } else { found[i - 1].0 };
         let until = found.get(i + 1).map_or(values.len(), |next| next.0);
-        let (before, after) = (median(&values[from..at]), median(&values[at..until]));
+        let (before, after) = (median_of(&values[from..at]), median_of(&values[at..until]));
         let percent = (before != 0.0).then(|| (after / before - 1.0) * 100.0);
         Change { at, last_old: commit(at - 1), first_new: commit(at), before, after, percent, p }
     });
     Series { name: name.to_owned(), changes: changes.collect(), points }
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let half = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[half] } else { (sorted[half - 1] + sorted[half]) / 2.0 }
-}
-
-/// Change points in words, one to a line.
-pub fn told(all: &[Series]) -> String {
+/// Returns a text with one change point per line.
+pub fn summary(all: &[Series]) -> String {
     let short = |commit: &str| commit.chars().take(12).collect::<String>();
     let mut text = String::new();
     for series in all {
         for change in &series.changes {
-            let percent =
-                change.percent.map_or("from nothing".to_owned(), |by| format!("{by:+.2} %"));
+            let percent = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
             text.push_str(&format!(
                 "{}: {} -> {} ({percent}) in {}..{}, p = {:.3}\n",
                 series.name,
@@ -123,17 +115,17 @@ mod tests {
     use crate::testing::history as sample;
 
     #[test]
-    fn a_change_is_placed_between_its_commits_with_its_size() {
+    fn a_change_point_has_its_commits_and_size() {
         let all = analyse(&sample(), &Rules::default());
         assert!(all[0].changes.is_empty());
         let [change] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
         assert_eq!((change.at, &change.first_new), (20, &format!("{:040x}", 20)));
         assert!((9.0..11.0).contains(&change.percent.unwrap()), "{change:?}");
-        assert!(told(&all).starts_with("uav/words: 100"), "{}", told(&all));
+        assert!(summary(&all).starts_with("uav/words: 100"), "{}", summary(&all));
     }
 
     #[test]
-    fn only_a_recent_change_for_the_worse_counts() {
+    fn only_recent_changes_for_the_worse_are_returned() {
         let all = analyse(&sample(), &Rules::default());
         assert!(all[1].worse_recently(10).is_some() && all[1].worse_recently(9).is_none());
         let mut better = all[1].clone();
@@ -141,10 +133,5 @@ mod tests {
         assert!(better.worse_recently(10).is_none());
         let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
         assert!(neutral.worse_recently(10).is_none());
-    }
-
-    #[test]
-    fn medians() {
-        assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
     }
 }

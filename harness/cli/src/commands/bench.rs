@@ -5,7 +5,7 @@ use super::values::cell_count;
 use bench::experiments::entry::What;
 use bench::experiments::foreign::{OWN, label};
 use bench::experiments::group::Groups;
-use bench::experiments::plan::{self, Experiment, Preset, Wishes, studies};
+use bench::experiments::plan::{self, Experiment, Overrides, Preset, studies};
 use bench::experiments::session::Options;
 use bench::experiments::{bench, table};
 use clap::Args;
@@ -132,7 +132,7 @@ fn options(arguments: &Arguments, programs: &Programs) -> Options {
     let templates = &programs.engine.description().run;
     let (sim, mpi) = (templates.simulated.is_some(), templates.parallel.is_some());
     let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
-    let wishes = Wishes {
+    let overrides = Overrides {
         cases: arguments.cases.clone(),
         experiments: arguments.experiment.clone(),
         ranks: list(&arguments.ranks),
@@ -147,5 +147,5 @@ fn options(arguments: &Arguments, programs: &Programs) -> Options {
         serial: arguments.engine == "reference" || !sim && !mpi,
         no_choice: !OWN.contains(&arguments.engine.as_str()),
     };
-    session.options(studies(arguments.preset, &wishes), label(&arguments.engine))
+    session.options(studies(arguments.preset, &overrides), label(&arguments.engine))
 }

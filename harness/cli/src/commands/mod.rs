@@ -1,11 +1,13 @@
-//! The commands, a file for each with its arguments; and what several of them share.
+//! The commands, each with its arguments in a file of its own, and what several of them share.
 
 pub mod audit;
 pub mod bench;
+pub mod completions;
 pub mod diff;
 pub mod export;
 mod files;
 pub mod gate;
+pub mod man;
 mod programs;
 pub mod report;
 pub mod selftest;

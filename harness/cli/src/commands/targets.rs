@@ -4,7 +4,7 @@ use super::session::{SessionArguments, progress, refuse, require};
 use bench::experiments::entry::{Judged, Line, Machine, Verdict, What};
 use bench::experiments::foreign::label;
 use bench::experiments::session::BenchError;
-use bench::targets::{self, Targets, Wishes};
+use bench::targets::{self, Overrides, Targets};
 use clap::Args;
 use report::targets as page;
 use run::engine::programs::Programs;
@@ -58,14 +58,14 @@ fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
         EXIT_INPUT
     })?;
     require(programs.mesher.program())?;
-    let wishes = Wishes {
+    let overrides = Overrides {
         repeats: session.repeat.map(usize::from),
         no_mpi: session.no_mpi,
         no_launcher: !session.launcher.is_found(),
     };
     // The runs are those that rows need, not those of an experiment.
     let options = session.options(Vec::new(), label("mesher"));
-    let outcome = targets::measure(&options, targets, &wishes, &programs, &mut progress())
+    let outcome = targets::measure(&options, targets, &overrides, &programs, &mut progress())
         .map_err(|error| refuse(&error))?;
     let written = tell(targets, &outcome.rows, &outcome.lines, session.report.as_deref());
     println!("record: {}", options.record.display());

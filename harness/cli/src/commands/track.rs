@@ -1,9 +1,9 @@
 //! `harness track`: numbers into the history, change points out.
 
 use super::files::put;
-use bench::track::divisive::Rules;
+use bench::statistics::change_points::Rules;
 use bench::track::history::{self, Record};
-use bench::track::{Series, analyse, told};
+use bench::track::{Series, analyse, summary};
 use clap::Args;
 use report::track::{export, page};
 use run::engine::paths::Paths;
@@ -88,7 +88,7 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
         Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
-    print!("{}", told(&all));
+    print!("{}", summary(&all));
     write(arguments, &records, &all).map_err(|error| error.to_string())?;
     let worse = all.iter().any(|series| series.worse_recently(arguments.fail_recent).is_some());
     Ok(if worse { EXIT_FAILED } else { EXIT_HOLDS })

@@ -60,7 +60,7 @@ fn per_rank(case: &str, group: &Group) -> Option<Figure> {
             "Useful time (CPU time outside communication) per rank: {case}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
              the load on 16, 32 and 64 ranks at 100 million cells. Load imbalance λ = max/mean: {lambda:.3} by time, {cells:.3} by cells. {}.",
             grouped(run.cells),
-            group.ranks_told()
+            group.rank_times_caption()
         ),
         x: Axis::linear("rank"),
         y: Axis::linear("useful time / s"),

@@ -5,7 +5,7 @@ use super::{balance, matrix, paper, scaling};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::stats::Median;
+use bench::statistics::Median;
 
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {

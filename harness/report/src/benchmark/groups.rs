@@ -3,7 +3,7 @@
 use crate::figure::{Point, Provenance};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::stats::Median;
+use bench::statistics::Median;
 
 /// How the times of a group were obtained.
 pub fn provenance(group: &Group) -> Provenance {

@@ -18,8 +18,8 @@ use crate::track::figures as trend;
 use crate::write::replace;
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
+use bench::statistics::change_points::Rules;
 use bench::track::analyse;
-use bench::track::divisive::Rules;
 use bench::track::history::Record;
 use html::Drawn;
 use lint::{Finding, Verdict};
@@ -49,7 +49,7 @@ pub fn report(directory: &Path, lines: &[Line], history: &[Record]) -> io::Resul
     let mut figures = figures::figures(&groups);
     figures.extend(trend::by_case(history, &tracked));
     let trend = (!history.is_empty()).then(|| {
-        let changes = bench::track::told(&tracked);
+        let changes = bench::track::summary(&tracked);
         format!("{} commits, {} metrics\n{changes}", history.len(), tracked.len())
     });
     let place = directory.join("figures");

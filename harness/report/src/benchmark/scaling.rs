@@ -7,8 +7,8 @@ use crate::figure::{Axis, Bars, Body, Claims, Figure, Point, Provenance, Series,
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::pop::{Efficiency, messages_s};
-use bench::experiments::stats::Median;
 use bench::experiments::table::grouped;
+use bench::statistics::Median;
 
 /// Maximum number of phases that have a segment of their own.
 const PHASES_SHOWN: usize = 6;
@@ -189,7 +189,7 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
             "Efficiencies by the POP definitions in {experiment} scaling of {case}, {size}, n = {}. The base case is {base_case}. {}, \
              projected from simulated ranks. Lines join powers of two.",
             last.setup.layer_cells_min,
-            last.ranks_told()
+            last.rank_times_caption()
         ),
         x: ranks_axis(&simulated),
         y: Axis { range: Some((0.0, efficiency_max * 1.1)), ..Axis::linear("efficiency") },
@@ -242,7 +242,7 @@ fn phases(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Opti
              scaling all bars are equal. {}, projected from simulated ranks.",
             grouped(cells),
             last.setup.ranks,
-            simulated[0].ranks_told()
+            simulated[0].rank_times_caption()
         ),
         x: Axis::linear("ranks"),
         y: Axis::linear(unit),

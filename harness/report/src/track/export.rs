@@ -4,7 +4,7 @@ use crate::figure::csv::table;
 use crate::json::pretty;
 use crate::verification::junit::to_text;
 use bench::track::history::Record;
-use bench::track::{Series, told};
+use bench::track::{Series, summary};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use serde_json::{Map, Value, json};
 
@@ -55,14 +55,14 @@ pub fn junit(all: &[Series], recent: usize) -> String {
         let status = match series.worse_recently(recent) {
             Some(_) => {
                 let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-                status.set_message(told(std::slice::from_ref(series)).trim_end().to_owned());
+                status.set_message(summary(std::slice::from_ref(series)).trim_end().to_owned());
                 status
             }
             None => TestCaseStatus::success(),
         };
         let mut test = TestCase::new(series.name.as_str(), status);
         if !series.changes.is_empty() {
-            test.set_system_out(told(std::slice::from_ref(series)));
+            test.set_system_out(summary(std::slice::from_ref(series)));
         }
         suite.add_test_case(test);
     }
@@ -73,9 +73,9 @@ pub fn junit(all: &[Series], recent: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench::statistics::change_points::Rules;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use bench::track::divisive::Rules;
 
     #[test]
     fn the_forms_are_those_that_the_tools_document() {

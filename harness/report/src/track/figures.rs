@@ -148,8 +148,8 @@ fn commits(count: usize) -> Axis {
 mod tests {
     use super::*;
     use crate::benchmark::lint::{Verdict, lint};
+    use bench::statistics::change_points::Rules;
     use bench::track::analyse;
-    use bench::track::divisive::Rules;
 
     #[test]
     fn costs_that_changed_are_shown_relative_to_their_first_values() {

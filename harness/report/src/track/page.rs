@@ -84,9 +84,9 @@ fn class(series: &Series, change: &Change) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench::statistics::change_points::Rules;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use bench::track::divisive::Rules;
 
     #[test]
     fn the_page_is_self_contained_and_has_every_change_point() {

@@ -1,22 +1,23 @@
-//! Change points by E-divisive (Matteson and James, "A Nonparametric Approach for Multiple Change Point
-//! Analysis of Multivariate Data", 2014): split where the energy distance between before and after is greatest, as
-//! long as a random order of the same values would hardly ever split as clearly.
+//! Change points by E-divisive (Matteson and James, "A Nonparametric Approach for Multiple Change Point Analysis of
+//! Multivariate Data", 2014). The series is split where the energy distance between the two sides is greatest, as long as
+//! a permutation test finds the split significant.
 //!
-//! Nothing is assumed about how values are distributed; a counter that repeats exactly and seconds on a busy
-//! machine are treated alike. Values are put into random order by a seed, so the answer repeats.
+//! The method assumes no distribution, so it treats exact counters and noisy times alike. Permutations are drawn from a
+//! seed: the result is reproducible.
 
-use crate::gate::stats::Random;
+use super::median::median_of;
+use super::random::Random;
 
-/// When a change is one.
+/// Criteria for a change point.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
-    /// Chance of a false change.
+    /// Significance level: the probability of a false change point.
     pub alpha: f64,
-    /// Random orders tried; the chance cannot be told finer than one in so many.
+    /// Number of permutations; the p-value has a resolution of one over this number.
     pub permutations: usize,
-    /// Smaller changes of the median are passed over; a share.
+    /// Smaller changes of the median are ignored; a fraction.
     pub effect_min: f64,
-    /// Chooses the orders.
+    /// Seed of the permutations.
     pub seed: u64,
 }
 
@@ -26,14 +27,14 @@ impl Default for Rules {
     }
 }
 
-/// Values on either side of a change: one value could be anything.
-const SEGMENT_LEAST: usize = 2;
+/// Minimum number of values on either side of a change: a single value may be an outlier.
+const SEGMENT_MIN: usize = 2;
 
-/// Indices of the first values after each change, with the chance of each, in order.
+/// Returns the index of the first value after each change and its p-value, in ascending order.
 pub fn change_points(values: &[f64], rules: &Rules) -> Vec<(usize, f64)> {
     let mut random = Random(rules.seed);
     let mut found = Vec::new();
-    // Segments still to be looked at, in an order that depends on the values alone, as the draws do.
+    // A stack of segments, so that the order of the random draws depends on the values alone.
     let mut segments = Vec::from([(0, values.len())]);
     while let Some((from, until)) = segments.pop() {
         let part = &values[from..until];
@@ -41,7 +42,7 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Vec<(usize, f64)> {
         if !large(&part[..at], &part[at..], rules.effect_min) {
             continue;
         }
-        let p = chance(part, energy, rules, &mut random);
+        let p = p_value(part, energy, rules, &mut random);
         if p <= rules.alpha {
             let at = from + at;
             found.push((at, p));
@@ -52,13 +53,14 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Vec<(usize, f64)> {
     found
 }
 
-fn large(before: &[f64], after: &[f64], share: f64) -> bool {
-    let (before, after) = (super::median(before), super::median(after));
-    (after - before).abs() > share * before.abs()
+/// Whether the medians differ by more than a fraction of the first.
+fn large(before: &[f64], after: &[f64], fraction: f64) -> bool {
+    let (before, after) = (median_of(before), median_of(after));
+    (after - before).abs() > fraction * before.abs()
 }
 
-/// Where the energy distance is greatest, and how great. Nothing where there is too little to split, or no
-/// difference between any values.
+/// Returns the split with the greatest energy distance, and that distance; `None` if the series is too short or
+/// constant.
 fn best_split(values: &[f64]) -> Option<(usize, f64)> {
     let n = values.len();
     let distances =
@@ -74,7 +76,7 @@ fn best_split(values: &[f64]) -> Option<(usize, f64)> {
         within_after -= to_after;
         between += to_after - to_before;
         let (b, a) = ((i + 1) as f64, (n - i - 1) as f64);
-        if i + 1 < SEGMENT_LEAST || n - i - 1 < SEGMENT_LEAST {
+        if i + 1 < SEGMENT_MIN || n - i - 1 < SEGMENT_MIN {
             continue;
         }
         let pairs = |count: f64| count * (count - 1.0) / 2.0;
@@ -87,10 +89,10 @@ fn best_split(values: &[f64]) -> Option<(usize, f64)> {
     best
 }
 
-/// How often a random order of the same values splits as clearly.
-fn chance(values: &[f64], energy: f64, rules: &Rules, random: &mut Random) -> f64 {
+/// Returns the p-value: the fraction of permutations whose best split has at least this energy distance.
+fn p_value(values: &[f64], energy: f64, rules: &Rules, random: &mut Random) -> f64 {
     let mut shuffled = values.to_vec();
-    // Sums in another order differ in their last bits.
+    // Sums in a different order differ in their last bits.
     let enough = energy * (1.0 - 1e-9);
     let as_clear = (0..rules.permutations).filter(|_| {
         random.shuffle(&mut shuffled);
@@ -130,14 +132,14 @@ mod tests {
     }
 
     #[test]
-    fn noise_hardly_ever_changes() {
+    fn noise_rarely_gives_a_change_point() {
         let false_alarms = (0..100).filter(|&seed| !places(&noise(30, seed)).is_empty()).count();
         assert!(false_alarms <= 4, "{false_alarms}");
         assert_eq!(places(&[]), [0usize; 0]);
         assert_eq!(places(&[5.0; 50]), [0usize; 0]);
     }
 
-    /// Against the definition, summed the long way.
+    /// Compares with the definition, summed naively.
     #[test]
     fn the_split_is_the_one_with_the_greatest_energy_distance() {
         for seed in 0..20 {

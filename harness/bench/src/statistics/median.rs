@@ -1,29 +1,29 @@
-//! Medians and how well they are known, without assuming any distribution: times have none that is known.
+//! Medians with confidence intervals that assume no distribution.
 //!
-//! The interval of a median is between two order statistics: that the true median lies below the k-th
-//! smallest of n independent values has the probability that a fair coin falls heads fewer than k times
-//! in n throws (Le Boudec, "Performance Evaluation", theorem 2.1; Hoefler and Belli, SC15, rule 5).
+//! The interval lies between two order statistics. The true median lies below the k-th smallest of n independent values with
+//! the probability that a fair coin shows heads fewer than k times in n throws (Le Boudec, "Performance Evaluation",
+//! theorem 2.1; Hoefler and Belli, SC15, rule 5).
 
-/// Coverage that is aimed at.
+/// Desired coverage of the interval.
 const COVERAGE: f64 = 0.95;
 
-/// A median, and an interval that contains the true one with a known probability.
+/// A median with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Median {
-    /// Middle value; mean of the two in the middle of an even number.
+    /// Middle value, or the mean of the two middle values.
     pub value: f64,
     /// Lower end of the interval.
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Probability that the interval contains the true median: 95 % or more from six values on, less
-    /// for fewer, whose whole range it then is.
+    /// Probability that the interval contains the true median: at least 95 % for six values or more. For fewer values
+    /// the interval is their whole range, and its coverage is less.
     pub coverage: f64,
     /// Number of values.
     pub count: usize,
 }
 
-/// The median of some values; none of none.
+/// Returns the median with its interval, or `None` for no values.
 pub fn median(values: &[f64]) -> Option<Median> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -31,14 +31,27 @@ pub fn median(values: &[f64]) -> Option<Median> {
     if n == 0 {
         return None;
     }
-    let value = (sorted[(n - 1) / 2] + sorted[n / 2]) * 0.5;
-    // The narrowest interval that covers enough; the whole range where none does.
+    let value = middle(&sorted);
+    // The narrowest interval with the desired coverage; the whole range if none has it.
     let cut = (0..n.div_ceil(2)).rev().find(|&k| coverage(n, k) >= COVERAGE).unwrap_or(0);
     let (low, high) = (sorted[cut], sorted[n - 1 - cut]);
     Some(Median { value, low, high, coverage: coverage(n, cut), count: n })
 }
 
-/// Probability that the true median lies between the values number `cut` from either end, from 0.
+/// Returns the median of a non-empty slice.
+pub fn median_of(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    middle(&sorted)
+}
+
+/// Returns the median of values in ascending order.
+fn middle(sorted: &[f64]) -> f64 {
+    let n = sorted.len();
+    (sorted[(n - 1) / 2] + sorted[n / 2]) * 0.5
+}
+
+/// Returns the probability that the true median lies between the order statistics `cut` places from either end.
 fn coverage(n: usize, cut: usize) -> f64 {
     let mut term = 0.5f64.powi(n as i32);
     let mut below = 0.0;
@@ -54,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn intervals_are_those_of_the_table() {
+    fn intervals_match_the_published_table() {
         // Le Boudec, table A.1: the 95 % interval's order statistics, from 1.
         for (n, low, high, covers) in [
             (6, 1, 6, 0.969),
@@ -71,17 +84,18 @@ mod tests {
     }
 
     #[test]
-    fn few_values_give_their_range_and_say_how_little_that_is_worth() {
+    fn few_values_give_their_range_with_its_low_coverage() {
         let m = median(&[3.0, 1.0, 2.0]).unwrap();
         assert_eq!((m.value, m.low, m.high, m.coverage, m.count), (2.0, 1.0, 3.0, 0.75, 3));
         let one = median(&[5.0]).unwrap();
         assert_eq!((one.low, one.high, one.coverage), (5.0, 5.0, 0.0));
         assert_eq!(median(&[4.0, 2.0]).unwrap().value, 3.0);
         assert!(median(&[]).is_none());
+        assert_eq!((median_of(&[3.0, 1.0, 2.0]), median_of(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
     }
 
     #[test]
-    fn the_interval_covers_as_often_as_it_says() {
+    fn the_interval_contains_the_median_as_often_as_stated() {
         // Uniform values from a fixed generator; the true median is one half.
         let mut state = 1u64;
         let mut draw = || {
@@ -96,7 +110,7 @@ mod tests {
             let values: Vec<f64> = (0..9).map(|_| draw()).collect();
             holds(median(&values).unwrap())
         });
-        let share = hits.count() as f64 / f64::from(rounds);
-        assert!((share - 0.961).abs() < 0.015, "{share}");
+        let fraction = hits.count() as f64 / f64::from(rounds);
+        assert!((fraction - 0.961).abs() < 0.015, "{fraction}");
     }
 }
