@@ -10,15 +10,14 @@ use crate::brickset::BrickSet;
 use crate::comm::{Comm, MessageBuffer};
 use crate::facet::{Facet, crossed};
 use crate::ingest::Slice;
-use crate::kept::Kept;
-use crate::lattice::{Keep, Rules};
+use crate::lattice::Rules;
 use crate::leaves::Totals;
 use crate::octant::{LEVEL_MAX, Level, morton, path, position};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::refine::owners_reached;
 use crate::sides::Sides;
 use crate::stream::Counts;
-use crate::tree::{PerLevel, Tree};
+use crate::tree::{PerLevel, Tree, check_existing, check_split};
 use crate::write::Written;
 use crate::{Mesh, Options};
 use std::collections::{BTreeMap, BTreeSet};
@@ -102,14 +101,7 @@ pub fn base_tree(tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn C
 
 /// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` asks for them; results are the same on all ranks.
 pub fn sides(sides: &Sides, tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn Comm) {
-    Kept::new(&sides.deleted).check_invariants(tree);
-    Kept::new(&sides.inside).check_invariants(tree);
-    for sets in [&sides.inside, &sides.deleted] {
-        is_within_tree(sets, &tree.split);
-    }
-    let is_empty = |sets: &PerLevel| sets.iter().all(BrickSet::is_empty);
-    let unused = if rules.keep == Keep::All { &sides.deleted } else { &sides.inside };
-    assert!(is_empty(unused), "only inside or only deleted leaves are stored");
+    sides.check_invariants(tree, rules.keep, ownership);
     replicas(&[&sides.inside, &sides.deleted], ownership, comm);
     same(
         &format!("{:?}", (sides.components, sides.rays, sides.ambiguous)),
@@ -121,9 +113,10 @@ pub fn sides(sides: &Sides, tree: &Tree, ownership: &Ownership, rules: &Rules, c
 /// The graded tree is a tree, contains the splits `base` of T0, splits no deleted leaf, and is balanced.
 pub fn graded(mesh: &Mesh, base: Option<&PerLevel>, comm: &dyn Comm) {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
-    is_within_tree(split, split);
-    is_within_tree(crossing, split);
-    is_within_tree(&sides.deleted, split);
+    check_split(split);
+    for sets in [crossing, &sides.deleted] {
+        check_existing(split, sets, "has no split parent");
+    }
     for (l, set) in split.iter().enumerate() {
         let mut cursor = set.cursor();
         for b in sides.deleted[l].bricks() {
@@ -138,21 +131,6 @@ pub fn graded(mesh: &Mesh, base: Option<&PerLevel>, comm: &dyn Comm) {
     replicas(&[split, crossing, &sides.inside, &sides.deleted], ownership, comm);
     is_complete(split, ownership, comm);
     is_balanced(split, &sides.deleted, ownership, comm);
-}
-
-/// The sets are sorted, and hold octants whose parents are split.
-fn is_within_tree(sets: &PerLevel, split: &PerLevel) {
-    for (l, set) in sets.iter().enumerate() {
-        set.check_invariants();
-        let mut parents = split[l.saturating_sub(1)].cursor();
-        for b in set.bricks() {
-            let exists = match l {
-                0 => 1,
-                _ => brick::children(brick::byte(parents.get(b.key >> 3), b.key & 7)),
-            };
-            assert_eq!(b.bits & !exists, 0, "level {l}: the parents of octants must be split");
-        }
-    }
 }
 
 /// Every rank that holds a brick has the same octants in it; no other rank has any.

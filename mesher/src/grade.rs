@@ -7,7 +7,7 @@
 //! of level `l` and grandparents instead of parents makes the balance. An octant that is split needs
 //! split ancestors. They are added when the sweep comes to their level, before anything reads it.
 //!
-//! Invariants of the result ([`check_invariants`]):
+//! Invariants of the result, which [`check::graded`](crate::check::graded) executes:
 //! - it contains all splits of the base tree, and the parent of every split octant is split;
 //! - no deleted leaf is split;
 //! - kept leaves that share a face, an edge or a corner differ by at most one level.
@@ -51,8 +51,8 @@ use crate::dilate::{Reach, Tile, Words};
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::octant::Level;
-use crate::partition::ownership::{Ownership, Placement};
-use crate::tree::{PerLevel, Tree, assert_none, check_split};
+use crate::partition::ownership::Ownership;
+use crate::tree::{PerLevel, Tree};
 
 /// The work done on this rank; repeats exactly.
 #[derive(Clone, Copy, Debug, Default)]
@@ -94,43 +94,6 @@ pub fn grade(
         touched = if l > 1 { g.reach(l, 1).coarsen() } else { BrickSet::default() };
     }
     (g.split, g.work)
-}
-
-/// Checks the invariants of a graded tree on the bricks that this rank holds; `base` are the splits of
-/// the base tree. Balance is checked for the leaves that this rank owns against all octants that it
-/// holds. Checks leaf by leaf, and so does not rely on the argument about whole groups.
-///
-/// # Panics
-/// If an invariant is violated; the message names it, the level and an octant.
-pub fn check_invariants(graded: &PerLevel, base: &PerLevel, kept: &Kept, ownership: &Ownership) {
-    check_split(graded);
-    for (l, split) in (0..).zip(graded) {
-        let (mut cursor, mut deleted) = (split.cursor(), kept.deleted(l).cursor());
-        for b in base[l as usize].bricks() {
-            assert_none(l, b.key, b.bits & !cursor.get(b.key), "is split in T0, but not graded");
-        }
-        for b in split.bricks() {
-            assert_none(l, b.key, b.bits & deleted.get(b.key), "is deleted and split");
-        }
-    }
-    for l in 2..graded.len() as Level {
-        if let Some(b) = unbalanced(graded, l, kept, ownership).bricks().next() {
-            assert_none(l - 2, b.key, b.bits, "is not split, but touches a leaf two levels deeper");
-        }
-    }
-}
-
-/// The kept octants of level `l - 2` that are not split, although a kept leaf of level `l` touches
-/// them over a face, an edge or a corner.
-fn unbalanced(split: &PerLevel, l: Level, kept: &Kept, ownership: &Ownership) -> BrickSet {
-    let mut tile = Tile::default();
-    let mut reach = Reach::new(l - 1, &mut tile);
-    reach.dilate_children(kept_leaves(split, l, kept, ownership), 1);
-    let touched = reach.finish().0.coarsen().without(&split[l as usize - 2]);
-    let mut wrong = kept.only(split, l - 2, touched);
-    let is_remote = |key| matches!(ownership.placement(l - 2, key), Placement::Remote(_));
-    wrong.retain(|b| if is_remote(b.key) { 0 } else { b.bits });
-    wrong
 }
 
 /// The kept leaves of level `l` in bricks that this rank owns.
@@ -265,55 +228,5 @@ impl Gradation<'_> {
             }
             self.split_where_kept(surface - 1, touched);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::brickset::tests::set;
-    use crate::comm::Solo;
-    use crate::tree::per_level;
-    use crate::tree::tests::{rules, small};
-
-    fn graded() -> (Tree, PerLevel) {
-        let (tree, nothing) = (small(), per_level());
-        let (solo, kept) = (Ownership::solo(), Kept::new(&nothing));
-        let split = grade(tree.split.clone(), &tree.crossing, &kept, &rules(), &solo, &Solo).0;
-        check_invariants(&split, &tree.split, &kept, &solo);
-        (tree, split)
-    }
-
-    fn check(tree: &Tree, split: &PerLevel, deleted: &PerLevel) {
-        check_invariants(split, &tree.split, &Kept::new(deleted), &Ownership::solo());
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 0.0 of level 2 is split in T0, but not graded")]
-    fn a_split_of_the_base_tree_that_gradation_lost_is_found() {
-        let (tree, mut split) = graded();
-        split[2] = BrickSet::EMPTY;
-        check(&tree, &split, &per_level());
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 0.7 of level 2 is deleted and split")]
-    fn a_deleted_leaf_that_is_split_is_found() {
-        let (tree, mut split) = graded();
-        split[2] = set(&[0, 7]);
-        let mut deleted = per_level();
-        deleted[2] = set(&[7]);
-        check(&tree, &split, &deleted);
-    }
-
-    /// The leaves below octant 0.0.7, of level 4, touch octant 0.7 at its corner only.
-    #[test]
-    #[should_panic(expected = "octant 0.7 of level 2 is not split, but touches a leaf two levels")]
-    fn an_imbalance_over_a_corner_is_found() {
-        let (tree, mut split) = graded();
-        split[1] = set(&[0, 1, 2, 3, 4, 5, 6, 7]);
-        split[2] = set(&[0, 1, 2, 3, 4, 5, 6]);
-        split[3] = set(&[7]);
-        check(&tree, &split, &per_level());
     }
 }

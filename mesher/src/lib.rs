@@ -215,6 +215,9 @@ fn make(
     let (mut tree, work) = record.phase("refine", comm, || {
         let binned = BinnedFacets::new(routed.as_ref().unwrap_or(&facets));
         drop(routed);
+        if check::is_on(options) {
+            binned.check_invariants();
+        }
         refine::refine(&binned, &rules, &ownership)
     });
     counters.add_voxelised(&work);

@@ -3,19 +3,18 @@
 //! A depth-first merge of the levels: each level's sets are read once in order, so a mesh larger than
 //! memory can be written. The walk proceeds by groups of eight siblings.
 //!
-//! Invariants of the stream of a rank:
-//! - it is *linear* ([`LinearCheck`]): leaf words ascend, and no leaf overlaps the one before it;
-//! - it is *complete* ([`Leaves::is_complete`]): the leaves emitted and the leaves left out (deleted, or
+//! Invariants of the stream of a rank, which [`check::leaves`](crate::check::leaves) executes:
+//! - it is *linear*: leaf words ascend, and no leaf overlaps the one before it;
+//! - it is *complete*: the leaves emitted and the leaves left out (deleted, or
 //!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
-use crate::brick::{self, Brick};
+use crate::brick;
 use crate::brickset::{BrickSet, Cursor, ones};
 use crate::lattice::{Keep, Rules};
-use crate::octant::{LEVEL_MAX, Level, Side, path, start57};
+use crate::octant::{Level, Side, start57};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
-use crate::tree::{LEVELS, Tree};
-use std::convert::Infallible;
+use crate::tree::LEVELS;
 
 /// Number of words that are buffered before they are passed to the sink.
 const CHUNK: usize = 4096;
@@ -83,70 +82,6 @@ impl Leaves<'_> {
         walk.flush()?;
         Ok(walk.counts)
     }
-
-    /// Whether the stream is complete: whether emitted leaves of this `volume` ([`LinearCheck::volume`]) and
-    /// the leaves that the rules leave out fill the bricks that this rank owns.
-    pub fn is_complete(&self, volume: u64) -> bool {
-        let (mut owned, mut left_out) = (0, 0);
-        for l in 0..LEVELS as Level {
-            let volume = |bits: u64| u64::from(bits.count_ones()) * volume_of(l);
-            let is_owned = |b: &Brick| self.ownership.owns(l, b.key);
-            let mut split = self.split[l as usize].cursor();
-            let existing = Tree::exists(self.split, l).filter(is_owned);
-            owned += existing.map(|b| volume(b.bits & !split.get(b.key))).sum::<u64>();
-            let deleted = self.sides.deleted[l as usize].bricks().filter(is_owned);
-            left_out += deleted.map(|b| volume(b.bits)).sum::<u64>();
-        }
-        if !self.rules.keep_crossing {
-            let Ok(_) = Self { all_leaves: true, ..*self }.emit(|words| {
-                let crossing = words.iter().filter(|w| *w & 3 == Side::Crossing as u64);
-                left_out += crossing.map(|w| volume_of(level_of(*w))).sum::<u64>();
-                Ok::<(), Infallible>(())
-            });
-        }
-        owned == volume + if self.all_leaves { 0 } else { left_out }
-    }
-}
-
-/// Checks, chunk by chunk, that a stream of leaf words is linear.
-#[derive(Debug, Default)]
-pub struct LinearCheck {
-    /// The level-19 code after the last leaf.
-    end: u64,
-    volume: u64,
-}
-
-impl LinearCheck {
-    /// Adds the next words.
-    ///
-    /// # Panics
-    /// If a leaf precedes or overlaps the leaf before it.
-    pub fn add(&mut self, words: &[u64]) {
-        for w in words {
-            let (start, l) = (w >> 7, level_of(*w));
-            if start < self.end {
-                let octant = path(l, start >> (3 * (LEVEL_MAX - l)));
-                panic!("octant {octant} of level {l} precedes or overlaps the leaf before it");
-            }
-            self.end = start + volume_of(l);
-            self.volume += volume_of(l);
-        }
-    }
-
-    /// Volume of all leaves so far, in octants of level 19.
-    pub fn volume(&self) -> u64 {
-        self.volume
-    }
-}
-
-/// Level of the leaf of a word.
-fn level_of(word: u64) -> Level {
-    (word >> 2 & 31) as Level
-}
-
-/// Volume of an octant of level `l`, in octants of level 19; 0 for the level that no leaf can have.
-fn volume_of(l: Level) -> u64 {
-    LEVEL_MAX.checked_sub(l).map_or(0, |up| 1 << (3 * up))
 }
 
 /// Cursors over the sets of one level.
@@ -268,50 +203,5 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         let result = if self.buffer.is_empty() { Ok(()) } else { (self.sink)(&self.buffer) };
         self.buffer.clear();
         result
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::comm::Solo;
-    use crate::octant::word;
-    use crate::sides::decide;
-    use crate::tree::tests::{rules, small};
-
-    /// Calls `check` with the leaves of a small tree and their volume.
-    fn with_leaves(rules: &Rules, check: impl FnOnce(&mut Leaves, u64)) {
-        let (tree, ownership) = (small(), Ownership::solo());
-        let sides = decide(&tree, &ownership, &[], rules.keep, &Solo);
-        let (split, crossing) = (&tree.split, &tree.crossing);
-        let all_leaves = false;
-        let mut leaves =
-            Leaves { split, crossing, sides: &sides, ownership: &ownership, all_leaves, rules };
-        let mut linear = LinearCheck::default();
-        let Ok(_) = leaves.emit(|words| {
-            linear.add(words);
-            Ok::<(), Infallible>(())
-        });
-        check(&mut leaves, linear.volume());
-    }
-
-    #[test]
-    fn a_stream_without_its_last_leaf_is_incomplete() {
-        for (keep, keep_crossing) in
-            [(Keep::All, true), (Keep::All, false), (Keep::Inside, true), (Keep::Outside, false)]
-        {
-            with_leaves(&Rules { keep, keep_crossing, ..rules() }, |leaves, volume| {
-                assert!(leaves.is_complete(volume), "{keep:?} {keep_crossing}");
-                assert!(!leaves.is_complete(volume - volume_of(LEVEL_MAX)));
-            });
-        }
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 0.3 of level 2 precedes or overlaps the leaf before it")]
-    fn overlapping_leaves_are_found() {
-        let mut check = LinearCheck::default();
-        check.add(&[word(2, 2, Side::Outside)]);
-        check.add(&[word(2, 3, Side::Outside), word(2, 3, Side::Inside)]);
     }
 }

@@ -130,7 +130,10 @@ pub fn check_split(split: &PerLevel) {
 }
 
 /// Checks the sets themselves, and that all their octants have split parents.
-fn check_existing(split: &PerLevel, sets: &PerLevel, violation: &str) {
+///
+/// # Panics
+/// If one has not; `violation` completes the sentence that names it.
+pub fn check_existing(split: &PerLevel, sets: &PerLevel, violation: &str) {
     assert_eq!((split.len(), sets.len()), (LEVELS, LEVELS), "one set for each level");
     for (l, set) in (0..).zip(sets) {
         set.check_invariants();

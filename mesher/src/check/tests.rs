@@ -3,6 +3,7 @@ use crate::case::{Case, RootSpec};
 use crate::comm::{Solo, sim};
 use crate::ingest::{self, Source};
 use crate::lattice::Bounds;
+use crate::lattice::Keep;
 use crate::octant::Side;
 use crate::partition::{Division, Partitioner, Weights};
 use crate::record::Recorder;
@@ -138,7 +139,7 @@ fn a_facet_on_the_wrong_rank_is_found() {
 }
 
 #[test]
-#[should_panic(expected = "crossing octants must be leaves")]
+#[should_panic(expected = "is crossing, but no leaf")]
 fn a_crossing_octant_that_is_split_is_found() {
     let corrupt = |m: &mut Mesh| {
         let l = deepest(&m.split);
@@ -148,7 +149,7 @@ fn a_crossing_octant_that_is_split_is_found() {
 }
 
 #[test]
-#[should_panic(expected = "a split octant has no parent")]
+#[should_panic(expected = "is split, but its parent is not")]
 fn a_split_octant_without_a_parent_is_found() {
     let corrupt = |m: &mut Mesh| {
         let l = deepest(&m.split);
@@ -205,13 +206,13 @@ fn leaves_that_overlap_a_coarser_one_are_found() {
 }
 
 #[test]
-#[should_panic(expected = "only leaves off the surface are deleted")]
+#[should_panic(expected = "has a side, but is no leaf off the surface")]
 fn a_crossing_leaf_that_is_deleted_is_found() {
     run(true, |m| m.sides.deleted = m.crossing.clone(), check_sides);
 }
 
 #[test]
-#[should_panic(expected = "only inside or only deleted leaves are stored")]
+#[should_panic(expected = "is in the set that this choice of sides leaves empty")]
 fn leaves_stored_as_inside_and_as_deleted_are_found() {
     run(true, |m| m.sides.inside = m.sides.deleted.clone(), check_sides);
 }
@@ -245,7 +246,7 @@ fn a_split_that_gradation_has_lost_is_found() {
 }
 
 #[test]
-#[should_panic(expected = "the parents of octants must be split")]
+#[should_panic(expected = "is split, but its parent is not")]
 fn a_graded_octant_without_a_parent_is_found() {
     let corrupt = |m: &mut Mesh| {
         let l = deepest(&m.split);

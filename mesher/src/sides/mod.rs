@@ -61,6 +61,9 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Sides {
     let mut nodes = nodes::Nodes::new(tree, ownership);
+    if cfg!(debug_assertions) {
+        nodes.check_invariants();
+    }
     let mut local = components::merge(&nodes, ownership);
     let faces = std::mem::take(&mut local.faces);
     let merged = local.numbered();
