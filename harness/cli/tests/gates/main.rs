@@ -21,7 +21,7 @@ fn a_bug_of_three_ranks_is_shrunk_to_its_two_facets() {
     assert!(case.root.level_for(2.0) == Some(case.level_surface), "{}", done.told);
     assert!(
         done.told.contains("3 simulated ranks")
-            && done.told.contains("nothing more can be left out"),
+            && done.told.contains("nothing more can be removed"),
         "{}",
         done.told
     );
@@ -39,7 +39,7 @@ fn a_bug_of_three_ranks_is_shrunk_to_its_two_facets() {
 }
 
 #[test]
-fn a_case_that_holds_is_left_alone() {
+fn a_passing_case_is_not_shrunk() {
     let play = Play::new();
     let done = play.harness("shrink case.toml --engine engine.toml --ranks 2 --out tiny");
     assert_eq!(done.code, 0, "{}", done.told);
@@ -74,7 +74,7 @@ fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
 }
 
 #[test]
-fn a_gate_says_what_it_cannot_do() {
+fn the_gate_reports_what_it_cannot_compare() {
     let play = Play::new();
     let done = play.harness("gate --engine engine.toml --rules gate.toml --baseline main");
     assert_eq!(done.code, 2, "{}", done.told);
@@ -98,7 +98,7 @@ fn a_run_on_ranks_that_makes_another_mesh_fails_the_gate() {
         "gate --engine engine.toml --rules gate.toml --baseline engine --candidate engine",
     );
     assert_eq!(done.code, 1, "{}", done.told);
-    assert!(done.told.contains("serially it is another"), "{}", done.told);
+    assert!(done.told.contains("differs from the serial one"), "{}", done.told);
 }
 
 #[test]

@@ -104,7 +104,7 @@ fn what_is_missing_and_what_is_wrong_have_codes_of_their_own() {
         "{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --launcher nonesuch/{{ranks}}"
     ));
     assert_eq!(done.code, 3, "{}", done.told);
-    assert!(done.told.contains("left out: there is nothing to start ranks with"), "{}", done.told);
+    assert!(done.told.contains("left out: the launcher is missing"), "{}", done.told);
     let wished =
         play.harness(&format!("{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --no-mpi"));
     assert_eq!(wished.code, 0, "{}", wished.told);
