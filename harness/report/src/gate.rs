@@ -179,7 +179,12 @@ mod tests {
         counters.findings = vec![
             Finding::exact("cube", "rays", 6, 7, 0.0),
             Finding::exact("cube", "messages", 6, 6, 0.0),
-            Finding::without_numbers("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
+            Finding::without_numbers(
+                "cube",
+                "time",
+                Verdict::Inconclusive,
+                "a <busy> machine | or so",
+            ),
         ];
         report.layers = vec![
             counters,

@@ -22,8 +22,8 @@ pub mod trend;
 
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
-use bench::track::analyse;
 use bench::statistics::change_points::Rules;
+use bench::track::analyse;
 use bench::track::history::Record;
 use html::Drawn;
 use lint::{Finding, Verdict};

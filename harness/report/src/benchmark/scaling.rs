@@ -6,8 +6,8 @@ use super::paper;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::pop::{Efficiency, messages_s};
-use bench::statistics::Median;
 use bench::experiments::table::grouped;
+use bench::statistics::Median;
 
 /// Most phases that a figure tells apart.
 const PHASES_SHOWN: usize = 6;

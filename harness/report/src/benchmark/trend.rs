@@ -89,8 +89,8 @@ fn commits(count: usize) -> Axis {
 mod tests {
     use super::*;
     use crate::benchmark::lint::{Verdict, lint};
-    use bench::track::analyse;
     use bench::statistics::change_points::Rules;
+    use bench::track::analyse;
 
     #[test]
     fn what_moved_is_shown_over_its_first_value() {

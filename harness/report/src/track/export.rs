@@ -87,9 +87,9 @@ pub fn junit(all: &[Series], recent: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench::statistics::change_points::Rules;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use bench::statistics::change_points::Rules;
 
     #[test]
     fn forms_are_those_that_the_tools_document() {

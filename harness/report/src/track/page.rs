@@ -216,9 +216,9 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench::statistics::change_points::Rules;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use bench::statistics::change_points::Rules;
 
     #[test]
     fn the_page_stands_alone_and_shows_every_change() {
