@@ -9,11 +9,11 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What [`Setup::experiment`] is of runs for targets.
+/// The [`Setup::experiment`] of runs for targets.
 pub const EXPERIMENT: &str = "targets";
-/// Cells that a mesh may be asked to have.
+/// Valid numbers of cells.
 const CELLS: std::ops::RangeInclusive<f64> = 1e3..=1e12;
-/// Ranks that a run may be asked to have.
+/// Maximum number of ranks.
 const RANKS_MAX: usize = 65_536;
 
 /// A file of targets.
@@ -34,7 +34,7 @@ pub struct Targets {
     pub directory: PathBuf,
 }
 
-/// What is meshed.
+/// A mesh.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
@@ -50,32 +50,32 @@ pub struct Mesh {
     pub layer_cells_min: Option<u32>,
     /// The spacing, instead of the case's; the root stays what it is.
     pub spacing_min: Option<f64>,
-    /// About how many cells, with `case` only: the spacing is found by meshing coarser, and the root fits it.
+    /// Approximate number of cells, with `case` only: the spacing is extrapolated from coarser meshes, and the root fits it.
     pub cells: Option<f64>,
 }
 
-/// How it is meshed.
+/// A run.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WantedRun {
     /// Name of the mesh.
     pub mesh: String,
-    /// How many ranks.
+    /// Number of ranks.
     #[serde(default = "one")]
     pub ranks: usize,
-    /// How they talk.
+    /// How ranks communicate.
     #[serde(default = "mpi")]
     pub comm: Comm,
-    /// `metis` or `morton`; the mesher's own choice if empty.
+    /// `metis` or `morton`; the default of the mesher if empty.
     #[serde(default)]
     pub partitioner: String,
-    /// `unit`, `area`, `rehearsal` or `rebalance`; likewise.
+    /// `unit`, `area` or `rebalance`; the default of the mesher if empty.
     #[serde(default)]
     pub weights: String,
     /// Repetitions, of which medians are taken.
     #[serde(default = "one")]
     pub repeats: usize,
-    /// One run more before them, not counted, unless the mesh was made already. By default where there are repetitions.
+    /// One uncounted run before them, unless the mesh was generated before. Default: if there are repetitions.
     pub warm_up: Option<bool>,
     /// Write the mesh to the record's disk and have `harness audit` read it, instead of timing the mesher.
     #[serde(default)]
@@ -94,19 +94,19 @@ fn mpi() -> Comm {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// What it is about, for people; `--only` names rows by it.
+    /// The name, used by `--only`.
     pub name: String,
-    /// The run, or several: each is a row then, but for measures of a series.
+    /// One or several runs. Several runs become one row each, except for measures of a series.
     pub run: OneOrMany,
-    /// The run that it is held against.
+    /// The run that it is compared with.
     pub against: Option<String>,
-    /// What is measured.
+    /// The measure.
     pub measure: Measure,
     /// The phase, or several together, for measures of those.
     pub phase: Option<OneOrMany>,
-    /// Least value wanted.
+    /// Lower bound.
     pub at_least: Option<f64>,
-    /// Greatest value wanted.
+    /// Upper bound.
     pub at_most: Option<f64>,
 }
 
@@ -121,7 +121,7 @@ pub enum OneOrMany {
 }
 
 impl OneOrMany {
-    /// All of them.
+    /// Returns all names.
     pub fn all(&self) -> &[String] {
         match self {
             Self::One(name) => std::slice::from_ref(name),
@@ -145,10 +145,10 @@ impl Targets {
         Ok(targets)
     }
 
-    /// Leaves only the rows of these names; all if there are none.
+    /// Keeps only the rows of these names; all if no name is given.
     ///
     /// # Errors
-    /// A name that no row has.
+    /// If no row has one of the names.
     pub fn only(&mut self, names: &[String]) -> Result<(), String> {
         let named = |row: &Row, name: &String| row.name == *name || row.family() == name;
         if let Some(name) = names.iter().find(|name| !self.row.iter().any(|row| named(row, name))) {
@@ -158,7 +158,7 @@ impl Targets {
         Ok(())
     }
 
-    /// The runs that a row needs: its own, and the one that it is held against.
+    /// Returns the runs that a row needs: its own and the one it is compared with.
     pub fn runs_of<'a>(&self, row: &'a Row) -> Vec<&'a String> {
         row.run.all().iter().chain(&row.against).collect()
     }
@@ -211,12 +211,12 @@ impl Targets {
         let kind = row.measure.kind();
         let needs_other = kind == Kind::Against;
         if needs_other != row.against.is_some() {
-            let what = if needs_other { "needs" } else { "has no use for" };
+            let what = if needs_other { "needs" } else { "does not take" };
             return wrong(format!("{} {what} a run in `against`", row.measure));
         }
         let phase = row.measure == Measure::PhaseShare;
         if phase != row.phase.is_some() {
-            let what = if phase { "needs" } else { "has no use for" };
+            let what = if phase { "needs" } else { "does not take" };
             return wrong(format!("{} {what} a name in `phase`", row.measure));
         }
         let least = if kind == Kind::Series { 2 } else { 1 };
@@ -240,7 +240,7 @@ impl Mesh {
             return wrong("give one of case, geometry and [generator]");
         }
         if self.case.is_some() && self.root_scale.is_some() {
-            return wrong("root_scale is the case's to say");
+            return wrong("the case defines root_scale");
         }
         if self.case.is_none() && (self.spacing_min.is_none() || self.cells.is_some()) {
             return wrong("without a case it needs spacing_min, and takes no cells");
@@ -256,7 +256,7 @@ impl Mesh {
 }
 
 impl Row {
-    /// The row's name as the file has it, without the run that was added to it.
+    /// Returns the row's name in the file, without the run that was appended.
     fn family(&self) -> &str {
         match self.run.all() {
             [run] => self.name.strip_suffix(&format!(": {run}")).unwrap_or(&self.name),
@@ -265,7 +265,7 @@ impl Row {
     }
 }
 
-/// A row of several runs becomes a row for each, unless its measure is one of a series.
+/// Splits a row of several runs into one row each, unless its measure is one of a series.
 fn each_run(row: &Row) -> Vec<Row> {
     let OneOrMany::Many(names) = &row.run else { return vec![row.clone()] };
     if row.measure.kind() == Kind::Series {
@@ -314,7 +314,7 @@ mod tests {
     "#;
 
     #[test]
-    fn several_runs_are_several_rows_but_for_a_series() {
+    fn several_runs_are_several_rows_except_for_a_series() {
         let mut targets = read(FILE).unwrap();
         let names = |t: &Targets| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
         assert_eq!(names(&targets), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn our_own_targets_are_declared_without_contradiction() {
+    fn the_targets_of_this_repository_are_consistent() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/targets.toml");
         let targets = Targets::read(&path).unwrap();
         // A run that no row needs is a mistake, as a row without a name of its own is.
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn contradictions_are_named() {
+    fn contradictions_are_reported() {
         for (from, to, why) in [
             ("mesh = \"cube\", repeats", "mesh = \"ball\", repeats", "run one: no mesh"),
             ("repeats = 3", "repeats = 0", "run one: repeats"),
@@ -346,10 +346,14 @@ mod tests {
             ("against = \"one\"", "", "\"speed-up\": speed_up needs a run in `against`"),
             ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
             ("run = \"disk\"", "run = \"one\"", "which one is not"),
-            ("\"speed_up\"", "\"phase_share\"", "has no use for a run"),
+            ("\"speed_up\"", "\"phase_share\"", "does not take a run"),
             ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
             ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
-            ("case = \"cube-small\"", "case = \"cube-small\"\nroot_scale = 3.0", "the case's"),
+            (
+                "case = \"cube-small\"",
+                "case = \"cube-small\"\nroot_scale = 3.0",
+                "the case defines",
+            ),
             (
                 "case = \"cube-small\"\n        spacing_min = 0.1",
                 "geometry = \"a.stl\"",

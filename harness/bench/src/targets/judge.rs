@@ -1,16 +1,16 @@
-//! Rows judged: a function of the declaration and of a record's lines alone.
+//! Judges rows from the declaration and the lines of a record alone.
 
 use super::declare::{OneOrMany, Row, Targets};
 use super::measure::{Kind, Sample};
 use crate::experiments::entry::{Audited, Judged, Line, Verdict, What};
 use crate::experiments::group::{Group, Groups};
 
-/// Every row, judged by the runs that these lines tell of.
+/// Judges every row by the runs in these lines.
 pub fn judged(targets: &Targets, lines: &[Line]) -> Vec<Judged> {
     targets.row.iter().map(|row| judge(targets, row, lines)).collect()
 }
 
-/// One row. Where a run that it needs failed or is not there, it says so.
+/// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
     match measured(targets, row, lines) {
         Ok((value, how)) => Judged {
@@ -29,7 +29,7 @@ pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
     }
 }
 
-/// A row of which nothing was measured.
+/// Returns a row without a measured value.
 pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
     Judged {
         name: row.name.clone(),
@@ -49,13 +49,13 @@ fn verdict(row: &Row, value: f64) -> Verdict {
     if row.at_least.is_none() && row.at_most.is_none() {
         return Verdict::Told;
     }
-    // A value that is no number is within no bounds.
+    // NaN is within no bounds.
     let above = row.at_least.is_none_or(|least| value >= least);
     let below = row.at_most.is_none_or(|most| value <= most);
     if above && below { Verdict::Met } else { Verdict::Missed }
 }
 
-/// The row's value and how it was come by.
+/// Returns the row's value and how it was measured.
 fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String), String> {
     if row.measure.kind() == Kind::Audit {
         let name = &row.run.all()[0];
@@ -79,10 +79,10 @@ fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String
 }
 
 fn absent(name: &str) -> String {
-    format!("run {name} was not made")
+    format!("run {name} is not in the record")
 }
 
-/// How the least trustworthy of the runs was come by.
+/// Returns how the least trustworthy run was measured.
 fn worst_how(runs: &[&Group]) -> &'static str {
     let rank =
         |how: &&str| ["measured", "oversubscribed", "projected"].iter().position(|h| h == how);
@@ -96,7 +96,7 @@ fn audit_of<'a>(targets: &Targets, name: &str, line: &'a Line) -> Option<&'a Aud
     }
 }
 
-/// Why a run failed, if it did.
+/// Returns the reason for which a run failed, if it did.
 fn failure(targets: &Targets, name: &str, lines: &[Line]) -> Option<String> {
     lines.iter().find_map(|line| match &line.what {
         What::Failure(f) if targets.is_run(name, &f.setup) => {
@@ -181,7 +181,7 @@ mod tests {
         };
         use Verdict::{Failed, LeftOut, Met, Missed, Told};
         assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 5.0), audited(true)]), [Met, Met, Told, Met]);
-        // Too slow; then faster than is to be believed.
+        // Too slow, then implausibly fast.
         assert_eq!(
             verdicts(&[ran(1, 9.1), ran(2, 5.1), audited(false)]),
             [Missed, Missed, Told, Missed]
@@ -202,15 +202,15 @@ mod tests {
     }
 
     #[test]
-    fn a_row_says_why_it_has_no_value() {
+    fn a_row_without_a_value_has_a_reason() {
         let targets = read(FILE).unwrap();
         let all = judged(&targets, &[ran(1, 9.0), failed(2)]);
         assert_eq!(all[1].why, "run two failed: killed after 9 s");
-        assert_eq!(all[3].why, "run disk was not made");
+        assert_eq!(all[3].why, "run disk is not in the record");
         // Runs of another experiment are none of its own.
         let mut other = run(Comm::Mpi, 900, &[("a", &[9.0])]);
         other.setup = Setup { experiment: "strong".into(), ..setup(1) };
         let lines = [line(What::Run(Box::new(other)))];
-        assert_eq!(judge(&targets, &targets.row[0], &lines).why, "run one was not made");
+        assert_eq!(judge(&targets, &targets.row[0], &lines).why, "run one is not in the record");
     }
 }

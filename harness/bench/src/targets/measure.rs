@@ -1,4 +1,4 @@
-//! What may be measured of runs: a small function each, on the medians of their repetitions.
+//! The measures of runs, each a small function of the medians of their repetitions.
 
 use crate::experiments::entry::{Audited, Comm, Network, Phase};
 use crate::experiments::group::Group;
@@ -24,13 +24,12 @@ pub enum Measure {
     RateRatio,
     /// Peak resident memory of all ranks together.
     PeakBytes,
-    /// The same over cells.
+    /// Peak resident memory of all ranks per cell.
     BytesPerCell,
-    /// What cells cost beyond what a run takes that has hardly any: the difference of peak memory to that
-    /// of the other run, over the difference of cells. With the same facets on as many ranks, coarsely
-    /// spaced, that one takes the program, MPI and the facets, with what reading them needs.
+    /// Marginal memory per cell: the difference of peak memory to the other run over the difference of cells. The other run has the
+    /// same facets on equally many ranks at a coarse spacing, so its memory is that of the program, MPI and the facets.
     BytesPerCellBeyond,
-    /// Of runs in order: greatest time per cell over the least of those before. 1 or less: it never grew.
+    /// Of runs in order: the maximum ratio of time per cell to the minimum before it. 1 or less: it never grew.
     TimePerCellGrowth,
     /// Greatest over mean number of cells of the ranks.
     LambdaCells,
@@ -51,12 +50,12 @@ pub enum Measure {
     AuditPeakBytes,
 }
 
-/// What a measure is a function of.
+/// The input of a measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// One run.
     Alone,
-    /// A run and another.
+    /// A run and the one it is compared with.
     Against,
     /// Runs in order.
     Series,
@@ -64,16 +63,16 @@ pub enum Kind {
     Audit,
 }
 
-/// What a row's measure is taken of.
+/// The input of a row's measure.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<'a> {
     /// The runs; one, unless the measure is of a series.
     pub runs: &'a [&'a Group],
-    /// The run that it is held against.
+    /// The run that it is compared with.
     pub against: Option<&'a Group>,
-    /// The phases, where some are asked for.
+    /// The requested phases, if any.
     pub phases: &'a [String],
-    /// What a message costs.
+    /// Latency and bandwidth of messages.
     pub network: &'a Network,
 }
 
@@ -103,7 +102,7 @@ impl fmt::Display for Measure {
 }
 
 impl Measure {
-    /// What it is a function of.
+    /// Returns its input.
     pub fn kind(self) -> Kind {
         match self {
             Self::SpeedUp | Self::RateRatio | Self::BytesPerCellBeyond | Self::Efficiency => {
@@ -117,7 +116,7 @@ impl Measure {
         }
     }
 
-    /// A value of it, for people.
+    /// Formats a value with its unit.
     pub fn show(self, value: f64) -> String {
         match self {
             Self::CellsPerSecondPerCore | Self::AuditCellsPerSecondPerCore => {
@@ -133,14 +132,14 @@ impl Measure {
         }
     }
 
-    /// The value on runs.
+    /// Returns the value for runs.
     ///
     /// # Errors
-    /// One sentence, where the runs do not tell it.
+    /// One sentence, if the runs do not report it.
     pub fn of(self, sample: &Sample) -> Result<f64, String> {
-        let run = *sample.runs.first().ok_or("there is no run")?;
+        let run = *sample.runs.first().ok_or("no run is given")?;
         let other =
-            || sample.against.ok_or_else(|| "there is no run to hold it against".to_owned());
+            || sample.against.ok_or_else(|| "the run to compare with is missing".to_owned());
         Ok(match self {
             Self::CellsPerSecondPerCore => run.rate(),
             Self::FacetsPerSecondPerCore => facet_rate(run),
@@ -162,10 +161,10 @@ impl Measure {
         })
     }
 
-    /// The value on audits.
+    /// Returns the value for audits.
     ///
     /// # Errors
-    /// One sentence, where there is none.
+    /// One sentence, if no audit is given.
     pub fn of_audits(self, audits: &[&Audited]) -> Result<f64, String> {
         let values: Vec<f64> = match self {
             Self::AuditHolds => audits.iter().map(|a| f64::from(u8::from(a.holds))).collect(),
@@ -177,9 +176,12 @@ impl Measure {
         };
         // One audit that fails is a failure, however many hold.
         if self == Self::AuditHolds {
-            return values.into_iter().reduce(f64::min).ok_or_else(|| "there is none".to_owned());
+            return values
+                .into_iter()
+                .reduce(f64::min)
+                .ok_or_else(|| "no audit is given".to_owned());
         }
-        median(&values).map(|m| m.value).ok_or_else(|| "there is no audit".to_owned())
+        median(&values).map(|m| m.value).ok_or_else(|| "no audit is given".to_owned())
     }
 }
 
@@ -267,7 +269,7 @@ mod tests {
         measure.of(&Sample { runs, against, phases: &["b".into()], network: &FREE })
     }
 
-    /// On so many ranks for as long, with as many cells.
+    /// Returns a group with the given ranks, time and cells.
     fn timed(ranks: usize, time_s: f64, cells: u64) -> Group {
         group(run(Comm::Mpi, cells, &[("a", &vec![time_s; ranks])]))
     }
@@ -301,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn growth_is_seen_wherever_it_is_in_a_series() {
+    fn growth_is_detected_anywhere_in_a_series() {
         let of = |times: &[f64]| {
             let groups: Vec<Group> = times.iter().map(|&t| timed(1, t, 100)).collect();
             value(Measure::TimePerCellGrowth, &groups.iter().collect::<Vec<_>>(), None).unwrap()
@@ -309,7 +311,7 @@ mod tests {
         assert_eq!(of(&[8.0, 4.0, 2.0]), 0.5);
         // Less than at first, and yet more than before.
         assert_eq!(of(&[8.0, 2.0, 3.0]), 1.5);
-        // A slow rise hides behind no neighbour.
+        // A slow rise accumulates.
         assert!((of(&[1.0, 1.04, 1.08]) - 1.08).abs() < 1e-9);
     }
 

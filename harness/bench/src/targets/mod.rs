@@ -1,12 +1,11 @@
-//! `harness targets FILE`: a table of targets, declared as data, and whether they are met.
+//! `harness targets FILE`: compares measurements with a declared table of targets.
 //!
 //! A file declares meshes, runs of them and rows; [`measure()`] makes the runs that rows need, each once
 //! whatever number of rows asks for it, and judges a row as soon as its runs are there. A judgement is a
 //! function of the declaration and of lines of a record alone ([`judge`]), so [`judged`] says the same of
 //! a record of another day.
 //!
-//! Invariants: what a row says is appended to the record when it is known; a run that fails costs the
-//! rows that need it and nothing else.
+//! Invariants: a row's result is appended to the record immediately; a failed run affects only the rows that need it.
 
 pub mod declare;
 pub mod judge;

@@ -1,10 +1,10 @@
-//! A judged row in words.
+//! A judged row as text.
 
 use super::declare::Targets;
 use super::measure::Measure;
 use crate::experiments::entry::{Judged, Verdict};
 
-/// One row on one line, for progress.
+/// Returns a row as one line, for progress.
 pub fn line(targets: &Targets, row: &Judged) -> String {
     let [name, target, measured, how, verdict] = fields(targets, row);
     match row.measured {
@@ -13,7 +13,7 @@ pub fn line(targets: &Targets, row: &Judged) -> String {
     }
 }
 
-/// Name, target, measured value, how it was measured, and verdict.
+/// Returns name, target, measured value, how it was measured, and verdict.
 pub fn fields(targets: &Targets, row: &Judged) -> [String; 5] {
     let measure = targets.row.iter().find(|r| r.name == row.name).map(|r| r.measure);
     let show = |value: f64| measure.map_or_else(|| value.to_string(), |m: Measure| m.show(value));

@@ -13,20 +13,20 @@ use run::engine::programs::Programs;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What measuring gave.
+/// The result of a session.
 #[derive(Debug)]
 pub struct Outcome {
     /// The rows, in the order of the file.
     pub rows: Vec<Judged>,
     /// The lines of the session in the record.
     pub lines: Vec<Line>,
-    /// Whether the user ended it early.
+    /// Whether the user interrupted it.
     pub interrupted: bool,
-    /// What was asked for and is not there.
+    /// What is missing, if anything.
     pub missing: Option<String>,
 }
 
-/// Makes the runs and judges the rows. `options.studies` is not looked at.
+/// Makes the runs and judges the rows; ignores `options.studies`.
 ///
 /// # Errors
 /// Where the record or a temporary directory cannot be written.
@@ -55,7 +55,7 @@ pub fn measure(
             }
             judged => judged?,
         };
-        // What was not measured for want of time is no result.
+        // A row that was not measured before the interruption is not a result.
         if !interrupted {
             let of = format!("row {} of {}", i + 1, targets.row.len());
             (session.bench.say)(&format!("{of}: {}", row::line(targets, &judged)));
@@ -67,18 +67,18 @@ pub fn measure(
     Ok(Outcome { rows, lines: session.bench.lines, interrupted, missing })
 }
 
-/// What the command line changes.
+/// Changes by the command line.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// Repetitions of every run, instead of the file's.
     pub repeats: Option<usize>,
-    /// No runs on MPI, by the user's wish.
+    /// No runs on MPI, as requested by the user.
     pub no_mpi: bool,
-    /// There is nothing to start ranks with.
+    /// The launcher is missing.
     pub no_launcher: bool,
 }
 
-/// A session under way.
+/// A running session.
 struct Session<'a> {
     bench: Bench<'a>,
     targets: &'a Targets,
@@ -140,11 +140,11 @@ impl<'a> Session<'a> {
         Ok(judge(targets, row, &self.bench.lines))
     }
 
-    /// Why there are no runs on MPI, if that is so.
+    /// Returns the reason for which runs on MPI are skipped, if they are.
     fn mpi_left_out(&self) -> Option<&'static str> {
         match (self.overrides.no_mpi, self.overrides.no_launcher) {
-            (true, _) => Some("runs on MPI were not wanted"),
-            (false, true) => Some("there is nothing to start ranks with"),
+            (true, _) => Some("--no-mpi was given"),
+            (false, true) => Some("the launcher is missing"),
             _ => None,
         }
     }
@@ -206,7 +206,7 @@ impl<'a> Session<'a> {
             let base = self.base(name, mesh).map_err(Failed::Because)?;
             self.bases.insert(key.clone(), (base, BTreeMap::new()));
         }
-        let (base, sizes) = self.bases.get_mut(&key).expect("it was inserted");
+        let (base, sizes) = self.bases.get_mut(&key).expect("the entry was inserted");
         let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
         let ready = |case: Result<PathBuf, String>, spacing_min| {
             case.map(|case| Ready { case, spacing_min, layer_cells_min: n })
@@ -241,7 +241,7 @@ impl<'a> Session<'a> {
         Base::read(&path, place)
     }
 
-    /// What rows were left out for want of, unless the user wished it so.
+    /// Returns what was missing for skipped rows, unless the user requested that.
     fn missing(&self) -> Option<String> {
         let wants_mpi = |row: &Row| {
             self.targets.runs_of(row).iter().any(|n| self.targets.run[*n].comm == Comm::Mpi)
@@ -249,7 +249,7 @@ impl<'a> Session<'a> {
         let missing = self.overrides.no_launcher && !self.overrides.no_mpi;
         let missing = missing && self.targets.row.iter().any(wants_mpi);
         let program = self.bench.options.launcher.program();
-        missing.then(|| format!("{} is not there: runs on MPI were left out", program.display()))
+        missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()))
     }
 }
 

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// The leaf-set directory
     mesh: PathBuf,
-    /// Distinct nodes that may be kept in memory
+    /// Maximum number of distinct nodes in memory
     #[arg(long)]
     nodes_max: Option<usize>,
     /// Write verdict, times and memory as JSON
@@ -19,10 +19,10 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// Audits, prints, writes; the exit code.
+/// Audits, prints and writes; returns the exit code.
 pub fn run(Arguments { mesh, nodes_max, json }: &Arguments) -> u8 {
     if !mesh.is_dir() {
-        eprintln!("harness: {} is no directory", mesh.display());
+        eprintln!("harness: {} is not a directory", mesh.display());
         return EXIT_INPUT;
     }
     let default = AuditOptions::default();

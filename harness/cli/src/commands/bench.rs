@@ -17,10 +17,10 @@ use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
 pub struct Arguments {
     /// Names in geometries/catalogue.toml or paths of case files [default: those of the preset]
     pub cases: Vec<String>,
-    /// Sizes and ranks to choose from
+    /// Sizes and rank counts
     #[arg(long, value_enum, default_value = "small")]
     pub preset: Preset,
-    /// Which questions to ask [default: all]
+    /// Experiments to run [default: all]
     #[arg(long, value_enum, value_delimiter = ',')]
     pub experiment: Vec<Experiment>,
     /// Ranks of simulated runs, as in 1,2,7 or 1..64 for powers of two [default: those of the preset]
@@ -35,19 +35,19 @@ pub struct Arguments {
     /// Values of n in the experiment `layers`
     #[arg(long, value_delimiter = ',')]
     pub layers: Vec<u32>,
-    /// Weights of base leaves: unit, area, rehearsal, rebalance
+    /// Weights of base leaves: unit, area, rebalance
     #[arg(long, value_delimiter = ',')]
     pub weights: Vec<String>,
     /// Partitioners: metis, morton
     #[arg(long, value_delimiter = ',')]
     pub partitioners: Vec<String>,
-    /// What to measure: mesher, reference, or an engine's description (a name in harness/engines, or a TOML file)
+    /// Program to measure: mesher, reference, or an engine description (a name in harness/engines or a TOML file)
     #[arg(long, value_name = "NAME|FILE", default_value = "mesher")]
     pub engine: String,
-    /// Print the tables of an existing record and measure nothing
+    /// Print the tables of an existing record without measuring
     #[arg(long)]
     pub show: bool,
-    /// How it is measured and where results go.
+    /// Options of the session.
     #[command(flatten)]
     pub session: SessionArguments,
 }
@@ -60,7 +60,7 @@ fn rank_list(text: &str) -> Result<RankList, String> {
     plan::ranks(text).map(RankList)
 }
 
-/// Measures, prints; the exit code.
+/// Measures and prints; returns the exit code.
 pub fn run(arguments: Arguments) -> u8 {
     let code = match arguments.show {
         true => show(&arguments),
@@ -84,9 +84,7 @@ fn measure(arguments: &Arguments) -> Result<u8, u8> {
     Ok(match (outcome.failures, measured) {
         (0, true) => EXIT_HOLDS,
         (0, false) => {
-            eprintln!(
-                "harness: nothing was measured: ask for fewer cells, or for another experiment"
-            );
+            eprintln!("harness: nothing was measured: request fewer cells or another experiment");
             EXIT_MISSING
         }
         _ => EXIT_FAILED,
@@ -98,7 +96,7 @@ fn programs(arguments: &Arguments) -> Result<Programs, u8> {
     let own = OWN.contains(&arguments.engine.as_str());
     if !own && (!arguments.weights.is_empty() || !arguments.partitioners.is_empty()) {
         eprintln!(
-            "harness: --weights and --partitioners are the mesher's: leave them out with another --engine"
+            "harness: --weights and --partitioners apply to the mesher only: remove them or --engine"
         );
         return Err(EXIT_INPUT);
     }
@@ -126,7 +124,7 @@ fn show(arguments: &Arguments) -> u8 {
     }
 }
 
-/// What is asked for, in the library's words.
+/// Returns the options of the library.
 fn options(arguments: &Arguments, programs: &Programs) -> Options {
     let session = &arguments.session;
     let templates = &programs.engine.description().run;

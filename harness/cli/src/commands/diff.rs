@@ -11,9 +11,9 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// A leaf-set directory
     a: PathBuf,
-    /// Another
+    /// The leaf-set directory to compare with
     b: PathBuf,
-    /// The case that both are meshes of: its facets help to decide
+    /// The case of both meshes: its facets help to find the deciding rule
     #[arg(long)]
     case: Option<PathBuf>,
 }

@@ -33,16 +33,16 @@ pub struct Arguments {
     /// Only these layers
     #[arg(long, value_delimiter = ',')]
     layers: Vec<LayerName>,
-    /// Seconds for timing one case [default: the rules']
+    /// Time for one case in the layer of time [default: from the rules]
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
-    /// Chooses the order of runs and the draws of tests
+    /// Seed of the order of runs and of the permutation tests
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
     timeout: u64,
-    /// Write what is exact about the candidate: a baseline for later, a point for `harness track`
+    /// Write the exact measures of the candidate: a baseline for later and input of `harness track`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Write the report as JUnit XML
@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Write the report as Markdown
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Exit code 3 if a layer that was asked for had to be left out
+    /// Exit code 3 if a requested layer was left out
     #[arg(long)]
     require_layers: bool,
     /// Where revisions are built and kept [default: target/gate]

@@ -15,7 +15,7 @@ pub struct Arguments {
     /// A record of `harness bench`; may be repeated
     #[arg(long, value_name = "FILE")]
     pub record: Vec<PathBuf>,
-    /// A history of `harness track`, whose trend is shown, too
+    /// A history of `harness track`, to show its trend
     #[arg(long, value_name = "FILE")]
     pub history: Option<PathBuf>,
 }
@@ -69,7 +69,7 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
 fn history_of(path: &Path) -> Result<Vec<Record>, String> {
     if !path.is_file() {
         return Err(format!(
-            "{}: there is no such history; harness track makes it",
+            "{}: the file is missing; create it with harness track",
             path.display()
         ));
     }

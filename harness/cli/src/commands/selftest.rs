@@ -27,20 +27,19 @@ pub struct Arguments {
     /// Corrupt the meshes of this case file instead of the built-in ones; may be repeated
     #[arg(long, value_name = "CASE")]
     pub case: Vec<PathBuf>,
-    /// Corrupt a mesh of any size instead, for the audit to find: a leaf-set directory, or a case file to be
-    /// meshed; may be repeated
+    /// Corrupt a mesh of any size and audit it: a leaf-set directory or a case file to mesh; may be repeated
     #[arg(long, value_name = "DIR|CASE", conflicts_with = "case")]
     pub at_scale: Vec<PathBuf>,
-    /// Cells of the meshes of case files, about; the spacing is chosen so [default: the case's own]
+    /// Approximate number of cells of meshes from case files [default: from the spacing of the case]
     #[arg(long, value_name = "N", requires = "at_scale", value_parser = cell_count)]
     pub cells: Option<u64>,
-    /// Trials at a time, at scale; each takes the memory of an audit
+    /// Concurrent trials at scale; each needs the memory of one audit
     #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: u16,
-    /// Chooses the places of corruptions, at scale
+    /// Seed of the positions of corruptions at scale
     #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1)]
     pub seed: u64,
-    /// Where scratch files go, at scale: two to four times the size of a mesh [default: the temporary directory]
+    /// Directory for temporary files at scale: two to four times the size of a mesh [default: the temporary directory]
     #[arg(long, value_name = "DIR", requires = "at_scale")]
     pub scratch: Option<PathBuf>,
     /// Time limit of every run of reference or mesher
@@ -139,7 +138,7 @@ fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
     let (trials, found) = (report.kills.len(), report.found_by_audit());
     let killed = report.kills.iter().filter(|kill| kill.killed()).count();
     println!(
-        "the audit found {found} of {trials}; {} show only against the untouched mesh",
+        "the audit found {found} of {trials}; {} only by comparison with the untouched mesh",
         killed.saturating_sub(found)
     );
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })

@@ -21,7 +21,7 @@ pub struct SessionArguments {
     /// Repetitions of every run; 95 % intervals of a median need six
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     pub repeat: Option<u16>,
-    /// What starts ranks; {ranks} stands for their number
+    /// Command that starts ranks; {ranks} is replaced by their number
     #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
     pub launcher: Launcher,
     /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
@@ -33,7 +33,7 @@ pub struct SessionArguments {
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = clap::value_parser!(u64).range(1..))]
     pub timeout: u64,
-    /// Make a report, too: DIR/record.jsonl is the record then, unless --record names one
+    /// Also write a report; the record is then DIR/record.jsonl unless --record is given
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Where the programs are.
@@ -75,7 +75,7 @@ impl SessionArguments {
             EXIT_INPUT
         })?;
         for (line, why) in &content.broken {
-            eprintln!("harness: line {line} is passed over: {why}");
+            eprintln!("harness: line {line} is skipped: {why}");
         }
         Ok(content)
     }
@@ -99,11 +99,11 @@ pub fn require(program: &Path) -> Result<(), u8> {
     if program.is_file() {
         return Ok(());
     }
-    eprintln!("harness: {} is not there; build it or name it", program.display());
+    eprintln!("harness: {} is missing: build it or give its path", program.display());
     Err(EXIT_MISSING)
 }
 
-/// Tells on standard error what is being done, with the seconds since now.
+/// Returns a function that prints progress to standard error with the elapsed seconds.
 pub fn progress() -> impl FnMut(&str) {
     let start = Instant::now();
     move |what| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs())

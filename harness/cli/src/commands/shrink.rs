@@ -20,25 +20,25 @@ pub struct Arguments {
     /// Name in harness/engines or path of an engine description
     #[arg(long, default_value = "mesher")]
     engine: String,
-    /// Compare a run on so many ranks with the serial run [default: the serial run with the reference]
+    /// Compare a run on N ranks with the serial run [default: the serial run with the reference]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     ranks: Option<u32>,
     /// Ranks on MPI instead of simulated ones
     #[arg(long, requires = "ranks")]
     mpi: bool,
-    /// Chooses the schedule of simulated ranks
+    /// Seed of the schedule of simulated ranks
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Only say whether the case fails
+    /// Only test whether the case fails
     #[arg(long)]
     check: bool,
-    /// Where the tiny case goes [default: shrunk-CASE]
+    /// Directory for the reduced case [default: shrunk-CASE]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Trials at most
+    /// Maximum number of trials
     #[arg(long, value_name = "N", default_value_t = 5000)]
     trials: usize,
-    /// Seconds at most
+    /// Maximum time
     #[arg(long, value_name = "SECONDS", default_value_t = 900)]
     budget: u64,
     /// Time limit of every single run

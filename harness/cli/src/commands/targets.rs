@@ -19,13 +19,13 @@ const PAGE: &str = "targets.md";
 pub struct Arguments {
     /// The table of targets, TOML
     pub file: PathBuf,
-    /// Only these rows of it
+    /// Only these rows
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// Judge the rows by an existing record and measure nothing
+    /// Judge the rows by an existing record without measuring
     #[arg(long)]
     pub show: bool,
-    /// How it is measured and where results go.
+    /// Options of the session.
     #[command(flatten)]
     pub session: SessionArguments,
 }
@@ -67,7 +67,7 @@ fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     let options = session.options(Vec::new(), label("mesher"));
     let outcome = targets::measure(&options, targets, &overrides, &programs, &mut progress())
         .map_err(|error| refuse(&error))?;
-    let written = tell(targets, &outcome.rows, &outcome.lines, session.report.as_deref());
+    let written = publish(targets, &outcome.rows, &outcome.lines, session.report.as_deref());
     println!("record: {}", options.record.display());
     if let Some(missing) = &outcome.missing {
         eprintln!("harness: {missing}");
@@ -83,14 +83,14 @@ fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
 fn show(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     let content = arguments.session.read_record()?;
     let rows = targets::judged(targets, &content.lines);
-    Ok(match tell(targets, &rows, &content.lines, arguments.session.report.as_deref()) {
+    Ok(match publish(targets, &rows, &content.lines, arguments.session.report.as_deref()) {
         Ok(()) => code(&rows),
         Err(()) => EXIT_INPUT.max(code(&rows)),
     })
 }
 
 /// Prints the table, and writes it into the report's directory if there is one.
-fn tell(
+fn publish(
     targets: &Targets,
     rows: &[Judged],
     lines: &[Line],

@@ -19,10 +19,10 @@ pub struct Arguments {
     /// Append the numbers of this record or JSON report of `harness gate`; may be repeated
     #[arg(long, value_name = "FILE")]
     add: Vec<PathBuf>,
-    /// Append this number, too; may be repeated
+    /// Also append this value; may be repeated
     #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number)]
     value: Vec<(String, f64)>,
-    /// The commit that they belong to
+    /// The commit of the appended values
     #[arg(long, value_name = "REVISION", default_value = "HEAD")]
     commit: String,
     /// The repository that the commit is in [default: the one that the harness is in]
@@ -49,20 +49,20 @@ pub struct Arguments {
     /// Exit code 1 (and a failed test) where the last change of a metric is for the worse and within its last N values
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
-    /// Chance of a false change point
+    /// Significance level: the probability of a false change point
     #[arg(long, default_value_t = 0.01)]
     alpha: f64,
-    /// Smaller changes are passed over; percent
+    /// Ignore smaller changes; percent
     #[arg(long, default_value_t = 0.1)]
     effect_min: f64,
-    /// Chooses the random orders of the test
+    /// Seed of the permutation test
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
 fn named_number(text: &str) -> Result<(String, f64), String> {
     let (name, number) = text.split_once('=').ok_or("give CASE/METRIC=NUMBER")?;
-    let number: f64 = number.parse().map_err(|_| format!("{number:?} is no number"))?;
+    let number: f64 = number.parse().map_err(|_| format!("{number:?} is not a number"))?;
     if number.is_finite() {
         Ok((name.to_owned(), number))
     } else {

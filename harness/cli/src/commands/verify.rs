@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Directory for reports and for results that are kept [default: a temporary one]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Keep the results of cases that hold, too
+    /// Also keep the results of passing cases
     #[arg(long)]
     pub keep: bool,
     /// Write the report as JUnit XML
@@ -62,19 +62,19 @@ pub struct Arguments {
     /// Verify another mesher: name in harness/engines or path of a description [default: the mesher itself]
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<String>,
-    /// What must not be missing: exit code 3 if it is
+    /// Required components: exit code 3 if one is missing
     #[arg(long, value_delimiter = ',')]
     pub require: Vec<Need>,
-    /// Most points put to the oracles on cases that are not small
+    /// Maximum number of points for the oracles on cases that are not small
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     pub oracle_points: usize,
-    /// Chooses those points
+    /// Seed of the choice of points
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Largest number of cells that is checked; larger meshes are only measured (see `harness audit`)
+    /// Maximum number of cells for checks; larger meshes are only measured (see `harness audit`)
     #[arg(long, value_name = "CELLS", default_value_t = 100_000_000)]
     pub cells_max: u64,
-    /// Largest number of cells up to which the reference is run
+    /// Maximum number of cells for the reference
     #[arg(long, value_name = "CELLS", default_value_t = 3_000_000)]
     pub reference_cells_max: u64,
     /// Where the programs are.

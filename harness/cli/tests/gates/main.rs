@@ -13,36 +13,36 @@ const SHRINK: &str = "shrink case.toml --engine engine.toml --ranks 8";
 fn a_bug_of_three_ranks_is_shrunk_to_its_two_facets() {
     let play = Play::new();
     let done = play.harness(&format!("{SHRINK} --out tiny"));
-    assert_eq!(done.code, 1, "{}", done.told);
+    assert_eq!(done.code, 1, "{}", done.printed);
     let case = contract::case::Case::read(&play.path("tiny/case.toml")).unwrap();
     let mut at: Vec<f32> = case.facets.iter().map(|facet| facet[0][0]).collect();
     at.sort_by(f32::total_cmp);
-    assert_eq!(at, [0.25, 0.5], "{}", done.told);
-    assert!(case.root.level_for(2.0) == Some(case.level_surface), "{}", done.told);
+    assert_eq!(at, [0.25, 0.5], "{}", done.printed);
+    assert!(case.root.level_for(2.0) == Some(case.level_surface), "{}", done.printed);
     assert!(
-        done.told.contains("3 simulated ranks")
-            && done.told.contains("nothing more can be left out"),
+        done.printed.contains("3 simulated ranks")
+            && done.printed.contains("nothing more can be removed"),
         "{}",
-        done.told
+        done.printed
     );
     // The mesh that was wanted has one leaf.
     assert!(
-        done.told.contains("nothing in either mesh asks for that")
-            || done.told.contains("section 3"),
+        done.printed.contains("nothing in either mesh asks for that")
+            || done.printed.contains("section 3"),
         "{}",
-        done.told
+        done.printed
     );
     let readme = fs::read_to_string(play.path("tiny/README.md")).unwrap();
     let line = readme.lines().find(|line| line.contains("harness shrink")).unwrap().trim();
     let again = play.harness(line.strip_prefix("harness ").unwrap());
-    assert_eq!(again.code, 1, "{line}: {}", again.told);
+    assert_eq!(again.code, 1, "{line}: {}", again.printed);
 }
 
 #[test]
-fn a_case_that_holds_is_left_alone() {
+fn a_passing_case_is_not_shrunk() {
     let play = Play::new();
     let done = play.harness("shrink case.toml --engine engine.toml --ranks 2 --out tiny");
-    assert_eq!(done.code, 0, "{}", done.told);
+    assert_eq!(done.code, 0, "{}", done.printed);
     assert!(!play.path("tiny").exists());
     assert_eq!(play.harness(&format!("{SHRINK} --check")).code, 1);
 }
@@ -55,36 +55,36 @@ fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     let done = play.harness(&format!(
         "{gate} --baseline engine --candidate more --junit gate.xml --record more.json"
     ));
-    assert_eq!(done.code, 1, "{}", done.told);
+    assert_eq!(done.code, 1, "{}", done.printed);
     assert!(
-        done.told.contains("regression   case.toml: words 40 -> 41 (+2.50 %)"),
+        done.printed.contains("regression   case.toml: words 40 -> 41 (+2.50 %)"),
         "{}",
-        done.told
+        done.printed
     );
     assert!(fs::read_to_string(play.path("gate.xml")).unwrap().contains("failures=\"2\""));
     for better in ["--baseline more --candidate engine", "--baseline more.json --mesher engine"] {
         let done = play.harness(&format!("{gate} {better}"));
-        assert_eq!(done.code, 0, "{}", done.told);
+        assert_eq!(done.code, 0, "{}", done.printed);
         assert!(
-            done.told.contains("improvement  case.toml: 2 ranks/words 41 -> 40"),
+            done.printed.contains("improvement  case.toml: 2 ranks/words 41 -> 40"),
             "{}",
-            done.told
+            done.printed
         );
     }
 }
 
 #[test]
-fn a_gate_says_what_it_cannot_do() {
+fn the_gate_reports_what_it_cannot_compare() {
     let play = Play::new();
     let done = play.harness("gate --engine engine.toml --rules gate.toml --baseline main");
-    assert_eq!(done.code, 2, "{}", done.told);
-    assert!(done.told.contains("does not say how a revision is built"), "{}", done.told);
+    assert_eq!(done.code, 2, "{}", done.printed);
+    assert!(done.printed.contains("does not say how a revision is built"), "{}", done.printed);
     let record = play
         .harness("gate --engine engine.toml --rules gate.toml --record now.json --layers counters");
-    assert_eq!(record.code, 0, "{}", record.told);
+    assert_eq!(record.code, 0, "{}", record.printed);
     let done = play.harness("gate --engine engine.toml --rules gate.toml --baseline now.json --layers time --require-layers");
-    assert_eq!(done.code, 3, "{}", done.told);
-    assert!(done.told.contains("a record cannot be run"), "{}", done.told);
+    assert_eq!(done.code, 3, "{}", done.printed);
+    assert!(done.printed.contains("a record cannot be run"), "{}", done.printed);
 }
 
 #[test]
@@ -97,8 +97,8 @@ fn a_run_on_ranks_that_makes_another_mesh_fails_the_gate() {
     let done = play.harness(
         "gate --engine engine.toml --rules gate.toml --baseline engine --candidate engine",
     );
-    assert_eq!(done.code, 1, "{}", done.told);
-    assert!(done.told.contains("serially it is another"), "{}", done.told);
+    assert_eq!(done.code, 1, "{}", done.printed);
+    assert!(done.printed.contains("differs from the serial one"), "{}", done.printed);
 }
 
 #[test]
@@ -128,12 +128,12 @@ fn numbers_of_commits_become_a_history_with_a_change_in_it() {
         git(&format!("commit --quiet --allow-empty -m commit-{i}"));
         let value = if i < 10 { 40 } else { 44 };
         let done = play.harness(&format!("track history.jsonl --value case/words={value}"));
-        assert_eq!(done.code, 0, "{}", done.told);
+        assert_eq!(done.code, 0, "{}", done.printed);
     }
     let forms = "--page trend.html --csv trend.csv --bencher b.json --github-benchmark g.json --junit t.xml";
     let done = play.harness(&format!("track history.jsonl --fail-recent 6 {forms}"));
-    assert_eq!(done.code, 1, "{}", done.told);
-    assert!(done.told.contains("case/words: 40 -> 44 (+10.00 %) in "), "{}", done.told);
+    assert_eq!(done.code, 1, "{}", done.printed);
+    assert!(done.printed.contains("case/words: 40 -> 44 (+10.00 %) in "), "{}", done.printed);
     assert_eq!(fs::read_to_string(play.path("trend.csv")).unwrap().lines().count(), 17);
     assert!(fs::read_to_string(play.path("trend.html")).unwrap().contains("commit-10"));
     assert_eq!(play.harness("track history.jsonl --fail-recent 5").code, 0);

@@ -49,7 +49,7 @@ pub struct Done {
     /// Its exit code.
     pub code: i32,
     /// All that it printed.
-    pub told: String,
+    pub printed: String,
 }
 
 /// The directory; gone at the end.
@@ -125,8 +125,8 @@ impl Play {
             .env("HARNESS_ROOT", self.0.path());
         command.env_remove("GITHUB_STEP_SUMMARY");
         let output = command.output().unwrap();
-        let told =
+        let printed =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
-        Done { code: output.status.code().unwrap_or(-1), told }
+        Done { code: output.status.code().unwrap_or(-1), printed }
     }
 }

@@ -61,15 +61,15 @@ fn met_targets_are_a_success_and_the_record_says_so_again() {
     let play = play();
     let only = "--only rate,audit --record out/r.jsonl";
     let done = play.harness(&format!("{TARGETS_COMMAND} {only}"));
-    assert_eq!(done.code, 0, "{}", done.told);
-    assert!(done.told.contains("2 met, 0 missed"), "{}", done.told);
+    assert_eq!(done.code, 0, "{}", done.printed);
+    assert!(done.printed.contains("2 met, 0 missed"), "{}", done.printed);
     // The audited mesh went when it had been read.
     let left: Vec<_> =
         fs::read_dir(play.path("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left, ["r.jsonl"]);
     let again = play.harness(&format!("{TARGETS_COMMAND} {only} --show"));
-    assert_eq!(again.code, 0, "{}", again.told);
-    assert!(done.told.contains(again.told.trim()), "{}", again.told);
+    assert_eq!(again.code, 0, "{}", again.printed);
+    assert!(done.printed.contains(again.printed.trim()), "{}", again.printed);
     let record = fs::read_to_string(play.path("out/r.jsonl")).unwrap();
     assert_eq!(record.matches(r#""kind":"target""#).count(), 2);
     assert_eq!(record.matches(r#""verdict":"met""#).count(), 2);
@@ -79,13 +79,14 @@ fn met_targets_are_a_success_and_the_record_says_so_again() {
 fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
     let play = play();
     let done = play.harness(&format!("{TARGETS_COMMAND} --no-mpi --report out"));
-    assert_eq!(done.code, 1, "{}", done.told);
+    assert_eq!(done.code, 1, "{}", done.printed);
     assert!(
-        done.told.contains("FAILED: run three failed: mesher ended with code 70: mesher: no three"),
+        done.printed
+            .contains("FAILED: run three failed: mesher ended with code 70: mesher: no three"),
         "{}",
-        done.told
+        done.printed
     );
-    assert!(done.told.contains("2 met, 0 missed, 1 failed, 1 left out"), "{}", done.told);
+    assert!(done.printed.contains("2 met, 0 missed, 1 failed, 1 left out"), "{}", done.printed);
     let page = fs::read_to_string(play.path("out/targets.md")).unwrap();
     assert!(
         page.contains("| rate | at least 0.00 M cells/s |") && page.contains("| met |"),
@@ -93,8 +94,8 @@ fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
     );
     play.write("targets.toml", &TARGETS.replace("at_least = 500", "at_least = 501"));
     let done = play.harness(&format!("{TARGETS_COMMAND} --only rate --record r.jsonl"));
-    assert_eq!(done.code, 1, "{}", done.told);
-    assert!(done.told.contains("MISSED"), "{}", done.told);
+    assert_eq!(done.code, 1, "{}", done.printed);
+    assert!(done.printed.contains("MISSED"), "{}", done.printed);
 }
 
 #[test]
@@ -103,18 +104,18 @@ fn what_is_missing_and_what_is_wrong_have_codes_of_their_own() {
     let done = play.harness(&format!(
         "{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --launcher nonesuch/{{ranks}}"
     ));
-    assert_eq!(done.code, 3, "{}", done.told);
-    assert!(done.told.contains("left out: there is nothing to start ranks with"), "{}", done.told);
+    assert_eq!(done.code, 3, "{}", done.printed);
+    assert!(done.printed.contains("left out: the launcher is missing"), "{}", done.printed);
     let wished =
         play.harness(&format!("{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --no-mpi"));
-    assert_eq!(wished.code, 0, "{}", wished.told);
+    assert_eq!(wished.code, 0, "{}", wished.printed);
     assert_eq!(play.harness(&format!("{TARGETS_COMMAND} --only luck")).code, 2);
     play.write("targets.toml", &TARGETS.replace("seconds", "minutes"));
     let done = play.harness(TARGETS_COMMAND);
-    assert_eq!(done.code, 2, "{}", done.told);
+    assert_eq!(done.code, 2, "{}", done.printed);
     assert!(
-        done.told.contains("targets.toml") && done.told.contains("unknown variant"),
+        done.printed.contains("targets.toml") && done.printed.contains("unknown variant"),
         "{}",
-        done.told
+        done.printed
     );
 }

@@ -48,7 +48,7 @@ pub struct Done {
     /// Its exit code.
     pub code: i32,
     /// All that it printed.
-    pub told: String,
+    pub printed: String,
 }
 
 /// The directory; gone at the end.
@@ -148,9 +148,9 @@ impl Fixture {
         command.env("HARNESS_PYTHON", "/nowhere/python").env("HARNESS_P4EST", "/nowhere/p4est");
         command.env("GITHUB_STEP_SUMMARY", self.path("summary.md"));
         let output = command.output().unwrap();
-        let told =
+        let printed =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
-        Done { code: output.status.code().unwrap_or(-1), told }
+        Done { code: output.status.code().unwrap_or(-1), printed }
     }
 
     /// What is left in the directory for temporary files.
