@@ -197,7 +197,9 @@ mod tests {
     fn text_tells_changes_and_counts_the_rest() {
         let text = text(&sample());
         assert!(
-            text.contains("regression   cube: rays 6 -> 7 (+16.67 %); exceeds the tolerance of 0 %"),
+            text.contains(
+                "regression   cube: rays 6 -> 7 (+16.67 %); exceeds the tolerance of 0 %"
+            ),
             "{text}"
         );
         assert!(text.contains("1 unchanged") && !text.contains("messages"), "{text}");
