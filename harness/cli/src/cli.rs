@@ -36,6 +36,8 @@ pub enum Command {
     Shrink(Box<commands::shrink::Arguments>),
     /// Checks a leaf-set directory of any size by itself
     Audit(commands::audit::Arguments),
+    /// Diagnoses a geometry before it is meshed: which defects it has, and what each means for the mesh
+    Geometry(commands::geometry::Arguments),
     /// Writes a leaf-set directory as a VTK unstructured grid, to look at in ParaView or pyvista
     Export(commands::export::Arguments),
     /// Tells where two leaf-set directories differ, and which rule of the definition decides

@@ -6,6 +6,7 @@ pub mod diff;
 pub mod export;
 mod files;
 pub mod gate;
+pub mod geometry;
 mod programs;
 pub mod report;
 pub mod selftest;
