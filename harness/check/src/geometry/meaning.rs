@@ -12,6 +12,7 @@ pub fn changes_region(kind: Kind, keep: Keep) -> bool {
         Kind::ThinWalls => keep != Keep::Outside,
         Kind::ThinGaps => keep != Keep::Inside,
         Kind::Openings
+        | Kind::Junctions
         | Kind::NonManifoldEven
         | Kind::Winding
         | Kind::Degenerate
@@ -25,6 +26,9 @@ pub fn changes_region(kind: Kind, keep: Keep) -> bool {
 pub fn meaning(finding: &Finding, input: &Input) -> String {
     match finding.kind {
         Kind::Openings => openings(finding, input),
+        Kind::Junctions => "No effect: a vertex lies on the edge of another facet, so the edges do not match, but the \
+                            crack is far narrower than the finest cell."
+            .into(),
         Kind::NonManifoldOdd => "Rays that pass on either side of such an edge disagree about the inside, so a \
                                  component's side may be wrong or ambiguous."
             .into(),

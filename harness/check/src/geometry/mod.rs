@@ -1,7 +1,7 @@
 //! Diagnosis of a geometry before it is meshed: which of its defects change the mesh's region, and how.
 //!
 //! - [`input`]: the file, its root and the cell's edge length; [`solids`]: the solids of an ASCII file;
-//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`] and [`width`] build on it;
+//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates;
 //! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search;
 //! - [`extent`]: the body's position in the root;
@@ -17,6 +17,7 @@ pub mod extent;
 pub mod facets;
 pub mod input;
 pub mod intersections;
+pub mod junctions;
 pub mod meaning;
 pub mod openings;
 pub mod report;
@@ -52,7 +53,7 @@ pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
     let shells = shells::shells(&edges);
     let boxes = (options.intersections || input.cell.is_some()).then(|| Boxes::new(&input.lattice));
     let mut findings: Vec<Finding> = Vec::new();
-    findings.push(openings::openings(input, &edges, options.first));
+    findings.extend(openings::openings(input, &edges, options.first));
     findings.extend(edges::findings(input, &edges, options.first));
     findings.push(facets::duplicates(input, &edges, options.first));
     findings.extend(facets::shapes(input, options.first));

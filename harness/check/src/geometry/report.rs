@@ -17,8 +17,10 @@ pub const SCHEMA: &str = "octree-geometry/1";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Connected sets of edges with one facet.
+    /// Connected sets of edges with one facet, apart from T-junctions.
     Openings,
+    /// Edges with one facet that run along others, at a vertex on an edge, so that no opening exists.
+    Junctions,
     /// Edges with three, five, ... facets.
     NonManifoldOdd,
     /// Edges with four, six, ... facets.
@@ -91,7 +93,7 @@ pub struct Finding {
     pub count_changing: u64,
     /// Whether the search ended before all were counted, so that `count` is a lower bound.
     pub is_lower_bound: bool,
-    /// Openings: number of open edges in all.
+    /// Openings: number of edges with one facet in all, those of T-junctions included.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edges: Option<u64>,
     /// The effect on the mesh; empty where nothing was found.

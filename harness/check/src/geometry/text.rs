@@ -10,6 +10,7 @@ impl Kind {
     pub fn title(self) -> &'static str {
         match self {
             Self::Openings => "openings",
+            Self::Junctions => "edges at T-junctions",
             Self::NonManifoldOdd => "edges with 3, 5, ... facets",
             Self::NonManifoldEven => "edges with 4, 6, ... facets",
             Self::Winding => "neighbours, opposite winding",
