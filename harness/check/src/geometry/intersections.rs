@@ -6,7 +6,9 @@
 
 use contract::lattice::FacetLattice;
 
-use super::boxes::Boxes;
+use std::ops::Range;
+
+use super::boxes::{Bounds, Boxes};
 use super::facets::normal;
 use super::input::Input;
 use super::report::{Finding, Kind, Place};
@@ -22,6 +24,9 @@ pub enum Relation {
     Intersecting,
 }
 
+/// Pairs that a shift of this length separates intersect by the rounding of their vertices, in lattice units.
+const ROUNDING: f64 = 2.0;
+
 /// The search ends when it has found this number of pairs.
 const PAIRS_MAX: usize = 1 << 22;
 
@@ -29,8 +34,8 @@ const PAIRS_MAX: usize = 1 << 22;
 /// pairs of facets with the same vertices are left out.
 pub fn intersections(input: &Input, boxes: &Boxes, first: usize) -> [Finding; 2] {
     let mut pairs: [Vec<(u32, u32)>; 2] = Default::default();
-    'groups: for (bounds, group) in boxes.groups() {
-        let visit = |node: &super::boxes::Bounds, members: Option<std::ops::Range<usize>>| {
+    for (bounds, group) in boxes.groups() {
+        let visit = |node: &Bounds, members: Option<Range<usize>>| {
             if !bounds.overlaps(node) {
                 return false;
             }
@@ -50,17 +55,23 @@ pub fn intersections(input: &Input, boxes: &Boxes, first: usize) -> [Finding; 2]
         };
         boxes.search(visit, |_| 0.0);
         if pairs[0].len() + pairs[1].len() >= PAIRS_MAX {
-            break 'groups;
+            break;
         }
     }
     let is_lower_bound = pairs[0].len() + pairs[1].len() >= PAIRS_MAX;
-    let kinds = [Kind::Intersections, Kind::Contacts];
-    std::array::from_fn(|k| {
-        pairs[k].sort_unstable();
-        let places = pairs[k].iter().take(first).map(|&(f, g)| place(input, f, g)).collect();
-        let count = pairs[k].len() as u64;
-        Finding { count, places, is_lower_bound, ..Finding::new(kinds[k]) }
-    })
+    let [mut crossing, mut touching] = pairs;
+    let is_rounding = |&(f, g): &(u32, u32)| {
+        depth(&input.lattice[f as usize], &input.lattice[g as usize]) <= ROUNDING
+    };
+    crossing.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
+    touching.sort_unstable();
+    let finding = |kind, pairs: &[(u32, u32)]| {
+        let places = pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect();
+        Finding { count: pairs.len() as u64, places, is_lower_bound, ..Finding::new(kind) }
+    };
+    let count_changing = crossing.partition_point(|pair| !is_rounding(pair)) as u64;
+    let intersections = Finding { count_changing, ..finding(Kind::Intersections, &crossing) };
+    [intersections, finding(Kind::Contacts, &touching)]
 }
 
 /// Index of the kind of a pair: 0 intersecting, 1 touching without a common vertex; none otherwise.
@@ -78,30 +89,47 @@ fn classify(a: &FacetLattice, b: &FacetLattice) -> Option<usize> {
 
 /// The relation of two triangles with area. Unless `is_exact`, `Touching` may stand for `Disjoint`.
 pub fn relation(a: &FacetLattice, b: &FacetLattice, is_exact: bool) -> Relation {
-    let (n, m) = (normal(a), normal(b));
     let mut touches = false;
-    let mut separates = |axis: [i64; 3]| {
+    for axis in axes(a, b) {
         let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
-        touches |= axis != [0; 3] && (high_a <= low_b || high_b <= low_a);
-        high_a < low_b || high_b < low_a || (touches && !is_exact)
-    };
-    let edges = |f: &FacetLattice| [sub(f[1], f[0]), sub(f[2], f[1]), sub(f[0], f[2])];
-    let is_coplanar = range(b, a[0], n) == (0, 0);
-    let is_separated = if is_coplanar {
-        // In the projection along an axis that is not parallel to the plane.
-        let along = (0..3).position(|a| n[a] != 0).expect("the facet has an area");
-        let unit = std::array::from_fn(|a| i64::from(a == along));
-        edges(a).into_iter().chain(edges(b)).any(|e| separates(cross(e, unit)))
-    } else {
-        let pairs = edges(a).into_iter().flat_map(|e| edges(b).map(|f| cross(e, f)));
-        [n, m].into_iter().chain(pairs).any(separates)
-    };
-    match (is_separated, touches) {
-        (true, true) if !is_exact => Relation::Touching,
-        (true, _) => Relation::Disjoint,
-        (false, true) => Relation::Touching,
-        (false, false) => Relation::Intersecting,
+        if high_a < low_b || high_b < low_a {
+            return Relation::Disjoint;
+        }
+        touches |= high_a == low_b || high_b == low_a;
+        if touches && !is_exact {
+            break;
+        }
     }
+    if touches { Relation::Touching } else { Relation::Intersecting }
+}
+
+/// An upper bound on the length of the least shift that separates two intersecting triangles, in lattice units.
+fn depth(a: &FacetLattice, b: &FacetLattice) -> f64 {
+    let along = |axis: [i64; 3]| {
+        let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
+        let length = axis.map(|x| (x as f64).powi(2)).iter().sum::<f64>().sqrt();
+        (high_a - low_b).min(high_b - low_a) as f64 / length
+    };
+    axes(a, b).map(along).fold(f64::INFINITY, f64::min)
+}
+
+/// The normals of the planes that can separate two triangles with area, none of them zero.
+fn axes(a: &FacetLattice, b: &FacetLattice) -> impl Iterator<Item = [i64; 3]> {
+    let (n, m) = (normal(a), normal(b));
+    let edges = |f: &FacetLattice| [sub(f[1], f[0]), sub(f[2], f[1]), sub(f[0], f[2])];
+    let (of_a, of_b) = (edges(a), edges(b));
+    let is_coplanar = range(b, a[0], n) == (0, 0);
+    // In one plane: the projection along an axis that is not parallel to the plane.
+    let along = (0..3).position(|x| n[x] != 0).expect("the facet has an area");
+    let unit = std::array::from_fn(|x| i64::from(x == along));
+    let axis = move |i: usize| match (is_coplanar, i) {
+        (true, 0..3) => cross(of_a[i], unit),
+        (true, _) => cross(of_b[i - 3], unit),
+        (false, 0) => n,
+        (false, 1) => m,
+        (false, _) => cross(of_a[(i - 2) / 3], of_b[(i - 2) % 3]),
+    };
+    (0..if is_coplanar { 6 } else { 11 }).map(axis).filter(|&axis| axis != [0; 3])
 }
 
 /// Least and greatest product of an axis (up to 2^59) with the corners' offsets from a point.
@@ -183,6 +211,13 @@ mod tests {
             .prop_filter("has an area", |f| normal(f) != [0; 3])
     }
 
+    #[test]
+    fn the_depth_is_the_least_shift_that_separates() {
+        let a = [[0, 0, 0], [80, 0, 0], [0, 80, 0]];
+        assert_eq!(depth(&a, &[[20, 20, -3], [20, 20, 50], [30, 20, 50]]), 3.0);
+        assert!((depth(&a, &a.map(|[x, y, z]| [x + 78, y, z])) - 2f64.sqrt()).abs() < 1e-12);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
 
@@ -221,8 +256,7 @@ mod tests {
         }
     }
 
-    /// Whether a closed segment meets a closed triangle, by the box test of the contract: in coordinates scaled so
-    /// that every point of intersection is on the lattice.
+    /// Whether a closed segment meets a closed triangle: the point where it meets the plane lies within.
     fn edge_meets(p: [i64; 3], q: [i64; 3], g: &FacetLattice) -> bool {
         let n = normal(g);
         let height = |v: [i64; 3]| (0..3).map(|a| n[a] * (v[a] - g[0][a])).sum::<i64>();

@@ -1,14 +1,16 @@
 //! What each finding means for the mesh at the given spacing.
 
 use contract::manifest::Keep;
+use contract::octant::CELLS_PER_EDGE;
 
 use super::input::Input;
 use super::report::{Finding, Kind};
 
-/// Whether every occurrence of a kind can change the mesh's region. Openings are judged one by one.
+/// Whether every occurrence of a kind can change the mesh's region. Openings and intersections are judged one
+/// by one.
 pub fn changes_region(kind: Kind, keep: Keep) -> bool {
     match kind {
-        Kind::NonManifoldOdd | Kind::Duplicates | Kind::Intersections | Kind::OutsideRoot => true,
+        Kind::NonManifoldOdd | Kind::Duplicates | Kind::OutsideRoot => true,
         Kind::ThinWalls => keep != Keep::Outside,
         Kind::ThinGaps => keep != Keep::Inside,
         Kind::Openings
@@ -17,6 +19,7 @@ pub fn changes_region(kind: Kind, keep: Keep) -> bool {
         | Kind::Winding
         | Kind::Degenerate
         | Kind::Slivers
+        | Kind::Intersections
         | Kind::Contacts
         | Kind::TouchingRoot => false,
     }
@@ -45,6 +48,10 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
                              counts it."
             .into(),
         Kind::Slivers => "No effect: every decision about a facet is exact, however thin it is.".into(),
+        Kind::Intersections if finding.count_changing == 0 => "No effect: a shift of 2 lattice units, a hundredth of \
+                                                               the finest cell, separates every pair. The facets \
+                                                               touch, and their vertices are rounded to the lattice."
+            .into(),
         Kind::Intersections => "Where two closed shells overlap by more than a cell, rays count both surfaces, and \
                                 the overlap is outside rather than inside. Unite the shells if that is not meant."
             .into(),
@@ -53,11 +60,11 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         }
         Kind::ThinWalls => format!(
             "No cell fits into the wall: it consists of crossing leaves, without an inside. {}",
-            resolved(finding)
+            resolved(finding, input)
         ),
         Kind::ThinGaps => format!(
             "No cell fits into the gap: crossing leaves fill it, and no flow passes. {}",
-            resolved(finding)
+            resolved(finding, input)
         ),
         Kind::OutsideRoot => "The root cuts the body: no leaf exists beyond its boundary. Rays still count these \
                               facets. Enlarge the root if the body is to be meshed whole."
@@ -114,11 +121,14 @@ fn of(finding: &Finding) -> String {
     }
 }
 
-fn resolved(finding: &Finding) -> String {
-    let narrowest = finding.places.first().and_then(|place| place.width);
-    narrowest.map_or(String::new(), |width| {
-        format!("A spacing below {} would resolve the narrowest place.", number(width / 2.0))
-    })
+/// The spacing at which cells fit between the narrowest facets. A gap of two cells holds one of them wherever it
+/// lies in the lattice, if it is parallel to a face of the lattice.
+fn resolved(finding: &Finding, input: &Input) -> String {
+    let narrowest = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
+    if narrowest / 2.0 < input.root.edge / f64::from(CELLS_PER_EDGE) {
+        return "The narrowest place is too narrow for the finest cell of the root.".into();
+    }
+    format!("A spacing below {} would resolve the narrowest place.", number(narrowest / 2.0))
 }
 
 /// A length with three significant digits.
@@ -127,7 +137,7 @@ pub fn number(x: f64) -> String {
         return "0".into();
     }
     let digits = 2 - x.abs().log10().floor() as i32;
-    if (-3..=8).contains(&digits) {
+    if (-3..=6).contains(&digits) {
         format!("{x:.*}", digits.max(0) as usize)
     } else {
         format!("{x:.2e}")

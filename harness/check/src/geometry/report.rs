@@ -98,7 +98,7 @@ pub struct Finding {
     pub edges: Option<u64>,
     /// The effect on the mesh; empty where nothing was found.
     pub meaning: String,
-    /// The first places: widest openings, narrowest sheets, lowest facet numbers.
+    /// The first places: widest openings, narrowest sheets, deep before shallow intersections, lowest facet numbers.
     pub places: Vec<Place>,
 }
 

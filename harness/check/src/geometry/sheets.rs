@@ -44,9 +44,12 @@ pub fn sheets(
             |node, members| {
                 let limits = [0, 1].map(|s| best.iter().map(|b| b[s].squared).fold(0.0, f64::max));
                 let is_near = may_oppose(bounds, node, limits);
-                for j in members.filter(|_| is_near).into_iter().flatten() {
+                if let Some(members) = members.filter(|_| is_near) {
                     for (i, best) in group.clone().zip(&mut best) {
-                        improve(input, edges, boxes, i, j, best);
+                        let limits = [best[0].squared, best[1].squared];
+                        if may_oppose(&boxes.bounds[i], node, limits) {
+                            members.clone().for_each(|j| improve(input, edges, boxes, i, j, best));
+                        }
                     }
                 }
                 is_near

@@ -137,6 +137,6 @@ fn in_cells(cells: Option<f64>) -> String {
 }
 
 fn point(at: &[f64; 3]) -> String {
-    let [x, y, z] = at.map(|c| (c as f32).to_string());
+    let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
     format!("({x}, {y}, {z})")
 }
