@@ -48,9 +48,9 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
                              counts it."
             .into(),
         Kind::Slivers => "No effect: every decision about a facet is exact, however thin it is.".into(),
-        Kind::Intersections if finding.count_changing == 0 => "No effect: a shift of 2 lattice units, a hundredth of \
-                                                               the finest cell, separates every pair. The facets \
-                                                               touch, and their vertices are rounded to the lattice."
+        Kind::Intersections if finding.count_changing == 0 => "No effect: the facets overlap within one plane, or a \
+                                                               shift of 2 lattice units separates them, less than a \
+                                                               hundredth of the finest cell. No volumes overlap."
             .into(),
         Kind::Intersections => "Where two closed shells overlap by more than a cell, rays count both surfaces, and \
                                 the overlap is outside rather than inside. Unite the shells if that is not meant."

@@ -59,7 +59,9 @@ impl Diagnosis {
         let Self { facets, vertices, shells, extent, root, .. } = self;
         writeln!(f, "facets    {facets}, with {vertices} distinct vertices")?;
         let names = self.solids.iter().filter_map(|s| s.name.as_ref().map(|name| (name, s)));
-        writeln!(f, "solids    {}", self.solids.len())?;
+        if !self.solids.is_empty() {
+            writeln!(f, "solids    {}", self.solids.len())?;
+        }
         for (name, solid) in names {
             writeln!(
                 f,

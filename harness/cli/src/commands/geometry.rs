@@ -20,13 +20,13 @@ pub struct Arguments {
     /// An STL file, or a case file (.toml), which provides root and spacing
     file: PathBuf,
     /// Upper bound on the edge length of the cells at the surface, in the units of the file
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     spacing_min: Option<f64>,
     /// Minimum corner and edge length of the root
     #[arg(long, value_name = "X,Y,Z,EDGE", value_parser = root, allow_hyphen_values = true, conflicts_with = "root_scale")]
     root: Option<Root>,
     /// Edge length of the root in longest edges of the bounding box, on which it is centred [default: 10]
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     root_scale: Option<f64>,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
