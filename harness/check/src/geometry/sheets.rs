@@ -5,7 +5,7 @@
 //! the inner side of f, and a gap if g is on the outer side, by the winding of the file. Every facet counts once
 //! as a wall and once as a gap, with its nearest opposite facet.
 
-use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::lattice::UNITS_PER_EDGE;
 
 use super::boxes::{Bounds, Boxes, unit_normal};
 use super::distance::{dot, nearest, sub};
@@ -105,8 +105,11 @@ fn improve(
     if dot(n, m) > -COSINE {
         return;
     }
-    let float = |t: &FacetLattice| t.map(|v| v.map(|c| c as f64));
-    let (squared, p, q) = nearest(&float(a), &float(b));
+    let [a_float, b_float] = [a, b].map(|t| t.map(|v| v.map(|c| c as f64)));
+    if is_beyond(&a_float, n, &b_float, limits) || is_beyond(&b_float, m, &a_float, limits) {
+        return;
+    }
+    let (squared, p, q) = nearest(&a_float, &b_float);
     let d = sub(q, p);
     let (along_n, along_m) = (dot(d, n), dot(d, m));
     let limit = COSINE * squared.sqrt();
@@ -116,6 +119,15 @@ fn improve(
         let at = std::array::from_fn(|x| (p[x] + q[x]) / 2.0);
         best[side] = Opposite { squared, facet: g, at };
     }
+}
+
+/// Whether a facet is on one side of the plane of another, with unit normal `n`, and as far from it as the limit.
+fn is_beyond(a: &[[f64; 3]; 3], n: [f64; 3], b: &[[f64; 3]; 3], limits: [f64; 2]) -> bool {
+    let heights = b.map(|v| dot(sub(v, a[0]), n));
+    let least = heights.into_iter().fold(f64::INFINITY, f64::min);
+    let greatest = heights.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (least > 0.0 && least * least >= limits[1])
+        || (greatest < 0.0 && greatest * greatest >= limits[0])
 }
 
 fn finding(

@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Do not search for self-intersections, which takes most of the time
+    /// Do not search for self-intersections, which takes about half of the time
     #[arg(long)]
     no_intersections: bool,
     /// Places to list for each kind of finding
