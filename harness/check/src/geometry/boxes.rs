@@ -1,6 +1,6 @@
 //! A binary tree of bounding boxes over the facets that have an area.
 //!
-//! Facets are sorted along the Morton curve of their centres and grouped by [`GROUP`]; the groups are the
+//! Facets are sorted along the Morton curve of their centres and grouped by `GROUP`; the groups are the
 //! leaves of a complete tree. Every node encloses its facets and their unit normals in boxes.
 
 use std::ops::Range;

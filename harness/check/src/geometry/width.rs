@@ -3,7 +3,7 @@
 /// Diameter and width of a set of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// The largest distance of two points; at most 1 % less for more than [`POINTS_EXACT`] points in general.
+    /// The largest distance of two points; at most 1 % less for more than 1024 points in general.
     pub diameter: f64,
     /// The least width of the convex hull of the points, projected on the plane that they span: a ball that is
     /// wider does not pass through a flat opening.
