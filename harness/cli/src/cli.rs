@@ -36,6 +36,8 @@ pub enum Command {
     Shrink(Box<commands::shrink::Arguments>),
     /// Check a leaf-set directory of any size by itself
     Audit(commands::audit::Arguments),
+    /// Diagnose a geometry before meshing: its defects, and what each means for the mesh
+    Geometry(commands::geometry::Arguments),
     /// Write a leaf-set directory as a VTK unstructured grid for ParaView or pyvista
     Export(commands::export::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides

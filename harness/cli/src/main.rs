@@ -21,6 +21,7 @@ fn main() -> ExitCode {
         Command::Track(arguments) => commands::track::run(&arguments),
         Command::Shrink(arguments) => commands::shrink::run(&arguments),
         Command::Audit(arguments) => commands::audit::run(&arguments),
+        Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),

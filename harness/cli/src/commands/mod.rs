@@ -7,6 +7,7 @@ pub mod diff;
 pub mod export;
 mod files;
 pub mod gate;
+pub mod geometry;
 pub mod man;
 mod programs;
 pub mod report;

@@ -1,0 +1,114 @@
+//! The distance of two triangles that do not intersect, in f64.
+
+type Point = [f64; 3];
+type Triangle = [Point; 3];
+
+/// Squared distance, and a nearest point of each triangle.
+pub fn nearest(a: &Triangle, b: &Triangle) -> (f64, Point, Point) {
+    let mut best = (f64::INFINITY, a[0], b[0]);
+    let mut keep = |p: Point, q: Point| {
+        let d = sub(q, p);
+        let squared = dot(d, d);
+        if squared < best.0 {
+            best = (squared, p, q);
+        }
+    };
+    for i in 0..3 {
+        for j in 0..3 {
+            let (p, q) = segments(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]);
+            keep(p, q);
+        }
+        if let Some(foot) = foot(a[i], b) {
+            keep(a[i], foot);
+        }
+        if let Some(foot) = foot(b[i], a) {
+            keep(foot, b[i]);
+        }
+    }
+    best
+}
+
+/// Nearest points of two segments (Ericson, Real-Time Collision Detection, section 5.1.9).
+fn segments(p: Point, p_end: Point, q: Point, q_end: Point) -> (Point, Point) {
+    let (d, e, r) = (sub(p_end, p), sub(q_end, q), sub(p, q));
+    let (dd, ee, de) = (dot(d, d), dot(e, e), dot(d, e));
+    let (dr, er) = (dot(d, r), dot(e, r));
+    let determinant = dd * ee - de * de;
+    let clamp = |x: f64| x.clamp(0.0, 1.0);
+    let mut s = if determinant > 0.0 { clamp((de * er - dr * ee) / determinant) } else { 0.0 };
+    let mut t = (de * s + er) / ee;
+    if t < 0.0 {
+        (s, t) = (clamp(-dr / dd), 0.0);
+    } else if t > 1.0 {
+        (s, t) = (clamp((de - dr) / dd), 1.0);
+    }
+    (along(p, d, s), along(q, e, t))
+}
+
+/// The foot of the perpendicular from a point on a triangle's plane, if it is in the triangle.
+fn foot(p: Point, t: &Triangle) -> Option<Point> {
+    let n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
+    let within = |i: usize| dot(cross(sub(t[(i + 1) % 3], t[i]), sub(p, t[i])), n) >= 0.0;
+    let height = dot(sub(p, t[0]), n) / dot(n, n);
+    (0..3).all(within).then(|| along(p, n, -height))
+}
+
+fn along(p: Point, d: Point, t: f64) -> Point {
+    std::array::from_fn(|a| p[a] + t * d[a])
+}
+
+/// Difference of two points.
+pub fn sub(a: Point, b: Point) -> Point {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// Scalar product.
+pub fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(u: Point, v: Point) -> Point {
+    std::array::from_fn(|a| {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        u[b] * v[c] - u[c] * v[b]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn face_above_face_and_edge_across_edge() {
+        let a = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]];
+        let above = [[1.0, 1.0, 3.0], [2.0, 1.0, 4.0], [1.0, 2.0, 4.0]];
+        assert_eq!(nearest(&a, &above), (9.0, [1.0, 1.0, 0.0], [1.0, 1.0, 3.0]));
+        let across = [[4.0, -9.0, 2.0], [4.0, 9.0, 2.0], [4.0, 0.0, 9.0]];
+        assert_eq!(nearest(&a, &across).0, 4.0);
+    }
+
+    proptest! {
+        /// No pair of sampled points is nearer, and the points returned are as far apart as reported.
+        #[test]
+        fn nothing_is_nearer(
+            a in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)),
+            b in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)),
+        ) {
+            let shifted = b.map(|[x, y, z]| [x + 20.0, y, z]);
+            let (squared, p, q) = nearest(&a, &shifted);
+            prop_assert!((dot(sub(p, q), sub(p, q)) - squared).abs() <= 1e-9 * squared);
+            let point = |t: &Triangle, i: i32, j: i32| -> Point {
+                let (u, v) = (f64::from(i) / 8.0, f64::from(j) / 8.0);
+                std::array::from_fn(|x| t[0][x] * (1.0 - u - v) + t[1][x] * u + t[2][x] * v)
+            };
+            let grid = || (0..=8).flat_map(|i| (0..=8 - i).map(move |j| (i, j)));
+            for (i, j) in grid() {
+                for (k, l) in grid() {
+                    let d = sub(point(&a, i, j), point(&shifted, k, l));
+                    prop_assert!(dot(d, d) >= squared * (1.0 - 1e-9));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! A geometry with its root and the cell's edge length, from an STL file or from a case.
+
+use std::path::Path;
+
+use contract::case::{Case, Facet};
+use contract::lattice::{FacetLattice, Root};
+use contract::manifest::Keep;
+use contract::stl;
+
+use super::solids::{self, Solid};
+
+/// Root and spacing given by the user, in the user's units. They take precedence over a case file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Asked {
+    /// Upper bound on the edge length of a cell at the surface.
+    pub spacing_min: Option<f64>,
+    /// Minimum corner and edge length of the root.
+    pub root: Option<Root>,
+    /// Edge length of the root, in longest edges of the bounding box.
+    pub root_scale: Option<f64>,
+}
+
+/// A geometry, ready for diagnosis.
+#[derive(Clone, Debug)]
+pub struct Input {
+    /// The facets as read, at most 2^32 / 3.
+    pub facets: Vec<Facet>,
+    /// The facets on the lattice.
+    pub lattice: Vec<FacetLattice>,
+    /// The solids of the file; none for a generated body.
+    pub solids: Vec<Solid>,
+    /// The root cube.
+    pub root: Root,
+    /// Edge length of the cells at the surface, in the user's units; none if no spacing was given.
+    pub cell: Option<f64>,
+    /// The side that the case keeps; outside for an STL file.
+    pub keep: Keep,
+}
+
+impl Input {
+    /// Reads an STL file, or a case file if the name ends in `.toml`.
+    ///
+    /// # Errors
+    /// One sentence if a file cannot be read or the geometry cannot be meshed.
+    pub fn read(path: &Path, asked: &Asked) -> Result<Self, String> {
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            return Self::from_case(path, asked);
+        }
+        let named = |error: String| format!("{}: {error}", path.display());
+        let facets = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
+        let solids = solids::read(path, facets.len()).map_err(|error| named(error.to_string()))?;
+        let input = Self::new(facets, asked).map_err(named)?;
+        Ok(Self { solids, ..input })
+    }
+
+    fn from_case(path: &Path, asked: &Asked) -> Result<Self, String> {
+        let case = Case::read(path).map_err(|error| error.to_string())?;
+        let cell = case.root.edge / f64::from(1u32 << case.level_surface);
+        let explicit = (asked.root.is_none() && asked.root_scale.is_none()).then_some(case.root);
+        let asked = Asked {
+            spacing_min: asked.spacing_min.or(Some(cell)),
+            root: asked.root.or(explicit),
+            ..*asked
+        };
+        let input = Self::new(case.facets, &asked)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok(Self { keep: case.keep, ..input })
+    }
+
+    /// A geometry in memory.
+    ///
+    /// # Errors
+    /// One sentence if the geometry cannot be meshed: it has no facets or too many, a vertex is not finite or too
+    /// far outside the root, or root and spacing contradict the definition.
+    pub fn new(facets: Vec<Facet>, asked: &Asked) -> Result<Self, String> {
+        if facets.is_empty() {
+            return Err("the geometry has no facets".to_owned());
+        }
+        if facets.len() > FACETS_MAX {
+            return Err(format!("{} facets exceed the limit of {FACETS_MAX}", facets.len()));
+        }
+        // A spacing above every root edge stands for level 0.
+        let spacing = asked.spacing_min.unwrap_or(f64::MAX);
+        let mut text = format!("spacing_min = {spacing:?}\n");
+        if let Some(scale) = asked.root_scale {
+            text += &format!("root_scale = {scale:?}\n");
+        }
+        if let Some(Root { origin, edge }) = asked.root {
+            text += &format!("[root]\norigin = {origin:?}\nedge = {edge:?}\n");
+        }
+        let case = Case::from_parts(&text, facets)?;
+        let cell = case.root.edge / f64::from(1u32 << case.level_surface);
+        Ok(Self {
+            facets: case.facets,
+            lattice: case.facets_lattice,
+            solids: Vec::new(),
+            root: case.root,
+            cell: asked.spacing_min.map(|_| cell),
+            keep: case.keep,
+        })
+    }
+
+    /// A length in cells; none if no spacing was given.
+    pub fn in_cells(&self, length: f64) -> Option<f64> {
+        self.cell.map(|cell| length / cell)
+    }
+
+    /// The centroid of a facet, in the user's units.
+    pub fn centroid(&self, facet: u32) -> [f64; 3] {
+        let corners = self.facets[facet as usize].map(|v| v.map(f64::from));
+        std::array::from_fn(|a| (corners[0][a] + corners[1][a] + corners[2][a]) / 3.0)
+    }
+}
+
+/// Corners are numbered in 32 bits, three per facet, with one bit left for a direction.
+const FACETS_MAX: usize = (1 << 31) / 3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACET: Facet = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn root_and_cell_follow_the_definition() {
+        let asked = Asked { spacing_min: Some(0.3), root_scale: Some(2.0), ..Asked::default() };
+        let input = Input::new(vec![FACET], &asked).unwrap();
+        assert_eq!(input.root, Root { origin: [-1.0, -1.5, -2.0], edge: 4.0 });
+        assert_eq!(input.cell, Some(0.25));
+        assert_eq!(Input::new(vec![FACET], &Asked::default()).unwrap().cell, None);
+    }
+
+    #[test]
+    fn a_geometry_that_cannot_be_meshed_is_refused() {
+        let why = |facets: Vec<Facet>, asked| Input::new(facets, &asked).unwrap_err();
+        let mut broken = FACET;
+        broken[1][2] = f32::NAN;
+        let root = Some(Root { origin: [0.0; 3], edge: 4.0 });
+        assert!(why(vec![FACET, broken], Asked::default()).contains("facet 1"));
+        assert!(why(vec![broken], Asked { root, ..Asked::default() }).contains("facet 0"));
+        assert!(why(vec![], Asked::default()).contains("no facets"));
+        let both = Asked { root, root_scale: Some(2.0), ..Asked::default() };
+        assert!(why(vec![FACET], both).contains("exclude"));
+        for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12] {
+            why(vec![FACET], Asked { spacing_min: Some(spacing), root, root_scale: None });
+        }
+    }
+}

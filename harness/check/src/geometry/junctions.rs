@@ -1,0 +1,115 @@
+//! T-junctions: open edges that run along each other.
+//!
+//! Where a vertex of one facet lies on an edge of another, both facets have open edges, but the surface has no
+//! hole. Two open edges that leave a vertex in the same direction cancel along the shorter one, until no such
+//! pair is left; what remains bounds openings.
+
+/// A segment between two vertices, given by their indices, at the boundary of a facet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Both ends.
+    pub ends: [u32; 2],
+    /// The facet.
+    pub facet: u32,
+}
+
+/// A vertex with more segments is left as it is.
+const SEGMENTS_MAX: usize = 256;
+
+/// The segments that remain after cancellation. A vertex lies on a segment if it is within `tolerance` of it.
+pub fn uncancelled(segments: Vec<Segment>, points: &[[f64; 3]], tolerance: f64) -> Vec<Segment> {
+    let mut at: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
+    for (i, segment) in segments.iter().enumerate() {
+        segment.ends.iter().for_each(|&v| at[v as usize].push(i as u32));
+    }
+    let mut segments: Vec<Option<Segment>> = segments.into_iter().map(Some).collect();
+    let mut waiting: Vec<u32> = (0..points.len() as u32).rev().collect();
+    while let Some(v) = waiting.pop() {
+        at[v as usize].retain(|&i| segments[i as usize].is_some_and(|s| s.ends.contains(&v)));
+        let Some((long, short)) = overlap(v, &at[v as usize], &segments, points, tolerance) else {
+            continue;
+        };
+        let end = |i: u32| segments[i as usize].map(|s| other(s, v)).expect("retained");
+        let (far, near) = (end(long), end(short));
+        segments[short as usize] = None;
+        let rest = segments[long as usize].filter(|_| far != near);
+        segments[long as usize] = rest.map(|s| Segment { ends: [near, far], ..s });
+        at[near as usize].push(long);
+        waiting.extend([v, near, far]);
+    }
+    segments.into_iter().flatten().collect()
+}
+
+/// Two segments that leave a vertex in the same direction, the longer first.
+fn overlap(
+    v: u32,
+    at: &[u32],
+    segments: &[Option<Segment>],
+    points: &[[f64; 3]],
+    tolerance: f64,
+) -> Option<(u32, u32)> {
+    if at.len() > SEGMENTS_MAX {
+        return None;
+    }
+    let along = |i: u32| {
+        let end = other(segments[i as usize].expect("retained"), v);
+        std::array::from_fn(|a| points[end as usize][a] - points[v as usize][a])
+    };
+    for (n, &i) in at.iter().enumerate() {
+        for &j in &at[n + 1..] {
+            let (p, q) = (along(i), along(j));
+            let is_longer = dot(p, p) >= dot(q, q);
+            let (long, short) = if is_longer { (p, q) } else { (q, p) };
+            let t = dot(short, long) / dot(long, long);
+            let offset: [f64; 3] = std::array::from_fn(|a| short[a] - t * long[a]);
+            if t > 0.0 && dot(offset, offset) <= tolerance * tolerance {
+                return Some(if is_longer { (i, j) } else { (j, i) });
+            }
+        }
+    }
+    None
+}
+
+fn other(segment: Segment, v: u32) -> u32 {
+    segment.ends[usize::from(segment.ends[0] == v)]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on the x axis but the last.
+    const POINTS: [[f64; 3]; 6] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [3.0, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+    ];
+
+    fn rest(ends: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        let sorted = |s: &Segment| [s.ends[0].min(s.ends[1]), s.ends[0].max(s.ends[1])];
+        let segments = ends.iter().map(|&ends| Segment { ends, facet: 0 }).collect();
+        uncancelled(segments, &POINTS, 1e-9).iter().map(sorted).collect()
+    }
+
+    #[test]
+    fn a_long_edge_cancels_with_its_parts() {
+        assert_eq!(rest(&[[0, 4], [1, 0], [1, 3], [4, 3]]), [] as [[u32; 2]; 0]);
+        // Both sides are divided, at different vertices.
+        assert_eq!(rest(&[[0, 2], [2, 4], [0, 1], [1, 3], [3, 4]]), [] as [[u32; 2]; 0]);
+    }
+
+    #[test]
+    fn a_missing_part_and_a_triangle_remain() {
+        assert_eq!(rest(&[[0, 4], [0, 1], [3, 4]]), [[1, 3]]);
+        assert_eq!(rest(&[[0, 4], [4, 5], [5, 0]]).len(), 3);
+        // Opposite directions at vertex 2.
+        assert_eq!(rest(&[[0, 2], [2, 4]]).len(), 2);
+    }
+}

@@ -1,0 +1,70 @@
+//! Diagnosis of a geometry before it is meshed: which of its defects change the mesh's region, and how.
+//!
+//! - [`input`]: the file, its root and the cell's edge length; [`solids`]: the solids of an ASCII file;
+//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
+//! - [`facets`]: defects of single facets, and duplicates;
+//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search;
+//! - [`extent`]: the body's position in the root;
+//! - [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
+//!
+//! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Whatever a decision of the
+//! mesher depends on is decided exactly on the lattice of the definition; widths and gaps are f64.
+
+pub mod boxes;
+pub mod distance;
+pub mod edges;
+pub mod extent;
+pub mod facets;
+pub mod input;
+pub mod intersections;
+pub mod junctions;
+pub mod meaning;
+pub mod openings;
+pub mod report;
+pub mod sheets;
+pub mod shells;
+pub mod solids;
+pub mod text;
+pub mod width;
+
+use boxes::Boxes;
+use edges::Edges;
+use input::Input;
+use report::{Diagnosis, Finding};
+
+/// What a diagnosis includes.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Whether to search for self-intersections.
+    pub intersections: bool,
+    /// Maximum number of places listed per finding.
+    pub first: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { intersections: true, first: 5 }
+    }
+}
+
+/// Diagnoses a geometry. The counts do not depend on the order of the facets or of a facet's vertices.
+pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
+    let edges = Edges::new(&input.facets);
+    let shells = shells::shells(&edges);
+    let boxes = (options.intersections || input.cell.is_some()).then(|| Boxes::new(&input.lattice));
+    let mut findings: Vec<Finding> = Vec::new();
+    findings.extend(openings::openings(input, &edges, options.first));
+    findings.extend(edges::findings(input, &edges, options.first));
+    findings.push(facets::duplicates(input, &edges, options.first));
+    findings.extend(facets::shapes(input, options.first));
+    if let Some(boxes) = boxes {
+        if options.intersections {
+            findings.extend(intersections::intersections(input, &boxes, options.first));
+        }
+        if let Some(cell) = input.cell {
+            findings.extend(sheets::sheets(input, &edges, &boxes, cell, options.first));
+        }
+    }
+    findings.extend(extent::findings(input, options.first));
+    Diagnosis::new(input, &edges, shells, findings, options)
+}

@@ -1,0 +1,168 @@
+//! The size of an opening: its widest diameter and its free width.
+
+/// Diameter and width of a set of points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// The largest distance of two points; at most 1 % less for more than 1024 points in general.
+    pub diameter: f64,
+    /// The least width of the convex hull of the points, projected on the plane that they span: a ball that is
+    /// wider does not pass through a flat opening.
+    pub width: f64,
+}
+
+/// Up to this number of points all pairs are compared.
+const POINTS_EXACT: usize = 1024;
+
+type Point = [f64; 3];
+
+/// The size of a set of at least one point.
+pub fn size(points: &[Point]) -> Size {
+    let (from, to) = farthest(points);
+    let along = sub(to, from);
+    let diameter = norm(along);
+    if diameter == 0.0 {
+        return Size { diameter, width: 0.0 };
+    }
+    let u = along.map(|x| x / diameter);
+    let across = |p: &Point| {
+        let offset = sub(*p, from);
+        let t = dot(offset, u);
+        std::array::from_fn(|a| offset[a] - t * u[a])
+    };
+    let far = points.iter().map(across).max_by(|a, b| norm(*a).total_cmp(&norm(*b)));
+    let far = far.expect("at least one point");
+    let height = norm(far);
+    // Rounding leaves points of one line at a distance from it.
+    if height <= 1e-12 * diameter {
+        return Size { diameter, width: 0.0 };
+    }
+    let v = far.map(|x| x / height);
+    let flat = points.iter().map(|p| [dot(sub(*p, from), u), dot(sub(*p, from), v)]).collect();
+    Size { diameter, width: width_of_hull(&hull(flat)) }
+}
+
+/// The two points farthest apart.
+fn farthest(points: &[Point]) -> (Point, Point) {
+    let candidates = if points.len() <= POINTS_EXACT { points.to_vec() } else { extremes(points) };
+    let mut best = (0.0, points[0], points[0]);
+    for (i, p) in candidates.iter().enumerate() {
+        for q in &candidates[i + 1..] {
+            let distance = norm(sub(*q, *p));
+            if distance > best.0 {
+                best = (distance, *p, *q);
+            }
+        }
+    }
+    (best.1, best.2)
+}
+
+/// The extreme points in directions spread evenly over the sphere (a Fibonacci lattice).
+fn extremes(points: &[Point]) -> Vec<Point> {
+    const DIRECTIONS: usize = 256;
+    let direction = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / DIRECTIONS as f64;
+        let (sin, cos) = (i as f64 * 2.399_963_229_728_653).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        [r * cos, r * sin, z]
+    };
+    let extreme = |i: usize| {
+        let d = direction(i);
+        *points.iter().max_by(|p, q| dot(**p, d).total_cmp(&dot(**q, d))).expect("points exist")
+    };
+    (0..DIRECTIONS).map(extreme).collect()
+}
+
+/// The convex hull, counter-clockwise (Andrew's monotone chain).
+fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    let mut hull: Vec<[f64; 2]> = Vec::new();
+    let forward: Vec<_> = points.clone();
+    points.reverse();
+    for chain in [forward, points] {
+        let start = hull.len();
+        for p in chain {
+            while hull.len() >= start + 2
+                && turn(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0.0
+            {
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.pop();
+    }
+    hull
+}
+
+/// The least distance of two parallel lines that enclose a convex polygon; one of them contains an edge.
+fn width_of_hull(hull: &[[f64; 2]]) -> f64 {
+    let n = hull.len();
+    if n < 3 {
+        return 0.0;
+    }
+    let mut least = f64::INFINITY;
+    let mut far = 1;
+    for i in 0..n {
+        let (p, q) = (hull[i], hull[(i + 1) % n]);
+        // The farthest vertex advances with the edge.
+        while turn(p, q, hull[(far + 1) % n]) > turn(p, q, hull[far]) {
+            far = (far + 1) % n;
+        }
+        least = least.min(turn(p, q, hull[far]) / (q[0] - p[0]).hypot(q[1] - p[1]));
+    }
+    least
+}
+
+/// Twice the signed area of a triangle.
+fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+fn sub(a: Point, b: Point) -> Point {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(n: usize, radius: f64) -> Vec<Point> {
+        let point = |i: usize| {
+            let (sin, cos) = (i as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+            [radius * cos, radius * sin * 0.6, radius * sin * 0.8]
+        };
+        (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn a_slit_is_as_wide_as_its_short_side() {
+        let slit = size(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]);
+        assert!(
+            (slit.width - 0.5).abs() < 1e-12 && (slit.diameter - 100.25f64.sqrt()).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn a_circle_is_as_wide_as_its_diameter_for_few_and_many_points() {
+        for n in [64, 1000, 5000] {
+            let Size { diameter, width } = size(&circle(n, 2.0));
+            assert!((3.96..=4.0 + 1e-12).contains(&diameter), "{n}: {diameter}");
+            assert!((3.96..=4.0 + 1e-12).contains(&width), "{n}: {width}");
+        }
+    }
+
+    #[test]
+    fn points_of_one_line_have_no_width() {
+        let line = size(&[[0.0; 3], [0.1, 0.2, 0.3], [0.3, 0.6, 0.9]]);
+        assert_eq!(line.width, 0.0);
+        assert_eq!(size(&[[7.0; 3]; 2]), Size { diameter: 0.0, width: 0.0 });
+    }
+}

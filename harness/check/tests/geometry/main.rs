@@ -1,0 +1,270 @@
+//! Shapes with known defects, and shapes without any.
+
+use check::geometry::input::{Asked, Input};
+use check::geometry::report::{Diagnosis, Kind, Place};
+use check::geometry::{Options, diagnose};
+use contract::case::Facet;
+use contract::lattice::Root;
+use geometries::{Generator, Shape};
+use proptest::prelude::*;
+
+/// Lattice units are powers of two, so that vertices with integer coordinates are exact.
+const ROOT: Root = Root { origin: [-16.0; 3], edge: 32.0 };
+
+fn diagnosis(facets: Vec<Facet>, spacing_min: Option<f64>) -> Diagnosis {
+    let asked = Asked { spacing_min, root: Some(ROOT), root_scale: None };
+    diagnose(&Input::new(facets, &asked).unwrap(), &Options::default())
+}
+
+fn count(diagnosis: &Diagnosis, kind: Kind) -> u64 {
+    diagnosis.finding(kind).unwrap().count
+}
+
+/// The kinds that occur, with their counts.
+fn counts(diagnosis: &Diagnosis) -> Vec<(Kind, u64)> {
+    let found = diagnosis.findings.iter().filter(|f| f.count > 0);
+    found.map(|f| (f.kind, f.count)).collect()
+}
+
+fn first(diagnosis: &Diagnosis, kind: Kind) -> &Place {
+    &diagnosis.finding(kind).unwrap().places[0]
+}
+
+fn quad([a, b, c, d]: [[f32; 3]; 4]) -> [Facet; 2] {
+    [[a, b, c], [a, c, d]]
+}
+
+/// An axis-parallel box, wound outward. The first two facets are the face z = low.
+fn cuboid(low: [f32; 3], high: [f32; 3]) -> Vec<Facet> {
+    let corner = |i: usize| std::array::from_fn(|a| if i >> a & 1 == 1 { high[a] } else { low[a] });
+    let faces =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    faces.iter().flat_map(|face| quad(face.map(corner))).collect()
+}
+
+fn cube() -> Vec<Facet> {
+    cuboid([0.0; 3], [4.0; 3])
+}
+
+/// A cube whose face z = 0 has a rectangular hole.
+fn cube_with_hole(low: [f32; 2], high: [f32; 2]) -> Vec<Facet> {
+    let outer = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+    let inner = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    let at = |[x, y]: [f32; 2]| [x, y, 0.0];
+    let side = |i: usize| {
+        let j = (i + 1) % 4;
+        quad([at(outer[i]), at(inner[i]), at(inner[j]), at(outer[j])])
+    };
+    (0..4).flat_map(side).chain(cube().split_off(2)).collect()
+}
+
+fn close(a: Option<f64>, b: f64) -> bool {
+    a.is_some_and(|a| (a - b).abs() < 1e-9)
+}
+
+#[test]
+fn a_cube_has_no_findings() {
+    let cube = diagnosis(cube(), Some(0.25));
+    assert_eq!(counts(&cube), []);
+    assert!(!cube.changes_region);
+    assert_eq!((cube.vertices, cube.shells.count, cube.shells.closed), (8, 1, 1));
+    assert_eq!((cube.extent.margin, cube.extent.margin_cells), (12.0, Some(48.0)));
+}
+
+#[test]
+fn a_removed_facet_leaves_one_opening_of_known_size() {
+    let mut facets = cube();
+    facets.remove(0);
+    let wide = diagnosis(facets.clone(), Some(2.0));
+    assert_eq!(counts(&wide), [(Kind::Openings, 1)]);
+    let hole = first(&wide, Kind::Openings);
+    assert_eq!(hole.edges, Some(3));
+    assert!(close(hole.diameter, 32f64.sqrt()) && close(hole.width, 8f64.sqrt()));
+    assert!(close(hole.width_cells, 2f64.sqrt()));
+    assert!(wide.changes_region);
+    assert_eq!(wide.shells.closed, 0);
+    // At a spacing above its width no cell fits through.
+    let narrow = diagnosis(facets, Some(4.0));
+    assert_eq!((count(&narrow, Kind::Openings), narrow.changes_region), (1, false));
+}
+
+#[test]
+fn a_slit_is_judged_by_its_width_and_not_by_its_length() {
+    let facets = cube_with_hole([1.0, 2.0], [3.0, 2.125]);
+    for (spacing, changes) in [(0.125, true), (0.25, false)] {
+        let slit = diagnosis(facets.clone(), Some(spacing));
+        assert_eq!(count(&slit, Kind::Openings), 1);
+        assert!(close(first(&slit, Kind::Openings).width, 0.125));
+        assert_eq!(slit.changes_region, changes, "spacing {spacing}");
+    }
+}
+
+#[test]
+fn a_repeated_facet_is_a_duplicate_in_any_order_of_its_vertices() {
+    let mut facets = cube();
+    let [a, b, c] = facets[5];
+    facets.push([c, b, a]);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!(counts(&found), [(Kind::NonManifoldOdd, 3), (Kind::Duplicates, 1)]);
+    assert_eq!(first(&found, Kind::Duplicates).facets, [5, 12]);
+    assert!(found.changes_region);
+}
+
+#[test]
+fn a_flipped_facet_disagrees_with_three_neighbours() {
+    let mut facets = cube();
+    facets[7].swap(0, 1);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!(counts(&found), [(Kind::Winding, 3)]);
+    assert!(!found.changes_region);
+}
+
+#[test]
+fn overlapping_boxes_intersect_along_six_segments() {
+    // Each segment of the hexagon lies in one facet of each box.
+    let facets = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat();
+    let found = diagnosis(facets.clone(), Some(0.25));
+    assert_eq!(count(&found, Kind::Intersections), 6);
+    assert_eq!((found.shells.count, found.shells.closed), (2, 2));
+    assert!(found.changes_region);
+    let apart = [cuboid([0.0; 3], [4.0; 3]), cuboid([5.0; 3], [6.0; 3])].concat();
+    assert_eq!(counts(&diagnosis(apart, Some(0.25))), []);
+}
+
+#[test]
+fn boxes_that_share_part_of_a_face_intersect_in_its_plane() {
+    let facets = [cube(), cuboid([4.0, 1.0, 1.0], [6.0, 3.0, 3.0])].concat();
+    let found = diagnosis(facets, Some(0.25));
+    // The diagonals of both faces are on one line, so each half of one overlaps with one half of the other.
+    assert_eq!(count(&found, Kind::Intersections), 2);
+}
+
+#[test]
+fn a_vertex_on_an_edge_is_a_t_junction_and_not_an_opening() {
+    let mut facets = cube();
+    let [a, b, c] = facets[0];
+    let middle = std::array::from_fn(|x| (b[x] + c[x]) / 2.0);
+    facets[0] = [a, b, middle];
+    facets.push([a, middle, c]);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!(counts(&found), [(Kind::Junctions, 3)]);
+    assert!(!found.changes_region);
+}
+
+#[test]
+fn edges_with_more_than_two_facets_are_even_or_odd() {
+    let beside = [cube(), cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0])].concat();
+    assert_eq!(count(&diagnosis(beside, Some(0.25)), Kind::NonManifoldEven), 1);
+    let mut with_fin = cube();
+    let [a, b, _] = with_fin[0];
+    with_fin.push([a, b, [-4.0; 3]]);
+    let found = diagnosis(with_fin, Some(0.25));
+    assert_eq!(count(&found, Kind::NonManifoldOdd), 1);
+    assert_eq!(found.shells.closed, 0);
+}
+
+#[test]
+fn facets_without_area_and_slivers_have_no_effect() {
+    let mut facets = cube();
+    facets.push([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]);
+    facets.push([[9.0, 9.0, 9.0]; 3]);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 2)], false));
+    let sliver = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]];
+    assert_eq!(count(&diagnosis(vec![sliver], None), Kind::Slivers), 1);
+    let thicker = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.015625, 0.0]];
+    assert_eq!(count(&diagnosis(vec![thicker], None), Kind::Slivers), 0);
+}
+
+#[test]
+fn walls_and_gaps_narrower_than_a_cell_are_thin() {
+    let plates = |gap: f32| {
+        let upper = 1.0 + gap;
+        [cuboid([0.0; 3], [4.0, 4.0, 1.0]), cuboid([0.0, 0.0, upper], [4.0, 4.0, 9.0])].concat()
+    };
+    let found = diagnosis(plates(0.375), Some(0.5));
+    assert_eq!(counts(&found), [(Kind::ThinGaps, 4)]);
+    assert!(close(first(&found, Kind::ThinGaps).width_cells, 0.75));
+    assert!(found.changes_region);
+    assert_eq!(counts(&diagnosis(plates(0.5), Some(0.5))), []);
+    // The lower plate is thinner than two units: with an outer flow its inside does not matter.
+    let found = diagnosis(cuboid([0.0; 3], [4.0, 4.0, 1.0]), Some(2.0));
+    assert_eq!((count(&found, Kind::ThinWalls), found.changes_region), (4, false));
+    assert!(close(first(&found, Kind::ThinWalls).width, 1.0));
+}
+
+#[test]
+fn facets_on_and_beyond_the_root_are_found() {
+    let on = diagnosis(cuboid([-16.0, 0.0, 0.0], [0.0, 1.0, 1.0]), Some(0.25));
+    assert!(count(&on, Kind::TouchingRoot) > 2 && !on.changes_region);
+    let beyond = diagnosis(cuboid([-17.0, 0.0, 0.0], [0.0, 1.0, 1.0]), Some(0.25));
+    assert!(count(&beyond, Kind::OutsideRoot) > 2 && beyond.changes_region);
+    assert_eq!(beyond.extent.margin, -1.0);
+}
+
+#[test]
+fn json_has_the_schema_and_the_text_every_kind() {
+    let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
+    let json: serde_json::Value = serde_json::to_value(&found).unwrap();
+    assert_eq!(json["schema"], "octree-geometry/1");
+    assert_eq!(json["findings"][0]["kind"], "openings");
+    assert_eq!(json["findings"][0]["places"][0]["width_cells"], 4.0);
+    let text = found.to_string();
+    for finding in &found.findings {
+        assert!(text.contains(finding.kind.title()), "{text}");
+    }
+    assert!(text.contains("2.00 wide (4.00 cells)"), "{text}");
+}
+
+/// Closed shapes at random sizes and places.
+fn shape() -> impl Strategy<Value = Vec<Facet>> {
+    let shapes = [Shape::Cube, Shape::Sphere, Shape::Torus, Shape::NestedSpheres, Shape::Pipe];
+    (prop::sample::select(shapes.to_vec()), 100usize..600, prop::array::uniform3(-4.0f64..4.0))
+        .prop_map(|(shape, facets, centre)| {
+            let generator = Generator { centre: Some(centre), ..Generator::new(shape, 2 * facets) };
+            generator.facets().unwrap()
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn closed_shapes_have_no_findings(facets in shape()) {
+        prop_assert_eq!(counts(&diagnosis(facets, Some(0.002))), []);
+    }
+
+    /// Defects at random: some facets removed, repeated, flipped, and a second shape put over the first.
+    #[test]
+    fn the_order_of_facets_and_vertices_has_no_effect(
+        a in shape(),
+        b in shape(),
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..3), 0..12),
+        seed in any::<u64>(),
+        spacing in 0.01f64..0.5,
+    ) {
+        let mut facets = [a, b].concat();
+        for (index, edit) in edits {
+            let i = index.index(facets.len());
+            match edit {
+                0 => drop(facets.remove(i)),
+                1 => facets.push(facets[i]),
+                _ => facets[i].swap(0, 1),
+            }
+        }
+        let want = diagnosis(facets.clone(), Some(spacing));
+        let mut state = seed;
+        let mut random = |n: usize| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as usize % n
+        };
+        for i in (1..facets.len()).rev() {
+            facets.swap(i, random(i + 1));
+            facets[i].rotate_left(random(3));
+        }
+        let got = diagnosis(facets, Some(spacing));
+        prop_assert_eq!(counts(&got), counts(&want));
+        prop_assert_eq!(got.changes_region, want.changes_region);
+        prop_assert_eq!((got.shells.count, got.shells.closed), (want.shells.count, want.shells.closed));
+    }
+}

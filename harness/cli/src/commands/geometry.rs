@@ -1,0 +1,78 @@
+//! `harness geometry`: an STL file or a case in, its defects and their effect on the mesh out, exit code.
+
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+
+use super::files::put;
+use check::geometry::input::{Asked, Input};
+use check::geometry::{Options, diagnose};
+use clap::Args;
+use contract::lattice::Root;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+
+/// `harness geometry`.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Exit codes: 0 no finding changes the mesh's region; 1 a finding can change it; 2 the geometry \
+                        cannot be meshed."
+)]
+pub struct Arguments {
+    /// An STL file, or a case file (.toml), which provides root and spacing
+    file: PathBuf,
+    /// Upper bound on the edge length of the cells at the surface, in the units of the file
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    spacing_min: Option<f64>,
+    /// Minimum corner and edge length of the root
+    #[arg(long, value_name = "X,Y,Z,EDGE", value_parser = root, allow_hyphen_values = true, conflicts_with = "root_scale")]
+    root: Option<Root>,
+    /// Edge length of the root in longest edges of the bounding box, on which it is centred [default: 10]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    root_scale: Option<f64>,
+    /// Write the result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Do not search for self-intersections, which takes about half of the time
+    #[arg(long)]
+    no_intersections: bool,
+    /// Places to list for each kind of finding
+    #[arg(long, value_name = "N", default_value = "5")]
+    first: NonZero<usize>,
+}
+
+/// Diagnoses, prints, writes; the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    match diagnosed(arguments) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("harness: {error}");
+            EXIT_INPUT
+        }
+    }
+}
+
+fn diagnosed(arguments: &Arguments) -> Result<u8, String> {
+    let Arguments { spacing_min, root, root_scale, .. } = *arguments;
+    let input = Input::read(&arguments.file, &Asked { spacing_min, root, root_scale })?;
+    let options =
+        Options { intersections: !arguments.no_intersections, first: arguments.first.get() };
+    let diagnosis = diagnose(&input, &options);
+    println!("{}\n{diagnosis}", arguments.file.display());
+    if let Some(path) = &arguments.json {
+        write(path, &diagnosis)?;
+    }
+    Ok(if diagnosis.changes_region { EXIT_FAILED } else { EXIT_HOLDS })
+}
+
+fn write(path: &Path, diagnosis: &check::geometry::report::Diagnosis) -> Result<(), String> {
+    let json = serde_json::to_string_pretty(diagnosis).map_err(|error| error.to_string())?;
+    put(path, &(json + "\n")).map_err(|error| error.to_string())
+}
+
+/// The root from four numbers.
+fn root(text: &str) -> Result<Root, String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, z, edge] if text.split(',').count() == 4 => Ok(Root { origin: [x, y, z], edge }),
+        _ => Err("give four numbers: X,Y,Z,EDGE".to_owned()),
+    }
+}

@@ -1,0 +1,119 @@
+"""Compares the counts of `harness geometry` with those of trimesh on the geometries in this repository.
+
+Run with: python -m unittest discover harness/oracles. The binary is target/debug/harness or target/release/harness,
+whichever is newer, or the one that the environment variable HARNESS names.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+try:
+    import trimesh
+except ImportError:
+    trimesh = None
+
+REPO = pathlib.Path(__file__).resolve().parents[2]
+
+
+def binary():
+    """The harness, or None if it is not built or does not have the command."""
+    named = os.environ.get("HARNESS")
+    built = [REPO / "target" / profile / "harness" for profile in ("debug", "release")]
+    candidates = [pathlib.Path(named)] if named else [path for path in built if path.exists()]
+    if not candidates:
+        return None
+    newest = max(candidates, key=lambda path: path.stat().st_mtime)
+    has_command = subprocess.run([newest, "geometry", "--help"], capture_output=True).returncode == 0
+    return newest if has_command else None
+
+
+HARNESS = binary()
+
+
+def diagnose(path):
+    """The diagnosis, and the counts of its findings by kind."""
+    with tempfile.TemporaryDirectory() as directory:
+        out = pathlib.Path(directory) / "geometry.json"
+        command = [HARNESS, "geometry", path, "--no-intersections", "--json", out]
+        run = subprocess.run(command, capture_output=True, text=True)
+        if run.returncode not in (0, 1):
+            raise AssertionError(f"{path}: exit code {run.returncode}: {run.stderr}")
+        diagnosis = json.loads(out.read_text())
+    return diagnosis, {finding["kind"]: finding for finding in diagnosis["findings"]}
+
+
+def load(path):
+    """The mesh with equal f32 vertices merged and facets with a repeated vertex removed, and all its facets."""
+    soup = trimesh.load_mesh(path, process=False)
+    facets = np.asarray(soup.vertices)[soup.faces].astype(np.float32)
+    vertices, corners = np.unique(facets.reshape(-1, 3), axis=0, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    repeats = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    return trimesh.Trimesh(vertices, corners[~repeats], process=False, validate=False), len(facets), repeats.sum()
+
+
+def components(mesh):
+    """Number of sets of facets that trimesh connects, across edges that have exactly two facets."""
+    parents = list(range(len(mesh.faces)))
+
+    def find(facet):
+        while parents[facet] != facet:
+            parents[facet] = parents[parents[facet]]
+            facet = parents[facet]
+        return facet
+
+    for a, b in mesh.face_adjacency.tolist():
+        parents[find(a)] = find(b)
+    return sum(find(facet) == facet for facet in range(len(parents)))
+
+
+@unittest.skipIf(trimesh is None, "trimesh is not installed")
+@unittest.skipIf(HARNESS is None, "the harness is not built, or is older than the command geometry")
+class GeometryTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        paths = sorted(REPO.glob("geometries/*.stl")) + sorted(REPO.glob("geometries/fetched/*.stl"))
+        cls.cases = [(path.name, *diagnose(path), *load(path)) for path in paths]
+        assert cls.cases, "no geometries"
+
+    def test_counts_agree(self):
+        for name, diagnosis, findings, mesh, facets, repeats in self.cases:
+            with self.subTest(name):
+                count = {kind: finding["count"] for kind, finding in findings.items()}
+                uses = np.unique(mesh.edges_unique_inverse, return_counts=True)[1]
+                self.assertEqual(diagnosis["facets"], facets)
+                self.assertEqual(findings["openings"]["edges"], (uses == 1).sum())
+                self.assertEqual(count["non_manifold_odd"], ((uses > 2) & (uses % 2 == 1)).sum())
+                self.assertEqual(count["non_manifold_even"], ((uses > 2) & (uses % 2 == 0)).sum())
+                self.assertEqual(count["duplicates"], (~mesh.unique_faces()).sum())
+                self.assertGreaterEqual(count["degenerate"], repeats)
+
+    def test_watertight_means_two_facets_at_every_edge(self):
+        for name, _, findings, mesh, _, _ in self.cases:
+            with self.subTest(name):
+                other = findings["openings"]["edges"] + sum(
+                    findings[kind]["count"] for kind in ("non_manifold_odd", "non_manifold_even")
+                )
+                self.assertEqual(other == 0, mesh.is_watertight)
+
+    def test_winding_agrees_where_every_edge_has_two_facets(self):
+        for name, _, findings, mesh, _, _ in self.cases:
+            with self.subTest(name):
+                if mesh.is_watertight:
+                    self.assertEqual(findings["winding"]["count"] == 0, mesh.is_winding_consistent)
+
+    def test_shells_agree_where_no_edge_has_more_than_two_facets(self):
+        for name, diagnosis, findings, mesh, _, _ in self.cases:
+            with self.subTest(name):
+                if not findings["non_manifold_odd"]["count"] + findings["non_manifold_even"]["count"]:
+                    self.assertEqual(diagnosis["shells"]["count"], components(mesh))
+
+
+if __name__ == "__main__":
+    unittest.main()
