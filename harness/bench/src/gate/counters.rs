@@ -105,7 +105,7 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseMeasures
         };
         if *measures.digest.get_or_insert(report.digest.clone()) != report.digest {
             let digest = report.digest;
-            let why = format!("on {ranks} has the digest {digest}, serially it is another");
+            let why = format!("on {ranks} has digest {digest}, which differs from the serial one");
             return Err(unusable(why));
         }
         if ranks == Ranks::Serial {
