@@ -163,7 +163,7 @@ fn command() -> Command {
 /// # Errors
 /// In one sentence, as all other errors.
 pub fn parse() -> Result<Args, Error> {
-    let parsed = command().try_get_matches().and_then(|m| {
+    let parsed = command().try_get_matches().and_then(|mut m| {
         if let Some(&shell) = m.get_one::<Shell>("completions") {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut command(), "mesher", &mut script);
@@ -175,7 +175,7 @@ pub fn parse() -> Result<Args, Error> {
             rendered.expect("memory can be written to");
             print_and_exit(&page);
         }
-        Args::from_arg_matches(&m)
+        Args::from_arg_matches_mut(&mut m)
     });
     parsed.map_err(|e| {
         if !e.use_stderr() {
