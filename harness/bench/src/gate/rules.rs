@@ -2,6 +2,7 @@
 
 use super::GateError;
 use super::report::LayerName;
+use crate::statistics::comparison::rounds_min;
 use run::engine::programs::Programs;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -110,16 +111,14 @@ impl Rules {
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let time = &rules.time;
-        if time.rounds_min < crate::statistics::comparison::ROUNDS_MIN
-            || time.rounds_max < time.rounds_min
-        {
-            let least = crate::statistics::comparison::ROUNDS_MIN;
-            return Err(wrong(format!(
-                "rounds_min must be at least {least} and rounds_max at least rounds_min"
-            )));
-        }
         if !(time.alpha > 0.0 && time.alpha < 0.5 && time.effect_min >= 0.0) {
             return Err(wrong("alpha must be between 0 and 0.5 and effect_min at least 0".into()));
+        }
+        let least = rounds_min(time.alpha);
+        if time.rounds_min < least || time.rounds_max < time.rounds_min {
+            return Err(wrong(format!(
+                "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
+            )));
         }
         Ok(rules)
     }

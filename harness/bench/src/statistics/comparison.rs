@@ -1,27 +1,37 @@
-//! Tests whether a candidate is slower or faster than a baseline on a machine with other load.
+//! Tests whether a candidate is slower or faster than a baseline on a machine that also runs other processes.
 //!
 //! A round consists of three runs in random order: baseline, baseline again, candidate. If baseline and candidate are
-//! the same program, the three times are exchangeable within a round whatever the machine was doing. A permutation test
-//! within rounds therefore gives the exact probability of a false alarm without any assumption about the noise. The
-//! noise floor is the difference between the two baseline runs of the same rounds.
+//! the same program, the three times are exchangeable within a round whatever the machine was doing, because their order
+//! is random. A permutation test within rounds therefore has a valid significance level for any noise; `p` is estimated
+//! from random permutations. The noise floor is the largest effect that noise alone produces at that level, estimated by
+//! random sign changes of the differences between the two baseline runs.
 
 use super::random::Random;
 use super::trimmed_mean::trimmed_mean;
 
-/// Minimum number of rounds: fewer cannot reach a small significance level.
-pub const ROUNDS_MIN: usize = 8;
+/// Minimum number of rounds for significance level `alpha`. With n rounds, a quarter of which the trimmed mean ignores at
+/// each end, no p-value is below 3^-(n - n/4): relabelling an ignored round does not change the effect. At least 8.
+pub fn rounds_min(alpha: f64) -> usize {
+    (8..=ROUNDS_MIN_LIMIT)
+        .find(|n| 3f64.powi((n / 4) as i32 - *n as i32) < alpha)
+        .unwrap_or(ROUNDS_MIN_LIMIT)
+}
 
-/// Permutations drawn per test: enough to resolve probabilities of 0.001.
-const DRAWS: usize = 20_000;
+/// Largest value of [`rounds_min`], for levels that no number of samples here resolves.
+const ROUNDS_MIN_LIMIT: usize = 40;
 
-/// Scales the difference of two baseline runs to the variance of candidate minus the mean of two baselines:
+/// Random permutations for `p` and sign patterns for the noise floor: enough to resolve probabilities of 0.001. The
+/// interval takes a quarter as many bootstrap samples.
+const SAMPLES: usize = 20_000;
+
+/// Factor that gives the difference of two baseline runs the variance of the candidate minus the mean of two baselines:
 /// sqrt((1 + 1/2) / 2).
-const SCALE: f64 = 0.866_025_403_784_438_6;
+const SCALE_BASELINE_DIFFERENCE: f64 = 0.866_025_403_784_438_6;
 
 /// The 90 % quantile of the standard normal distribution.
-const POWER_90: f64 = 1.2816;
+const NORMAL_QUANTILE_90: f64 = 1.2816;
 
-/// Logarithms of one round's times.
+/// Natural logarithms of the times of one round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
     /// Baseline.
@@ -37,58 +47,61 @@ pub struct Round {
 pub struct Comparison {
     /// Candidate relative to baseline.
     pub effect: f64,
-    /// Probability of an effect at least as large if the programs were equally fast.
+    /// Probability of an effect at least as large in magnitude if the programs are equally fast.
     pub p: f64,
-    /// Noise floor: the effect between the two baseline runs at significance level `alpha`.
+    /// Noise floor: the effect that noise alone exceeds with probability `alpha`, from the baseline runs.
     pub floor: f64,
     /// Minimum detectable effect: one this large is detected with a probability of 90 %.
     pub visible: f64,
-    /// Lower end of the effect's 99 % interval.
+    /// Lower limit of the 99 % bootstrap percentile interval of the effect.
     pub low: f64,
-    /// Upper end.
+    /// Upper limit.
     pub high: f64,
 }
 
 /// Compares the candidate with the baseline at significance level `alpha`; reproducible for a given seed.
 pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let mut random = Random(seed);
-    let against = |b: f64, a: f64, c: f64| b - (a + c) / 2.0;
-    let differences: Vec<f64> = rounds.iter().map(|r| against(r.b, r.a, r.a_again)).collect();
+    let difference = |b: f64, a: f64, c: f64| b - (a + c) / 2.0;
+    let differences: Vec<f64> = rounds.iter().map(|r| difference(r.b, r.a, r.a_again)).collect();
     let effect = trimmed_mean(&differences);
-    let permuted = |random: &mut Random| {
-        let drawn = rounds.iter().map(|r| match random.below(3) {
-            0 => against(r.b, r.a, r.a_again),
-            1 => against(r.a, r.b, r.a_again),
-            _ => against(r.a_again, r.a, r.b),
+    let permuted_effect = |random: &mut Random| {
+        let relabelled = rounds.iter().map(|r| match random.below(3) {
+            0 => difference(r.b, r.a, r.a_again),
+            1 => difference(r.a, r.b, r.a_again),
+            _ => difference(r.a_again, r.a, r.b),
         });
-        trimmed_mean(&drawn.collect::<Vec<_>>()).abs()
+        trimmed_mean(&relabelled.collect::<Vec<_>>()).abs()
     };
-    let as_large = (0..DRAWS).filter(|_| permuted(&mut random) >= effect.abs()).count();
-    let baseline_only: Vec<f64> = rounds.iter().map(|r| (r.a_again - r.a) * SCALE).collect();
-    let mut null = drawn(DRAWS, || {
-        let flipped = baseline_only.iter().map(|d| if random.below(2) == 0 { *d } else { -d });
+    let as_large = (0..SAMPLES).filter(|_| permuted_effect(&mut random) >= effect.abs()).count();
+    let baseline_differences: Vec<f64> =
+        rounds.iter().map(|r| (r.a_again - r.a) * SCALE_BASELINE_DIFFERENCE).collect();
+    let mut null_effects = collect_draws(SAMPLES, || {
+        let flipped =
+            baseline_differences.iter().map(|d| if random.below(2) == 0 { *d } else { -d });
         trimmed_mean(&flipped.collect::<Vec<_>>()).abs()
     });
-    null.sort_by(f64::total_cmp);
+    null_effects.sort_by(f64::total_cmp);
     let resampled = |random: &mut Random| {
-        let of = differences.len();
-        trimmed_mean(&(0..of).map(|_| differences[random.below(of)]).collect::<Vec<_>>())
+        let count = differences.len();
+        trimmed_mean(&(0..count).map(|_| differences[random.below(count)]).collect::<Vec<_>>())
     };
-    let mut spread = drawn(DRAWS / 4, || resampled(&mut random));
-    spread.sort_by(f64::total_cmp);
-    let floor = quantile(&null, 1.0 - alpha);
-    let ratio = |logarithm: f64| logarithm.exp_m1();
+    let mut bootstrap_effects = collect_draws(SAMPLES / 4, || resampled(&mut random));
+    bootstrap_effects.sort_by(f64::total_cmp);
+    let floor = quantile(&null_effects, 1.0 - alpha);
+    let relative = |logarithm: f64| logarithm.exp_m1();
     Comparison {
-        effect: ratio(effect),
-        p: (1 + as_large) as f64 / (1 + DRAWS) as f64,
-        floor: ratio(floor),
-        visible: ratio(floor + POWER_90 * deviation(&spread)),
-        low: ratio(quantile(&spread, 0.005)),
-        high: ratio(quantile(&spread, 0.995)),
+        effect: relative(effect),
+        p: (1 + as_large) as f64 / (1 + SAMPLES) as f64,
+        floor: relative(floor),
+        visible: relative(floor + NORMAL_QUANTILE_90 * deviation(&bootstrap_effects)),
+        low: relative(quantile(&bootstrap_effects, 0.005)),
+        high: relative(quantile(&bootstrap_effects, 0.995)),
     }
 }
 
-fn drawn(count: usize, mut draw: impl FnMut() -> f64) -> Vec<f64> {
+/// Collects `count` draws.
+fn collect_draws(count: usize, mut draw: impl FnMut() -> f64) -> Vec<f64> {
     (0..count).map(|_| draw()).collect()
 }
 
@@ -98,7 +111,7 @@ fn quantile(sorted: &[f64], fraction: f64) -> f64 {
     sorted[index.min(sorted.len() - 1)]
 }
 
-/// Returns the standard deviation.
+/// Returns the population standard deviation.
 fn deviation(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
@@ -109,7 +122,7 @@ fn deviation(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Rounds on a machine with 2 % noise, a burst that doubles the time of one run in 25, and a drift.
+    /// Rounds on a machine with 2 % noise, bursts that double the time of one run in 25 on average, and a drift.
     fn rounds(count: usize, slower: f64, seed: u64) -> Vec<Round> {
         let mut random = Random(seed);
         let mut time = |round: usize, factor: f64| {

@@ -1,11 +1,11 @@
 //! Every layer is at least n cells thick, at every level.
 //!
 //! Section 7 of reference/DEFINITION.md: the Chebyshev distance of a leaf of level l + 1 or finer from a leaf
-//! of level l - 1 or coarser is at least n cells of level l, for every l coarser than the surface and, if all
-//! leaves are kept, for every l. Leaves that are nearer than n - 1 surface cells to a crossing leaf of the
-//! surface's level have at least that level. If crossing leaves are deleted, leaves that touched one have at
-//! least the surface's level. The check cannot detect layers that are too thick and, without T0, layers that
-//! deleted crossing leaves require.
+//! of level l - 1 or coarser is at least n cells of level l, for every l coarser than the surface level D and, if
+//! `keep` is `all`, for every l. Every leaf less than n - 1 cells of level D from a crossing leaf of level D has
+//! at least level D. If crossing leaves are deleted, leaves adjacent to one have at least level D: by the extra layer
+//! of section 6 for n < 3, and by the layers themselves for larger n. The check detects neither layers that are too
+//! thick nor, without T0, missing layers around deleted crossing leaves.
 
 use super::gap::Gap;
 use super::trail::Trail;
@@ -17,14 +17,14 @@ use contract::word::Side;
 
 const NAME: &str = "layer";
 
-/// Checks the mesh together with the deleted crossing leaves, if T0 is known.
+/// Checks the mesh, together with the deleted crossing leaves if T0 is known and they are deleted.
 pub fn check(subject: &Subject) -> CheckResult {
     let mut result = check_tree(subject.tree_with_deleted(), &subject.terms);
     result.examined = subject.mesh.words.len() as u64;
     result
 }
 
-/// Checks the layers of a tree.
+/// Checks all layers of a tree, that at the surface included.
 pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     let mut result = CheckResult::new(NAME);
     let n = i64::from(terms.layer_cells_min);
@@ -44,13 +44,14 @@ fn cell(level: u8) -> i64 {
 }
 
 impl Terms {
-    /// Minimum distance of a crossing leaf of this kind and level from leaves coarser than the surface, in
-    /// level-19 cells.
-    fn surface_layer(&self, kind: Kind, level: u8) -> i64 {
+    /// Minimum distance between a crossing or deleted leaf of this level and any leaf coarser than the surface level,
+    /// in level-19 cells.
+    fn surface_margin(&self, kind: Kind, level: u8) -> i64 {
         let layer = i64::from(self.layer_cells_min) - 1;
-        // The extra layer is required only if crossing leaves are deleted.
+        // One cell at least, if crossing leaves are deleted.
         let extra = i64::from(!self.keep_crossing);
         let cells = match kind {
+            // The leaf may have been refined before it was deleted, so only adjacent leaves are constrained.
             DELETED => extra,
             _ if level == self.level_surface => layer.max(extra),
             _ => extra,
@@ -59,29 +60,31 @@ impl Terms {
     }
 }
 
-const SURFACE: Kinds = 1 << Side::Crossing as u8 | 1 << DELETED;
+const CROSSING_OR_DELETED: Kinds = 1 << Side::Crossing as u8 | 1 << DELETED;
 
-/// Requires that no leaf near a crossing leaf is coarser than the surface.
+/// Requires that no leaf near a crossing leaf is coarser than the surface level.
 struct SurfaceLayer<'a> {
     tree: &'a Tree,
     terms: &'a Terms,
 }
 
 impl SurfaceLayer<'_> {
-    /// Checks the children of the current octant. All children are tested together first, which mostly suffices.
+    /// Checks the children of the current octant. One search around all selected children comes first; it usually finds
+    /// nothing.
     fn check_children(&self, trail: &mut Trail, result: &mut CheckResult) {
         let (tree, surface) = (self.tree, self.terms.level_surface);
         let (handle, octant) = (trail.current().centre(), trail.current().octant);
-        let margin_max = self.terms.surface_layer(Side::Crossing as Kind, surface);
-        let crossing = trail.select_children(tree, |child| tree.kinds(child) & SURFACE != 0);
-        if crossing == 0 || margin_max == 0 {
+        let margin_max = self.terms.surface_margin(Side::Crossing as Kind, surface);
+        let selected =
+            trail.select_children(tree, |child| tree.kinds(child) & CROSSING_OR_DELETED != 0);
+        if selected == 0 || margin_max == 0 {
             return;
         }
-        let region = Region::around_children(&octant, crossing, margin_max);
+        let region = Region::around_children(&octant, selected, margin_max);
         if trail.coarsest_nearby(tree, margin_max, &region, surface) >= surface {
             return;
         }
-        for digit in (0..8).filter(|d| crossing >> d & 1 == 1) {
+        for digit in (0..8).filter(|d| selected >> d & 1 == 1) {
             let child = tree.child(handle, digit, octant.level);
             trail.descend(tree, digit);
             match child.as_leaf() {
@@ -94,16 +97,19 @@ impl SurfaceLayer<'_> {
         }
     }
 
+    /// Reports a leaf coarser than the surface level within the margin of the current leaf.
     fn check_leaf(&self, trail: &Trail, kind: Kind, result: &mut CheckResult) {
         let (octant, surface) = (trail.current().octant, self.terms.level_surface);
-        let margin = self.terms.surface_layer(kind, octant.level);
+        let margin = self.terms.surface_margin(kind, octant.level);
         let found = trail.search(self.tree, margin, &Region::around(&octant, margin), surface);
         if let Some(coarse) = found.leaf(self.tree) {
             result.report_with(|| {
                 let (what, cells) = (contact::name(1 << kind), margin / cell(octant.level));
                 let (leaf, coarse) =
                     (self.terms.root.describe(&octant), self.terms.root.describe(&coarse));
-                format!("a leaf within {cells} cells of the {what} leaf {leaf} is coarser than the surface: {coarse}")
+                format!(
+                    "a leaf less than {cells} cells from the {what} leaf {leaf} is coarser than the surface level: {coarse}"
+                )
             });
         }
     }
