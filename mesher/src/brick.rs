@@ -40,6 +40,26 @@ const fn axis_masks(axis: u32) -> [u64; 4] {
     masks
 }
 
+/// Mask of the positions `first..=last` of one axis.
+const fn spans(m: [u64; 4]) -> [[u64; 4]; 4] {
+    let mut table = [[0; 4]; 4];
+    let mut a = 0;
+    while a < 4 {
+        let mut b = a;
+        let mut bits = 0;
+        while b < 4 {
+            bits |= m[b];
+            table[a][b] = bits;
+            b += 1;
+        }
+        a += 1;
+    }
+    table
+}
+
+/// Masks of the octants whose position along an axis is in `first..=last`, by axis, `first` and `last`.
+pub const SPANS: [[[u64; 4]; 4]; 3] = [spans(X), spans(Y), spans(Z)];
+
 /// Mask of the bits that octants of level `l` can have: all but at levels 0 and 1.
 #[inline]
 pub const fn valid(l: Level) -> u64 {

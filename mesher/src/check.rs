@@ -12,6 +12,7 @@ use crate::facet::{Facet, crossed};
 use crate::ingest::Slice;
 use crate::lattice::Rules;
 use crate::leaves::Totals;
+use crate::mesh::{Mesh, Options};
 use crate::octant::{LEVEL_MAX, Level, morton, path, position};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::refine::owners_reached;
@@ -19,7 +20,6 @@ use crate::sides::Sides;
 use crate::stream::Counts;
 use crate::tree::{PerLevel, Tree, check_existing, check_split};
 use crate::write::Written;
-use crate::{Mesh, Options};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 

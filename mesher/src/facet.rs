@@ -23,8 +23,7 @@
 //!   `m + floor(c / h) >= 0`. Since `h` is a power of two, the floor is an arithmetic shift. Constants are
 //!   therefore shifted first, and the lanes evaluate `m + floor(c / h)` in i64 for all octants.
 
-use crate::brick::{X, Y, Z, valid};
-use crate::lattice::ExtentBox;
+use crate::brick::{SPANS, X, Y, Z};
 use crate::octant::{Level, ROOT_BITS};
 use bytemuck::{Pod, Zeroable};
 
@@ -52,25 +51,6 @@ impl Facet {
         [cross(1, 2), cross(2, 0), cross(0, 1)]
     }
 }
-
-/// Mask of the positions `first..=last` of one axis.
-const fn spans(m: [u64; 4]) -> [[u64; 4]; 4] {
-    let mut table = [[0; 4]; 4];
-    let mut a = 0;
-    while a < 4 {
-        let mut b = a;
-        let mut bits = 0;
-        while b < 4 {
-            bits |= m[b];
-            table[a][b] = bits;
-            b += 1;
-        }
-        a += 1;
-    }
-    table
-}
-
-const SPANS: [[[u64; 4]; 4]; 3] = [spans(X), spans(Y), spans(Z)];
 
 /// Extrudes masks of squares along an axis `a`. A mask of 4 x 4 squares over the axes `a + 1` (fastest) and
 /// `a + 2` is given as two bytes; `COLUMNS[a][half][byte]` are the brick's octants over these squares.
@@ -118,22 +98,6 @@ pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
     }
     // A connected set within one row of octants meets each octant that its extent meets.
     if wide < 2 { mask } else { mask & kernel::separated(f, corner, shift) }
-}
-
-/// Mask of the octants of level `l`, in the brick with minimum corner `corner`, whose interior meets the
-/// interior of the box.
-pub fn box_mask(b: &ExtentBox, corner: [i64; 3], l: Level) -> u64 {
-    let shift = ROOT_BITS - l;
-    let mut mask = u64::MAX;
-    for axis in 0..3 {
-        let first = (b.min[axis] - corner[axis]) >> shift;
-        let last = (b.max[axis] - corner[axis] - 1) >> shift;
-        if first > 3 || last < 0 || b.min[axis] >= b.max[axis] {
-            return 0;
-        }
-        mask &= SPANS[axis][first.max(0) as usize][last.min(3) as usize];
-    }
-    mask & valid(l)
 }
 
 /// The ten tests by plane and edges, in the widest vectors that the processor supports.

@@ -3,9 +3,10 @@
 //! The root cube has 2^27 lattice units along an edge, 256 for each cell of level 19. Vertices and extent
 //! boxes are rounded to the lattice once; no later step rounds.
 
+use crate::brick::{SPANS, valid};
 use crate::error::Error;
 use crate::facet::Facet;
-use crate::octant::{LEVEL_MAX, Level, ROOT_EDGE};
+use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE};
 use crate::wide::widest;
 
 /// The root cube, in the unit of the geometry.
@@ -184,6 +185,22 @@ impl ExtentBox {
     pub fn meets(&self, corner: [i64; 3], h: i64) -> bool {
         (0..3).all(|a| self.min[a].max(corner[a]) < self.max[a].min(corner[a] + h))
     }
+}
+
+/// Mask of the octants of level `l`, in the brick with minimum corner `corner`, whose interior meets the
+/// interior of the box.
+pub fn box_mask(b: &ExtentBox, corner: [i64; 3], l: Level) -> u64 {
+    let shift = ROOT_BITS - l;
+    let mut mask = u64::MAX;
+    for axis in 0..3 {
+        let first = (b.min[axis] - corner[axis]) >> shift;
+        let last = (b.max[axis] - corner[axis] - 1) >> shift;
+        if first > 3 || last < 0 || b.min[axis] >= b.max[axis] {
+            return 0;
+        }
+        mask &= SPANS[axis][first.max(0) as usize][last.min(3) as usize];
+    }
+    mask & valid(l)
 }
 
 /// The parameters that, with the facets, define the mesh.

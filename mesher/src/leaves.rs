@@ -1,9 +1,9 @@
 //! The leaves of the finished mesh: digests, files and the manifest.
 
-use crate::Mesh;
 use crate::comm::{Comm, agree};
 use crate::digest::Digests;
 use crate::error::Error;
+use crate::mesh::Mesh;
 use crate::record::check_interrupt;
 use crate::stream::Counts;
 use crate::write::{self, Manifest, OutDir, Written};

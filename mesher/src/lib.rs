@@ -1,7 +1,7 @@
 //! Off-body hexahedral oct-tree meshes around facets, on any number of ranks, after O'Connell and
 //! Karman, "Advances in Parallelization For Large Scale Oct-Tree Mesh Generation".
 //!
-//! [`mesh`] runs ten phases, each in a module: 1 read, 2 quantise, 3 partition, 4 refine, 5 repartition after refinement, 6 sides,
+//! [`mesh()`] runs ten phases, each in a module: 1 read, 2 quantise, 3 partition, 4 refine, 5 repartition after refinement, 6 sides,
 //! 7 gradation, 8 repartition after gradation, 9 leaves, 10 finish. Each phase ends with a check of the invariants of what
 //! it has made ([`check`]). The mesh is a function of the facets and the rules alone (see
 //! `reference/DEFINITION.md`), not of the ranks, the partitioner or the base level.
@@ -22,6 +22,7 @@ pub mod ingest;
 pub mod kept;
 pub mod lattice;
 pub mod leaves;
+mod mesh;
 pub mod octant;
 pub mod partition;
 pub mod quantise;
@@ -36,72 +37,20 @@ pub mod voxelise;
 mod wide;
 pub mod write;
 
+pub use mesh::{Mesh, Options};
+
 use case::Case;
 use check::debug_check;
 use comm::{Comm, agree};
 use error::Error;
 use kept::Kept;
-use lattice::Rules;
-use partition::Division;
 use partition::base_leaves::cells_heaviest;
 use partition::initial::{self, Partition};
-use partition::ownership::Ownership;
 use partition::repartition::{self, LeafCounts, Sets};
 use record::{Recorder, check_interrupt};
 use report::{Counters, Report};
-use sides::Sides;
-use std::path::PathBuf;
-use stream::Leaves;
-use tree::PerLevel;
 use voxelise::BinnedFacets;
 use write::OutDir;
-
-/// Options that have no effect on the mesh, but for `ungraded`.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// How to divide the work among ranks.
-    pub division: Division,
-    /// Stop after sides: the mesh is the base tree T0, with all its leaves.
-    pub ungraded: bool,
-    /// Directory to write the mesh to.
-    pub out: Option<PathBuf>,
-    /// Check invariants after each phase, which debug builds do in any case.
-    pub check: bool,
-}
-
-/// A mesh as one rank holds it.
-pub struct Mesh {
-    /// Number of facets on all ranks.
-    pub facets: u64,
-    /// The rules on the lattice.
-    pub rules: Rules,
-    /// The ranks that own and hold bricks.
-    pub ownership: Ownership,
-    /// Level of the base leaves, or of the octants between which partition boundaries lie.
-    pub level_base: octant::Level,
-    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
-    pub split: PerLevel,
-    /// Crossing leaves of T0.
-    pub crossing: PerLevel,
-    /// Sides of the leaves of T0.
-    pub sides: Sides,
-    /// Whether the tree is T0, of which all leaves are in the mesh.
-    pub is_base: bool,
-}
-
-impl Mesh {
-    /// The leaves that this rank owns.
-    pub fn leaves(&self) -> Leaves<'_> {
-        Leaves {
-            split: &self.split,
-            crossing: &self.crossing,
-            sides: &self.sides,
-            ownership: &self.ownership,
-            all_leaves: self.is_base,
-            rules: &self.rules,
-        }
-    }
-}
 
 /// Meshes a case: all ten phases. The recorder keeps this rank's times; the report is the same on all ranks. Collective.
 ///

@@ -3,10 +3,11 @@
 use crate::comm::{Comm, Traffic, matrix};
 use crate::digest::hex;
 use crate::leaves::Totals;
+use crate::mesh::Mesh;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::record::{Phase, Recorder, peak_rss_bytes};
 use crate::sides::Ambiguous;
-use crate::{Mesh, grade, voxelise};
+use crate::{grade, voxelise};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;

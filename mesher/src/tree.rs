@@ -12,8 +12,7 @@
 
 use crate::brick::{self, Brick};
 use crate::brickset::{BrickSet, ones};
-use crate::facet::box_mask;
-use crate::lattice::Rules;
+use crate::lattice::{Rules, box_mask};
 use crate::octant::{LEVEL_MAX, Level, path};
 use crate::partition::ownership::{Ownership, Placement};
 
@@ -56,6 +55,19 @@ impl Tree {
     /// The deepest level at which an octant is split, plus one; 0 for a root that is a leaf.
     pub fn depth(&self) -> Level {
         (0..LEVELS).rev().find(|&l| !self.split[l].is_empty()).map_or(0, |l| l as Level + 1)
+    }
+
+    /// The fully replicated bricks: the same on all ranks.
+    pub fn fully_replicated(&self, ownership: &Ownership) -> Self {
+        let mut top = Self::default();
+        for (to, from) in [(&mut top.split, &self.split), (&mut top.crossing, &self.crossing)] {
+            for l in 0..=ownership.level_fully_replicated() {
+                let bricks =
+                    from[l as usize].bricks().filter(|b| ownership.is_fully_replicated(l, b.key));
+                bricks.for_each(|b| to[l as usize].push(b.key, b.bits));
+            }
+        }
+        top
     }
 
     /// Checks all invariants on the bricks that this rank holds. Replicas must be synchronised.

@@ -15,8 +15,8 @@
 
 use crate::brick;
 use crate::brickset::ones;
-use crate::facet::{Facet, box_mask, crossed};
-use crate::lattice::ExtentBox;
+use crate::facet::{Facet, crossed};
+use crate::lattice::{ExtentBox, box_mask};
 use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use crate::tree::Tree;
 use std::ops::Range;

@@ -7,8 +7,8 @@ use crate::experiments::variant::Base;
 use check::selftest::scale::Source;
 use run::engine::launcher::Launcher;
 use run::engine::layout::SERIAL;
+use run::engine::options::RunOptions;
 use run::engine::programs::Programs;
-use run::engine::runner::RunOptions;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

@@ -3,7 +3,7 @@
 mod cli;
 mod commands;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
 use run::engine::interrupt;
 use std::process::ExitCode;
@@ -24,8 +24,10 @@ fn main() -> ExitCode {
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
-        Command::Completions(arguments) => commands::completions::run(&arguments),
-        Command::Man(arguments) => commands::man::run(&arguments),
+        Command::Completions(arguments) => {
+            commands::completions::run(&arguments, &mut Arguments::command())
+        }
+        Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     };
     ExitCode::from(code)
 }

@@ -7,7 +7,7 @@
 use crate::comm::{Comm, Entry, all_gather_reduced};
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton};
+use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use crate::partition::curve::Bin;
 use std::ops::Range;
 
@@ -30,6 +30,35 @@ pub fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
         (0..3).map(|a| (span(a) as u64).div_ceil(edge(b.level) as u64)).product::<u64>()
     };
     rules.boxes.iter().map(leaves).max().unwrap_or(0)
+}
+
+/// Adds the leaves that the boxes ask for within an interval of the curve, with weight `each`: by octants of `level`, or larger ones
+/// that hold no more than `light` leaves.
+pub fn add_boxes(
+    bins: &mut Vec<Bin>,
+    rules: &Rules,
+    level: Level,
+    light: u64,
+    each: u64,
+    within: &Range<u64>,
+) {
+    if rules.boxes.is_empty() {
+        return;
+    }
+    let mut open = vec![(0, 0)];
+    while let Some((l, code)) = open.pop() {
+        let span = start57(l, code)..start57(l, code + 1);
+        let leaves = leaves_in_boxes(l, code, rules);
+        if leaves == 0 || span.end <= within.start || within.end <= span.start {
+            continue;
+        }
+        let inside = within.start <= span.start && span.end <= within.end;
+        if l >= level || inside && leaves <= light {
+            bins.push((span.start, leaves.saturating_mul(each)));
+        } else {
+            open.extend((0..8).map(|child| (l + 1, code << 3 | child)));
+        }
+    }
 }
 
 /// The area in each octant of one level, the same on all ranks.
@@ -162,7 +191,6 @@ mod tests {
     use super::*;
     use crate::comm::Solo;
     use crate::lattice::{Keep, Root};
-    use crate::octant::start57;
     use crate::partition::curve;
 
     fn rules(level_surface: Level) -> Rules {
@@ -231,5 +259,37 @@ mod tests {
         let oblique = Facet { v: [[h, 0, 0], [0, h, 0], [0, 0, h]] };
         // The sum of its projections onto the three coordinate planes.
         assert_eq!(total(&[oblique]), 1.5 * f64::from(h) * f64::from(h));
+    }
+
+    #[test]
+    fn bins_of_boxes_hold_the_leaves_that_the_boxes_ask_for() {
+        let h = 1i64 << (ROOT_BITS - 6);
+        // 5 x 20 x 33 cells of level 6, at odd positions.
+        let (min, max) = ([h * 3, h * 7, h * 11], [h * 8, h * 27, h * 44]);
+        let rules = Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface: 6,
+            layer_cells_min: 1,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: vec![ExtentBox { min, max, level: 6 }],
+        };
+        let weights = |level: Level, light: u64, within: &Range<u64>| {
+            let mut bins = Vec::new();
+            add_boxes(&mut bins, &rules, level, light, 10, within);
+            curve::merge(&mut bins);
+            bins
+        };
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        for (level, light) in [(2, 0), (5, 0), (6, 0), (5, 100), (5, 3300)] {
+            let bins = weights(level, light, &curve::ALL);
+            assert_eq!(sum(&bins), 10 * 5 * 20 * 33, "level {level}, light {light}");
+            assert!(bins.iter().all(|b| b.0.trailing_zeros() >= 3 * (LEVEL_MAX - level)));
+            let middle = start57(5, 12_345);
+            let halves =
+                [0..middle, middle..curve::ALL.end].map(|half| sum(&weights(5, light, &half)));
+            assert_eq!(halves[0] + halves[1], 33_000, "each bin belongs to one interval");
+        }
+        assert_eq!(weights(5, 3300, &curve::ALL).len(), 1, "light octants are not divided");
     }
 }

@@ -13,6 +13,7 @@ use crate::error::Error;
 use crate::facet::Facet;
 use crate::lattice::Rules;
 use crate::octant::{Level, start57};
+use crate::partition::curve::assign_morton;
 #[cfg(feature = "metis")]
 use crate::partition::metis;
 use crate::partition::ownership::{BaseLeaf, KEY_BITS};
@@ -71,11 +72,11 @@ impl<'a> Survey<'a> {
 
 /// A base leaf with the subtree of T0 below it.
 #[derive(Clone, Debug)]
-pub struct Subtree {
+struct Subtree {
     /// Level of its root.
-    pub level: Level,
+    level: Level,
     /// Morton code of its root.
-    pub code: u64,
+    code: u64,
     /// Whether its root is split in T0; true or false only above the survey's level.
     is_split: bool,
     /// Estimated leaves of the mesh in it.
@@ -89,12 +90,6 @@ impl Subtree {
         let areas = survey.areas.within(&survey.areas.all(), span(0, 0));
         let weight = survey.weight(0, 0, &areas);
         Self { level: 0, code: 0, is_split: survey.split[0].contains(0), weight, areas }
-    }
-
-    /// An octant of weight 1.
-    #[cfg(test)]
-    pub fn new(level: Level, code: u64) -> Self {
-        Self { level, code, is_split: true, weight: 1, areas: 0..0 }
     }
 
     fn children(self, survey: &Survey) -> [Self; 8] {
@@ -192,21 +187,10 @@ fn assign(
     }
 }
 
-/// Assigns each base leaf to the rank in whose interval of equal weight its middle lies. Weights are not all zero.
-pub fn assign_morton(weights: &[u64], ranks: usize) -> Vec<usize> {
-    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
-    let mut before = 0u128;
-    let mut owner = |w: &u64| {
-        let middle = 2 * before + u128::from(*w);
-        before += u128::from(*w);
-        ((middle * ranks as u128 / (2 * total)) as usize).min(ranks - 1)
-    };
-    weights.iter().map(&mut owner).collect()
-}
-
 #[cfg(feature = "metis")]
 fn assign_metis(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
-    metis::assign(leaves, weights, ranks)
+    let octants: Vec<(Level, u64)> = leaves.iter().map(|s| (s.level, s.code)).collect();
+    metis::assign(&octants, weights, ranks)
 }
 
 #[cfg(not(feature = "metis"))]
@@ -214,21 +198,4 @@ fn assign_metis(_: &[Subtree], _: &[u64], _: usize) -> Result<Vec<usize>, Error>
     Err(Error::input(
         "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn intervals_of_the_curve_are_in_order_and_equally_heavy() {
-        let owners = assign_morton(&[1; 100], 7);
-        assert!(owners.is_sorted());
-        for r in 0..7 {
-            let n = owners.iter().filter(|&&o| o == r).count();
-            assert!((14..=15).contains(&n), "{n}");
-        }
-        assert!(assign_morton(&[1, 1], 5).iter().all(|&o| o < 5));
-        assert_eq!(assign_morton(&[1 << 63, 1 << 63, 1 << 63], 3), [0, 1, 2]);
-    }
 }

@@ -5,9 +5,7 @@
 //! from there to the next. Functions that return boundaries return none if all weights are zero.
 
 use crate::comm::Comm;
-use crate::lattice::Rules;
-use crate::octant::{LEVEL_MAX, Level, start57};
-use crate::partition::area::leaves_in_boxes;
+use crate::octant::LEVEL_MAX;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
@@ -84,6 +82,18 @@ pub fn partition_known(bins: &[Bin], ranks: usize) -> Option<Vec<Boundary>> {
     (total > 0).then(|| without_repeats(local().into_iter()))
 }
 
+/// Assigns each base leaf to the rank in whose interval of equal weight its middle lies. Weights are not all zero.
+pub fn assign_morton(weights: &[u64], ranks: usize) -> Vec<usize> {
+    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
+    let mut before = 0u128;
+    let mut owner = |w: &u64| {
+        let middle = 2 * before + u128::from(*w);
+        before += u128::from(*w);
+        ((middle * ranks as u128 / (2 * total)) as usize).min(ranks - 1)
+    };
+    weights.iter().map(&mut owner).collect()
+}
+
 /// The cumulative weight at which each rank begins, where all loads are equal.
 fn equal(total: u128, ranks: usize) -> Vec<u128> {
     (0..ranks as u128).map(|r| total * r / ranks as u128).collect()
@@ -143,35 +153,6 @@ fn without_repeats(boundaries: impl Iterator<Item = Boundary>) -> Vec<Boundary> 
         first.0 = 0;
     }
     all
-}
-
-/// Adds the leaves that the boxes ask for within an interval of the curve, with weight `each`: by octants of `level`, or larger ones
-/// that hold no more than `light` leaves.
-pub fn add_boxes(
-    bins: &mut Vec<Bin>,
-    rules: &Rules,
-    level: Level,
-    light: u64,
-    each: u64,
-    within: &Range<u64>,
-) {
-    if rules.boxes.is_empty() {
-        return;
-    }
-    let mut open = vec![(0, 0)];
-    while let Some((l, code)) = open.pop() {
-        let span = start57(l, code)..start57(l, code + 1);
-        let leaves = leaves_in_boxes(l, code, rules);
-        if leaves == 0 || span.end <= within.start || within.end <= span.start {
-            continue;
-        }
-        let inside = within.start <= span.start && span.end <= within.end;
-        if l >= level || inside && leaves <= light {
-            bins.push((span.start, leaves.saturating_mul(each)));
-        } else {
-            open.extend((0..8).map(|child| (l + 1, code << 3 | child)));
-        }
-    }
 }
 
 #[cfg(test)]

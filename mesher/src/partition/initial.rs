@@ -118,7 +118,7 @@ fn by_area(
     let mut bins: Vec<Bin> =
         received.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
     for interval in rough.intervals() {
-        curve::add_boxes(&mut bins, rules, fine, light, FRACTIONS, &interval);
+        area::add_boxes(&mut bins, rules, fine, light, FRACTIONS, &interval);
     }
     curve::merge(&mut bins);
     let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
@@ -143,7 +143,7 @@ fn coarse_bins(local: &[Bin], rules: &Rules, level: Level, comm: &dyn Comm) -> (
     let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
     let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
     let light = leaves(&bins) / comm.size() as u64;
-    curve::add_boxes(&mut bins, rules, level, light, FRACTIONS, &curve::ALL);
+    area::add_boxes(&mut bins, rules, level, light, FRACTIONS, &curve::ALL);
     curve::merge(&mut bins);
     let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
     (bins, light)
@@ -201,7 +201,7 @@ mod tests {
     /// Estimated leaves on each rank.
     fn weights(rules: &Rules, owners: &[usize]) -> Vec<u64> {
         let mut bins = estimated(&sheet(), rules, FINE);
-        curve::add_boxes(&mut bins, rules, FINE, 0, FRACTIONS, &curve::ALL);
+        area::add_boxes(&mut bins, rules, FINE, 0, FRACTIONS, &curve::ALL);
         let mut sums = vec![0; RANKS];
         for (start, weight) in bins {
             sums[owners[(start / start57(FINE, 1)) as usize]] += weight;

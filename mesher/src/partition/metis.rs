@@ -1,14 +1,14 @@
 //! METIS: parts of equal weight with few faces between them.
 
 use crate::error::Error;
-use crate::octant::{neighbour, start57};
-use crate::partition::base_leaves::{Subtree, assign_morton};
+use crate::octant::{Level, neighbour, start57};
+use crate::partition::curve::assign_morton;
 
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
 const LEAVES_PER_RANK_MIN: usize = 8;
 
-/// The owner of each base leaf.
-pub fn assign(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
+/// The owner of each base leaf, given by level and code.
+pub fn assign(leaves: &[(Level, u64)], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
     // METIS bisects recursively, and prints complaints on standard output about empty parts. With few leaves per rank, or few
     // that have nearly all the weight, intervals of the curve are as good.
     let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
@@ -16,7 +16,7 @@ pub fn assign(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<u
     if ((LEAVES_PER_RANK_MIN * ranks) as f64) * even > 1.0 {
         return Ok(assign_morton(weights, ranks));
     }
-    let starts: Vec<u64> = leaves.iter().map(|b| start57(b.level, b.code)).collect();
+    let starts: Vec<u64> = leaves.iter().map(|&(l, code)| start57(l, code)).collect();
     let pairs = face_neighbours(leaves, |s| starts.partition_point(|&t| t <= s) - 1);
     let (xadj, adjncy) = adjacency(leaves.len(), &pairs);
     // METIS sums weights in i32 without a check for overflow.
@@ -36,17 +36,20 @@ pub fn assign(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<u
 }
 
 /// Pairs of base leaves that share part of a face, each once, the lower number first.
-fn face_neighbours(leaves: &[Subtree], leaf_index: impl Fn(u64) -> usize) -> Vec<(usize, usize)> {
+fn face_neighbours(
+    leaves: &[(Level, u64)],
+    leaf_index: impl Fn(u64) -> usize,
+) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
-    for (i, b) in leaves.iter().enumerate() {
+    for (i, &(level, code)) in leaves.iter().enumerate() {
         for axis in 0..3 {
             for up in [false, true] {
-                let Some(n) = neighbour(b.level, b.code, axis, up) else {
+                let Some(n) = neighbour(level, code, axis, up) else {
                     continue;
                 };
-                let j = leaf_index(start57(b.level, n));
+                let j = leaf_index(start57(level, n));
                 // A finer neighbour adds the pair itself.
-                if leaves[j].level <= b.level {
+                if leaves[j].0 <= level {
                     pairs.push((i.min(j), i.max(j)));
                 }
             }
@@ -78,7 +81,7 @@ mod tests {
 
     #[test]
     fn parts_are_equal_whatever_the_sum_of_weights() {
-        let leaves: Vec<Subtree> = (0..512).map(|code| Subtree::new(3, code)).collect();
+        let leaves: Vec<(Level, u64)> = (0..512).map(|code| (3, code)).collect();
         for weight in [1, 1 << 40] {
             let owners = assign(&leaves, &[weight; 512], 8).unwrap();
             for r in 0..8 {
@@ -90,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_uniform_base_tree_has_three_pairs_per_octant_but_for_its_faces() {
-        let leaves: Vec<Subtree> = (0..64).map(|code| Subtree::new(2, code)).collect();
+        let leaves: Vec<(Level, u64)> = (0..64).map(|code| (2, code)).collect();
         let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
         assert_eq!(pairs.len(), 3 * 3 * 16);
         let apart = |a: usize, b: usize| -> i64 {

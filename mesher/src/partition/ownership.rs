@@ -15,7 +15,6 @@ mod redistribute;
 
 use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::curve::Boundary;
-use crate::tree::Tree;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -139,19 +138,6 @@ impl Ownership {
         Self { rank: RANK_NONE, own: 0..0, is_single: false, ..self.clone() }
     }
 
-    /// The fully replicated bricks of a tree: the same on all ranks.
-    pub fn top_of(&self, tree: &Tree) -> Tree {
-        let mut top = Tree::default();
-        for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
-            for l in 0..=self.level_fully_replicated {
-                let bricks =
-                    from[l as usize].bricks().filter(|b| self.is_fully_replicated(l, b.key));
-                bricks.for_each(|b| to[l as usize].push(b.key, b.bits));
-            }
-        }
-        top
-    }
-
     /// The largest octants that this rank owns all of, in Morton order: level and code.
     pub fn octants(&self) -> Vec<(Level, u64)> {
         let mut octants = Vec::new();
@@ -202,8 +188,13 @@ impl Ownership {
             .then(|| self.intervals.owners[interval])
     }
 
+    /// Deepest level with a fully replicated brick.
+    pub fn level_fully_replicated(&self) -> Level {
+        self.level_fully_replicated
+    }
+
     /// Whether all ranks hold brick `key` of level `l`.
-    fn is_fully_replicated(&self, l: Level, key: u64) -> bool {
+    pub fn is_fully_replicated(&self, l: Level, key: u64) -> bool {
         l < 2
             || l <= self.level_fully_replicated
                 && self.intervals.of_brick(l, key).len() >= OWNERS_MANY

@@ -62,7 +62,7 @@ fn label_replicated(
     merged: &MergedComponents,
 ) -> Vec<[Label; 2]> {
     let non_owning_view = ownership.non_owning_view();
-    let replicated = Nodes::new(&ownership.top_of(tree), &non_owning_view);
+    let replicated = Nodes::new(&tree.fully_replicated(ownership), &non_owning_view);
     let of_replicated = components::merge(&replicated, &non_owning_view).numbered().of;
     let of_nodes = replicated_components(nodes);
     assert_eq!(

@@ -8,7 +8,8 @@ use super::{Bench, left_out};
 use run::engine::failure::{End, Failure};
 use run::engine::interrupt;
 use run::engine::layout::{Layout, Ranks};
-use run::engine::runner::{Engine, RunOptions};
+use run::engine::options::RunOptions;
+use run::engine::runner::Engine;
 
 /// Any seed will do: counters must not depend on the schedule, and both programs run with the same one.
 const SEED: u64 = 1;

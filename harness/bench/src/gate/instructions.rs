@@ -9,9 +9,10 @@ use super::subject::Baseline;
 use super::{Bench, left_out};
 use run::engine::interrupt;
 use run::engine::layout::SERIAL;
+use run::engine::options::RunOptions;
 use run::engine::paths::on_path;
 use run::engine::process::{self, ErrorLine, Watch};
-use run::engine::runner::{Engine, RunOptions};
+use run::engine::runner::Engine;
 use std::process::Command;
 
 const VALGRIND: &str = "valgrind";

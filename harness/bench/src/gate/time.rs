@@ -10,8 +10,9 @@ use crate::statistics::trimmed_mean;
 use run::engine::failure::Failure;
 use run::engine::interrupt;
 use run::engine::layout::SERIAL;
+use run::engine::options::RunOptions;
 use run::engine::report::PhaseReport;
-use run::engine::runner::{Completed, Engine, RunOptions};
+use run::engine::runner::{Completed, Engine};
 use std::path::Path;
 
 /// Compares the times of candidate and baseline.

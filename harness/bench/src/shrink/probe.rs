@@ -3,8 +3,9 @@
 use contract::plain::PlainCase;
 use run::engine::failure::{End, Failure as RunFailure};
 use run::engine::layout::{Layout, Ranks};
+use run::engine::options::RunOptions;
 use run::engine::report::RunReport;
-use run::engine::runner::{Engine, RunOptions};
+use run::engine::runner::Engine;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

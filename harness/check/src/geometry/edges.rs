@@ -5,8 +5,8 @@
 
 use contract::case::Facet;
 
+use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::report::{Finding, Kind, Place};
 
 /// One facet at an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

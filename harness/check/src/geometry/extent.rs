@@ -3,8 +3,8 @@
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use serde::Serialize;
 
+use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::report::{Finding, Kind, Place};
 
 /// The bounding box and its distances from the root's faces.
 #[derive(Clone, Debug, PartialEq, Serialize)]

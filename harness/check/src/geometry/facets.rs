@@ -1,8 +1,8 @@
 //! Defects of single facets, and facets that repeat others.
 
 use super::edges::Edges;
+use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::report::{Finding, Kind, Place};
 use contract::lattice::FacetLattice;
 
 /// A facet is a sliver if its height is below this part of its longest edge.

@@ -10,8 +10,8 @@ use std::ops::Range;
 
 use super::boxes::{Bounds, Boxes};
 use super::facets::normal;
+use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::report::{Finding, Kind, Place};
 
 /// How two triangles with area lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,8 @@
 use contract::manifest::Keep;
 use contract::octant::CELLS_PER_EDGE;
 
+use super::finding::{Finding, Kind};
 use super::input::Input;
-use super::report::{Finding, Kind};
 
 /// Whether every occurrence of a kind can change the mesh's region. Openings and intersections are judged one
 /// by one.

@@ -5,7 +5,7 @@
 //! - [`facets`]: defects of single facets, and duplicates;
 //! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search;
 //! - [`extent`]: the body's position in the root;
-//! - [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
+//! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
 //!
 //! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Whatever a decision of the
 //! mesher depends on is decided exactly on the lattice of the definition; widths and gaps are f64.
@@ -15,6 +15,7 @@ pub mod distance;
 pub mod edges;
 pub mod extent;
 pub mod facets;
+pub mod finding;
 pub mod input;
 pub mod intersections;
 pub mod junctions;
@@ -29,8 +30,9 @@ pub mod width;
 
 use boxes::Boxes;
 use edges::Edges;
+use finding::Finding;
 use input::Input;
-use report::{Diagnosis, Finding};
+use report::Diagnosis;
 
 /// What a diagnosis includes.
 #[derive(Clone, Copy, Debug)]
@@ -66,5 +68,5 @@ pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
         }
     }
     findings.extend(extent::findings(input, options.first));
-    Diagnosis::new(input, &edges, shells, findings, options)
+    Diagnosis::new(input, &edges, shells, findings, options.first)
 }

@@ -3,9 +3,9 @@
 use contract::lattice::UNITS_PER_EDGE;
 
 use super::edges::Edges;
+use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::junctions::{Segment, uncancelled};
-use super::report::{Finding, Kind, Place};
 use super::shells::{find, unite};
 use super::width;
 

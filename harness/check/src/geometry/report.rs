@@ -5,119 +5,14 @@ use serde::Serialize;
 
 use super::edges::Edges;
 use super::extent::{self, Extent};
+use super::finding::{Finding, Kind};
 use super::input::Input;
+use super::meaning;
 use super::shells::Shell;
 use super::solids::Solid;
-use super::{Options, meaning};
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-geometry/1";
-
-/// Kinds of findings, in the order of the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// Connected sets of edges with one facet, apart from T-junctions.
-    Openings,
-    /// Edges with one facet that run along others, at a vertex on an edge, so that no opening exists.
-    Junctions,
-    /// Edges with three, five, ... facets.
-    NonManifoldOdd,
-    /// Edges with four, six, ... facets.
-    NonManifoldEven,
-    /// Pairs of facets that traverse their common edge, which has no other facet, in the same direction.
-    Winding,
-    /// Facets with the three vertices of an earlier facet, in any order.
-    Duplicates,
-    /// Facets without area on the lattice.
-    Degenerate,
-    /// Facets with area whose height is below 1e-3 of the longest edge.
-    Slivers,
-    /// Pairs of facets whose interiors share a point on the lattice; duplicates are not among them.
-    Intersections,
-    /// Pairs of facets without a common vertex that share boundary points only, on the lattice.
-    Contacts,
-    /// Facets with an opposite facet less than one cell away, on the inner side.
-    ThinWalls,
-    /// Facets with an opposite facet less than one cell away, on the outer side.
-    ThinGaps,
-    /// Facets with a point beyond the root.
-    OutsideRoot,
-    /// Facets within the root with a point on its boundary.
-    TouchingRoot,
-}
-
-/// Where a finding is.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Place {
-    /// Facets by number, counting from 0, at most [`Place::FACETS_MAX`].
-    pub facets: Vec<u32>,
-    /// A point nearby, in the user's units.
-    pub at: [f64; 3],
-    /// Openings: number of edges.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub edges: Option<u64>,
-    /// Openings: largest distance of two vertices, in the user's units.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub diameter: Option<f64>,
-    /// The same in cells.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub diameter_cells: Option<f64>,
-    /// Openings: free width; thin walls and gaps: distance of the facets. In the user's units.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub width: Option<f64>,
-    /// The same in cells.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub width_cells: Option<f64>,
-}
-
-impl Place {
-    /// Maximum number of facets listed for one place.
-    pub const FACETS_MAX: usize = 8;
-
-    /// A place without sizes.
-    pub fn new(facets: Vec<u32>, at: [f64; 3]) -> Self {
-        let (edges, diameter, width) = (None, None, None);
-        Self { facets, at, edges, diameter, diameter_cells: None, width, width_cells: None }
-    }
-}
-
-/// All findings of one kind.
-#[derive(Clone, Debug, Serialize)]
-pub struct Finding {
-    /// The kind.
-    pub kind: Kind,
-    /// How many exist.
-    pub count: u64,
-    /// How many of them can change the mesh's region.
-    pub count_changing: u64,
-    /// Whether the search ended before all were counted, so that `count` is a lower bound.
-    pub is_lower_bound: bool,
-    /// Openings: number of edges with one facet in all, those of T-junctions included.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub edges: Option<u64>,
-    /// The effect on the mesh; empty where nothing was found.
-    pub meaning: String,
-    /// The first places: widest openings, narrowest sheets, deep before shallow intersections, lowest facet numbers.
-    pub places: Vec<Place>,
-}
-
-impl Finding {
-    /// A finding that has not occurred yet.
-    pub fn new(kind: Kind) -> Self {
-        let (count, count_changing) = (0, 0);
-        let (edges, meaning, places) = (None, String::new(), Vec::new());
-        Self { kind, count, count_changing, is_lower_bound: false, edges, meaning, places }
-    }
-
-    /// Counts one occurrence and lists its place if it is among the first.
-    pub fn add(&mut self, first: usize, place: impl FnOnce() -> Place) {
-        self.count += 1;
-        if self.places.len() < first {
-            self.places.push(place());
-        }
-    }
-}
 
 /// The shells in numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -161,7 +56,7 @@ impl Diagnosis {
         edges: &Edges,
         shells: Vec<Shell>,
         mut findings: Vec<Finding>,
-        options: &Options,
+        first: usize,
     ) -> Self {
         for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
             if meaning::changes_region(finding.kind, input.keep) {
@@ -170,7 +65,7 @@ impl Diagnosis {
             finding.meaning = meaning::meaning(finding, input);
         }
         let closed = shells.iter().filter(|shell| shell.is_closed).count() as u64;
-        let largest = shells.iter().take(options.first).cloned().collect();
+        let largest = shells.iter().take(first).cloned().collect();
         Self {
             schema: SCHEMA,
             facets: input.facets.len() as u64,

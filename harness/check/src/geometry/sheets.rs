@@ -10,9 +10,9 @@ use contract::lattice::UNITS_PER_EDGE;
 use super::boxes::{Bounds, Boxes, unit_normal};
 use super::distance::{dot, nearest, sub};
 use super::edges::Edges;
+use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::intersections::{Relation, relation};
-use super::report::{Finding, Kind, Place};
 
 /// The cosine of 60 degrees.
 const COSINE: f64 = 0.5;

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
+use super::finding::{Finding, Kind, Place};
 use super::meaning::number;
-use super::report::{Diagnosis, Finding, Kind, Place};
+use super::report::Diagnosis;
 
 impl Kind {
     /// The heading of the kind's row.

@@ -1,7 +1,8 @@
 //! Shapes with known defects, and shapes without any.
 
+use check::geometry::finding::{Kind, Place};
 use check::geometry::input::{Asked, Input};
-use check::geometry::report::{Diagnosis, Kind, Place};
+use check::geometry::report::Diagnosis;
 use check::geometry::{Options, diagnose};
 use contract::case::Facet;
 use contract::lattice::Root;

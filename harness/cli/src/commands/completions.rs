@@ -1,7 +1,6 @@
 //! `harness completions`: a completion script from the definition of the command line.
 
-use crate::cli;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 use run::verify::report::EXIT_HOLDS;
 
@@ -12,8 +11,8 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    generate(arguments.shell, &mut cli::Arguments::command(), "harness", &mut std::io::stdout());
+/// Prints the script for the command line `definition`; returns the exit code.
+pub fn run(arguments: &Arguments, definition: &mut Command) -> u8 {
+    generate(arguments.shell, definition, "harness", &mut std::io::stdout());
     EXIT_HOLDS
 }

@@ -1,7 +1,6 @@
 //! `harness man`: manual pages from the definition of the command line.
 
-use crate::cli;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_mangen::{Man, generate_to};
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
 use std::io;
@@ -15,13 +14,12 @@ pub struct Arguments {
     directory: Option<PathBuf>,
 }
 
-/// Writes the pages; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    let command = cli::Arguments::command();
+/// Writes the pages of the command line `definition`; returns the exit code.
+pub fn run(arguments: &Arguments, definition: Command) -> u8 {
     let written = match &arguments.directory {
-        None => Man::new(command).render(&mut io::stdout()),
+        None => Man::new(definition).render(&mut io::stdout()),
         Some(directory) => {
-            std::fs::create_dir_all(directory).and_then(|()| generate_to(command, directory))
+            std::fs::create_dir_all(directory).and_then(|()| generate_to(definition, directory))
         }
     };
     match written {

@@ -1,7 +1,8 @@
 //! The figures of a record: counterparts of the paper's Figures 17 to 23, messages, rate and memory.
 
 use super::groups::{by_case, point, provenance, repetitions};
-use super::{balance, matrix, paper, scaling};
+use super::paper::{self, cited};
+use super::{balance, matrix, scaling};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
@@ -46,12 +47,6 @@ fn series(all: &[&Group], value: impl Fn(&Group) -> Point) -> Vec<Series> {
         Series::new(&format!("{name}, {}", how.word()), how, style, points)
     };
     by_layout(all).into_iter().enumerate().map(of_layout).collect()
-}
-
-/// Values of the paper, which are not joined.
-pub fn cited(name: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-    let points = points.into_iter().map(|(x, y)| Point::exact(x, y)).collect();
-    Series::new(name, Provenance::Cited, 5, points).not_joined()
 }
 
 fn time(group: &Group) -> Point {

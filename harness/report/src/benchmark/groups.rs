@@ -1,4 +1,4 @@
-//! Groups of runs in the form that figures need: by case, as points, with their provenance.
+//! Groups of runs in the form that figures and tables need: by case, as points, with provenance and labels.
 
 use crate::figure::{Point, Provenance};
 use bench::experiments::entry::Comm;
@@ -47,4 +47,18 @@ pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(&'a str, Vec<&'
         }
     }
     out
+}
+
+/// Whether a group is in the summary and in the tables of phases: scaling on at least 16 simulated ranks.
+pub fn is_summarised(group: &Group) -> bool {
+    let scales = ["strong", "weak"].contains(&group.setup.experiment.as_str());
+    scales && group.setup.comm == Comm::Sim && group.setup.ranks >= 16
+}
+
+/// A number of cells to two digits, for names of files.
+pub fn cells_label(cells: u64) -> String {
+    let (value, unit) =
+        if cells >= 1_000_000_000 { (cells as f64 / 1e9, "G") } else { (cells as f64 / 1e6, "M") };
+    let text = if value < 9.5 { format!("{value:.1}") } else { format!("{value:.0}") };
+    format!("{}{unit}", text.trim_end_matches(".0").replace('.', "p"))
 }

@@ -1,13 +1,14 @@
 //! The page of a benchmark report.
 
+use super::groups::is_summarised;
 use super::latex::{commands, machines};
 use super::lint::{Finding, RULES, Verdict};
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
 use bench::experiments::cause::sentence;
-use bench::experiments::entry::{Comm, Line, What};
-use bench::experiments::group::{Group, Groups};
+use bench::experiments::entry::{Line, What};
+use bench::experiments::group::Groups;
 use bench::experiments::table::grouped;
 use maud::{Markup, html};
 
@@ -81,12 +82,6 @@ fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
             }
         }
     }
-}
-
-/// Whether a group is in the summary and in the tables of phases: scaling on at least 16 simulated ranks.
-pub fn is_summarised(group: &Group) -> bool {
-    let scales = ["strong", "weak"].contains(&group.setup.experiment.as_str());
-    scales && group.setup.comm == Comm::Sim && group.setup.ranks >= 16
 }
 
 fn figure(drawn: &Drawn) -> Markup {

@@ -1,6 +1,6 @@
 //! Figures of message matrices: bytes and messages between pairs of ranks.
 
-use super::scaling::cells_label;
+use super::groups::cells_label;
 use crate::figure::{Axis, Body, Claims, Figure, HeatMap, Layer, svg};
 use bench::experiments::entry::Run;
 use bench::experiments::group::Groups;

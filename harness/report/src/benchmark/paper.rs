@@ -3,6 +3,8 @@
 //! The paper does not state the number of facets of its UAV. Its largest mesh (1.6e9 cells in 132 min) has no number of
 //! ranks either and is not among the runs here: it was made with thicker layers on "the same hardware".
 
+use crate::figure::{Point, Provenance, Series};
+
 /// A run in the text of the paper.
 #[derive(Clone, Copy, Debug)]
 pub struct Cited {
@@ -27,6 +29,12 @@ pub const CELLS_OF_BALANCE: f64 = 100e6;
 /// Ranks and speedup over one rank, of the two runs of one mesh.
 pub fn speedups() -> [(f64, f64); 2] {
     [(1.0, 1.0), (RUNS[1].ranks as f64, RUNS[0].time_s / RUNS[1].time_s)]
+}
+
+/// Values of the paper, which are not joined.
+pub fn cited(name: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
+    let points = points.into_iter().map(|(x, y)| Point::exact(x, y)).collect();
+    Series::new(name, Provenance::Cited, 5, points).not_joined()
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! Figures over ranks: speedup, efficiency and its factors, time by phase.
 
-use super::figures::cited;
-use super::groups::{by_case, point, provenance, repetitions};
-use super::paper;
+use super::groups::{by_case, cells_label, point, provenance, repetitions};
+use super::paper::{self, cited};
 use crate::figure::{Axis, Bars, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
@@ -41,14 +40,6 @@ fn meshes<'a>(all: &[&'a Group]) -> Vec<Vec<&'a Group>> {
     }
     out.sort_by_key(|mesh| mesh[0].cells());
     out
-}
-
-/// A number of cells to two digits, for names of files.
-pub fn cells_label(cells: u64) -> String {
-    let (value, unit) =
-        if cells >= 1_000_000_000 { (cells as f64 / 1e9, "G") } else { (cells as f64 / 1e6, "M") };
-    let text = if value < 9.5 { format!("{value:.1}") } else { format!("{value:.0}") };
-    format!("{}{unit}", text.trim_end_matches(".0").replace('.', "p"))
 }
 
 /// The groups of one provenance, by ranks.

@@ -1,6 +1,6 @@
 //! The tables of the page of a benchmark report.
 
-use super::html::is_summarised;
+use super::groups::is_summarised;
 use crate::page::table;
 use bench::experiments::entry::Phase;
 use bench::experiments::group::{Group, Groups, Projection};

@@ -1,9 +1,10 @@
 //! Lines, markers and text as elements of an SVG document.
 
 use super::palette::{MARKERS, colour, hex};
-use super::svg::WIDTH;
 use maud::{Markup, html};
 
+/// Width of every figure in the units of its coordinates.
+pub const WIDTH: u32 = 1600;
 /// The typeface, which is in `font/`.
 pub const FONT: &str = "DejaVu Sans";
 /// Height of the text.

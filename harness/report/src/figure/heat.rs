@@ -3,10 +3,9 @@
 //! Invariants: larger values are darker, so that the order survives in grey; zero has the colour of the background; the
 //! colour scale is logarithmic and ends at powers of ten.
 
-use super::canvas::{Anchor, Canvas, INK, SIZE};
+use super::canvas::{Anchor, Canvas, INK, SIZE, WIDTH};
 use super::palette::{SHADES, hex, shade};
 use super::scale::Scale;
-use super::svg::WIDTH;
 use super::{Axis, Figure, HeatMap, Layer, tick_label};
 
 /// Ends of the colour scale of a layer: powers of ten that enclose its values.

@@ -4,7 +4,7 @@
 //! Invariants: every value states its provenance; points are joined only where interpolation between them is
 //! meaningful; captions state the confidence intervals.
 
-mod canvas;
+pub mod canvas;
 pub mod csv;
 pub mod heat;
 pub mod palette;
@@ -214,7 +214,7 @@ pub struct Figure {
     pub y: Axis,
     /// The data.
     pub body: Body,
-    /// Height in units of which the width has [`svg::WIDTH`].
+    /// Height in units of which the width has [`canvas::WIDTH`].
     pub height: u32,
     /// Facts that the rules for figures are checked against.
     pub claims: Claims,

@@ -3,13 +3,11 @@
 //! Axes and legend are our own: plotters drops ticks of logarithmic axes (see `scale`), puts the legend inside the
 //! frame in one column, where it hides data, and breaks no labels of bars.
 
-use super::canvas::{Anchor, Canvas, DASHED, DOTTED, FAINT, INK, SIZE, width};
+use super::canvas::{Anchor, Canvas, DASHED, DOTTED, FAINT, INK, SIZE, WIDTH, width};
 use super::palette::{colour, hex};
 use super::scale::Scale;
 use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series, heat, tick_label};
 
-/// Width of every figure in the units of its coordinates.
-pub const WIDTH: u32 = 1600;
 /// Usual height of a figure.
 pub const HEIGHT: u32 = 1040;
 

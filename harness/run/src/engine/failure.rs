@@ -3,6 +3,9 @@
 use std::fmt;
 use std::time::Duration;
 
+/// Exit code of mesher and reference for an error in the user's input.
+pub const CODE_INPUT: i32 = 2;
+
 /// How a program failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {

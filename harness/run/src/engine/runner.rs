@@ -5,6 +5,7 @@ use super::description::{Description, Values, fill};
 use super::failure::{End, Failure};
 use super::launcher::{self, Launcher};
 use super::layout::{Layout, Ranks};
+use super::options::RunOptions;
 use super::paths::Paths;
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
@@ -13,7 +14,6 @@ use contract::plain::PlainCase;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 /// An engine, ready to run.
 #[derive(Clone, Debug)]
@@ -22,52 +22,6 @@ pub struct Engine {
     program: PathBuf,
     places: Values<'static>,
     launcher: Launcher,
-}
-
-/// Files, choices and limits of a run.
-#[derive(Clone, Copy, Debug)]
-pub struct RunOptions<'a> {
-    /// Existing directory for the run report, the status and the logs; no other run may use it at the same time.
-    pub place: &'a Path,
-    /// Time after which the run is killed.
-    pub limit: Duration,
-    /// Leaf-set directory to write. An engine without a run report writes its mesh even if this is `None`, to `mesh`
-    /// in `place`.
-    pub mesh: Option<&'a Path>,
-    /// Write a run report. Without one, cells and digest are read from the mesh.
-    pub report: bool,
-    /// Include the message matrix in the run report.
-    pub message_matrix: bool,
-    /// Keep the ranks' activity on disk, to report it if the run hangs.
-    pub status: bool,
-    /// Stop at the base tree.
-    pub ungraded: bool,
-    /// Sample the memory of an engine that does not report it.
-    pub sample_memory: bool,
-}
-
-impl<'a> RunOptions<'a> {
-    /// A run that writes a run report and nothing else.
-    pub fn new(place: &'a Path, limit: Duration) -> Self {
-        Self {
-            place,
-            limit,
-            mesh: None,
-            report: true,
-            message_matrix: false,
-            status: false,
-            ungraded: false,
-            sample_memory: false,
-        }
-    }
-
-    pub(super) fn report_path(&self) -> PathBuf {
-        self.place.join("run.json")
-    }
-
-    pub(super) fn status_path(&self) -> PathBuf {
-        self.place.join("status")
-    }
 }
 
 /// A run that ended well.
@@ -130,16 +84,8 @@ impl Engine {
         self.description.run.json.is_some()
     }
 
-    pub(super) fn places(&self) -> &Values<'static> {
-        &self.places
-    }
-
-    pub(super) fn launcher(&self) -> &Launcher {
-        &self.launcher
-    }
-
     /// The directory to which a run writes its mesh, if it writes one.
-    pub(super) fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
+    fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
         let unreported = || (!self.writes_report()).then(|| options.place.join("mesh"));
         options.mesh.map(Path::to_owned).or_else(unreported)
     }
@@ -167,7 +113,12 @@ impl Engine {
         layout: &Layout,
         options: &RunOptions,
     ) -> Result<Command, Failure> {
-        command::assemble(self, case, layout, options).map_err(|end| self.failure(end))
+        let text = |path: &Path| path.to_string_lossy().into_owned();
+        let mut values = self.places.clone();
+        values.insert("program", text(&self.program));
+        values.extend(self.mesh_path(options).map(|mesh| ("out", text(&mesh))));
+        command::assemble(&self.description.run, &self.launcher, values, case, layout, options)
+            .map_err(|end| self.failure(end))
     }
 
     /// Runs the engine on a case and reads its run report.
@@ -262,4 +213,60 @@ fn completed(mut report: RunReport, finished: &Finished) -> RunReport {
         report.peak_rss_bytes.extend(finished.peak_rss_bytes);
     }
     report
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::layout::SERIAL;
+    use crate::engine::programs::Programs;
+    use std::time::Duration;
+
+    fn words(engine: &Engine, layout: &Layout, options: &RunOptions) -> String {
+        let command = engine.command(Path::new("a.toml"), layout, options).unwrap();
+        let program = Path::new(command.get_program()).file_name().unwrap();
+        let arguments = command.get_args().map(|word| word.to_string_lossy().into_owned());
+        let words = arguments.map(|word| match word.ends_with("/mesher") {
+            true => "mesher".to_owned(),
+            false => word,
+        });
+        let words: Vec<String> = words.collect();
+        format!("{} {}", program.to_string_lossy(), words.join(" "))
+    }
+
+    #[test]
+    fn command_lines_of_our_programs() {
+        let programs = Programs::find(Default::default()).unwrap();
+        let mesher = programs.mesher.with_launcher(Launcher::parse("mpirun -n {ranks}").unwrap());
+        let plain = RunOptions::new(Path::new("p"), Duration::from_secs(1));
+        let files = RunOptions {
+            mesh: Some(Path::new("mesh")),
+            report: false,
+            status: true,
+            ungraded: true,
+            ..plain
+        };
+        let serial = "mesher a.toml --comm solo --quiet --json p/run.json";
+        assert_eq!(words(&mesher, &SERIAL, &plain), serial);
+        let simulated = Layout {
+            partitioner: Some("metis".into()),
+            weights: Some("area".into()),
+            ..Layout::on(Ranks::Simulated { ranks: 3, seed: 7 })
+        };
+        let matrix = RunOptions { message_matrix: true, ..plain };
+        let expected = "mesher a.toml --comm sim:3:7 --quiet --json p/run.json --message-matrix \
+                        --partitioner metis --weights area";
+        assert_eq!(words(&mesher, &simulated, &matrix), expected);
+        let on_mpi = Layout { level_base: Some("2".into()), ..Layout::on(Ranks::Mpi(3)) };
+        let expected = "mpirun -n 3 mesher a.toml --comm mpi --quiet --out mesh --status p/status \
+                        --ungraded --level-base 2";
+        assert_eq!(words(&mesher, &on_mpi, &files), expected);
+        let reference = "reference a.toml --out mesh --ungraded";
+        assert_eq!(words(&programs.reference, &on_serial(&simulated), &files), reference);
+    }
+
+    /// The same choices, serially: the reference does not offer them.
+    fn on_serial(layout: &Layout) -> Layout {
+        Layout { ranks: Ranks::Serial, ..layout.clone() }
+    }
 }

@@ -3,15 +3,12 @@
 use super::case::{CaseRun, RUNS};
 use super::report::{Check, Outcome};
 use super::run::{Meshed, Program, Request};
-use crate::engine::failure::End;
+use crate::engine::failure::{CODE_INPUT, End};
 use crate::engine::layout::SERIAL;
 use check::checks::{self, Subject, identical};
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use std::path::{Path, PathBuf};
-
-/// Exit code of mesher and reference for an error in the user's input.
-pub const CODE_INPUT: i32 = 2;
 
 /// Meshes that later steps use.
 #[derive(Debug)]

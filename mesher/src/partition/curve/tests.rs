@@ -1,7 +1,6 @@
 use super::*;
 use crate::comm::sim;
-use crate::lattice::{Keep, Root};
-use crate::octant::ROOT_BITS;
+use crate::octant::start57;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -135,32 +134,13 @@ proptest! {
 }
 
 #[test]
-fn bins_of_boxes_hold_the_leaves_that_the_boxes_ask_for() {
-    let h = 1i64 << (ROOT_BITS - 6);
-    // 5 x 20 x 33 cells of level 6, at odd positions.
-    let (min, max) = ([h * 3, h * 7, h * 11], [h * 8, h * 27, h * 44]);
-    let rules = Rules {
-        root: Root { origin: [0.0; 3], edge: 1.0 },
-        level_surface: 6,
-        layer_cells_min: 1,
-        keep: Keep::All,
-        keep_crossing: true,
-        boxes: vec![crate::lattice::ExtentBox { min, max, level: 6 }],
-    };
-    let weights = |level: Level, light: u64, within: &Range<u64>| {
-        let mut bins = Vec::new();
-        add_boxes(&mut bins, &rules, level, light, 10, within);
-        merge(&mut bins);
-        bins
-    };
-    let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
-    for (level, light) in [(2, 0), (5, 0), (6, 0), (5, 100), (5, 3300)] {
-        let bins = weights(level, light, &ALL);
-        assert_eq!(sum(&bins), 10 * 5 * 20 * 33, "level {level}, light {light}");
-        assert!(bins.iter().all(|b| b.0.trailing_zeros() >= 3 * (LEVEL_MAX - level)));
-        let middle = start57(5, 12_345);
-        let halves = [0..middle, middle..ALL.end].map(|half| sum(&weights(5, light, &half)));
-        assert_eq!(halves[0] + halves[1], 33_000, "each bin belongs to one interval");
+fn intervals_of_the_curve_are_in_order_and_equally_heavy() {
+    let owners = assign_morton(&[1; 100], 7);
+    assert!(owners.is_sorted());
+    for r in 0..7 {
+        let n = owners.iter().filter(|&&o| o == r).count();
+        assert!((14..=15).contains(&n), "{n}");
     }
-    assert_eq!(weights(5, 3300, &ALL).len(), 1, "light octants are not divided");
+    assert!(assign_morton(&[1, 1], 5).iter().all(|&o| o < 5));
+    assert_eq!(assign_morton(&[1 << 63, 1 << 63, 1 << 63], 3), [0, 1, 2]);
 }

@@ -1,0 +1,57 @@
+//! The options of a run, and the mesh as the phases pass it on.
+
+use crate::lattice::Rules;
+use crate::octant::Level;
+use crate::partition::Division;
+use crate::partition::ownership::Ownership;
+use crate::sides::Sides;
+use crate::stream::Leaves;
+use crate::tree::PerLevel;
+use std::path::PathBuf;
+
+/// Options that have no effect on the mesh, but for `ungraded`.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// How to divide the work among ranks.
+    pub division: Division,
+    /// Stop after sides: the mesh is the base tree T0, with all its leaves.
+    pub ungraded: bool,
+    /// Directory to write the mesh to.
+    pub out: Option<PathBuf>,
+    /// Check invariants after each phase, which debug builds do in any case.
+    pub check: bool,
+}
+
+/// A mesh as one rank holds it.
+pub struct Mesh {
+    /// Number of facets on all ranks.
+    pub facets: u64,
+    /// The rules on the lattice.
+    pub rules: Rules,
+    /// The ranks that own and hold bricks.
+    pub ownership: Ownership,
+    /// Level of the base leaves, or of the octants between which partition boundaries lie.
+    pub level_base: Level,
+    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
+    pub split: PerLevel,
+    /// Crossing leaves of T0.
+    pub crossing: PerLevel,
+    /// Sides of the leaves of T0.
+    pub sides: Sides,
+    /// Whether the tree is T0, of which all leaves are in the mesh.
+    pub is_base: bool,
+}
+
+impl Mesh {
+    /// The leaves that this rank owns.
+    pub fn leaves(&self) -> Leaves<'_> {
+        Leaves {
+            split: &self.split,
+            crossing: &self.crossing,
+            sides: &self.sides,
+            ownership: &self.ownership,
+            all_leaves: self.is_base,
+            rules: &self.rules,
+        }
+    }
+}
