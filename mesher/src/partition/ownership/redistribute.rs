@@ -1,4 +1,5 @@
-//! Redistribution: octants are sent to the ranks that hold their bricks.
+//! Redistribution: sends octants to the ranks that hold their bricks (*hold* is defined in [`ownership`](super)),
+//! whichever rank computed them.
 
 use super::{KEY_BITS, Ownership, Placement, brick_start};
 use crate::brick::Brick;
@@ -9,8 +10,9 @@ use crate::tree::PerLevel;
 use std::ops::Range;
 
 impl Ownership {
-    /// Sends octants of level `l` to the ranks that hold their bricks. Returns the union of those for this rank, for each set, and the
-    /// number of bricks that this rank has sent. Collective.
+    /// Sends octants of level `l` to the ranks that hold their bricks. For each set, returns the union over all ranks,
+    /// restricted to bricks that this rank holds; and the number of bricks sent point to point, once per receiver.
+    /// Fully replicated bricks are not counted. Collective.
     pub fn redistribute<const N: usize>(
         &self,
         l: Level,
@@ -19,22 +21,24 @@ impl Ownership {
     ) -> ([BrickSet; N], u64) {
         let sets = sets.into_iter().map(|set| (l, set)).collect();
         let (sets, sent) = self.redistribute_all(sets, comm);
-        (sets.try_into().expect("one set for each that was given"), sent)
+        (sets.try_into().expect("as many sets as were passed"), sent)
     }
 
-    /// Makes the replicas of all bricks of some sets equal: each becomes the union of what all ranks have. Bricks that a rank does not
-    /// hold are sent to those that do. Collective.
+    /// Replaces each set by its union over all ranks, restricted to the bricks that this rank holds. Afterwards all
+    /// replicas agree. Also moves bricks to their new holders after a change of partition. Collective.
     pub fn synchronise_replicas(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
-        let levels = |set: &mut &mut PerLevel| (0..).zip(std::mem::take(*set)).collect::<Vec<_>>();
+        let take_levels =
+            |set: &mut &mut PerLevel| (0..).zip(std::mem::take(*set)).collect::<Vec<_>>();
         let (synchronised, _) =
-            self.redistribute_all(sets.iter_mut().flat_map(levels).collect(), comm);
+            self.redistribute_all(sets.iter_mut().flat_map(take_levels).collect(), comm);
         let mut synchronised = synchronised.into_iter();
         for set in sets {
             **set = synchronised.by_ref().take(crate::tree::LEVELS).collect();
         }
     }
 
-    /// Sends the octants of several sets, each with its level, to the ranks that hold their bricks.
+    /// Sends the octants of several sets, each with its level, to the ranks that hold their bricks. All ranks pass the same
+    /// levels in the same order. Collective.
     fn redistribute_all(
         &self,
         mut sets: Vec<(Level, BrickSet)>,
@@ -45,23 +49,25 @@ impl Ownership {
         }
         let any_full = sets.iter().any(|(l, _)| *l <= self.level_fully_replicated);
         let mut out = Outgoing::default();
-        let select = |(number, (l, set)): (usize, &mut (Level, BrickSet))| {
-            self.select(number, *l, set, &mut out)
+        let select = |(index, (l, set)): (usize, &mut (Level, BrickSet))| {
+            self.select(index, *l, set, &mut out)
         };
-        let stay: Vec<Range<usize>> = sets.iter_mut().enumerate().map(select).collect();
+        let retained: Vec<Range<usize>> = sets.iter_mut().enumerate().map(select).collect();
         let mut full = std::mem::take(&mut out.full);
         if any_full && let Some(to_reducers) = split_by_reducer(&mut full, |a, b| a | b, comm) {
             full.clear();
-            out.push_by_receiver(FULL, to_reducers);
+            out.push_by_receiver(ENTRIES_TO_REDUCE, to_reducers);
         }
-        let sent = out.sent + out.loose.len() as u64;
+        let single = std::mem::take(&mut out.single);
+        let sent = out.bricks_packed + out.push_by_receiver(ENTRIES, single);
         let messages = out.into_messages(&sets);
-        let held = |((_, mut set), stay): ((Level, BrickSet), Range<usize>)| {
-            set.keep(stay);
+        let retained_part = |((_, mut set), range): ((Level, BrickSet), Range<usize>)| {
+            set.keep(range);
             vec![set]
         };
-        // The parts of each set on this rank: its own, and those received.
-        let mut parts: Vec<Vec<BrickSet>> = sets.into_iter().zip(stay).map(held).collect();
+        // The parts of each set on this rank: the retained one and those received.
+        let mut parts: Vec<Vec<BrickSet>> =
+            sets.into_iter().zip(retained).map(retained_part).collect();
         let mut received: Vec<Entry> = Vec::new();
         for (_, words) in comm.sparse_all_to_all(messages).messages() {
             read_message(words, &mut parts, &mut received, &mut full);
@@ -78,27 +84,27 @@ impl Ownership {
         (parts.into_iter().map(BrickSet::union_of).collect(), sent)
     }
 
-    /// Adds the bricks of set `number` that other ranks hold to `out`. Returns the range of the set that stays on this rank. Fully
-    /// replicated bricks do not stay: they come back with the allgather.
+    /// Adds the bricks of set `set_index` that other ranks hold to `out`. Returns the range of the set that this rank
+    /// retains. Fully replicated bricks are removed: the allgather returns them to all ranks.
     fn select(
         &self,
-        number: usize,
+        set_index: usize,
         l: Level,
         set: &mut BrickSet,
         out: &mut Outgoing,
     ) -> Range<usize> {
         if self.is_single && l > self.level_replicated {
-            // No brick has several owners, and the bricks of each are contiguous.
-            let position =
+            // No brick has several owners, and the bricks of each interval are contiguous.
+            let position_of =
                 |set: &BrickSet, start: u64| set.position(start >> (3 * (LEVEL_MAX + 2 - l)));
-            let local = position(set, self.own.start)..position(set, self.own.end);
+            let local = position_of(set, self.own.start)..position_of(set, self.own.end);
             for others in [0..local.start, local.end..set.len()] {
-                let mut at = others.start;
-                while at < others.end {
-                    let interval = self.intervals.at(brick_start(l, set.key_at(at)));
-                    let theirs = at..position(set, self.intervals.end(interval));
-                    at = theirs.end;
-                    out.send(number, set, theirs, self.intervals.owners[interval]);
+                let mut first = others.start;
+                while first < others.end {
+                    let interval = self.intervals.at(brick_start(l, set.key_at(first)));
+                    let same_owner = first..position_of(set, self.intervals.end(interval));
+                    first = same_owner.end;
+                    out.queue(set_index, set, same_owner, self.intervals.owners[interval]);
                 }
             }
             return local;
@@ -109,15 +115,15 @@ impl Ownership {
             }
             let owners = self.owners_of(l, b.key);
             let placement = self.placement_among(l, owners);
-            let entry = [(number as u64) << KEY_BITS | b.key, b.bits];
+            let entry = [(set_index as u64) << KEY_BITS | b.key, b.bits];
             if placement == Placement::FullyReplicated {
                 out.full.push(entry);
                 return 0;
             }
             if placement != Placement::Local {
-                // Few bricks for several owners each: sent one by one.
+                // Such bricks are few: queued as single entries.
                 let others = owners.iter().filter(|&&owner| owner != self.rank);
-                out.loose.extend(others.map(|&owner| (owner, entry)));
+                out.single.extend(others.map(|&owner| (owner, entry)));
             }
             if matches!(placement, Placement::Local | Placement::PartiallyReplicated) {
                 b.bits
@@ -129,73 +135,76 @@ impl Ownership {
     }
 }
 
-/// Up to this number of bricks are sent one by one, which is as short and simpler.
-const FEW: usize = 10;
+/// Up to this many bricks are sent as (key, bits) entries: no longer than a packed block, and simpler.
+const ENTRIES_MAX: usize = 10;
 
-/// In place of a set's number: entries follow, preceded by their number, each with the number of its set.
-const LOOSE: u64 = 1 << 32;
-/// The same for entries of fully replicated bricks that the receiver reduces.
-const FULL: u64 = LOOSE + 1;
+/// Header of a block of entries, instead of a set index. The number of entries follows, then the entries.
+const ENTRIES: u64 = 1 << 32;
+/// The same for fully replicated bricks, which the receiver reduces.
+const ENTRIES_TO_REDUCE: u64 = ENTRIES + 1;
 
-/// Bricks to send. Entries have the number of their set above the key.
+/// The queue of bricks to send. Entries store their set index in the bits above the key.
 #[derive(Default)]
 struct Outgoing {
-    /// Blocks with their receivers.
+    /// Receiver and block.
     blocks: Vec<(usize, Block)>,
     /// The entries of the blocks.
     entries: Vec<Entry>,
-    /// Single bricks with their receivers.
-    loose: Vec<(usize, Entry)>,
+    /// Receiver and brick, for bricks sent as entries.
+    single: Vec<(usize, Entry)>,
     /// Fully replicated bricks.
     full: Vec<Entry>,
-    /// Number of bricks in blocks of sets.
-    sent: u64,
+    /// Number of bricks in [`Block::Bricks`].
+    bricks_packed: u64,
 }
 
+/// A part of a message.
 enum Block {
-    /// A set's number, and a range of its bricks.
+    /// A set index, and a range of the set's bricks.
     Bricks(usize, Range<usize>),
-    /// The kind, and a range of the entries.
+    /// The header, and a range of [`Outgoing::entries`].
     Entries(u64, Range<usize>),
 }
 
 impl Outgoing {
-    fn send(&mut self, number: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
-        if bricks.len() <= FEW {
-            let entry = |b: Brick| (to, [(number as u64) << KEY_BITS | b.key, b.bits]);
-            return self.loose.extend(bricks.map(|at| entry(set.brick(at))));
+    /// Queues bricks of a set for rank `to`.
+    fn queue(&mut self, set_index: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
+        if bricks.len() <= ENTRIES_MAX {
+            let entry = |b: Brick| (to, [(set_index as u64) << KEY_BITS | b.key, b.bits]);
+            return self.single.extend(bricks.map(|position| entry(set.brick(position))));
         }
-        self.sent += bricks.len() as u64;
-        self.blocks.push((to, Block::Bricks(number, bricks)));
+        self.bricks_packed += bricks.len() as u64;
+        self.blocks.push((to, Block::Bricks(set_index, bricks)));
     }
 
-    fn push_by_receiver(&mut self, kind: u64, mut entries: Vec<(usize, Entry)>) {
+    /// Adds one block of entries per receiver. Returns the number of entries.
+    fn push_by_receiver(&mut self, header: u64, mut entries: Vec<(usize, Entry)>) -> u64 {
         entries.sort_by_key(|e| e.0);
-        // With METIS one owner may have several intervals of an octant.
+        // With METIS a rank may own several intervals in a brick, which gives duplicates.
         entries.dedup();
-        for same in entries.chunk_by(|a, b| a.0 == b.0) {
+        for group in entries.chunk_by(|a, b| a.0 == b.0) {
             let start = self.entries.len();
-            self.entries.extend(same.iter().map(|e| e.1));
-            self.blocks.push((same[0].0, Block::Entries(kind, start..self.entries.len())));
+            self.entries.extend(group.iter().map(|e| e.1));
+            self.blocks.push((group[0].0, Block::Entries(header, start..self.entries.len())));
         }
+        entries.len() as u64
     }
 
-    /// The messages; the bricks are those of `sets`.
+    /// Serialises the queue; [`Block::Bricks`] refer to `sets`.
     fn into_messages(mut self, sets: &[(Level, BrickSet)]) -> MessageBuffer {
-        let loose = std::mem::take(&mut self.loose);
-        self.push_by_receiver(LOOSE, loose);
-        self.blocks.sort_by_key(|p| p.0);
-        // A brick takes one word and a half.
-        let words = 2 * (self.entries.len() + 4 * self.blocks.len()) as u64 + self.sent * 3 / 2;
+        self.blocks.sort_by_key(|block| block.0);
+        // A packed brick takes 1.5 words, an entry 2, the headers of a block about 8.
+        let words =
+            2 * (self.entries.len() + 4 * self.blocks.len()) as u64 + self.bricks_packed * 3 / 2;
         let mut messages = MessageBuffer::with_capacity(words as usize);
         for (to, block) in self.blocks {
             messages.append(to, |words| match block {
-                Block::Bricks(number, bricks) => {
-                    words.push(number as u64);
-                    sets[number].1.pack(bricks, words);
+                Block::Bricks(set_index, bricks) => {
+                    words.push(set_index as u64);
+                    sets[set_index].1.pack(bricks, words);
                 }
-                Block::Entries(kind, entries) => {
-                    words.extend([kind, entries.len() as u64]);
+                Block::Entries(header, entries) => {
+                    words.extend([header, entries.len() as u64]);
                     words.extend(self.entries[entries].as_flattened());
                 }
             });
@@ -204,23 +213,23 @@ impl Outgoing {
     }
 }
 
-/// Reads a message: bricks of sets, entries, and entries of fully replicated bricks that this rank reduces.
+/// Reads a message: parts of sets, entries, and entries of fully replicated bricks that this rank reduces.
 fn read_message(
     mut words: &[u64],
-    sets: &mut [Vec<BrickSet>],
+    parts: &mut [Vec<BrickSet>],
     received: &mut Vec<Entry>,
     full: &mut Vec<Entry>,
 ) {
-    while let Some((&kind, packed)) = words.split_first() {
-        if kind < LOOSE {
+    while let Some((&header, packed)) = words.split_first() {
+        if header < ENTRIES {
             let (set, rest) = BrickSet::unpack(packed);
-            sets[kind as usize].push(set);
+            parts[header as usize].push(set);
             words = rest;
             continue;
         }
         let (entries, rest) = packed[1..].split_at(2 * packed[0] as usize);
-        let to = if kind == FULL { &mut *full } else { &mut *received };
-        to.extend_from_slice(entries.as_chunks().0);
+        let target = if header == ENTRIES_TO_REDUCE { &mut *full } else { &mut *received };
+        target.extend_from_slice(entries.as_chunks().0);
         words = rest;
     }
 }
