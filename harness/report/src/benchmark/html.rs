@@ -6,7 +6,7 @@ use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
 use bench::experiments::cause::sentence;
-use bench::experiments::entry::{Comm, Line, What};
+use bench::experiments::entry::{Comm, Entry, Line};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::table::grouped;
 use maud::{Markup, html};
@@ -56,7 +56,7 @@ pub fn page(
 
 fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
     let runs: usize = groups.all.iter().map(|g| g.runs.len()).sum();
-    let failed = lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
+    let failed = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
     let network = &groups.network;
     html! {
         p {
