@@ -111,14 +111,14 @@ impl Mesh {
     /// each pass selects the longest edges of the mesh that the previous pass produced.
     pub(crate) fn split_edges_until(&mut self, facets: usize) {
         while self.triangles.len() + 1 < facets {
-            let wanted = (facets - self.triangles.len()) / 2;
-            self.split_longest(wanted);
+            let splits_max = (facets - self.triangles.len()) / 2;
+            self.split_longest(splits_max);
         }
     }
 
-    /// Splits between one and `wanted` edges, no two of which share a facet.
-    fn split_longest(&mut self, wanted: usize) {
-        let chosen = edges::longest(self, wanted.saturating_mul(3));
+    /// Splits between one and `splits_max` edges, no two of which share a facet.
+    fn split_longest(&mut self, splits_max: usize) {
+        let chosen = edges::longest(self, splits_max.saturating_mul(3));
         // The chosen edges store only the facet that traverses them upward; find the other facet.
         let slots: HashMap<u64, usize, EdgeHasher> =
             chosen.iter().enumerate().map(|(slot, edge)| (edge.key, slot)).collect();
@@ -133,7 +133,7 @@ impl Mesh {
         let mut is_split = vec![false; self.triangles.len()];
         let mut split = 0;
         for (edge, facet_down) in chosen.iter().zip(down) {
-            if split < wanted && !is_split[edge.facet_up] && !is_split[facet_down] {
+            if split < splits_max && !is_split[edge.facet_up] && !is_split[facet_down] {
                 is_split[edge.facet_up] = true;
                 is_split[facet_down] = true;
                 self.split(edge.ends(), [edge.facet_up, facet_down]);

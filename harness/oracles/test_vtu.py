@@ -18,7 +18,7 @@ EDGE_BITS = 19
 
 
 def decode(words):
-    """Corners (in lattice units), levels and sides of leaf words (SPEC: morton57 << 7 | level << 2 | side)."""
+    """Corners (in lattice units), levels and sides of leaf words (morton57 << 7 | level << 2 | side)."""
     morton = words >> np.uint64(7)
     corners = np.zeros((len(words), 3), np.int64)
     for bit in range(EDGE_BITS):

@@ -1,4 +1,4 @@
-//! Generates a mesh of a wanted size and its T0 for the self test.
+//! Generates a mesh of a requested size and its T0 for the self test.
 
 use crate::experiments::entry::{Comm, Setup};
 use crate::experiments::execute::{Failed, Runner};
@@ -24,13 +24,13 @@ pub fn source(
     place: &Path,
     limit: Duration,
 ) -> Result<Source, Failed> {
-    let base = Base::read(case, place).map_err(Failed::Because)?;
+    let base = Base::read(case, place).map_err(Failed::Reason)?;
     let n = base.layer_cells_min;
     let path = match cells {
         None => base.in_own_root(base.spacing_min, n),
         Some(cells) => base.variant(spacing(programs, &base, cells, place, limit)?, n),
     };
-    let path = path.map_err(Failed::Because)?;
+    let path = path.map_err(Failed::Reason)?;
     let mut made = Vec::new();
     for (name, ungraded) in [("mesh", false), ("base", true)] {
         let out = place.join(format!("{}-{name}", base.name));
@@ -70,7 +70,7 @@ fn spacing(
             partitioner: String::new(),
             weights: String::new(),
         };
-        let case = base.variant(spacing_min, layer_cells_min).map_err(Failed::Because)?;
+        let case = base.variant(spacing_min, layer_cells_min).map_err(Failed::Reason)?;
         runner.run(&setup, &case, 0, true).map(|run| run.cells)
     };
     Sizes::default().spacing(cells as f64, base.coarse(), count)

@@ -1,6 +1,6 @@
 //! Data for tests, here and in the crates that build on this one.
 
-use crate::experiments::entry::{Comm, Line, Phase, Run, SCHEMA, Setup, Spread, What};
+use crate::experiments::entry::{Comm, Entry, Line, Phase, Run, SCHEMA, Setup, Spread};
 use crate::targets::Targets;
 use crate::track::history::Record;
 use std::collections::BTreeMap;
@@ -48,8 +48,8 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
 }
 
 /// Returns a line of a record.
-pub fn line(what: What) -> Line {
-    Line { schema: SCHEMA.into(), session: "s".into(), time_utc: "t".into(), what }
+pub fn line(entry: Entry) -> Line {
+    Line { schema: SCHEMA.into(), session: "s".into(), time_utc: "t".into(), entry }
 }
 
 /// Returns a history of 30 commits in which `uav/words` grows by a tenth at commit 20, with noise below one percent.
@@ -73,7 +73,7 @@ pub fn history() -> Vec<Record> {
 /// Returns the targets declared by a file with this text.
 ///
 /// # Errors
-/// As [`Targets::read`], with `FILE` in the place of the path.
+/// As [`Targets::read`], with `FILE` instead of the path.
 pub fn targets(text: &str) -> Result<Targets, String> {
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("targets.toml");

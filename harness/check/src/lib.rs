@@ -4,7 +4,7 @@
 //! - [`checks`]: one file per property; [`audit`](mod@audit): the checks that need only the leaves, for meshes of any size;
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
 //! - [`geometry`]: diagnosis of a geometry before it is meshed;
-//! - [`oracle`]: the points for which other programs are asked, and the evaluation of their answers;
+//! - [`oracle`]: the sample points of the oracles, and the evaluation of their answers;
 //! - [`selftest`]: corrupted meshes that the checks must detect.
 
 pub mod audit;

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn targets_takes_the_options_of_a_session() {
+    fn targets_accepts_the_options_of_a_session() {
         let words = ["harness", "targets", "t.toml", "--only", "a,b", "--repeat", "2", "--show"];
         let Command::Targets(targets) = Arguments::try_parse_from(words).unwrap().command else {
             panic!()

@@ -276,9 +276,9 @@ mod tests {
                     [[box]]\nmin = [-4.0, 1.0, 2.0]\nmax = [4.0, 99.0, 3.0]\nspacing = 0.3";
         let case = Case::from_parts(text, vec![]).unwrap();
         let unit = 1 << 24;
-        let want =
+        let expected =
             ExtentBox { min: [0, unit, 2 * unit], max: [4 * unit, 8 * unit, 3 * unit], level: 5 };
-        assert_eq!(case.boxes, [want]);
+        assert_eq!(case.boxes, [expected]);
         assert_eq!(case.level_deepest(), 5);
     }
 

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 )]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
-    /// Seconds each; the oracles are asked about every leaf of the base tree.
+    /// Seconds each; the oracles decide every leaf of the base tree.
     Small,
     /// Up to some millions of cells.
     Medium,
@@ -173,7 +173,7 @@ fn missing_geometry(case: &Path) -> Option<String> {
     let exists = case.parent()?.join(&geometry).exists();
     (!exists).then(|| {
         format!(
-            "{} is not here; ci/setup --geometries fetches what may be fetched",
+            "{} is missing; ci/setup --geometries fetches it if it can be fetched",
             geometry.display()
         )
     })

@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_go_to_even() {
+    fn ties_are_rounded_to_even() {
         let root = Root { origin: [0.0; 3], edge: UNITS_PER_EDGE as f64 };
         assert_eq!(root.quantise([0.5, 1.5, 2.5]), Some([0, 2, 2]));
     }

@@ -26,7 +26,7 @@ pub enum Keep {
     Outside,
     /// Internal flow.
     Inside,
-    /// Everything.
+    /// Both sides.
     All,
 }
 
@@ -125,7 +125,7 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Replaces everything that follows from the leaves.
+    /// Replaces all entries that depend on the leaves.
     pub fn set_tally(&mut self, tally: Tally) {
         self.leaves = tally.leaves;
         self.leaves_by_level = tally.by_level;
@@ -149,7 +149,7 @@ pub fn part_name(index: usize) -> String {
     format!("leaves-{index:05}.npy")
 }
 
-/// The entries of a manifest that follow from the leaves alone.
+/// The entries of a manifest that depend on the leaves alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tally {
     /// Number of words.

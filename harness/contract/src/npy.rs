@@ -172,8 +172,8 @@ mod tests {
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!(part.read_all().unwrap(), words);
         for probe in [0, 1, 2, 5000, 9801, 9802] {
-            let want = words.partition_point(|&w| w < probe) as u64;
-            assert_eq!(part.lower_bound(probe).unwrap(), want);
+            let expected = words.partition_point(|&w| w < probe) as u64;
+            assert_eq!(part.lower_bound(probe).unwrap(), expected);
         }
     }
 

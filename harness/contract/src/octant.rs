@@ -150,8 +150,10 @@ mod tests {
             let (low, high) = octant.bounds();
             for offset in triples(-1..=1) {
                 let edge = high[0] - low[0];
-                let want: [i64; 3] = std::array::from_fn(|a| low[a] + i64::from(offset[a]) * edge);
-                let found = all.iter().find(|o| o.level == octant.level && o.bounds().0 == want);
+                let expected: [i64; 3] =
+                    std::array::from_fn(|a| low[a] + i64::from(offset[a]) * edge);
+                let found =
+                    all.iter().find(|o| o.level == octant.level && o.bounds().0 == expected);
                 assert_eq!(octant.neighbour(offset), found.copied());
             }
         }

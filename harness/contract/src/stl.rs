@@ -117,7 +117,7 @@ mod tests {
 
     const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
                          vertex 0 1 -2.5e-1\nendloop\nendfacet\n";
-    const WANT: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, -0.25]];
+    const EXPECTED: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, -0.25]];
 
     fn of(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
         binary(bytes).map_or_else(|| ascii(bytes), Ok)
@@ -127,13 +127,13 @@ mod tests {
     fn ascii_files_may_have_several_solids_any_line_ends_and_any_case() {
         let plain = format!("solid a\n{FACET}endsolid a\n");
         let two = format!("{plain}solid vertex 1 2 3\n{FACET}endsolid\n");
-        assert_eq!(of(plain.as_bytes()).unwrap(), [WANT]);
-        assert_eq!(of(two.as_bytes()).unwrap(), [WANT, WANT]);
+        assert_eq!(of(plain.as_bytes()).unwrap(), [EXPECTED]);
+        assert_eq!(of(two.as_bytes()).unwrap(), [EXPECTED, EXPECTED]);
         for text in [plain.replace('\n', "\r\n"), plain.replace('\n', "\r"), plain.to_uppercase()] {
-            assert_eq!(of(text.as_bytes()).unwrap(), [WANT]);
+            assert_eq!(of(text.as_bytes()).unwrap(), [EXPECTED]);
         }
         let one_line = format!("\n  solid\n{}\nendsolid", FACET.replace('\n', " "));
-        assert_eq!(of(one_line.as_bytes()).unwrap(), [WANT]);
+        assert_eq!(of(one_line.as_bytes()).unwrap(), [EXPECTED]);
         assert_eq!(of(b"solid\nendsolid").unwrap(), [] as [Facet; 0]);
     }
 
@@ -143,9 +143,9 @@ mod tests {
         bytes.resize(80, b' ');
         bytes.extend(1u32.to_le_bytes());
         bytes.extend([0; 12]);
-        WANT.as_flattened().iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+        EXPECTED.as_flattened().iter().for_each(|c| bytes.extend(c.to_le_bytes()));
         bytes.extend([0; 2]);
-        assert_eq!(of(&bytes).unwrap(), [WANT]);
+        assert_eq!(of(&bytes).unwrap(), [EXPECTED]);
         assert!(of(&bytes[..bytes.len() - 1]).is_err());
     }
 

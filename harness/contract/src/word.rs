@@ -181,19 +181,19 @@ mod tests {
 
         #[test]
         fn keys_interleave_bit_by_bit(x in 0..CELLS_PER_EDGE, y in 0..CELLS_PER_EDGE, z in 0..CELLS_PER_EDGE) {
-            let mut want = 0u64;
+            let mut expected = 0u64;
             for bit in 0..19 {
                 for (a, c) in [x, y, z].into_iter().enumerate() {
-                    want |= u64::from(c >> bit & 1) << (3 * bit + a);
+                    expected |= u64::from(c >> bit & 1) << (3 * bit + a);
                 }
             }
-            prop_assert_eq!(key_of([x, y, z]), want);
-            prop_assert_eq!(corner_of(want), [x, y, z]);
+            prop_assert_eq!(key_of([x, y, z]), expected);
+            prop_assert_eq!(corner_of(expected), [x, y, z]);
         }
     }
 
     #[test]
-    fn each_fault_has_its_own_error() {
+    fn each_invalid_field_has_its_own_error() {
         assert_eq!(fault(20 << 2), Some(WordError::LevelTooDeep(20)));
         assert_eq!(fault(3), Some(WordError::SideUnknown));
         assert_eq!(fault(1 << 7), Some(WordError::Misaligned));

@@ -17,11 +17,11 @@ fn files(folder: &str) -> Vec<PathBuf> {
 fn all_tricky_files_contain_the_same_facets() {
     let files = files("tricky");
     let plain = files.iter().find(|p| p.ends_with("tricky/binary.stl")).unwrap();
-    let want: Vec<Facet> = stl::read(plain).unwrap();
-    assert_eq!(want.len(), 8);
+    let expected: Vec<Facet> = stl::read(plain).unwrap();
+    assert_eq!(expected.len(), 8);
     for path in files {
         let found = stl::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-        assert_eq!(found, want, "{}", path.display());
+        assert_eq!(found, expected, "{}", path.display());
     }
 }
 

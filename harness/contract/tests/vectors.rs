@@ -61,14 +61,14 @@ fn levels_and_lattice_coordinates_match_the_vectors() {
     }
     let root = |v: &Value| Root { origin: triple(&v["origin"], float), edge: float(&v["edge"]) };
     for v in vectors("quantised") {
-        let want =
+        let expected =
             (!v["lattice"].is_null()).then(|| triple(&v["lattice"], |q| q.as_i64().unwrap()));
-        assert_eq!(root(&v).quantise(triple(&v["vertex"], float)), want);
+        assert_eq!(root(&v).quantise(triple(&v["vertex"], float)), expected);
     }
     for v in vectors("boxes") {
         for (given, on_lattice) in [("min", "lattice_min"), ("max", "lattice_max")] {
-            let want = triple(&v[on_lattice], |q| q.as_i64().unwrap());
-            assert_eq!(root(&v).quantise_clamped(triple(&v[given], float)), want);
+            let expected = triple(&v[on_lattice], |q| q.as_i64().unwrap());
+            assert_eq!(root(&v).quantise_clamped(triple(&v[given], float)), expected);
         }
     }
 }

@@ -84,7 +84,7 @@ static void read_part(const char *path, struct words *words)
     size_t count = read_npy_header(file, path);
     words->data = realloc(words->data, (words->count + count + 1) * sizeof(uint64_t));
     if (words->data == NULL)
-        fail(EXIT_TREE, "there is not enough memory for the %zu leaves of %s", count, path);
+        fail(EXIT_TREE, "not enough memory for the %zu leaves of %s", count, path);
     if (fread(words->data + words->count, sizeof(uint64_t), count, file) != count)
         fail(EXIT_TREE, "%s has fewer leaves than its header specifies", path);
     words->count += count;

@@ -41,7 +41,7 @@ fn count(rows: &[Judged]) -> String {
         number(Verdict::Missed),
         number(Verdict::Failed),
         number(Verdict::LeftOut),
-        number(Verdict::Told)
+        number(Verdict::ForComparison)
     )
 }
 

@@ -1,18 +1,18 @@
 //! A report from a record of every experiment: its files, its trend, its page.
 
 use bench::experiments::entry::{
-    Comm, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread, What,
+    Comm, Entry, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread,
 };
 use bench::track::history::Record;
 use report::benchmark::report;
 use std::path::Path;
 
-fn line(what: What) -> Line {
+fn line(entry: Entry) -> Line {
     Line {
         schema: SCHEMA.into(),
         session: "s".into(),
         time_utc: "2026-01-31T12:00:00Z".into(),
-        what,
+        entry,
     }
 }
 
@@ -27,7 +27,7 @@ fn session() -> Line {
         commit: "0123456789ab".into(),
     };
     let command = vec!["harness".into(), "bench".into()];
-    line(What::Session(Box::new(Session { command, machine, load_average: 0.0 })))
+    line(Entry::Session(Box::new(Session { command, machine, load_average: 0.0 })))
 }
 
 /// Six repetitions of a run with nearly the same load on every rank.
@@ -64,7 +64,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             ("leaves".to_owned(), Spread::of(&vec![cells as f64 / ranks as f64; ranks])),
             ("base_leaf_cells_max".to_owned(), Spread::of(&vec![cells as f64 / 500.0; ranks])),
         ];
-        line(What::Run(Box::new(Run {
+        line(Entry::Run(Box::new(Run {
             setup,
             repeat,
             warm_up: false,
@@ -88,7 +88,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
 /// A warm-up with a message matrix.
 fn warm_up() -> Line {
     let mut line = run("strong", Comm::Sim, 4, 50_000_000, 4, "").remove(0);
-    if let What::Run(run) = &mut line.what {
+    if let Entry::Run(run) = &mut line.entry {
         (run.warm_up, run.message_matrix) = (true, vec![[0, 1, 3, 96], [3, 0, 1, 4096]]);
     }
     line
@@ -96,7 +96,7 @@ fn warm_up() -> Line {
 
 fn record() -> Vec<Line> {
     let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
-    let mut lines = vec![session(), line(What::Network(network)), warm_up()];
+    let mut lines = vec![session(), line(Entry::Network(network)), warm_up()];
     for ranks in [1, 2, 4, 16, 32, 64] {
         lines.extend(run("strong", Comm::Sim, ranks, 50_000_000, 4, ""));
         lines.extend(run("weak", Comm::Sim, ranks, 1_000_000 * ranks as u64, 4, ""));
@@ -201,7 +201,7 @@ fn the_page_is_self_contained() {
         assert!(!page.contains(external), "{external}");
     }
     assert_eq!(page.matches("url(").count(), page.matches("url(#").count());
-    // The namespace of SVG is a name and no address.
+    // The namespace of SVG is a name, not an address.
     let rest = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!rest.contains("http:") && !rest.contains("https:"));
     for reference in rest.split("href=\"").skip(1) {

@@ -60,7 +60,7 @@ impl Question {
     pub fn ask(&self, oracle: &str, paths: &Paths, limit: Duration) -> Result<Answer, Failure> {
         let failure = |end| Failure::new(oracle, end);
         if !paths.python.is_file() {
-            let why = format!("needs Python at {} (ci/setup makes it)", paths.python.display());
+            let why = format!("needs Python at {} (ci/setup installs it)", paths.python.display());
             return Err(failure(End::Missing(why)));
         }
         let sides = self.place.join(format!("{oracle}.npy"));
@@ -103,7 +103,7 @@ mod tests {
     const POINTS: [[f64; 3]; 2] = [[0.5, -1.0, 1e300], [2.0, 3.0, 4.0]];
     const BODY: [Facet; 1] = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]];
 
-    /// Runs a shell script in the place of Python; it sees the protocol's arguments as $3, $4 and $5.
+    /// Runs a shell script instead of Python, with the protocol's arguments as $3, $4 and $5.
     fn ask(script: &str) -> Result<Vec<bool>, Failure> {
         let place = tempfile::tempdir().unwrap();
         let python = place.path().join("python");
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn each_failure_has_its_sentence() {
+    fn each_failure_has_its_own_message() {
         let sentence = |script: &str| ask(script).unwrap_err().to_string();
         let missing = ask("echo no module >&2; exit 3").unwrap_err().end;
         assert_eq!(missing, End::Missing("is not installed: no module".into()));

@@ -7,7 +7,7 @@ use crate::verify::report::{CaseReport, Missing, Report, Run, SCHEMA};
 use contract::catalogue::Size;
 use std::time::Duration;
 
-/// A report with one of everything, also for the tests of the output formats.
+/// A report with one entry of every kind, also for the tests of the output formats.
 pub fn report() -> Report {
     let layout = Layout {
         partitioner: Some("metis".into()),

@@ -23,13 +23,13 @@ pub struct Line {
     pub time_utc: String,
     /// The content.
     #[serde(flatten)]
-    pub what: What,
+    pub entry: Entry,
 }
 
-/// The kinds of lines.
+/// The content of a line, by kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum What {
+pub enum Entry {
     /// A session begins.
     Session(Box<Session>),
     /// The cost of messages.
@@ -172,7 +172,7 @@ pub struct Setup {
     pub comm: Comm,
     /// `metis` or `morton`; empty if the choice was left to the program.
     pub partitioner: String,
-    /// `unit`, `area`, `rehearsal` or `rebalance`; empty if the choice was left to the program.
+    /// `unit`, `area` or `rebalance` (`rehearsal` in old records); empty if the choice was left to the program.
     pub weights: String,
 }
 
@@ -279,15 +279,16 @@ pub struct Judged {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Within its bounds.
+    /// The value is within the bounds.
     Met,
-    /// Outside its bounds.
+    /// The value is outside the bounds.
     Missed,
-    /// It has no bounds and serves for comparison.
-    Told,
+    /// The row has no bounds.
+    #[serde(rename = "told")]
+    ForComparison,
     /// A run failed.
     Failed,
-    /// It was not measured, because the user excluded it or a prerequisite is missing.
+    /// The row was not measured: the user excluded it or a prerequisite is missing.
     LeftOut,
 }
 
@@ -312,7 +313,7 @@ mod tests {
             schema: SCHEMA.into(),
             session: "s".into(),
             time_utc: "2026-01-31T12:00:00Z".into(),
-            what: What::Network(network),
+            entry: Entry::Network(network),
         };
         let text = serde_json::to_string(&line).unwrap();
         assert!(text.contains(r#""kind":"network""#), "{text}");

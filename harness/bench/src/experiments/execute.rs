@@ -38,20 +38,20 @@ pub struct Runner<'a> {
     pub place: &'a Path,
 }
 
-/// Why there is no result.
+/// Why a run gave no result.
 #[derive(Debug)]
 pub enum Failed {
     /// The user interrupted the harness.
     Interrupted,
     /// A failure, in a sentence.
-    Because(String),
+    Reason(String),
 }
 
 impl From<Failure> for Failed {
     fn from(failure: Failure) -> Self {
         match failure.is_interrupt() {
             true => Self::Interrupted,
-            false => Self::Because(failure.to_string()),
+            false => Self::Reason(failure.to_string()),
         }
     }
 }
@@ -81,7 +81,7 @@ impl Runner<'_> {
         if setup.comm == Comm::Sim && report.phases.is_empty() {
             let why =
                 "its run report has no phases, without which simulated ranks cannot be projected";
-            return Err(Failed::Because(why.to_owned()));
+            return Err(Failed::Reason(why.to_owned()));
         }
         Ok(Run {
             repeat,
@@ -103,7 +103,7 @@ impl Runner<'_> {
     /// If the mesh or the audit fails. A mesh with findings is a result.
     pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, Failed> {
         let place = tempfile::Builder::new().prefix("harness-audit-").tempdir_in(disk);
-        let place = place.map_err(|error| Failed::Because(error.to_string()))?;
+        let place = place.map_err(|error| Failed::Reason(error.to_string()))?;
         let mesh = place.path().join("mesh");
         let options = RunOptions {
             mesh: Some(&mesh),
@@ -120,7 +120,7 @@ impl Runner<'_> {
             Ok(_) | Err(Failure { end: End::Exited { code: 1, .. }, .. }) => {}
             Err(failure) => return Err(failure.into()),
         }
-        let record = AuditRecord::read(&json).map_err(Failed::Because)?;
+        let record = AuditRecord::read(&json).map_err(Failed::Reason)?;
         let found = record.checks.iter().filter(|c| c.findings > 0).map(|c| c.name.clone());
         Ok(Audited {
             setup: setup.clone(),
@@ -142,7 +142,7 @@ impl Runner<'_> {
         let program = self.programs.mesher.program().with_file_name("pingpong");
         if !program.is_file() {
             return Err(format!(
-                "there is no {}: build the mesher with --features mpi",
+                "{} is missing: build the mesher with --features mpi",
                 program.display()
             ));
         }

@@ -24,15 +24,15 @@ mod tests {
     use std::time::Duration;
 
     /// The measured run of a shell script.
-    fn played(script: &str, json: &str, comm: Comm) -> Result<Run, String> {
+    fn scripted(script: &str, json: &str, comm: Comm) -> Result<Run, String> {
         let place = tempfile::tempdir().unwrap();
-        std::fs::write(place.path().join("play.sh"), script).unwrap();
+        std::fs::write(place.path().join("engine.sh"), script).unwrap();
         let words =
             "serial = ['sh', '{program}', '{case}']\nsimulated = ['sh', '{program}', '{case}']\n";
         let text = format!(
-            "about = 'x'\nprogram = '{{here}}/play.sh'\n[run]\n{words}out = ['{{out}}']\n{json}"
+            "about = 'x'\nprogram = '{{here}}/engine.sh'\n[run]\n{words}out = ['{{out}}']\n{json}"
         );
-        let file = place.path().join("played.toml");
+        let file = place.path().join("scripted.toml");
         std::fs::write(&file, text).unwrap();
         let limit = Duration::from_secs(60);
         let file = file.to_str().unwrap();
@@ -51,21 +51,21 @@ mod tests {
     #[test]
     fn time_and_memory_are_measured_from_outside_if_they_are_not_reported() {
         let script = "sleep 0.05; echo '{\"cells\": 8, \"digest\": \"ab\"}' > $2";
-        let run = played(script, REPORTS, Comm::Solo).unwrap();
+        let run = scripted(script, REPORTS, Comm::Solo).unwrap();
         assert_eq!(
             (run.setup.engine.as_str(), run.cells, run.digest.as_str()),
-            ("played", 8, "ab")
+            ("scripted", 8, "ab")
         );
         assert!(run.time_wall_s >= 0.05 && run.time_wall_s == run.time_launch_s);
         assert!(run.peak_rss_bytes.sum > 1e5 && run.useful_s.sum > 0.0);
-        assert!(run.command.starts_with("sh play.sh case.toml"), "{}", run.command);
+        assert!(run.command.starts_with("sh engine.sh case.toml"), "{}", run.command);
     }
 
     #[test]
     fn reported_time_and_memory_take_precedence() {
         let report = r#"{"cells": 8, "digest": "ab", "time_wall_s": 7.5, "peak_rss_bytes": [3, 4],
             "phases": [{"name": "all", "time_cpu_s": [2.0, 1.0]}]}"#;
-        let run = played(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
+        let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
         assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (7.5, 4.0));
         assert_eq!((run.useful_s.by_rank, run.phases[0].useful_s.max), (vec![2.0, 1.0], 2.0));
     }
@@ -73,10 +73,12 @@ mod tests {
     #[test]
     fn a_run_without_the_required_output_is_a_failure() {
         let script = "echo '{\"cells\": 8, \"digest\": \"ab\"}' > $2";
-        assert!(played(script, REPORTS, Comm::Sim).unwrap_err().contains("no phases"));
-        assert!(played("mkdir $2", "", Comm::Solo).unwrap_err().contains("mesh.json"));
+        assert!(scripted(script, REPORTS, Comm::Sim).unwrap_err().contains("no phases"));
+        assert!(scripted("mkdir $2", "", Comm::Solo).unwrap_err().contains("mesh.json"));
         assert!(
-            played("echo no >&2; exit 3", REPORTS, Comm::Solo).unwrap_err().contains("code 3: no")
+            scripted("echo no >&2; exit 3", REPORTS, Comm::Solo)
+                .unwrap_err()
+                .contains("code 3: no")
         );
     }
 

@@ -1,6 +1,6 @@
 //! Repetitions of the same setup, and the statistics of each such group.
 
-use super::entry::{Comm, Line, Network, Phase, Run, Setup, Spread, What};
+use super::entry::{Comm, Entry, Line, Network, Phase, Run, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::statistics::{Median, median};
@@ -8,7 +8,7 @@ use crate::statistics::{Median, median};
 /// The repetitions of one run.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// What was run.
+    /// The parameters of the runs.
     pub setup: Setup,
     /// The runs without warm-ups, in chronological order.
     pub runs: Vec<Run>,
@@ -145,9 +145,9 @@ impl Groups {
         let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
         let mut matrices: Vec<Run> = Vec::new();
         for line in lines {
-            match &line.what {
-                What::Network(n) => network = *n,
-                What::Run(run) if !run.warm_up => {
+            match &line.entry {
+                Entry::Network(n) => network = *n,
+                Entry::Run(run) if !run.warm_up => {
                     match by_setup.iter_mut().find(|(setup, _)| *setup == run.setup) {
                         Some((_, runs)) => runs.push((**run).clone()),
                         None => by_setup.push((run.setup.clone(), vec![(**run).clone()])),
@@ -156,8 +156,8 @@ impl Groups {
                 _ => {}
             }
         }
-        let with_matrix = lines.iter().filter_map(|line| match &line.what {
-            What::Run(run) if !run.message_matrix.is_empty() => Some(&**run),
+        let with_matrix = lines.iter().filter_map(|line| match &line.entry {
+            Entry::Run(run) if !run.message_matrix.is_empty() => Some(&**run),
             _ => None,
         });
         for run in with_matrix {
@@ -168,13 +168,13 @@ impl Groups {
         Self { all: by_setup.into_iter().filter_map(group).collect(), matrices, network }
     }
 
-    /// Returns the groups whose setup is `wanted`, in ascending order of `key`.
+    /// Returns the groups whose setup satisfies `predicate`, in ascending order of `key`.
     pub fn series<K: PartialOrd>(
         &self,
-        wanted: impl Fn(&Setup) -> bool,
+        predicate: impl Fn(&Setup) -> bool,
         key: impl Fn(&Group) -> K,
     ) -> Vec<&Group> {
-        let mut found: Vec<&Group> = self.all.iter().filter(|g| wanted(&g.setup)).collect();
+        let mut found: Vec<&Group> = self.all.iter().filter(|g| predicate(&g.setup)).collect();
         found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
         found
     }
@@ -250,11 +250,15 @@ mod tests {
     use crate::testing::run;
 
     fn line_of(run: Run) -> Line {
-        line(What::Run(Box::new(run)))
+        line(Entry::Run(Box::new(run)))
     }
 
     fn free() -> Line {
-        line(What::Network(Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true }))
+        line(Entry::Network(Network {
+            latency_s: 0.0,
+            bandwidth_bytes_per_s: 1e30,
+            measured: true,
+        }))
     }
 
     #[test]
@@ -304,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn without_times_by_rank_a_real_run_is_typical() {
+    fn without_times_by_rank_the_typical_run_is_a_measured_one() {
         let mut brief = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
         brief.phases[0].useful_s.by_rank.clear();
         let lines =

@@ -22,7 +22,7 @@ pub mod sizing;
 pub mod table;
 pub mod variant;
 
-use entry::{Comm, Line, What};
+use entry::{Comm, Entry, Line};
 use plan::Study;
 use points::warmers;
 use run::engine::programs::Programs;
@@ -39,24 +39,24 @@ pub struct Outcome {
     pub failures: usize,
 }
 
-/// Runs a session. `say` receives progress messages.
+/// Runs a session. `progress` receives messages for the user.
 ///
 /// # Errors
 /// If the input is invalid, a program is missing, or the user interrupts.
 pub fn bench(
     options: &Options,
     programs: &Programs,
-    say: &mut dyn FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
     let place = session::temporary_directory()?;
-    let mut bench = Bench::open(options, programs, place.path(), say)?;
+    let mut bench = Bench::open(options, programs, place.path(), progress)?;
     if options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim) {
         bench.measure_network()?;
     }
     for study in &options.studies {
         bench.study(study)?;
     }
-    let failures = bench.lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
+    let failures = bench.lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
     Ok(Outcome { lines: bench.lines, failures })
 }
 
@@ -64,7 +64,10 @@ impl Bench<'_> {
     /// Runs a study.
     fn study(&mut self, study: &Study) -> Result<(), BenchError> {
         let base = self.base(&study.case)?;
-        (self.say)(&format!("{} scaling of {}: choosing spacings", study.experiment, base.name));
+        (self.progress)(&format!(
+            "{} scaling of {}: choosing spacings",
+            study.experiment, base.name
+        ));
         let mut points = self.points(study, &base)?;
         self.warm_up(&mut points)?;
         for repeat in 0..study.repeats {

@@ -105,14 +105,14 @@ const MILLION: u64 = 1_000_000;
 
 /// Returns the studies of a preset with the overrides applied.
 pub fn studies(preset: Preset, overrides: &Overrides) -> Vec<Study> {
-    let wanted = |s: &Study| {
+    let is_selected = |s: &Study| {
         overrides.experiments.is_empty() || overrides.experiments.contains(&s.experiment)
     };
     let mut of_preset: Vec<Study> = match preset {
         Preset::Small => small(),
         Preset::Full => full(),
     };
-    of_preset.retain(wanted);
+    of_preset.retain(is_selected);
     of_preset.retain(|s| !(overrides.no_choice && s.experiment == Experiment::Weights));
     if !overrides.cases.is_empty() {
         of_preset = on_cases(of_preset, &overrides.cases);
@@ -326,11 +326,11 @@ mod tests {
     #[test]
     fn presets_contain_every_experiment() {
         for preset in [Preset::Small, Preset::Full] {
-            let mut asked: Vec<Experiment> =
+            let mut experiments: Vec<Experiment> =
                 studies(preset, &Overrides::default()).iter().map(|s| s.experiment).collect();
-            asked.sort();
-            asked.dedup();
-            assert_eq!(asked.len(), 5);
+            experiments.sort();
+            experiments.dedup();
+            assert_eq!(experiments.len(), 5);
         }
     }
 }

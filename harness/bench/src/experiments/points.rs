@@ -22,7 +22,7 @@ impl Bench<'_> {
                 for spacing in self.spacings(study, base, layout, &mut sizes)? {
                     let case = base.variant(spacing, n).map_err(BenchError::Input)?;
                     if let Some(why) = self.declined(&case)? {
-                        (self.say)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
+                        (self.progress)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
                         continue;
                     }
                     for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
@@ -85,16 +85,16 @@ impl Bench<'_> {
         let Some(cells) = study.cells else { return Ok(vec![base.spacing_min]) };
         let n = base.layer_cells_min;
         let known = sizes.entry(n).or_default();
-        let wanted = match study.experiment {
+        let target = match study.experiment {
             Experiment::Weak => cells as f64 * layout.ranks as f64,
             _ => cells as f64,
         };
         let coarse = base.coarse();
-        let finest = known.spacing(wanted, coarse, |spacing| self.count(base, spacing, n))?;
+        let finest = known.spacing(target, coarse, |spacing| self.count(base, spacing, n))?;
         Ok(match study.experiment {
             Experiment::Spacing => {
                 // Coarser by factors of two, while there are enough cells to measure.
-                let halvings = (wanted / 1e5).log(4.0).max(0.0) as i32;
+                let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
                 (0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect()
             }
             _ => vec![finest],
@@ -118,7 +118,7 @@ impl Bench<'_> {
         match self.runner.run(&setup, &case, 0, true) {
             Ok(run) => Ok(run.cells),
             Err(Failed::Interrupted) => Err(BenchError::Interrupted),
-            Err(Failed::Because(why)) => Err(BenchError::Input(format!("{}: {why}", base.name))),
+            Err(Failed::Reason(why)) => Err(BenchError::Input(format!("{}: {why}", base.name))),
         }
     }
 }

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_without_phases_loses_nothing_between_them() {
+    fn a_program_without_phases_has_no_communication_loss() {
         let mut without_phases = run(Comm::Solo, 100, &[("all", &[3.0])]);
         without_phases.phases.clear();
         let e = efficiency(&without_phases, &without_phases.clone(), &FREE);

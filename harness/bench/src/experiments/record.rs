@@ -4,7 +4,7 @@
 //! An interruption or a full disk leaves at most one broken line, which the next writer terminates and readers report and
 //! skip. Lines are never rewritten.
 
-use super::entry::{Line, SCHEMA, What};
+use super::entry::{Entry, Line, SCHEMA};
 use jiff::Timestamp;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -41,12 +41,12 @@ impl Record {
     ///
     /// # Errors
     /// If the line could not be written completely.
-    pub fn append(&mut self, what: What) -> io::Result<Line> {
+    pub fn append(&mut self, entry: Entry) -> io::Result<Line> {
         let line = Line {
             schema: SCHEMA.to_owned(),
             session: self.session.clone(),
             time_utc: now_utc(),
-            what,
+            entry,
         };
         let mut text = serde_json::to_vec(&line)?;
         text.push(b'\n');
@@ -112,8 +112,8 @@ mod tests {
     use super::super::entry::Network;
     use super::*;
 
-    fn network(latency_s: f64) -> What {
-        What::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, measured: false })
+    fn network(latency_s: f64) -> Entry {
+        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, measured: false })
     }
 
     #[test]
@@ -135,7 +135,7 @@ mod tests {
         assert!(content.broken.is_empty(), "{:?}", content.broken);
         let mut seen: Vec<u64> = Vec::new();
         for line in content.lines {
-            let What::Network(n) = line.what else { panic!() };
+            let Entry::Network(n) = line.entry else { panic!() };
             seen.push(n.latency_s as u64);
         }
         seen.sort_unstable();

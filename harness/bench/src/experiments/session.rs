@@ -1,6 +1,6 @@
 //! A measurement session: makes runs, checks that equal meshes have equal digests, and appends to the record.
 
-use super::entry::{Comm, Failure, Line, Network, Run, Session, Setup, What};
+use super::entry::{Comm, Entry, Failure, Line, Network, Run, Session, Setup};
 use super::execute::{Failed, Runner};
 use super::plan::Study;
 use super::record::Record;
@@ -65,7 +65,7 @@ pub(crate) struct Bench<'a> {
     pub(crate) options: &'a Options,
     pub(crate) runner: Runner<'a>,
     pub(crate) record: Record,
-    pub(crate) say: &'a mut dyn FnMut(&str),
+    pub(crate) progress: &'a mut dyn FnMut(&str),
     pub(crate) lines: Vec<Line>,
     digests: HashMap<Mesh, String>,
 }
@@ -76,22 +76,22 @@ impl<'a> Bench<'a> {
         options: &'a Options,
         programs: &'a Programs,
         place: &'a Path,
-        say: &'a mut dyn FnMut(&str),
+        progress: &'a mut dyn FnMut(&str),
     ) -> Result<Self, BenchError> {
         let record = Record::open(&options.record)
             .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
         let (launcher, limit) = (&options.launcher, options.limit);
         let runner = Runner { programs, launcher, limit, place };
         let (lines, digests) = (Vec::new(), HashMap::new());
-        let mut bench = Self { options, runner, record, say, lines, digests };
+        let mut bench = Self { options, runner, record, progress, lines, digests };
         bench.begin()?;
         Ok(bench)
     }
 }
 
 impl Bench<'_> {
-    pub(crate) fn append(&mut self, what: What) -> Result<(), BenchError> {
-        let line = self.record.append(what).map_err(|error| {
+    pub(crate) fn append(&mut self, entry: Entry) -> Result<(), BenchError> {
+        let line = self.record.append(entry).map_err(|error| {
             BenchError::Input(format!("{}: {error}", self.record.path().display()))
         })?;
         self.lines.push(line);
@@ -106,7 +106,7 @@ impl Bench<'_> {
             machine: machine::describe(&self.options.launcher.program(), repository),
             load_average: machine::load_average(),
         };
-        self.append(What::Session(Box::new(session)))
+        self.append(Entry::Session(Box::new(session)))
     }
 
     pub(crate) fn measure_network(&mut self) -> Result<(), BenchError> {
@@ -115,12 +115,14 @@ impl Bench<'_> {
             None => match self.runner.ping_pong().and_then(|text| network::parse(&text)) {
                 Ok(measured) => measured,
                 Err(why) => {
-                    (self.say)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
+                    (self.progress)(&format!(
+                        "latency 2 us and bandwidth 10 GB/s are assumed: {why}"
+                    ));
                     network::ASSUMED
                 }
             },
         };
-        self.append(What::Network(network))
+        self.append(Entry::Network(network))
     }
 
     pub(crate) fn run(
@@ -130,7 +132,7 @@ impl Bench<'_> {
         warm_up: bool,
     ) -> Result<(), BenchError> {
         let s = &point.setup;
-        (self.say)(&format!(
+        (self.progress)(&format!(
             "{} {}: {} {} ranks, spacing {:.3e}, n {}{}",
             s.experiment,
             s.case,
@@ -150,9 +152,9 @@ impl Bench<'_> {
         ));
         let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
             Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
-            Err(Failed::Because(why)) => why,
+            Err(Failed::Reason(why)) => why,
             Ok(run) => match self.same_mesh(&run) {
-                Ok(()) => return self.append(What::Run(Box::new(run))),
+                Ok(()) => return self.append(Entry::Run(Box::new(run))),
                 Err(why) => why,
             },
         };
@@ -160,22 +162,22 @@ impl Bench<'_> {
     }
 
     fn failed(&mut self, point: &mut Point, why: String) -> Result<(), BenchError> {
-        (self.say)(&format!("failed: {why}"));
+        (self.progress)(&format!("failed: {why}"));
         point.failed = true;
         let command = format!("{} on {} ranks", self.options.engine, point.setup.ranks);
-        self.append(What::Failure(Failure { setup: point.setup.clone(), command, why }))
+        self.append(Entry::Failure(Failure { setup: point.setup.clone(), command, why }))
     }
 
     /// Writes a mesh to the record's file system and audits it.
     pub(crate) fn audit(&mut self, point: &mut Point) -> Result<(), BenchError> {
         let s = &point.setup;
-        (self.say)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
+        (self.progress)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
         let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
         let disk = disk.unwrap_or(Path::new("."));
         match self.runner.audit(s, &point.case, disk) {
-            Ok(audited) => self.append(What::Audit(audited)),
+            Ok(audited) => self.append(Entry::Audit(audited)),
             Err(Failed::Interrupted) => Err(BenchError::Interrupted),
-            Err(Failed::Because(why)) => self.failed(point, why),
+            Err(Failed::Reason(why)) => self.failed(point, why),
         }
     }
 
@@ -187,6 +189,6 @@ impl Bench<'_> {
         if *first == run.digest {
             return Ok(());
         }
-        Err(format!("its mesh has the digest {}, where another run of it had {first}", run.digest))
+        Err(format!("the mesh has digest {}, but that of an earlier run has {first}", run.digest))
     }
 }

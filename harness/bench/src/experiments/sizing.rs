@@ -1,13 +1,13 @@
-//! Finds the spacing that gives a wanted number of cells by extrapolation from coarser meshes.
+//! Finds the spacing that gives a requested number of cells by extrapolation from coarser meshes.
 //!
 //! The number of cells follows a power of the spacing, close to -2 if cells fill layers around a surface. The exponent is
 //! estimated from the two nearest meshes so far, each a few times finer than the previous one.
 
 /// Tolerated relative deviation of the number of cells.
 const TOLERANCE: f64 = 0.02;
-/// Two meshes within this factor of the wanted size determine the exponent.
+/// Two meshes within this factor of the requested size determine the exponent.
 const NEAR: f64 = 4.0;
-/// Target of the next mesh as a fraction of the wanted size: an overshooting mesh would cost more than the wanted one.
+/// Size of the next mesh as a fraction of the requested size: an overshooting mesh would cost more than the requested one.
 const AIM: f64 = 0.5;
 /// Maximum growth of cells from mesh to mesh: a distant extrapolation may be far off.
 const STEP: f64 = 40.0;
@@ -76,7 +76,7 @@ impl Sizes {
         self.meshes.iter().rev().find(|m| m.1 < cells).copied().or(self.meshes.first().copied())
     }
 
-    /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the wanted one.
+    /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the requested size.
     fn power(&self, cells: f64) -> f64 {
         let mut near = self.meshes.clone();
         near.sort_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
@@ -94,18 +94,18 @@ mod tests {
     #[test]
     fn a_spacing_is_found_from_coarser_meshes() {
         let truth = |s: f64| (3.0 / (s * s) + 50.0 / s + 700.0) as u64;
-        for wanted in [5e4, 3e6, 1e9] {
+        for target in [5e4, 3e6, 1e9] {
             let mut sizes = Sizes::default();
             let mut most = 0;
             let mesh = |s: f64| {
                 most = most.max(truth(s));
                 Ok::<u64, ()>(truth(s))
             };
-            let spacing = sizes.spacing(wanted, 0.2, mesh).unwrap();
-            let error = truth(spacing) as f64 / wanted - 1.0;
-            assert!(error.abs() < 0.08, "{wanted}: {error}");
+            let spacing = sizes.spacing(target, 0.2, mesh).unwrap();
+            let error = truth(spacing) as f64 / target - 1.0;
+            assert!(error.abs() < 0.08, "{target}: {error}");
             // Overshooting would be expensive.
-            assert!(most as f64 <= wanted.max(1e5) * 1.1, "{most}");
+            assert!(most as f64 <= target.max(1e5) * 1.1, "{most}");
         }
     }
 
@@ -113,7 +113,7 @@ mod tests {
     fn known_sizes_are_not_meshed_again() {
         let mut sizes = Sizes::default();
         let mut count = 0;
-        let mut ask = |cells| {
+        let mut request = |cells| {
             let mesh = |s: f64| {
                 count += 1;
                 Ok::<u64, ()>((1.0 / (s * s)) as u64)
@@ -121,11 +121,11 @@ mod tests {
             sizes.spacing(cells, 0.1, mesh).unwrap();
             count
         };
-        let first = ask(1e6);
-        assert_eq!(ask(1e6), first);
-        assert!(ask(9e5) <= first + 1);
-        let second = ask(9e5);
-        assert_eq!(ask(9e5), second);
+        let first = request(1e6);
+        assert_eq!(request(1e6), first);
+        assert!(request(9e5) <= first + 1);
+        let second = request(9e5);
+        assert_eq!(request(9e5), second);
     }
 
     #[test]

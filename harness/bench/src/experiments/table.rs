@@ -175,7 +175,7 @@ pub fn grouped(n: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::entry::What;
+    use super::super::entry::Entry;
     use super::*;
     use crate::testing::line;
     use crate::testing::run;
@@ -183,9 +183,9 @@ mod tests {
     #[test]
     fn a_table_shows_times_intervals_causes_and_errors() {
         let lines = [
-            line(What::Run(Box::new(run(Comm::Sim, 1_000_000, &[("grade", &[4.0])])))),
-            line(What::Run(Box::new(run(Comm::Sim, 1_000_000, &[("grade", &[3.0, 1.0])])))),
-            line(What::Run(Box::new(run(Comm::Mpi, 1_000_000, &[("grade", &[2.5, 1.0])])))),
+            line(Entry::Run(Box::new(run(Comm::Sim, 1_000_000, &[("grade", &[4.0])])))),
+            line(Entry::Run(Box::new(run(Comm::Sim, 1_000_000, &[("grade", &[3.0, 1.0])])))),
+            line(Entry::Run(Box::new(run(Comm::Mpi, 1_000_000, &[("grade", &[2.5, 1.0])])))),
         ];
         let text = tables(&Groups::of(&lines));
         for part in [

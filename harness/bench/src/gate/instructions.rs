@@ -96,7 +96,7 @@ fn against_program(bench: &Bench, case: &Selected, old: &Profile, new: &Profile)
     findings
 }
 
-/// A change within the tolerance is no change: hash seeds and addresses vary the count slightly.
+/// A change within the tolerance counts as unchanged: hash seeds and addresses vary the count slightly.
 fn within_tolerance(bench: &Bench, case: &Selected, metric: &str, old: u64, new: u64) -> Finding {
     let rules = &bench.rules.tolerance;
     let tolerance = rules.of_metric(&case.rule, metric, rules.instructions);

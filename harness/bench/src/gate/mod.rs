@@ -109,8 +109,8 @@ pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError>
 }
 
 fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result<(), GateError> {
-    let asked = |name| bench.options.layers.is_empty() || bench.options.layers.contains(&name);
-    for name in LayerName::ALL.into_iter().filter(|&name| asked(name)) {
+    let requested = |name| bench.options.layers.is_empty() || bench.options.layers.contains(&name);
+    for name in LayerName::ALL.into_iter().filter(|&name| requested(name)) {
         if interrupt::requested() {
             break;
         }

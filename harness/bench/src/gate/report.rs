@@ -22,7 +22,7 @@ pub enum LayerName {
 }
 
 impl LayerName {
-    /// All of them.
+    /// All layers.
     pub const ALL: [Self; 4] = [Self::Correctness, Self::Counters, Self::Instructions, Self::Time];
 }
 
@@ -134,7 +134,7 @@ impl Finding {
 /// One layer.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Layer {
-    /// Which.
+    /// Its name.
     pub name: LayerName,
     /// Why it was skipped.
     pub left_out: Option<String>,
@@ -168,9 +168,9 @@ pub struct Report {
     pub baseline: Option<Measured>,
     /// The candidate.
     pub candidate: Measured,
-    /// The layers that were asked for.
+    /// The requested layers.
     pub layers: Vec<Layer>,
-    /// The exact measures of the candidate: a baseline for later.
+    /// The exact measures of the candidate, which can serve as a baseline.
     pub candidate_measures: Measures,
     /// Whether the user interrupted it.
     pub interrupted: bool,

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rules {
-    /// For every case.
+    /// Tolerances of all cases.
     #[serde(default)]
     pub tolerance: Tolerance,
     /// How times are compared.
@@ -139,8 +139,8 @@ impl Rules {
                 "no case {name} in the gate's rules, which have {known}"
             )));
         }
-        let asked = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
-        self.cases.iter().filter(asked).map(|rule| self.find(rule, programs)).collect()
+        let named = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
+        self.cases.iter().filter(named).map(|rule| self.find(rule, programs)).collect()
     }
 
     fn find(&self, rule: &CaseRule, programs: &Programs) -> Result<Selected, GateError> {

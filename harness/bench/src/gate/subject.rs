@@ -21,13 +21,13 @@ const BUILD_LIMIT: Duration = Duration::from_secs(3600);
 /// A program under comparison.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// How it is run.
+    /// The engine that runs it.
     pub engine: Engine,
     /// Its name in the report.
     pub measured: Measured,
 }
 
-/// What the candidate is compared with.
+/// The baseline of a comparison.
 #[derive(Clone, Debug)]
 pub enum Baseline {
     /// A program: it can be run, so times can be compared.
@@ -96,7 +96,7 @@ impl Subject {
                 if !program.is_file() {
                     let program = program.display();
                     return Err(GateError::Missing(format!(
-                        "there is no {program}: build it, or give its path"
+                        "{program} is missing: build it, or give its path"
                     )));
                 }
                 let revision = revision_of("HEAD", &programs.paths.root).ok();
@@ -121,7 +121,7 @@ impl Subject {
         let name = &engine.description().name;
         let build = engine.description().build.as_ref().ok_or_else(|| {
             GateError::Input(format!(
-                "{named} is no file, and {name} does not say how a revision is built"
+                "{named} is not a file, and {name} does not describe how to build a revision"
             ))
         })?;
         let head = if named == "." { "HEAD" } else { named };
@@ -164,7 +164,7 @@ fn revision_of(named: &str, repository: &Path) -> Result<String, String> {
         git.arg(format!("{named}^{{commit}}")).output().map_err(|error| format!("git: {error}"))?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned()),
-        false => Err(format!("git knows no {named} in {}", repository.display())),
+        false => Err(format!("{named} is not a revision in {}", repository.display())),
     }
 }
 

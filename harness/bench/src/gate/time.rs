@@ -25,7 +25,7 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
                 "a record cannot be run, and times of different sessions are not comparable",
             );
         }
-        Baseline::None => return left_out(LayerName::Time, "there is no baseline"),
+        Baseline::None => return left_out(LayerName::Time, "no baseline was given"),
     };
     let mut layer = Layer::new(LayerName::Time);
     for case in bench.cases_of(LayerName::Time) {
@@ -162,12 +162,13 @@ fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
     }
 }
 
+/// Returns the change of each phase as text.
 fn phases(timed: &Timed) -> String {
-    let told =
+    let changes =
         timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
             format!("{name} {:+.0} %", trimmed_mean(ratios).exp_m1() * 100.0)
         });
-    told.collect::<Vec<_>>().join(", ")
+    changes.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! `harness shrink`: reduces a failing case.
 //!
 //! [`probe`] tests whether and how a case fails; [`reduce`] removes everything that the failure does not need: depth, facets, layer
-//! cells, boxes, ranks; [`leave`] writes the small case with the command that repeats the failure.
+//! cells, boxes, ranks; [`bundle`] writes the small case with the command that repeats the failure.
 //!
 //! Invariant: the reduced case fails in the same way as the given one. A different failure is a different bug.
 
-pub mod leave;
+pub mod bundle;
 pub mod probe;
 pub mod reduce;
 
@@ -47,7 +47,7 @@ pub fn shrink(case: &Path, probe: &Probe, budget: &Budget) -> Result<Option<Shru
     let start = Instant::now();
     let given = Trial { case: PlainCase::read(case)?, ranks: probe.ranks() };
     let Some(failure) = probe.failure(&given)? else { return Ok(None) };
-    eprintln!("harness shrink: it fails: {failure}");
+    eprintln!("harness shrink: the case fails: {failure}");
     let facets_before = given.case.facets.len();
     let mut trials = 1;
     let spent = |trials| {

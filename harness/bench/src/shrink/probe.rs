@@ -61,7 +61,7 @@ impl Probe {
     /// wrong in the same way, the serial case is the simpler one to shrink. Each run may take `limit`.
     ///
     /// # Errors
-    /// If there is no directory for runs.
+    /// If no directory for runs can be created.
     pub fn new(
         engine: Engine,
         reference: Engine,
@@ -81,12 +81,12 @@ impl Probe {
     /// How a trial fails; `None` if it does not. A case that both programs refuse does not fail.
     ///
     /// # Errors
-    /// If the engine cannot be run, or there is no mesh to compare with.
+    /// If the engine cannot be run, or no mesh exists to compare with.
     pub fn failure(&self, trial: &Trial) -> Result<Option<Failure>, String> {
         let case = self.write(&trial.case)?;
         let expected = self.run(&self.truth, &case, Ranks::Serial, "truth", false);
         let expected = expected.map_err(|why| {
-            format!("there is no mesh to compare with, that of {}: {why}", self.truth_name())
+            format!("no mesh to compare with, because {} failed: {why}", self.truth_name())
         })?;
         let report = match self.run(&self.engine, &case, trial.ranks, "engine", false) {
             Ok(report) if report.digest == expected.digest => return Ok(None),

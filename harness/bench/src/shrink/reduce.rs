@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_the_failure_needs_remains() {
+    fn only_the_necessary_parts_of_a_failing_case_remain() {
         let mut trials = 0;
         let mut fails = |trial: &Trial| {
             trials += 1;

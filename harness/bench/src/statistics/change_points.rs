@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_found_where_they_are() {
+    fn steps_are_located_exactly() {
         let mut values = noise(60, 1);
         values[20..].iter_mut().for_each(|value| *value *= 1.1);
         values[45..].iter_mut().for_each(|value| *value *= 0.8);

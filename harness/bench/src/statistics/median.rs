@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn few_values_give_their_range_with_its_low_coverage() {
+    fn few_values_give_their_range_and_its_low_coverage() {
         let m = median(&[3.0, 1.0, 2.0]).unwrap();
         assert_eq!((m.value, m.low, m.high, m.coverage, m.count), (2.0, 1.0, 3.0, 0.75, 3));
         let one = median(&[5.0]).unwrap();

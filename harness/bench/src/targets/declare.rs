@@ -1,7 +1,7 @@
-//! The file of targets, read: meshes, runs and rows by name. reports/README.md describes the format.
+//! Reads a targets file: meshes, runs and rows by name. reports/README.md describes the format.
 //!
-//! Invariants of [`Targets`] as [`Targets::read`] gives them: every name that is used is declared; a row
-//! has the runs, the other run and the phase that its measure needs, and no others.
+//! Invariants of the [`Targets`] that [`Targets::read`] returns: every name that is used is declared; a row has exactly
+//! the runs, the other run and the phase that its measure requires.
 
 use super::measure::{Kind, Measure};
 use crate::experiments::entry::{Comm, Setup};
@@ -16,7 +16,7 @@ const CELLS: std::ops::RangeInclusive<f64> = 1e3..=1e12;
 /// Maximum number of ranks.
 const RANKS_MAX: usize = 65_536;
 
-/// A file of targets.
+/// A targets file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Targets {
@@ -25,7 +25,7 @@ pub struct Targets {
     pub mesh: BTreeMap<String, Mesh>,
     /// Runs by name.
     #[serde(default)]
-    pub run: BTreeMap<String, WantedRun>,
+    pub run: BTreeMap<String, RunSpec>,
     /// The rows, in order.
     #[serde(default)]
     pub row: Vec<Row>,
@@ -40,15 +40,15 @@ pub struct Targets {
 pub struct Mesh {
     /// A name in geometries/catalogue.toml, or the path of a case file.
     pub case: Option<String>,
-    /// Instead of a case: an STL file.
+    /// An STL file, as an alternative to `case`.
     pub geometry: Option<PathBuf>,
-    /// Instead of a case: a shape, as the table of that name in a case file.
+    /// A generated shape, as an alternative to `case`: the `[generator]` table of a case file.
     pub generator: Option<toml::Table>,
     /// Root edge in longest edges of the bounding box; with `geometry` and `generator` only.
     pub root_scale: Option<f64>,
-    /// n, instead of the case's.
+    /// n; replaces that of the case.
     pub layer_cells_min: Option<u32>,
-    /// The spacing, instead of the case's; the root stays what it is.
+    /// The spacing; replaces that of the case, in the same root.
     pub spacing_min: Option<f64>,
     /// Approximate number of cells, with `case` only: the spacing is extrapolated from coarser meshes, and the root fits it.
     pub cells: Option<f64>,
@@ -57,7 +57,7 @@ pub struct Mesh {
 /// A run.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct WantedRun {
+pub struct RunSpec {
     /// Name of the mesh.
     pub mesh: String,
     /// Number of ranks.
@@ -72,12 +72,12 @@ pub struct WantedRun {
     /// `unit`, `area` or `rebalance`; the default of the mesher if empty.
     #[serde(default)]
     pub weights: String,
-    /// Repetitions, of which medians are taken.
+    /// Number of repetitions; results are their medians.
     #[serde(default = "one")]
     pub repeats: usize,
-    /// One uncounted run before them, unless the mesh was generated before. Default: if there are repetitions.
+    /// Whether an uncounted run precedes the first run of a mesh. Default: true if the run is repeated.
     pub warm_up: Option<bool>,
-    /// Write the mesh to the record's disk and have `harness audit` read it, instead of timing the mesher.
+    /// Whether the mesh is written to the record's disk and audited, instead of timing the mesher.
     #[serde(default)]
     pub audit: bool,
 }
@@ -96,13 +96,13 @@ fn mpi() -> Comm {
 pub struct Row {
     /// The name, used by `--only`.
     pub name: String,
-    /// One or several runs. Several runs become one row each, except for measures of a series.
+    /// One or several runs. Each of several runs has its own row, unless the measure is that of a series.
     pub run: OneOrMany,
-    /// The run that it is compared with.
+    /// The run with which it is compared.
     pub against: Option<String>,
     /// The measure.
     pub measure: Measure,
-    /// The phase, or several together, for measures of those.
+    /// The phase or phases, for measures of phases.
     pub phase: Option<OneOrMany>,
     /// Lower bound.
     pub at_least: Option<f64>,
@@ -134,7 +134,7 @@ impl Targets {
     /// Reads a file.
     ///
     /// # Errors
-    /// One sentence: the file, what is wrong, and where.
+    /// One sentence with the file, the position and the error.
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("{}: {why}", path.display());
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
@@ -145,7 +145,7 @@ impl Targets {
         Ok(targets)
     }
 
-    /// Keeps only the rows of these names; all if no name is given.
+    /// Keeps only the rows with these names, or all rows if no name is given.
     ///
     /// # Errors
     /// If no row has one of the names.
@@ -158,7 +158,7 @@ impl Targets {
         Ok(())
     }
 
-    /// Returns the runs that a row needs: its own and the one it is compared with.
+    /// Returns the runs that a row needs: its own and the one with which it is compared.
     pub fn runs_of<'a>(&self, row: &'a Row) -> Vec<&'a String> {
         row.run.all().iter().chain(&row.against).collect()
     }
@@ -189,7 +189,7 @@ impl Targets {
         }
     }
 
-    fn check_run(&self, name: &str, run: &WantedRun) -> Result<(), String> {
+    fn check_run(&self, name: &str, run: &RunSpec) -> Result<(), String> {
         let wrong = |why: String| Err(format!("run {name}: {why}"));
         if !self.mesh.contains_key(&run.mesh) {
             return wrong(format!("no mesh is called {:?}", run.mesh));
@@ -211,17 +211,17 @@ impl Targets {
         let kind = row.measure.kind();
         let needs_other = kind == Kind::Against;
         if needs_other != row.against.is_some() {
-            let what = if needs_other { "needs" } else { "does not take" };
+            let what = if needs_other { "requires" } else { "does not accept" };
             return wrong(format!("{} {what} a run in `against`", row.measure));
         }
         let phase = row.measure == Measure::PhaseShare;
         if phase != row.phase.is_some() {
-            let what = if phase { "needs" } else { "does not take" };
+            let what = if phase { "requires" } else { "does not accept" };
             return wrong(format!("{} {what} a name in `phase`", row.measure));
         }
         let least = if kind == Kind::Series { 2 } else { 1 };
         if row.run.all().len() < least {
-            return wrong(format!("{} needs {least} or more runs", row.measure));
+            return wrong(format!("{} requires {least} or more runs", row.measure));
         }
         let audit = kind == Kind::Audit;
         if let Some(name) = row.run.all().iter().find(|n| self.run[*n].audit != audit) {
@@ -243,7 +243,7 @@ impl Mesh {
             return wrong("the case defines root_scale");
         }
         if self.case.is_none() && (self.spacing_min.is_none() || self.cells.is_some()) {
-            return wrong("without a case it needs spacing_min, and takes no cells");
+            return wrong("without a case, spacing_min is required and cells is not allowed");
         }
         if self.spacing_min.is_some() && self.cells.is_some() {
             return wrong("give spacing_min or cells, not both");
@@ -256,7 +256,7 @@ impl Mesh {
 }
 
 impl Row {
-    /// Returns the row's name in the file, without the run that was appended.
+    /// Returns the row's name in the file, without the appended name of the run.
     fn family(&self) -> &str {
         match self.run.all() {
             [run] => self.name.strip_suffix(&format!(": {run}")).unwrap_or(&self.name),
@@ -265,7 +265,7 @@ impl Row {
     }
 }
 
-/// Splits a row of several runs into one row each, unless its measure is one of a series.
+/// Splits a row of several runs into one row for each, unless its measure is that of a series.
 fn each_run(row: &Row) -> Vec<Row> {
     let OneOrMany::Many(names) = &row.run else { return vec![row.clone()] };
     if row.measure.kind() == Kind::Series {
@@ -327,7 +327,7 @@ mod tests {
     fn the_targets_of_this_repository_are_consistent() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/targets.toml");
         let targets = Targets::read(&path).unwrap();
-        // A run that no row needs is a mistake, as a row without a name of its own is.
+        // A run that no row needs and two rows of the same name are mistakes.
         let used = |name| targets.row.iter().any(|r| targets.runs_of(r).contains(&name));
         let unused: Vec<&String> = targets.run.keys().filter(|name| !used(name)).collect();
         assert!(unused.is_empty(), "{unused:?}");
@@ -343,10 +343,10 @@ mod tests {
             ("mesh = \"cube\", repeats", "mesh = \"ball\", repeats", "run one: no mesh"),
             ("repeats = 3", "repeats = 0", "run one: repeats"),
             ("ranks = 2, comm = \"sim\"", "ranks = 2, comm = \"solo\"", "cannot have 2 ranks"),
-            ("against = \"one\"", "", "\"speed-up\": speed_up needs a run in `against`"),
+            ("against = \"one\"", "", "\"speed-up\": speed_up requires a run in `against`"),
             ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
             ("run = \"disk\"", "run = \"one\"", "which one is not"),
-            ("\"speed_up\"", "\"phase_share\"", "does not take a run"),
+            ("\"speed_up\"", "\"phase_share\"", "does not accept a run"),
             ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
             ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
             (
@@ -357,7 +357,7 @@ mod tests {
             (
                 "case = \"cube-small\"\n        spacing_min = 0.1",
                 "geometry = \"a.stl\"",
-                "needs spacing_min",
+                "spacing_min is required",
             ),
             ("case = \"cube-small\"", "", "give one of"),
             ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),

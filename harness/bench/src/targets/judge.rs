@@ -2,7 +2,7 @@
 
 use super::declare::{OneOrMany, Row, Targets};
 use super::measure::{Kind, Sample};
-use crate::experiments::entry::{Audited, Judged, Line, Verdict, What};
+use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
 use crate::experiments::group::{Group, Groups};
 
 /// Judges every row by the runs in these lines.
@@ -17,7 +17,7 @@ pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
             measured: Some(value),
             how,
             verdict: verdict(row, value),
-            ..unjudged(row, Verdict::Told, String::new())
+            ..unjudged(row, Verdict::ForComparison, String::new())
         },
         Err(why) => {
             let failed = targets.runs_of(row).into_iter().find_map(|n| failure(targets, n, lines));
@@ -47,7 +47,7 @@ pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
 
 fn verdict(row: &Row, value: f64) -> Verdict {
     if row.at_least.is_none() && row.at_most.is_none() {
-        return Verdict::Told;
+        return Verdict::ForComparison;
     }
     // NaN is within no bounds.
     let above = row.at_least.is_none_or(|least| value >= least);
@@ -90,16 +90,16 @@ fn worst_how(runs: &[&Group]) -> &'static str {
 }
 
 fn audit_of<'a>(targets: &Targets, name: &str, line: &'a Line) -> Option<&'a Audited> {
-    match &line.what {
-        What::Audit(audited) if targets.is_run(name, &audited.setup) => Some(audited),
+    match &line.entry {
+        Entry::Audit(audited) if targets.is_run(name, &audited.setup) => Some(audited),
         _ => None,
     }
 }
 
 /// Returns the reason for which a run failed, if it did.
 fn failure(targets: &Targets, name: &str, lines: &[Line]) -> Option<String> {
-    lines.iter().find_map(|line| match &line.what {
-        What::Failure(f) if targets.is_run(name, &f.setup) => {
+    lines.iter().find_map(|line| match &line.entry {
+        Entry::Failure(f) if targets.is_run(name, &f.setup) => {
             Some(format!("run {name} failed: {}", f.why))
         }
         _ => None,
@@ -152,16 +152,16 @@ mod tests {
     fn ran(ranks: usize, time_s: f64) -> Line {
         let mut run = run(Comm::Mpi, 900, &[("a", &vec![time_s; ranks])]);
         run.setup = setup(ranks);
-        line(What::Run(Box::new(run)))
+        line(Entry::Run(Box::new(run)))
     }
 
     fn failed(ranks: usize) -> Line {
         let (command, why) = (String::new(), "killed after 9 s".to_owned());
-        line(What::Failure(Failure { setup: setup(ranks), command, why }))
+        line(Entry::Failure(Failure { setup: setup(ranks), command, why }))
     }
 
     fn audited(holds: bool) -> Line {
-        line(What::Audit(Audited {
+        line(Entry::Audit(Audited {
             setup: Setup { comm: Comm::Solo, ..setup(1) },
             command: String::new(),
             cells: 9,
@@ -179,19 +179,22 @@ mod tests {
         let verdicts = |lines: &[Line]| -> Vec<Verdict> {
             judged(&targets, lines).iter().map(|j| j.verdict).collect()
         };
-        use Verdict::{Failed, LeftOut, Met, Missed, Told};
-        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 5.0), audited(true)]), [Met, Met, Told, Met]);
+        use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
+        assert_eq!(
+            verdicts(&[ran(1, 9.0), ran(2, 5.0), audited(true)]),
+            [Met, Met, ForComparison, Met]
+        );
         // Too slow, then implausibly fast.
         assert_eq!(
             verdicts(&[ran(1, 9.1), ran(2, 5.1), audited(false)]),
-            [Missed, Missed, Told, Missed]
+            [Missed, Missed, ForComparison, Missed]
         );
-        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, Told, LeftOut]);
+        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, ForComparison, LeftOut]);
         assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed, LeftOut]);
     }
 
     #[test]
-    fn medians_of_repetitions_are_judged() {
+    fn a_row_is_judged_by_the_median_of_its_repetitions() {
         let targets = read(FILE).unwrap();
         let lines = [ran(1, 90.0), ran(1, 8.0), ran(1, 9.0)];
         let rate = judge(&targets, &targets.row[0], &lines);
@@ -207,10 +210,10 @@ mod tests {
         let all = judged(&targets, &[ran(1, 9.0), failed(2)]);
         assert_eq!(all[1].why, "run two failed: killed after 9 s");
         assert_eq!(all[3].why, "run disk is not in the record");
-        // Runs of another experiment are none of its own.
+        // Runs of other experiments do not count.
         let mut other = run(Comm::Mpi, 900, &[("a", &[9.0])]);
         other.setup = Setup { experiment: "strong".into(), ..setup(1) };
-        let lines = [line(What::Run(Box::new(other)))];
+        let lines = [line(Entry::Run(Box::new(other)))];
         assert_eq!(judge(&targets, &targets.row[0], &lines).why, "run one is not in the record");
     }
 }

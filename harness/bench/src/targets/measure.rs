@@ -1,4 +1,4 @@
-//! The measures of runs, each a small function of the medians of their repetitions.
+//! The measures, each a function of the medians of the repetitions of runs.
 
 use crate::experiments::entry::{Audited, Comm, Network, Phase};
 use crate::experiments::group::Group;
@@ -8,7 +8,7 @@ use crate::statistics::median;
 use serde::Deserialize;
 use std::fmt;
 
-/// A quantity. Times are wall times by the program's own clock; projected ones where ranks are simulated.
+/// A quantity. Times are wall times by the program's own clock, or projected times for simulated ranks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
@@ -26,21 +26,21 @@ pub enum Measure {
     PeakBytes,
     /// Peak resident memory of all ranks per cell.
     BytesPerCell,
-    /// Marginal memory per cell: the difference of peak memory to the other run over the difference of cells. The other run has the
+    /// Marginal memory per cell: the difference in peak memory from the other run over the difference in cells. The other run has the
     /// same facets on equally many ranks at a coarse spacing, so its memory is that of the program, MPI and the facets.
     BytesPerCellBeyond,
-    /// Of runs in order: the maximum ratio of time per cell to the minimum before it. 1 or less: it never grew.
+    /// For runs in order: the maximum ratio of time per cell to the minimum of the preceding runs; at most 1 if it never grew.
     TimePerCellGrowth,
-    /// Greatest over mean number of cells of the ranks.
+    /// Maximum over mean of the cells per rank.
     LambdaCells,
-    /// Greatest over mean CPU time of the ranks outside calls, each the median over repetitions.
+    /// Maximum over mean of the CPU time per rank outside communication calls; the time of a rank is the median over repetitions.
     LambdaCpu,
-    /// The other run's CPU time per cell over ranks * time per cell of this one: the other one being on one
-    /// rank, speed-up over ranks where the mesh is the same, and weak efficiency where cells grow with ranks.
+    /// CPU time per cell of the other run, which is on one rank, over ranks * time per cell. For the same mesh this is the
+    /// speed-up over ranks; if cells grow with ranks, it is the weak efficiency.
     Efficiency,
-    /// Mean CPU time of the ranks outside calls over time: what balance and communication leave (POP).
+    /// Mean CPU time of the ranks outside communication calls over time: the parallel efficiency of POP.
     ParallelEfficiency,
-    /// Time of a phase, its slowest rank's and its messages, over the whole.
+    /// Time of one or more phases on the slowest rank, including messages, over the time of the run.
     PhaseShare,
     /// 1 if every check of `harness audit` holds, otherwise 0.
     AuditHolds,
@@ -55,7 +55,7 @@ pub enum Measure {
 pub enum Kind {
     /// One run.
     Alone,
-    /// A run and the one it is compared with.
+    /// A run and the run with which it is compared.
     Against,
     /// Runs in order.
     Series,
@@ -66,9 +66,9 @@ pub enum Kind {
 /// The input of a row's measure.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<'a> {
-    /// The runs; one, unless the measure is of a series.
+    /// The runs: one, unless the measure is that of a series.
     pub runs: &'a [&'a Group],
-    /// The run that it is compared with.
+    /// The run with which it is compared.
     pub against: Option<&'a Group>,
     /// The requested phases, if any.
     pub phases: &'a [String],
@@ -77,7 +77,7 @@ pub struct Sample<'a> {
 }
 
 impl fmt::Display for Measure {
-    /// As in a file of targets.
+    /// Its name in a targets file.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
             Self::CellsPerSecondPerCore => "cells_per_second_per_core",
@@ -174,7 +174,7 @@ impl Measure {
             Self::AuditPeakBytes => audits.iter().map(|a| a.peak_rss_bytes as f64).collect(),
             _ => return Err(format!("{self} is not measured of a mesh on disk")),
         };
-        // One audit that fails is a failure, however many hold.
+        // A single failed audit is a failure.
         if self == Self::AuditHolds {
             return values
                 .into_iter()
@@ -194,7 +194,7 @@ fn facet_rate(run: &Group) -> f64 {
     run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64
 }
 
-/// Median over repetitions of the ranks' peaks together. Pages that ranks share count for each of them.
+/// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.
 fn peak(run: &Group) -> f64 {
     let values: Vec<f64> = run.runs.iter().map(|r| r.peak_rss_bytes.sum).collect();
     median(&values).map_or(f64::NAN, |m| m.value)
@@ -234,15 +234,15 @@ fn efficiency(run: &Group, other: &Group, network: &Network) -> Result<f64, Stri
     Ok(run.efficiency(other, network).global())
 }
 
-/// The part of the time that some phases take; those that a run does not have take none, but one it must have.
+/// The fraction of the time that the named phases take. Missing phases count as zero, but at least one must exist.
 fn share(run: &Group, names: &[String], network: &Network) -> Result<f64, String> {
     let typical = &run.typical;
-    let wanted = typical.phases.iter().filter(|p| names.contains(&p.name));
+    let selected = typical.phases.iter().filter(|p| names.contains(&p.name));
     let time = |phase: &Phase| match run.setup.comm {
         Comm::Sim => phase.useful_s.max + pop::messages_s(phase, network),
         Comm::Mpi | Comm::Solo => phase.wall_s.max,
     };
-    let times: Vec<f64> = wanted.map(time).collect();
+    let times: Vec<f64> = selected.map(time).collect();
     if times.is_empty() {
         let there: Vec<&str> = typical.phases.iter().map(|p| p.name.as_str()).collect();
         return Err(format!("it has no phase {}, but {}", names.join(" or "), there.join(", ")));
@@ -253,7 +253,7 @@ fn share(run: &Group, names: &[String], network: &Network) -> Result<f64, String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Run, Spread, What};
+    use crate::experiments::entry::{Entry, Run, Spread};
     use crate::experiments::group::Groups;
     use crate::testing::line;
     use crate::testing::run;
@@ -261,7 +261,7 @@ mod tests {
     const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true };
 
     fn group(run: Run) -> Group {
-        let lines = [line(What::Network(FREE)), line(What::Run(Box::new(run)))];
+        let lines = [line(Entry::Network(FREE)), line(Entry::Run(Box::new(run)))];
         Groups::of(&lines).all.remove(0)
     }
 
@@ -309,7 +309,7 @@ mod tests {
             value(Measure::TimePerCellGrowth, &groups.iter().collect::<Vec<_>>(), None).unwrap()
         };
         assert_eq!(of(&[8.0, 4.0, 2.0]), 0.5);
-        // Less than at first, and yet more than before.
+        // Less than the first value, but more than the preceding one.
         assert_eq!(of(&[8.0, 2.0, 3.0]), 1.5);
         // A slow rise accumulates.
         assert!((of(&[1.0, 1.04, 1.08]) - 1.08).abs() < 1e-9);
@@ -322,9 +322,9 @@ mod tests {
         assert!(value(Measure::LambdaCells, &[&group(two.clone())], None).is_err());
         two.counters.insert("leaves".into(), Spread::brief(&[55.0, 45.0]));
         let two = group(two);
-        let close = |measure, against, wanted: f64| {
+        let close = |measure, against, expected: f64| {
             let found = value(measure, &[&two], against).unwrap();
-            assert!((found - wanted).abs() < 1e-6, "{measure}: {found} is not {wanted}");
+            assert!((found - expected).abs() < 1e-6, "{measure}: {found} is not {expected}");
         };
         close(Measure::LambdaCells, None, 1.1);
         close(Measure::LambdaCpu, None, 5.0 / 4.5);
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_those_of_the_file() {
+    fn measures_have_the_same_names_as_in_a_targets_file() {
         for measure in [Measure::BytesPerCellBeyond, Measure::AuditHolds, Measure::LambdaCpu] {
             let text = format!("measure = \"{measure}\"");
             let table: std::collections::BTreeMap<String, Measure> = toml::from_str(&text).unwrap();

@@ -1,9 +1,8 @@
 //! `harness targets FILE`: compares measurements with a declared table of targets.
 //!
-//! A file declares meshes, runs of them and rows; [`measure()`] makes the runs that rows need, each once
-//! whatever number of rows asks for it, and judges a row as soon as its runs are there. A judgement is a
-//! function of the declaration and of lines of a record alone ([`judge`]), so [`judged`] says the same of
-//! a record of another day.
+//! A file declares meshes, their runs and rows. [`measure()`] executes every run that a row needs, each once, and
+//! evaluates a row as soon as its runs are complete. A verdict depends on the declaration and on the lines of a record
+//! alone ([`judge`]), so [`judged`] reproduces it from a record at any time.
 //!
 //! Invariants: a row's result is appended to the record immediately; a failed run affects only the rows that need it.
 

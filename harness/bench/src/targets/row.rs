@@ -23,7 +23,7 @@ pub fn fields(targets: &Targets, row: &Judged) -> [String; 5] {
     let verdict = match row.verdict {
         Verdict::Met => "met".to_owned(),
         Verdict::Missed => "MISSED".to_owned(),
-        Verdict::Told => "for comparison".to_owned(),
+        Verdict::ForComparison => "for comparison".to_owned(),
         Verdict::Failed => format!("FAILED: {}", row.why),
         Verdict::LeftOut => format!("left out: {}", row.why),
     };

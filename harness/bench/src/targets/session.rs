@@ -1,9 +1,9 @@
-//! Makes the runs that rows need, row by row.
+//! Executes the runs that rows need, row by row.
 
-use super::declare::{EXPERIMENT, Mesh, Row, Targets, WantedRun};
+use super::declare::{EXPERIMENT, Mesh, Row, RunSpec, Targets};
 use super::judge::{judge, unjudged};
 use super::row;
-use crate::experiments::entry::{Comm, Judged, Line, Setup, Verdict, What};
+use crate::experiments::entry::{Comm, Entry, Judged, Line, Setup, Verdict};
 use crate::experiments::execute::Failed;
 use crate::experiments::session::{Bench, BenchError, Options, Point, temporary_directory};
 use crate::experiments::sizing::Sizes;
@@ -22,23 +22,23 @@ pub struct Outcome {
     pub lines: Vec<Line>,
     /// Whether the user interrupted it.
     pub interrupted: bool,
-    /// What is missing, if anything.
+    /// The missing prerequisite, if any.
     pub missing: Option<String>,
 }
 
-/// Makes the runs and judges the rows; ignores `options.studies`.
+/// Executes the runs and judges the rows; ignores `options.studies`.
 ///
 /// # Errors
-/// Where the record or a temporary directory cannot be written.
+/// If the record or a temporary directory cannot be written.
 pub fn measure(
     options: &Options,
     targets: &Targets,
     overrides: &Overrides,
     programs: &Programs,
-    say: &mut dyn FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
     let place = temporary_directory()?;
-    let bench = Bench::open(options, programs, place.path(), say)?;
+    let bench = Bench::open(options, programs, place.path(), progress)?;
     let mut session = Session::new(bench, targets, overrides);
     let mut rows = Vec::new();
     let mut interrupted = false;
@@ -58,8 +58,8 @@ pub fn measure(
         // A row that was not measured before the interruption is not a result.
         if !interrupted {
             let of = format!("row {} of {}", i + 1, targets.row.len());
-            (session.bench.say)(&format!("{of}: {}", row::line(targets, &judged)));
-            session.bench.append(What::Target(judged.clone()))?;
+            (session.bench.progress)(&format!("{of}: {}", row::line(targets, &judged)));
+            session.bench.append(Entry::Target(judged.clone()))?;
         }
         rows.push(judged);
     }
@@ -67,7 +67,7 @@ pub fn measure(
     Ok(Outcome { rows, lines: session.bench.lines, interrupted, missing })
 }
 
-/// Changes by the command line.
+/// Options of the command line that override the file.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// Repetitions of every run, instead of the file's.
@@ -83,19 +83,19 @@ struct Session<'a> {
     bench: Bench<'a>,
     targets: &'a Targets,
     overrides: &'a Overrides,
-    /// Geometries that were read, by what they were read from.
+    /// Geometries read so far, by their source.
     bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
-    /// Meshes whose case files are written, or why that failed.
+    /// Meshes with a written case file, or the reason for a failure.
     meshes: BTreeMap<String, Result<Ready, String>>,
-    /// Runs that need not be made again.
+    /// Runs that are complete.
     made: BTreeSet<String>,
-    /// Meshes that were made once.
+    /// Meshes that have been generated at least once.
     warm: BTreeSet<String>,
-    /// Whether messages were measured.
+    /// Whether latency and bandwidth were measured.
     network: bool,
 }
 
-/// A mesh that can be made.
+/// A mesh that can be generated.
 #[derive(Clone, Debug)]
 struct Ready {
     case: PathBuf,
@@ -105,7 +105,7 @@ struct Ready {
 
 /// A run to be repeated.
 struct Pending<'a> {
-    wanted: &'a WantedRun,
+    spec: &'a RunSpec,
     point: Point,
 }
 
@@ -116,20 +116,20 @@ impl<'a> Session<'a> {
         Self { bench, targets, overrides, bases, meshes, made, warm, network: false }
     }
 
-    /// Makes the runs of a row that were not made yet; judges it.
+    /// Executes the runs of a row that are not complete, and judges it.
     fn row(&mut self, row: &Row) -> Result<Judged, BenchError> {
         let targets = self.targets;
         let mut pending = Vec::new();
         for name in targets.runs_of(row) {
-            let wanted = &targets.run[name];
-            if let Some(why) = self.mpi_left_out().filter(|_| wanted.comm == Comm::Mpi) {
+            let spec = &targets.run[name];
+            if let Some(why) = self.mpi_left_out().filter(|_| spec.comm == Comm::Mpi) {
                 return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
             }
             if self.made.insert(name.clone()) {
-                match self.ready(&wanted.mesh) {
-                    Ok(ready) => pending.push(Pending { wanted, point: point(wanted, ready) }),
+                match self.ready(&spec.mesh) {
+                    Ok(ready) => pending.push(Pending { spec, point: point(spec, ready) }),
                     Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
-                    Err(Failed::Because(why)) => {
+                    Err(Failed::Reason(why)) => {
                         self.made.remove(name);
                         return Ok(unjudged(row, Verdict::Failed, why));
                     }
@@ -140,7 +140,7 @@ impl<'a> Session<'a> {
         Ok(judge(targets, row, &self.bench.lines))
     }
 
-    /// Returns the reason for which runs on MPI are skipped, if they are.
+    /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
         match (self.overrides.no_mpi, self.overrides.no_launcher) {
             (true, _) => Some("--no-mpi was given"),
@@ -149,26 +149,26 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Repetitions are the outer loop here too.
+    /// Executes runs. Repetitions are the outer loop, as in a session of experiments.
     fn make(&mut self, pending: &mut [Pending]) -> Result<(), BenchError> {
         let overrides = self.overrides;
-        let repeats = |wanted: &WantedRun| overrides.repeats.unwrap_or(wanted.repeats);
-        if !self.network && pending.iter().any(|p| p.wanted.comm == Comm::Sim) {
+        let repeats = |spec: &RunSpec| overrides.repeats.unwrap_or(spec.repeats);
+        if !self.network && pending.iter().any(|p| p.spec.comm == Comm::Sim) {
             self.network = true;
             self.bench.measure_network()?;
         }
-        let most = pending.iter().map(|p| repeats(p.wanted)).max().unwrap_or(0);
-        for p in pending.iter_mut().filter(|p| !p.wanted.audit) {
-            let cold = self.warm.insert(p.wanted.mesh.clone());
-            let wished = p.wanted.warm_up.unwrap_or(repeats(p.wanted) > 1);
-            if cold && wished {
+        let most = pending.iter().map(|p| repeats(p.spec)).max().unwrap_or(0);
+        for p in pending.iter_mut().filter(|p| !p.spec.audit) {
+            let cold = self.warm.insert(p.spec.mesh.clone());
+            let warm_up = p.spec.warm_up.unwrap_or(repeats(p.spec) > 1);
+            if cold && warm_up {
                 self.bench.run(&mut p.point, 0, true)?;
             }
         }
         for repeat in 0..most {
             for p in pending.iter_mut() {
-                let due = repeat < repeats(p.wanted) && !p.point.failed;
-                match p.wanted.audit {
+                let due = repeat < repeats(p.spec) && !p.point.failed;
+                match p.spec.audit {
                     _ if !due => {}
                     true => self.bench.audit(&mut p.point)?,
                     false => self.bench.run(&mut p.point, repeat, false)?,
@@ -178,19 +178,19 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// The case file of a mesh; made once.
+    /// Returns the case file of a mesh, which is written once.
     fn ready(&mut self, name: &str) -> Result<Ready, Failed> {
         if let Some(known) = self.meshes.get(name) {
-            return known.clone().map_err(Failed::Because);
+            return known.clone().map_err(Failed::Reason);
         }
         let made = self.prepare(name, &self.targets.mesh[name]);
         match &made {
             Err(Failed::Interrupted) => {}
             Ok(ready) => drop(self.meshes.insert(name.to_owned(), Ok(ready.clone()))),
-            Err(Failed::Because(why)) => {
+            Err(Failed::Reason(why)) => {
                 let why = format!("mesh {name}: {why}");
                 self.meshes.insert(name.to_owned(), Err(why.clone()));
-                return Err(Failed::Because(why));
+                return Err(Failed::Reason(why));
             }
         }
         made
@@ -202,32 +202,31 @@ impl<'a> Session<'a> {
             mesh.case, mesh.geometry, mesh.generator, mesh.root_scale
         );
         if !self.bases.contains_key(&key) {
-            (self.bench.say)(&format!("{name}: reading the geometry"));
-            let base = self.base(name, mesh).map_err(Failed::Because)?;
+            (self.bench.progress)(&format!("{name}: reading the geometry"));
+            let base = self.base(name, mesh).map_err(Failed::Reason)?;
             self.bases.insert(key.clone(), (base, BTreeMap::new()));
         }
         let (base, sizes) = self.bases.get_mut(&key).expect("the entry was inserted");
         let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
         let ready = |case: Result<PathBuf, String>, spacing_min| {
-            case.map(|case| Ready { case, spacing_min, layer_cells_min: n })
-                .map_err(Failed::Because)
+            case.map(|case| Ready { case, spacing_min, layer_cells_min: n }).map_err(Failed::Reason)
         };
         let Some(cells) = mesh.cells else {
             let spacing = mesh.spacing_min.unwrap_or(base.spacing_min);
             return ready(base.in_own_root(spacing, n), spacing);
         };
-        (self.bench.say)(&format!("{name}: looking for the spacing"));
+        (self.bench.progress)(&format!("{name}: looking for the spacing"));
         let bench = &mut self.bench;
         let known = sizes.entry(n).or_default();
         let spacing = known.spacing(cells, base.coarse(), |spacing| bench.count(base, spacing, n));
         match spacing {
             Ok(spacing) => ready(base.variant(spacing, n), spacing),
             Err(BenchError::Interrupted) => Err(Failed::Interrupted),
-            Err(other) => Err(Failed::Because(other.to_string())),
+            Err(other) => Err(Failed::Reason(other.to_string())),
         }
     }
 
-    /// The geometry of a mesh, in a binary STL file.
+    /// Writes the geometry of a mesh as a binary STL file.
     fn base(&self, name: &str, mesh: &Mesh) -> Result<Base, String> {
         let place = self.bench.runner.place;
         if let Some(case) = &mesh.case {
@@ -241,19 +240,19 @@ impl<'a> Session<'a> {
         Base::read(&path, place)
     }
 
-    /// Returns what was missing for skipped rows, unless the user requested that.
+    /// Returns the missing prerequisite of skipped rows; `None` if the user excluded them.
     fn missing(&self) -> Option<String> {
-        let wants_mpi = |row: &Row| {
+        let needs_mpi = |row: &Row| {
             self.targets.runs_of(row).iter().any(|n| self.targets.run[*n].comm == Comm::Mpi)
         };
         let missing = self.overrides.no_launcher && !self.overrides.no_mpi;
-        let missing = missing && self.targets.row.iter().any(wants_mpi);
+        let missing = missing && self.targets.row.iter().any(needs_mpi);
         let program = self.bench.options.launcher.program();
         missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()))
     }
 }
 
-/// A case file for a geometry that is given without one.
+/// Returns a case file for a geometry that was given without one.
 fn given_case(mesh: &Mesh, directory: &Path) -> Result<String, String> {
     let mut table = toml::Table::new();
     if let Some(file) = &mesh.geometry {
@@ -269,17 +268,17 @@ fn given_case(mesh: &Mesh, directory: &Path) -> Result<String, String> {
     Ok(table.to_string())
 }
 
-fn point(wanted: &WantedRun, ready: Ready) -> Point {
+fn point(spec: &RunSpec, ready: Ready) -> Point {
     let setup = Setup {
         experiment: EXPERIMENT.to_owned(),
         engine: "mesher".to_owned(),
-        case: wanted.mesh.clone(),
+        case: spec.mesh.clone(),
         spacing_min: ready.spacing_min,
         layer_cells_min: ready.layer_cells_min,
-        ranks: wanted.ranks,
-        comm: wanted.comm,
-        partitioner: wanted.partitioner.clone(),
-        weights: wanted.weights.clone(),
+        ranks: spec.ranks,
+        comm: spec.comm,
+        partitioner: spec.partitioner.clone(),
+        weights: spec.weights.clone(),
     };
     Point { setup, case: ready.case, failed: false }
 }

@@ -14,7 +14,7 @@ pub struct Component {
     pub leaves: Vec<u32>,
     /// The side that rays determine.
     pub side: Side,
-    /// Whether there was no candidate whose rays agreed.
+    /// Whether the rays of no candidate agreed.
     pub ambiguous: bool,
     /// The first candidate.
     pub first: Octant,

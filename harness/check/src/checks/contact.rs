@@ -107,12 +107,12 @@ mod tests {
             let mut seen = 0;
             let contacts = Contacts { tree: &tree, sought: !0, matters: &|_, _| true };
             contacts.visit(&mut |octant, _, kinds| {
-                let mut want = 0;
+                let mut expected = 0;
                 let mut area = 0;
                 for &w in &words {
                     let other = word::octant(w);
                     if share_face(&octant, &other) {
-                        want |= 1 << (w & 3);
+                        expected |= 1 << (w & 3);
                         area += u64::from(octant.edge().min(other.edge())).pow(2);
                     }
                 }
@@ -120,9 +120,9 @@ mod tests {
                 let offsets = (0..3).flat_map(|a| [-1, 1].map(|s| { let mut offset = [0; 3]; offset[a] = s; offset }));
                 let in_root = offsets.filter(|offset| octant.neighbour(*offset).is_some()).count() as u64;
                 if area < in_root * edge * edge {
-                    want |= HOLES;
+                    expected |= HOLES;
                 }
-                assert_eq!(kinds, want, "{octant}");
+                assert_eq!(kinds, expected, "{octant}");
                 seen += 1;
             });
             prop_assert_eq!(seen, words.len());

@@ -107,7 +107,7 @@ mod tests {
                     std::array::from_fn(|a| if i >> a & 1 == 0 { low[a] } else { high[a] })
                 }));
             }
-            let mut want = [0; 3];
+            let mut expected = [0; 3];
             for &w in &words {
                 let (low, high) = word::octant(w).bounds();
                 for axis in 0..3 {
@@ -115,11 +115,11 @@ mod tests {
                         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                         let inside = |c: &&[i64; 3]| low[axis] < c[axis] && c[axis] < high[axis]
                             && c[u] == [low, high][i & 1][u] && c[v] == [low, high][i >> 1][v];
-                        want[corners.iter().filter(inside).count().min(2)] += 1;
+                        expected[corners.iter().filter(inside).count().min(2)] += 1;
                     }
                 }
             }
-            prop_assert_eq!(count(&Tree::of_words(&words)).edges, want);
+            prop_assert_eq!(count(&Tree::of_words(&words)).edges, expected);
         }
     }
 }

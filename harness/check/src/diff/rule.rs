@@ -6,8 +6,8 @@
 //! Gradation goes from fine to coarse, so the search ends at the first difference in the order of the
 //! definition.
 //!
-//! Crossing leaves that were deleted after gradation are in neither mesh and cannot be witnesses. The text says
-//! so where that is possible.
+//! Crossing leaves that were deleted after gradation are in neither mesh and cannot be witnesses. The text
+//! mentions this where it is possible.
 
 use crate::checks::Terms;
 use crate::checks::identical::describe;
@@ -54,7 +54,7 @@ impl Mesh {
 /// The reason why an octant must be split, as text.
 enum Reason {
     /// The inputs or a leaf of both meshes require the split.
-    Settled(String),
+    Decided(String),
     /// This leaf requires the split, but only the mesh with the split has it.
     Disputed(String, Octant),
     /// Nothing requires the split.
@@ -140,13 +140,13 @@ impl Dispute<'_> {
             let what = format!("{coarse} has the leaf {}, {fine} has split it", leaf.octant);
             let (why, witness) = match self.reason(mesh, &leaf) {
                 Reason::Disputed(why, witness) => (why, witness),
-                Reason::Settled(why) => {
+                Reason::Decided(why) => {
                     rules.push(format!("{what}: {why}: {fine} is right"));
                     return rules;
                 }
                 Reason::None => {
                     rules.push(format!(
-                        "{what}: nothing in either mesh asks for that, and refinement is minimal (sections 3 and 6): \
+                        "{what}: nothing in either mesh requires the split, and refinement is minimal (sections 3 and 6): \
                          {coarse} is right{}",
                         self.caveat()
                     ));
@@ -196,18 +196,18 @@ impl Dispute<'_> {
         if octant.level < self.terms.level_surface {
             let d = self.terms.level_surface;
             if let Some(facet) = self.case.and_then(|case| crossed_by(octant, case)) {
-                return Reason::Settled(format!(
+                return Reason::Decided(format!(
                     "section 3: facet {facet} crosses it, so it has level >= D = {d}"
                 ));
             }
             if self.case.is_none() && leaf.side == Side::Crossing {
-                return Reason::Settled(format!(
+                return Reason::Decided(format!(
                     "section 3: it is crossing, so it has level >= D = {d}"
                 ));
             }
         }
         if let Some(b) = self.terms.box_that_splits(octant) {
-            return Reason::Settled(format!(
+            return Reason::Decided(format!(
                 "section 3: it meets the box {:?} to {:?}, so it has level >= {}",
                 b.min, b.max, b.level
             ));
@@ -217,7 +217,7 @@ impl Dispute<'_> {
         let why =
             format!("{}, by the leaf {source}", self.requires(&source, octant).unwrap_or_default());
         match undisputed {
-            true => Reason::Settled(format!("{why}, which both have")),
+            true => Reason::Decided(format!("{why}, which both have")),
             false => Reason::Disputed(why, source),
         }
     }
@@ -291,7 +291,7 @@ mod tests {
         );
         let text = rule(&unsplit, &split, 1);
         assert!(
-            text.contains("nothing in either mesh asks") && text.contains("A is right"),
+            text.contains("nothing in either mesh requires") && text.contains("A is right"),
             "{text}"
         );
         let (unsplit, split) = pair(&[0, 1, 1]);

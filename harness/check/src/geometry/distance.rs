@@ -80,7 +80,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn face_above_face_and_edge_across_edge() {
+    fn distances_of_parallel_faces_and_of_crossing_edges() {
         let a = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]];
         let above = [[1.0, 1.0, 3.0], [2.0, 1.0, 4.0], [1.0, 2.0, 4.0]];
         assert_eq!(nearest(&a, &above), (9.0, [1.0, 1.0, 0.0], [1.0, 1.0, 3.0]));
@@ -91,7 +91,7 @@ mod tests {
     proptest! {
         /// No pair of sampled points is nearer, and the points returned are as far apart as reported.
         #[test]
-        fn nothing_is_nearer(
+        fn no_sampled_pair_of_points_is_nearer(
             a in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)),
             b in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)),
         ) {

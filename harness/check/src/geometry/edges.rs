@@ -65,7 +65,7 @@ impl Edges {
     }
 }
 
-/// Numbers the distinct vertices: the numbers of every facet's corners, and how many numbers exist.
+/// Numbers the distinct vertices. Returns the numbers of every facet's corners, and the number of vertices.
 fn number(facets: &[Facet]) -> (Vec<[u32; 3]>, u32) {
     // Adding zero turns -0 into 0.
     let bits = |x: f32| u128::from((x + 0.0).to_bits());

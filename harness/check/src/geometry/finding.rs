@@ -36,7 +36,7 @@ pub enum Kind {
     TouchingRoot,
 }
 
-/// Where a finding is.
+/// The place of a finding.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
     /// Facets by number, counting from 0, at most [`Place::FACETS_MAX`].
@@ -76,9 +76,9 @@ impl Place {
 pub struct Finding {
     /// The kind.
     pub kind: Kind,
-    /// How many exist.
+    /// Number of occurrences.
     pub count: u64,
-    /// How many of them can change the mesh's region.
+    /// Number of occurrences that can change the mesh's region.
     pub count_changing: u64,
     /// Whether the search ended before all were counted, so that `count` is a lower bound.
     pub is_lower_bound: bool,

@@ -11,7 +11,7 @@ use super::solids::{self, Solid};
 
 /// Root and spacing given by the user, in the user's units. They take precedence over a case file.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Asked {
+pub struct Requested {
     /// Upper bound on the edge length of a cell at the surface.
     pub spacing_min: Option<f64>,
     /// Minimum corner and edge length of the root.
@@ -42,27 +42,28 @@ impl Input {
     ///
     /// # Errors
     /// One sentence if a file cannot be read or the geometry cannot be meshed.
-    pub fn read(path: &Path, asked: &Asked) -> Result<Self, String> {
+    pub fn read(path: &Path, requested: &Requested) -> Result<Self, String> {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-            return Self::from_case(path, asked);
+            return Self::from_case(path, requested);
         }
         let named = |error: String| format!("{}: {error}", path.display());
         let facets = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
         let solids = solids::read(path, facets.len()).map_err(|error| named(error.to_string()))?;
-        let input = Self::new(facets, asked).map_err(named)?;
+        let input = Self::new(facets, requested).map_err(named)?;
         Ok(Self { solids, ..input })
     }
 
-    fn from_case(path: &Path, asked: &Asked) -> Result<Self, String> {
+    fn from_case(path: &Path, requested: &Requested) -> Result<Self, String> {
         let case = Case::read(path).map_err(|error| error.to_string())?;
         let cell = case.root.edge / f64::from(1u32 << case.level_surface);
-        let explicit = (asked.root.is_none() && asked.root_scale.is_none()).then_some(case.root);
-        let asked = Asked {
-            spacing_min: asked.spacing_min.or(Some(cell)),
-            root: asked.root.or(explicit),
-            ..*asked
+        let explicit =
+            (requested.root.is_none() && requested.root_scale.is_none()).then_some(case.root);
+        let requested = Requested {
+            spacing_min: requested.spacing_min.or(Some(cell)),
+            root: requested.root.or(explicit),
+            ..*requested
         };
-        let input = Self::new(case.facets, &asked)
+        let input = Self::new(case.facets, &requested)
             .map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(Self { keep: case.keep, ..input })
     }
@@ -72,7 +73,7 @@ impl Input {
     /// # Errors
     /// One sentence if the geometry cannot be meshed: it has no facets or too many, a vertex is not finite or too
     /// far outside the root, or root and spacing contradict the definition.
-    pub fn new(facets: Vec<Facet>, asked: &Asked) -> Result<Self, String> {
+    pub fn new(facets: Vec<Facet>, requested: &Requested) -> Result<Self, String> {
         if facets.is_empty() {
             return Err("the geometry has no facets".to_owned());
         }
@@ -80,12 +81,12 @@ impl Input {
             return Err(format!("{} facets exceed the limit of {FACETS_MAX}", facets.len()));
         }
         // A spacing above every root edge stands for level 0.
-        let spacing = asked.spacing_min.unwrap_or(f64::MAX);
+        let spacing = requested.spacing_min.unwrap_or(f64::MAX);
         let mut text = format!("spacing_min = {spacing:?}\n");
-        if let Some(scale) = asked.root_scale {
+        if let Some(scale) = requested.root_scale {
             text += &format!("root_scale = {scale:?}\n");
         }
-        if let Some(Root { origin, edge }) = asked.root {
+        if let Some(Root { origin, edge }) = requested.root {
             text += &format!("[root]\norigin = {origin:?}\nedge = {edge:?}\n");
         }
         let case = Case::from_parts(&text, facets)?;
@@ -95,7 +96,7 @@ impl Input {
             lattice: case.facets_lattice,
             solids: Vec::new(),
             root: case.root,
-            cell: asked.spacing_min.map(|_| cell),
+            cell: requested.spacing_min.map(|_| cell),
             keep: case.keep,
         })
     }
@@ -123,26 +124,27 @@ mod tests {
 
     #[test]
     fn root_and_cell_follow_the_definition() {
-        let asked = Asked { spacing_min: Some(0.3), root_scale: Some(2.0), ..Asked::default() };
-        let input = Input::new(vec![FACET], &asked).unwrap();
+        let requested =
+            Requested { spacing_min: Some(0.3), root_scale: Some(2.0), ..Requested::default() };
+        let input = Input::new(vec![FACET], &requested).unwrap();
         assert_eq!(input.root, Root { origin: [-1.0, -1.5, -2.0], edge: 4.0 });
         assert_eq!(input.cell, Some(0.25));
-        assert_eq!(Input::new(vec![FACET], &Asked::default()).unwrap().cell, None);
+        assert_eq!(Input::new(vec![FACET], &Requested::default()).unwrap().cell, None);
     }
 
     #[test]
     fn a_geometry_that_cannot_be_meshed_is_refused() {
-        let why = |facets: Vec<Facet>, asked| Input::new(facets, &asked).unwrap_err();
+        let why = |facets: Vec<Facet>, requested| Input::new(facets, &requested).unwrap_err();
         let mut broken = FACET;
         broken[1][2] = f32::NAN;
         let root = Some(Root { origin: [0.0; 3], edge: 4.0 });
-        assert!(why(vec![FACET, broken], Asked::default()).contains("facet 1"));
-        assert!(why(vec![broken], Asked { root, ..Asked::default() }).contains("facet 0"));
-        assert!(why(vec![], Asked::default()).contains("no facets"));
-        let both = Asked { root, root_scale: Some(2.0), ..Asked::default() };
+        assert!(why(vec![FACET, broken], Requested::default()).contains("facet 1"));
+        assert!(why(vec![broken], Requested { root, ..Requested::default() }).contains("facet 0"));
+        assert!(why(vec![], Requested::default()).contains("no facets"));
+        let both = Requested { root, root_scale: Some(2.0), ..Requested::default() };
         assert!(why(vec![FACET], both).contains("exclude"));
         for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12] {
-            why(vec![FACET], Asked { spacing_min: Some(spacing), root, root_scale: None });
+            why(vec![FACET], Requested { spacing_min: Some(spacing), root, root_scale: None });
         }
     }
 }

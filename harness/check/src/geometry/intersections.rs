@@ -13,7 +13,7 @@ use super::facets::normal;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 
-/// How two triangles with area lie to each other.
+/// The relative position of two triangles with area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Relation {
     /// They have no common point.
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(of([[0, 0, 0], [-1, 0, 3], [0, -1, 3]]), Relation::Touching);
         assert_eq!(of([[2, 2, 1], [2, 2, 4], [3, 3, 4]]), Relation::Disjoint);
         assert_eq!(of(A.map(|[x, y, z]| [x, y, z + 1])), Relation::Disjoint);
-        // Astride of the other's plane, but beyond its edges.
+        // On both sides of the other's plane, but beyond its edges.
         assert_eq!(of([[5, 5, -4], [5, 5, 4], [6, 9, 0]]), Relation::Disjoint);
     }
 
@@ -229,8 +229,8 @@ mod tests {
             let meets = |f: &FacetLattice, g: &FacetLattice| {
                 (0..3).any(|i| edge_meets(f[i], f[(i + 1) % 3], g))
             };
-            let want = meets(&a, &b) || meets(&b, &a);
-            prop_assert_eq!(relation(&a, &b, true) != Relation::Disjoint, want);
+            let expected = meets(&a, &b) || meets(&b, &a);
+            prop_assert_eq!(relation(&a, &b, true) != Relation::Disjoint, expected);
         }
 
         /// Interiors intersect exactly if the triangles, slightly shrunk, still have a common point.
@@ -247,14 +247,14 @@ mod tests {
 
         #[test]
         fn neither_order_nor_axes_matter(a in small(), b in small()) {
-            let want = relation(&a, &b, true);
+            let expected = relation(&a, &b, true);
             let [p, q, r] = a;
-            prop_assert_eq!(relation(&b, &a, true), want);
-            prop_assert_eq!(relation(&[r, q, p], &b, true), want);
+            prop_assert_eq!(relation(&b, &a, true), expected);
+            prop_assert_eq!(relation(&[r, q, p], &b, true), expected);
             let turned = |f: FacetLattice| f.map(|[x, y, z]| [y, z, -x]);
-            prop_assert_eq!(relation(&turned(a), &turned(b), true), want);
+            prop_assert_eq!(relation(&turned(a), &turned(b), true), expected);
             let quick = relation(&a, &b, false);
-            prop_assert_eq!(quick == Relation::Intersecting, want == Relation::Intersecting);
+            prop_assert_eq!(quick == Relation::Intersecting, expected == Relation::Intersecting);
         }
     }
 

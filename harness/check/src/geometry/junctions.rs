@@ -13,7 +13,7 @@ pub struct Segment {
     pub facet: u32,
 }
 
-/// A vertex with more segments is left as it is.
+/// A vertex with more segments is left unchanged.
 const SEGMENTS_MAX: usize = 256;
 
 /// The segments that remain after cancellation. A vertex lies on a segment if it is within `tolerance` of it.

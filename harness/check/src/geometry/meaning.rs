@@ -1,4 +1,4 @@
-//! What each finding means for the mesh at the given spacing.
+//! The effect of each finding on the mesh at the given spacing.
 
 use contract::manifest::Keep;
 use contract::octant::CELLS_PER_EDGE;

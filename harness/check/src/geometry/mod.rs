@@ -7,8 +7,8 @@
 //! - [`extent`]: the body's position in the root;
 //! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
 //!
-//! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Whatever a decision of the
-//! mesher depends on is decided exactly on the lattice of the definition; widths and gaps are f64.
+//! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Decisions that
+//! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
 
 pub mod boxes;
 pub mod distance;
@@ -34,7 +34,7 @@ use finding::Finding;
 use input::Input;
 use report::Diagnosis;
 
-/// What a diagnosis includes.
+/// Options of a diagnosis.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Whether to search for self-intersections.

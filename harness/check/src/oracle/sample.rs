@@ -1,4 +1,4 @@
-//! The points for which the oracles are asked: centroids of leaves of the base tree.
+//! The sample points of the oracles: centroids of leaves of the base tree.
 //!
 //! Invariants: no point lies within [`Sample::band`] of the surface that the oracles read; the choice of points
 //! depends on the leaves and the seed only.
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn all_leaves_are_chosen_if_they_are_few_except_crossing_ones() {
+    fn a_small_mesh_is_sampled_completely_except_for_crossing_leaves() {
         let sample = choose(&case(8.0, -4.0, BODY), &leaves(), 1000, 0);
         assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
         assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));

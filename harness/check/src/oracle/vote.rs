@@ -106,7 +106,7 @@ impl Tally {
         (!reasons.is_empty()).then(|| reasons.join("; "))
     }
 
-    /// Remarks that are no failures, one sentence each.
+    /// Remarks that are not failures, one sentence each.
     pub fn notes(&self, ballot: &Ballot) -> Vec<String> {
         let all = ballot.mesh.len();
         let sentence = |dissent: &Dissent| {
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wrong_oracle_is_noted_and_is_no_failure() {
+    fn one_wrong_oracle_is_noted_and_does_not_fail() {
         let (count, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
         let dissent = Dissent { name: "oracle 1".into(), points: 2, right: 0, wrong: 2 };
         assert_eq!((&count.dissents[1], count.disputed, failure), (&dissent, 2, None));
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn on_a_body_that_is_not_watertight_contradictions_are_noted_and_are_no_failure() {
+    fn contradictions_on_a_body_that_is_not_watertight_are_noted_and_do_not_fail() {
         let exact = [Some(true), Some(true), None];
         let no: &[u8] = &[1, 1, 0];
         let (count, failure, notes) = vote(exact, [no, no, no], false);

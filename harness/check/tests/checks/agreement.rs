@@ -24,8 +24,8 @@ proptest! {
     #[test]
     fn crossing_tests_agree_on_small_boxes(facet in lattice_facet(), min in prop::array::uniform3(-8i64..=6), size in 1i64..=6) {
         let max = min.map(|c| c + size);
-        let want = reference::crossing::crosses(&facet, &reference::octant::Extent { min, max });
-        prop_assert_eq!(Triangle::new(&facet).meets(min, max), want);
+        let expected = reference::crossing::crosses(&facet, &reference::octant::Extent { min, max });
+        prop_assert_eq!(Triangle::new(&facet).meets(min, max), expected);
     }
 
     #[test]
@@ -33,8 +33,8 @@ proptest! {
         let edge = UNITS_PER_EDGE >> level;
         let min = at.map(|c| c % (1 << level) * edge);
         let max = min.map(|c| c + edge);
-        let want = reference::crossing::crosses(&facet, &reference::octant::Extent { min, max });
-        prop_assert_eq!(Triangle::new(&facet).meets(min, max), want);
+        let expected = reference::crossing::crosses(&facet, &reference::octant::Extent { min, max });
+        prop_assert_eq!(Triangle::new(&facet).meets(min, max), expected);
     }
 }
 

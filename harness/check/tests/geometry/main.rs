@@ -1,7 +1,7 @@
 //! Shapes with known defects, and shapes without any.
 
 use check::geometry::finding::{Kind, Place};
-use check::geometry::input::{Asked, Input};
+use check::geometry::input::{Input, Requested};
 use check::geometry::report::Diagnosis;
 use check::geometry::{Options, diagnose};
 use contract::case::Facet;
@@ -13,8 +13,8 @@ use proptest::prelude::*;
 const ROOT: Root = Root { origin: [-16.0; 3], edge: 32.0 };
 
 fn diagnosis(facets: Vec<Facet>, spacing_min: Option<f64>) -> Diagnosis {
-    let asked = Asked { spacing_min, root: Some(ROOT), root_scale: None };
-    diagnose(&Input::new(facets, &asked).unwrap(), &Options::default())
+    let requested = Requested { spacing_min, root: Some(ROOT), root_scale: None };
+    diagnose(&Input::new(facets, &requested).unwrap(), &Options::default())
 }
 
 fn count(diagnosis: &Diagnosis, kind: Kind) -> u64 {
@@ -154,8 +154,8 @@ fn a_vertex_on_an_edge_is_a_t_junction_and_not_an_opening() {
 
 #[test]
 fn edges_with_more_than_two_facets_are_even_or_odd() {
-    let beside = [cube(), cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0])].concat();
-    assert_eq!(count(&diagnosis(beside, Some(0.25)), Kind::NonManifoldEven), 1);
+    let adjacent = [cube(), cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0])].concat();
+    assert_eq!(count(&diagnosis(adjacent, Some(0.25)), Kind::NonManifoldEven), 1);
     let mut with_fin = cube();
     let [a, b, _] = with_fin[0];
     with_fin.push([a, b, [-4.0; 3]]);
@@ -204,7 +204,7 @@ fn facets_on_and_beyond_the_root_are_found() {
 }
 
 #[test]
-fn json_has_the_schema_and_the_text_every_kind() {
+fn json_has_the_schema_and_text_has_every_kind() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
     assert_eq!(json["schema"], "octree-geometry/1");
@@ -253,7 +253,7 @@ proptest! {
                 _ => facets[i].swap(0, 1),
             }
         }
-        let want = diagnosis(facets.clone(), Some(spacing));
+        let expected = diagnosis(facets.clone(), Some(spacing));
         let mut state = seed;
         let mut random = |n: usize| {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -264,8 +264,8 @@ proptest! {
             facets[i].rotate_left(random(3));
         }
         let got = diagnosis(facets, Some(spacing));
-        prop_assert_eq!(counts(&got), counts(&want));
-        prop_assert_eq!(got.changes_region, want.changes_region);
-        prop_assert_eq!((got.shells.count, got.shells.closed), (want.shells.count, want.shells.closed));
+        prop_assert_eq!(counts(&got), counts(&expected));
+        prop_assert_eq!(got.changes_region, expected.changes_region);
+        prop_assert_eq!((got.shells.count, got.shells.closed), (expected.shells.count, expected.shells.closed));
     }
 }

@@ -1,4 +1,4 @@
-//! `harness audit`: a leaf-set directory in, a verdict out, exit code.
+//! `harness audit`: checks a leaf-set directory by itself.
 
 use check::audit::record::AuditRecord;
 use check::audit::{self, AuditOptions};

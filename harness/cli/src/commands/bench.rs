@@ -1,8 +1,8 @@
-//! `harness bench`: options in, a record and tables out, exit code.
+//! `harness bench`: runs experiments, appends to the record and prints tables.
 
 use super::session::{SessionArguments, progress, refuse, require};
 use super::values::cell_count;
-use bench::experiments::entry::What;
+use bench::experiments::entry::Entry;
 use bench::experiments::foreign::{OWN, label};
 use bench::experiments::group::Groups;
 use bench::experiments::plan::{self, Experiment, Overrides, Preset, studies};
@@ -75,12 +75,12 @@ fn measure(arguments: &Arguments) -> Result<u8, u8> {
     let outcome = bench(&options, &programs, &mut progress()).map_err(|error| refuse(&error))?;
     print!("{}", table::tables(&Groups::of(&outcome.lines)));
     for line in &outcome.lines {
-        if let What::Failure(f) = &line.what {
+        if let Entry::Failure(f) = &line.entry {
             println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);
         }
     }
     println!("record: {}", options.record.display());
-    let measured = outcome.lines.iter().any(|line| matches!(line.what, What::Run(_)));
+    let measured = outcome.lines.iter().any(|line| matches!(line.entry, Entry::Run(_)));
     Ok(match (outcome.failures, measured) {
         (0, true) => EXIT_HOLDS,
         (0, false) => {
@@ -91,7 +91,10 @@ fn measure(arguments: &Arguments) -> Result<u8, u8> {
     })
 }
 
-/// Where the programs are; an exit code where the one to be measured is not.
+/// Finds the programs.
+///
+/// # Errors
+/// The exit code, if the options contradict each other or the program to be measured is missing.
 fn programs(arguments: &Arguments) -> Result<Programs, u8> {
     let own = OWN.contains(&arguments.engine.as_str());
     if !own && (!arguments.weights.is_empty() || !arguments.partitioners.is_empty()) {

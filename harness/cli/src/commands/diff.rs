@@ -1,4 +1,4 @@
-//! `harness diff`: two leaf-set directories in, their first difference out, exit code.
+//! `harness diff`: prints the first difference between two leaf-set directories.
 
 use check::diff;
 use clap::Args;
@@ -18,7 +18,7 @@ pub struct Arguments {
     case: Option<PathBuf>,
 }
 
-/// Compares, prints; the exit code.
+/// Compares and prints; returns the exit code.
 pub fn run(Arguments { a, b, case }: &Arguments) -> u8 {
     let compared = case.as_deref().map(Case::read).transpose().map_err(|error| error.to_string());
     match compared

@@ -1,4 +1,4 @@
-//! `harness export`: a leaf-set directory in, a file for VTK out, exit code.
+//! `harness export`: writes a leaf-set directory as a VTK file.
 
 use clap::Args;
 use contract::leafset;
@@ -16,7 +16,7 @@ pub struct Arguments {
     to: PathBuf,
 }
 
-/// Reads, writes; the exit code.
+/// Reads and writes; returns the exit code.
 pub fn run(Arguments { mesh, to }: &Arguments) -> u8 {
     let exported = leafset::read(mesh).map_err(|e| e.to_string());
     match exported.and_then(|mesh| vtu(&mesh, to).map_err(|e| e.to_string())) {

@@ -3,7 +3,10 @@
 use std::path::Path;
 use std::{fs, io};
 
-/// Writes a file and the directories it lies in, naming it where that fails.
+/// Writes a file and creates its missing parent directories.
+///
+/// # Errors
+/// The file's name and the reason.
 pub fn put(path: &Path, text: &str) -> io::Result<()> {
     let make = || {
         if let Some(directory) = path.parent() {

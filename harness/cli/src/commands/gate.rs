@@ -1,4 +1,4 @@
-//! `harness gate`: options in, reports out, exit code.
+//! `harness gate`: compares a candidate with a baseline and reports.
 
 use super::files::put;
 use super::programs::ProgramArguments;
@@ -15,7 +15,7 @@ use std::{env, fs, io};
 /// `harness gate`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// A revision (built and kept), a program, or a record of --record; without it nothing is compared
+    /// A revision (built and kept), a program, or a record of --record [default: none; the candidate is only measured]
     #[arg(long, value_name = "REVISION|FILE")]
     baseline: Option<String>,
     /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]
@@ -64,7 +64,7 @@ pub struct Arguments {
     programs: ProgramArguments,
 }
 
-/// Compares, prints, writes; the exit code.
+/// Compares, prints and writes; returns the exit code.
 pub fn run(arguments: Arguments) -> u8 {
     let given = arguments.programs.given();
     let programs = match Programs::find_with_engine(&arguments.engine, given) {

@@ -1,10 +1,10 @@
-//! `harness geometry`: an STL file or a case in, its defects and their effect on the mesh out, exit code.
+//! `harness geometry`: prints the defects of an STL file or a case, and their effect on the mesh.
 
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use super::files::put;
-use check::geometry::input::{Asked, Input};
+use check::geometry::input::{Input, Requested};
 use check::geometry::{Options, diagnose};
 use clap::Args;
 use contract::lattice::Root;
@@ -39,7 +39,7 @@ pub struct Arguments {
     first: NonZero<usize>,
 }
 
-/// Diagnoses, prints, writes; the exit code.
+/// Diagnoses, prints and writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
     match diagnosed(arguments) {
         Ok(code) => code,
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> u8 {
 
 fn diagnosed(arguments: &Arguments) -> Result<u8, String> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
-    let input = Input::read(&arguments.file, &Asked { spacing_min, root, root_scale })?;
+    let input = Input::read(&arguments.file, &Requested { spacing_min, root, root_scale })?;
     let options =
         Options { intersections: !arguments.no_intersections, first: arguments.first.get() };
     let diagnosis = diagnose(&input, &options);
@@ -68,7 +68,7 @@ fn write(path: &Path, diagnosis: &check::geometry::report::Diagnosis) -> Result<
     put(path, &(json + "\n")).map_err(|error| error.to_string())
 }
 
-/// The root from four numbers.
+/// Parses a root from four numbers.
 fn root(text: &str) -> Result<Root, String> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
     match numbers[..] {

@@ -1,4 +1,4 @@
-//! The commands, each with its arguments in a file of its own, and what several of them share.
+//! The commands, one file each with its arguments; `files`, `programs`, `session` and `values` are shared.
 
 pub mod audit;
 pub mod bench;

@@ -1,10 +1,10 @@
-//! Options that say where the programs are.
+//! Options for the paths of the programs.
 
 use clap::Args;
 use run::engine::programs::Given;
 use std::path::PathBuf;
 
-/// Where the programs are.
+/// Paths of the programs.
 #[derive(Args, Clone, Debug)]
 pub struct ProgramArguments {
     /// The mesher [default: next to the harness]
@@ -16,7 +16,7 @@ pub struct ProgramArguments {
 }
 
 impl ProgramArguments {
-    /// What was given, for the search for programs.
+    /// Returns the given paths, which take precedence over the search.
     pub fn given(&self) -> Given {
         Given { mesher: self.mesher.clone(), reference: self.reference.clone() }
     }

@@ -1,4 +1,4 @@
-//! `harness report`: records in, figures and a page out.
+//! `harness report`: draws figures and a page from records.
 
 use bench::experiments::record;
 use bench::track::history::{self, Record};
@@ -20,7 +20,7 @@ pub struct Arguments {
     pub history: Option<PathBuf>,
 }
 
-/// Writes the report; the exit code.
+/// Writes the report; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
     match write(&arguments.directory, &arguments.record, arguments.history.as_deref()) {
         Ok(()) => EXIT_HOLDS,
@@ -31,20 +31,20 @@ pub fn run(arguments: &Arguments) -> u8 {
     }
 }
 
-/// Reads records, writes the report into `directory`, and says what it is.
+/// Reads records, writes the report into `directory` and prints a summary.
 ///
 /// # Errors
-/// One sentence.
+/// One sentence, if a record or the history cannot be read, or the report cannot be written.
 pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Result<(), String> {
     let mut records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
-    // A history beside the records is none of them.
+    // The history is a *.jsonl file too, but no record.
     records.retain(|path| Some(path.as_path()) != history);
     let history = history.map_or(Ok(Vec::new()), history_of)?;
     let mut lines = Vec::new();
     for path in &records {
         let content = record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
         for (line, why) in &content.broken {
-            eprintln!("harness: {}, line {line} is passed over: {why}", path.display());
+            eprintln!("harness: {}, line {line} is skipped: {why}", path.display());
         }
         lines.extend(content.lines);
     }
@@ -65,7 +65,7 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
     Ok(())
 }
 
-/// The history; to the tracker one that is not there is empty, but here it was asked for.
+/// Reads the history. `harness track` starts a missing one; here a missing one is an error.
 fn history_of(path: &Path) -> Result<Vec<Record>, String> {
     if !path.is_file() {
         return Err(format!(

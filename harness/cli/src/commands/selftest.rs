@@ -1,4 +1,4 @@
-//! `harness selftest`: correct meshes from the reference, corrupted; the table of kills, exit code.
+//! `harness selftest`: corrupts correct meshes and prints which check detects each corruption.
 
 use super::programs::ProgramArguments;
 use super::values::cell_count;
@@ -45,20 +45,20 @@ pub struct Arguments {
     /// Time limit of every run of reference or mesher
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     pub timeout: u64,
-    /// Where the programs are.
+    /// Paths of the programs.
     #[command(flatten)]
     pub programs: ProgramArguments,
 }
 
-/// The built-in cases: between them every corruption applies.
-const SPECIMENS: [(&str, &str); 4] = [
+/// The built-in cases: every corruption applies to at least one of them.
+const BUILT_IN: [(&str, &str); 4] = [
     ("outside", include_str!("../../../selftest-cases/outside.toml")),
     ("inside", include_str!("../../../selftest-cases/inside.toml")),
     ("all", include_str!("../../../selftest-cases/all.toml")),
     ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
 ];
 
-/// Makes specimens, corrupts them, prints the table of kills; the exit code.
+/// Meshes the cases, corrupts the meshes and prints the table; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
     match try_run(arguments) {
         Ok(code) => code,
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> u8 {
     }
 }
 
-/// An exit code and its sentence.
+/// An exit code and the message.
 type Failure = (u8, String);
 
 fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
@@ -81,26 +81,28 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
         let path = programs.reference.program().display();
         return Err((
             EXIT_MISSING,
-            format!("there is no reference at {path}: build it, or say where it is"),
+            format!(
+                "the reference is missing: build {path}, or give another path with --reference"
+            ),
         ));
     }
     let scratch = tempfile::tempdir().map_err(|error| (EXIT_INPUT, error.to_string()))?;
     let cases =
         if arguments.case.is_empty() { built_in(scratch.path())? } else { arguments.case.clone() };
     let limit = Duration::from_secs(arguments.timeout);
-    let made = cases.iter().enumerate().map(|(index, case)| {
-        let place = scratch.path().join(format!("specimen-{index}"));
-        specimen(&programs, case, &place, limit)
+    let meshed = cases.iter().enumerate().map(|(index, case)| {
+        let directory = scratch.path().join(format!("case-{index}"));
+        mesh_case(&programs, case, &directory, limit)
     });
-    let specimens = made.collect::<Result<Vec<SelftestCase>, Failure>>()?;
+    let cases = meshed.collect::<Result<Vec<SelftestCase>, Failure>>()?;
     let mutants = scratch.path().join("mutants");
-    let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&specimens, &mutants));
+    let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&cases, &mutants));
     let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
     println!("{report}");
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
 }
 
-/// The self test on meshes of any size.
+/// Runs the self test on meshes of any size.
 fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
     let input = |error: std::io::Error| (EXIT_INPUT, error.to_string());
     let mut place = tempfile::Builder::new();
@@ -124,14 +126,14 @@ fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
         ProgressStyle::with_template("{pos}/{len} trials [{elapsed}]")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let say = |done: usize, all: usize| {
+    let progress = |done: usize, all: usize| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     };
-    let report = scale::run(&sources, &options, scratch.path(), &say);
+    let report = scale::run(&sources, &options, scratch.path(), &progress);
     bar.finish_and_clear();
     let report = report.map_err(|error| match error.kind() {
-        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
         _ => input(error),
     })?;
     println!("{report}");
@@ -144,7 +146,7 @@ fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
 }
 
-/// A directory as it is, or what a case file makes.
+/// Returns the mesh in a leaf-set directory, or that of a case file, which the mesher writes into `made`.
 fn source(arguments: &Arguments, path: &Path, made: &Path) -> Result<Source, Failure> {
     if path.is_dir() {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -155,43 +157,44 @@ fn source(arguments: &Arguments, path: &Path, made: &Path) -> Result<Source, Fai
         let path = programs.mesher.program().display();
         return Err((
             EXIT_MISSING,
-            format!("there is no mesher at {path}: build it, or say where it is"),
+            format!("the mesher is missing: build {path}, or give another path with --mesher"),
         ));
     }
     let limit = Duration::from_secs(arguments.timeout);
     let place = made.join(format!("{}", fs::read_dir(made).map_or(0, Iterator::count)));
     fs::create_dir(&place).map_err(|error| (EXIT_INPUT, error.to_string()))?;
     made_by_mesher(&programs, path, arguments.cells, &place, limit).map_err(|why| match why {
-        Failed::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
-        Failed::Because(why) => (EXIT_INPUT, format!("{}: {why}", path.display())),
+        Failed::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+        Failed::Reason(why) => (EXIT_INPUT, format!("{}: {why}", path.display())),
     })
 }
 
+/// Writes the built-in cases; returns their paths.
 fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {
     let write = |(name, text): (&str, &str)| {
         let path = scratch.join(format!("{name}.toml"));
         fs::write(&path, text).map(|()| path).map_err(|error| (EXIT_INPUT, error.to_string()))
     };
-    SPECIMENS.into_iter().map(write).collect()
+    BUILT_IN.into_iter().map(write).collect()
 }
 
 fn find(arguments: &Arguments) -> Result<Programs, Failure> {
     Programs::find(arguments.programs.given()).map_err(|why| (EXIT_INPUT, why))
 }
 
-/// The reference's meshes of a case.
-fn specimen(
+/// Meshes a case with the reference in `directory`: the mesh, and the base tree T0.
+fn mesh_case(
     programs: &Programs,
     path: &Path,
-    place: &Path,
+    directory: &Path,
     limit: Duration,
 ) -> Result<SelftestCase, Failure> {
     let case = Case::read(path).map_err(|error| (EXIT_INPUT, error.to_string()))?;
     let mut meshes = Vec::new();
     for (name, ungraded) in [("mesh", false), ("base", true)] {
-        let logs = place.join(format!("{name}-logs"));
+        let logs = directory.join(format!("{name}-logs"));
         fs::create_dir_all(&logs).map_err(|error| (EXIT_INPUT, error.to_string()))?;
-        let out = place.join(name);
+        let out = directory.join(name);
         let options = RunOptions {
             mesh: Some(&out),
             report: false,
@@ -200,13 +203,13 @@ fn specimen(
         };
         programs.reference.run(path, &SERIAL, &options).map_err(|failure| match &failure.end {
             End::Missing(_) => (EXIT_MISSING, failure.to_string()),
-            End::Interrupted => (EXIT_INTERRUPTED, "ended by the user".to_owned()),
+            End::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
             End::Exited { code: 2, error } => (EXIT_INPUT, error.clone()),
             _ => (EXIT_FAILED, format!("{failure}, on {}", path.display())),
         })?;
         meshes.push(leafset::read(&out).map_err(|error| (EXIT_FAILED, error.to_string()))?);
     }
-    let base = meshes.pop().expect("two were made");
-    let mesh = meshes.pop().expect("two were made");
+    let base = meshes.pop().expect("the loop reads two meshes");
+    let mesh = meshes.pop().expect("the loop reads two meshes");
     Ok(SelftestCase { case, mesh, base })
 }

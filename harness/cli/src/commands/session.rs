@@ -12,7 +12,7 @@ use run::verify::report::{EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How measurements are made, and where results go.
+/// Options for the measurements and for their results.
 #[derive(Args, Debug)]
 pub struct SessionArguments {
     /// No runs on MPI
@@ -36,25 +36,25 @@ pub struct SessionArguments {
     /// Also write a report; the record is then DIR/record.jsonl unless --record is given
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
-    /// Where the programs are.
+    /// Paths of the programs.
     #[command(flatten)]
     pub programs: ProgramArguments,
 }
 
 impl SessionArguments {
-    /// The record to append to.
+    /// Returns the record to append to.
     pub fn record_path(&self) -> PathBuf {
         let in_report = self.report.as_ref().map(|directory| directory.join("record.jsonl"));
         let given = self.record.clone().or(in_report);
         given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
     }
 
-    /// Time limit of a run.
+    /// Returns the time limit of a run.
     pub fn limit(&self) -> Duration {
         Duration::from_secs(self.timeout)
     }
 
-    /// A session of these studies.
+    /// Returns the options of a session with these studies.
     pub fn options(&self, studies: Vec<Study>, engine: String) -> Options {
         Options {
             studies,
@@ -67,7 +67,10 @@ impl SessionArguments {
         }
     }
 
-    /// The existing record; an exit code where it cannot be read.
+    /// Reads the existing record.
+    ///
+    /// # Errors
+    /// The exit code, if it cannot be read.
     pub fn read_record(&self) -> Result<Content, u8> {
         let path = self.record_path();
         let content = record::read(&path).map_err(|error| {
@@ -80,12 +83,11 @@ impl SessionArguments {
         Ok(content)
     }
 
-    /// Writes the report if one was asked for; the graver of its exit code and the given one.
+    /// Writes the report if `--report` is given; returns the greater of its exit code and `code`.
     pub fn write_report(&self, code: u8) -> u8 {
         let Some(directory) = &self.report else { return code };
         match super::report::write(directory, &[], None) {
             Ok(()) => code,
-            // A failed run stays the graver of the two.
             Err(why) => {
                 eprintln!("harness: {why}");
                 code.max(EXIT_INPUT)
@@ -94,7 +96,10 @@ impl SessionArguments {
     }
 }
 
-/// An exit code where a program to be measured is not there.
+/// Checks that a program to be measured exists.
+///
+/// # Errors
+/// The exit code, if it is missing.
 pub fn require(program: &Path) -> Result<(), u8> {
     if program.is_file() {
         return Ok(());
@@ -109,7 +114,7 @@ pub fn progress() -> impl FnMut(&str) {
     move |what| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs())
 }
 
-/// Says why nothing more was measured; the exit code.
+/// Prints why the session ended early; returns the exit code.
 pub fn refuse(error: &BenchError) -> u8 {
     eprintln!("harness: {error}");
     match error {

@@ -1,7 +1,7 @@
-//! `harness shrink`: options in, a tiny case directory out, exit code.
+//! `harness shrink`: reduces a failing case and writes it as a directory.
 
 use super::programs::ProgramArguments;
-use bench::shrink::leave::{Repeat, leave};
+use bench::shrink::bundle::{self, Repeat};
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{Budget, shrink};
 use clap::Args;
@@ -48,15 +48,15 @@ pub struct Arguments {
     programs: ProgramArguments,
 }
 
-/// Shrinks, prints, writes; the exit code.
+/// Shrinks, prints and writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
-    run_or_why(arguments).unwrap_or_else(|why| {
+    try_run(arguments).unwrap_or_else(|why| {
         eprintln!("harness: {why}");
         EXIT_INPUT
     })
 }
 
-fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
+fn try_run(arguments: &Arguments) -> Result<u8, String> {
     let given = arguments.programs.given();
     let program = given.mesher.as_ref().map(|path| path.to_string_lossy().into_owned());
     let programs = Programs::find_with_engine(&arguments.engine, given)?;
@@ -70,19 +70,22 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
     let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
     if arguments.check {
         let failure = probe.failure(&Trial { case: PlainCase::read(&case)?, ranks })?;
-        println!("{}", failure.as_ref().map_or("it does not fail".to_owned(), ToString::to_string));
+        println!(
+            "{}",
+            failure.as_ref().map_or("the case does not fail".to_owned(), ToString::to_string)
+        );
         return Ok(if failure.is_some() { EXIT_FAILED } else { EXIT_HOLDS });
     }
     let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
     let Some(shrunk) = shrink(&case, &probe, &budget)? else {
-        println!("it does not fail: there is nothing to shrink");
+        println!("the case does not fail and was not shrunk");
         return Ok(EXIT_HOLDS);
     };
     let name = case.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let repeat = Repeat { engine: arguments.engine.clone(), program };
-    let told = leave(&shrunk, &probe, &repeat, &out)
+    let readme = bundle::write(&shrunk, &probe, &repeat, &out)
         .map_err(|error| format!("{}: {error}", out.display()))?;
-    println!("{told}\nThe case is in {}", out.display());
+    println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

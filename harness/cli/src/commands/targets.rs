@@ -1,7 +1,7 @@
-//! `harness targets`: a file of targets in, a table out, exit code.
+//! `harness targets`: measures the rows of a table of targets and prints which are met.
 
 use super::session::{SessionArguments, progress, refuse, require};
-use bench::experiments::entry::{Judged, Line, Machine, Verdict, What};
+use bench::experiments::entry::{Entry, Judged, Line, Machine, Verdict};
 use bench::experiments::foreign::label;
 use bench::experiments::session::BenchError;
 use bench::targets::{self, Overrides, Targets};
@@ -30,7 +30,7 @@ pub struct Arguments {
     pub session: SessionArguments,
 }
 
-/// Measures, or with `--show` reads an existing record; prints the table; the exit code.
+/// Measures, or reads an existing record with `--show`, and prints the table; returns the exit code.
 pub fn run(arguments: Arguments) -> u8 {
     let code = match read(&arguments) {
         Ok(targets) if arguments.show => show(&targets, &arguments),
@@ -43,7 +43,7 @@ pub fn run(arguments: Arguments) -> u8 {
     arguments.session.write_report(code.unwrap_or_else(|code| code))
 }
 
-/// The table, or the rows of it that were asked for.
+/// Reads the table, restricted to the rows of `--only`.
 fn read(arguments: &Arguments) -> Result<Targets, String> {
     let mut targets = Targets::read(&arguments.file)?;
     let file = arguments.file.display();
@@ -89,7 +89,7 @@ fn show(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     })
 }
 
-/// Prints the table, and writes it into the report's directory if there is one.
+/// Prints the table, and writes it into the report's directory if one is given.
 fn publish(
     targets: &Targets,
     rows: &[Judged],
@@ -109,20 +109,20 @@ fn publish(
     Ok(())
 }
 
-/// Beside, synced, renamed.
+/// Replaces the file atomically: a synced temporary file in the same directory is renamed.
 fn write(path: &PathBuf, text: &str) -> std::io::Result<()> {
     let directory = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory)?;
-    let mut beside = tempfile::NamedTempFile::new_in(directory)?;
-    std::io::Write::write_all(&mut beside, text.as_bytes())?;
-    beside.as_file().sync_all()?;
-    beside.persist(path).map(drop).map_err(|error| error.error)
+    let mut temporary = tempfile::NamedTempFile::new_in(directory)?;
+    std::io::Write::write_all(&mut temporary, text.as_bytes())?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path).map(drop).map_err(|error| error.error)
 }
 
-/// Where the last session ran.
+/// Describes the machine of the last session.
 fn machine(lines: &[Line]) -> String {
-    let session = lines.iter().rev().find_map(|line| match &line.what {
-        What::Session(session) => Some(&session.machine),
+    let session = lines.iter().rev().find_map(|line| match &line.entry {
+        Entry::Session(session) => Some(&session.machine),
         _ => None,
     });
     let Some(Machine { cpu, cores, kernel, mpi, compiler, commit, memory_bytes }) = session else {
@@ -132,7 +132,7 @@ fn machine(lines: &[Line]) -> String {
     format!("{cpu}, {cores} cores, {gib} GiB, {kernel}, {mpi}, {compiler}, commit {commit}")
 }
 
-/// 0 where nothing was missed or failed.
+/// Returns the exit code: 1 if a row was missed or failed.
 fn code(rows: &[Judged]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict, Verdict::Missed | Verdict::Failed);
     if rows.iter().any(bad) { EXIT_FAILED } else { EXIT_HOLDS }

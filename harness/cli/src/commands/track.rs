@@ -1,4 +1,4 @@
-//! `harness track`: numbers into the history, change points out.
+//! `harness track`: appends metrics to the history and reports change points.
 
 use super::files::put;
 use bench::statistics::change_points::Rules;
@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Write all series with their change points as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Exit code 1 (and a failed test) where the last change of a metric is for the worse and within its last N values
+    /// Exit code 1 (and a failed test) if the last change of a metric is for the worse and within its last N values
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
     /// Significance level: the probability of a false change point
@@ -70,15 +70,15 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
     }
 }
 
-/// Appends, analyses, prints, writes; the exit code.
+/// Appends, analyses, prints and writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
-    run_or_why(arguments).unwrap_or_else(|why| {
+    try_run(arguments).unwrap_or_else(|why| {
         eprintln!("harness: {why}");
         EXIT_INPUT
     })
 }
 
-fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
+fn try_run(arguments: &Arguments) -> Result<u8, String> {
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     }
@@ -95,7 +95,7 @@ fn run_or_why(arguments: &Arguments) -> Result<u8, String> {
 }
 
 fn append(arguments: &Arguments) -> Result<(), String> {
-    // A history that cannot be read is not made worse.
+    // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
     let repository = arguments.repository.clone();
     let repository = repository.unwrap_or_else(|| Paths::find().root);

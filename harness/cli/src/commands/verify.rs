@@ -1,4 +1,4 @@
-//! `harness verify`: options in, reports out, exit code.
+//! `harness verify`: verifies the selected cases and reports.
 
 use super::programs::ProgramArguments;
 use clap::Args;
@@ -77,7 +77,7 @@ pub struct Arguments {
     /// Maximum number of cells for the reference
     #[arg(long, value_name = "CELLS", default_value_t = 3_000_000)]
     pub reference_cells_max: u64,
-    /// Where the programs are.
+    /// Paths of the programs.
     #[command(flatten)]
     pub programs: ProgramArguments,
 }
@@ -90,7 +90,7 @@ fn rank_count(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Verifies, prints, writes; the exit code.
+/// Verifies, prints and writes; returns the exit code.
 pub fn run(arguments: Arguments) -> u8 {
     let engine = arguments.engine.as_deref().unwrap_or("mesher");
     let programs = match Programs::find_with_engine(engine, arguments.programs.given()) {
@@ -117,7 +117,6 @@ pub fn run(arguments: Arguments) -> u8 {
         Ok(()) => report.exit_code(),
         Err(error) => {
             eprintln!("harness: a report could not be written: {error}");
-            // A failed check stays the graver of the two.
             report.exit_code().max(EXIT_INPUT)
         }
     }
@@ -144,7 +143,7 @@ fn options(arguments: Arguments) -> Options {
     }
 }
 
-/// Every form of the report that was asked for; with `--out` all of them, there.
+/// Writes the requested forms of the report, and all forms into the directory of `--out`.
 fn write(
     report: &Report,
     options: &Options,
@@ -178,7 +177,10 @@ fn write(
     Ok(())
 }
 
-/// Writes a file, naming it where that fails.
+/// Writes a file.
+///
+/// # Errors
+/// The file's name and the reason.
 fn put(path: &Path, text: &str) -> io::Result<()> {
     fs::write(path, text)
         .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))

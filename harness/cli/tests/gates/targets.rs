@@ -1,10 +1,10 @@
-//! `harness targets` as a user runs it, on a mesher that a script plays.
+//! `harness targets` as a user runs it, on a scripted mesher.
 
-use crate::play::Play;
+use crate::fixture::Fixture;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-/// 1000 cells in 2 s; fails on three ranks; writes the mesh that is right.
+/// Reports 1000 cells in 2 s, fails on three ranks, and writes the correct mesh.
 const MESHER: &str = r#"#!/bin/sh
 here=$(dirname "$0")
 while [ $# -gt 0 ]; do
@@ -46,76 +46,81 @@ measure = "seconds"
 at_most = 9
 "#;
 
-fn play() -> Play {
-    let play = Play::new();
-    play.write("mesher", MESHER);
-    fs::set_permissions(play.path("mesher"), fs::Permissions::from_mode(0o755)).unwrap();
-    play.write("targets.toml", TARGETS);
-    play
+fn scripted() -> Fixture {
+    let fixture = Fixture::new();
+    fixture.write("mesher", MESHER);
+    fs::set_permissions(fixture.path("mesher"), fs::Permissions::from_mode(0o755)).unwrap();
+    fixture.write("targets.toml", TARGETS);
+    fixture
 }
 
 const TARGETS_COMMAND: &str = "targets targets.toml --mesher ./mesher --network 1e-6,1e10";
 
 #[test]
-fn met_targets_are_a_success_and_the_record_says_so_again() {
-    let play = play();
+fn met_targets_succeed_and_the_record_gives_the_same_table() {
+    let fixture = scripted();
     let only = "--only rate,audit --record out/r.jsonl";
-    let done = play.harness(&format!("{TARGETS_COMMAND} {only}"));
-    assert_eq!(done.code, 0, "{}", done.printed);
-    assert!(done.printed.contains("2 met, 0 missed"), "{}", done.printed);
-    // The audited mesh went when it had been read.
-    let left: Vec<_> =
-        fs::read_dir(play.path("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(left, ["r.jsonl"]);
-    let again = play.harness(&format!("{TARGETS_COMMAND} {only} --show"));
-    assert_eq!(again.code, 0, "{}", again.printed);
-    assert!(done.printed.contains(again.printed.trim()), "{}", again.printed);
-    let record = fs::read_to_string(play.path("out/r.jsonl")).unwrap();
+    let outcome = fixture.harness(&format!("{TARGETS_COMMAND} {only}"));
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    assert!(outcome.printed.contains("2 met, 0 missed"), "{}", outcome.printed);
+    // The audited mesh was removed after the audit.
+    let files: Vec<_> =
+        fs::read_dir(fixture.path("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(files, ["r.jsonl"]);
+    let shown = fixture.harness(&format!("{TARGETS_COMMAND} {only} --show"));
+    assert_eq!(shown.code, 0, "{}", shown.printed);
+    assert!(outcome.printed.contains(shown.printed.trim()), "{}", shown.printed);
+    let record = fs::read_to_string(fixture.path("out/r.jsonl")).unwrap();
     assert_eq!(record.matches(r#""kind":"target""#).count(), 2);
     assert_eq!(record.matches(r#""verdict":"met""#).count(), 2);
 }
 
 #[test]
-fn a_missed_target_fails_and_a_failed_run_costs_its_row_only() {
-    let play = play();
-    let done = play.harness(&format!("{TARGETS_COMMAND} --no-mpi --report out"));
-    assert_eq!(done.code, 1, "{}", done.printed);
+fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
+    let fixture = scripted();
+    let outcome = fixture.harness(&format!("{TARGETS_COMMAND} --no-mpi --report out"));
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
     assert!(
-        done.printed
+        outcome
+            .printed
             .contains("FAILED: run three failed: mesher ended with code 70: mesher: no three"),
         "{}",
-        done.printed
+        outcome.printed
     );
-    assert!(done.printed.contains("2 met, 0 missed, 1 failed, 1 left out"), "{}", done.printed);
-    let page = fs::read_to_string(play.path("out/targets.md")).unwrap();
+    assert!(
+        outcome.printed.contains("2 met, 0 missed, 1 failed, 1 left out"),
+        "{}",
+        outcome.printed
+    );
+    let page = fs::read_to_string(fixture.path("out/targets.md")).unwrap();
     assert!(
         page.contains("| rate | at least 0.00 M cells/s |") && page.contains("| met |"),
         "{page}"
     );
-    play.write("targets.toml", &TARGETS.replace("at_least = 500", "at_least = 501"));
-    let done = play.harness(&format!("{TARGETS_COMMAND} --only rate --record r.jsonl"));
-    assert_eq!(done.code, 1, "{}", done.printed);
-    assert!(done.printed.contains("MISSED"), "{}", done.printed);
+    fixture.write("targets.toml", &TARGETS.replace("at_least = 500", "at_least = 501"));
+    let outcome = fixture.harness(&format!("{TARGETS_COMMAND} --only rate --record r.jsonl"));
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    assert!(outcome.printed.contains("MISSED"), "{}", outcome.printed);
 }
 
 #[test]
-fn what_is_missing_and_what_is_wrong_have_codes_of_their_own() {
-    let play = play();
-    let done = play.harness(&format!(
+fn missing_programs_and_invalid_input_have_different_exit_codes() {
+    let fixture = scripted();
+    let outcome = fixture.harness(&format!(
         "{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --launcher nonesuch/{{ranks}}"
     ));
-    assert_eq!(done.code, 3, "{}", done.printed);
-    assert!(done.printed.contains("left out: the launcher is missing"), "{}", done.printed);
-    let wished =
-        play.harness(&format!("{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --no-mpi"));
-    assert_eq!(wished.code, 0, "{}", wished.printed);
-    assert_eq!(play.harness(&format!("{TARGETS_COMMAND} --only luck")).code, 2);
-    play.write("targets.toml", &TARGETS.replace("seconds", "minutes"));
-    let done = play.harness(TARGETS_COMMAND);
-    assert_eq!(done.code, 2, "{}", done.printed);
+    assert_eq!(outcome.code, 3, "{}", outcome.printed);
+    assert!(outcome.printed.contains("left out: the launcher is missing"), "{}", outcome.printed);
+    let excluded =
+        fixture.harness(&format!("{TARGETS_COMMAND} --only mpi,rate --record r.jsonl --no-mpi"));
+    assert_eq!(excluded.code, 0, "{}", excluded.printed);
+    assert_eq!(fixture.harness(&format!("{TARGETS_COMMAND} --only luck")).code, 2);
+    fixture.write("targets.toml", &TARGETS.replace("seconds", "minutes"));
+    let outcome = fixture.harness(TARGETS_COMMAND);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
     assert!(
-        done.printed.contains("targets.toml") && done.printed.contains("unknown variant"),
+        outcome.printed.contains("targets.toml") && outcome.printed.contains("unknown variant"),
         "{}",
-        done.printed
+        outcome.printed
     );
 }

@@ -1,4 +1,4 @@
-//! A directory with a case, and scripts that play the programs.
+//! A directory with a case and scripted programs.
 
 use contract::leafset::LeafSet;
 use serde_json::json;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// A program that does what it should: copies the tree that was asked for, and says so in its record.
+/// A correct program: copies the requested tree and writes a run report that describes it.
 pub const HOLDS: &str = r#"
 here=$(dirname "$0"); tree=final; shift
 while [ $# -gt 0 ]; do
@@ -26,10 +26,10 @@ ranks="$FAKE_RANKS"
     "$(cat "$here/$tree.digest")" "${ranks:-1}" > "$json"
 "#;
 
-/// A mesher that holds the case to be at fault.
+/// A mesher that rejects every case.
 pub const REFUSES: &str = "echo 'spacing_min is negative' >&2; exit 2";
 
-/// A mesher that says what two ranks are doing and then sleeps, in a process of its own.
+/// A mesher that writes the status of two ranks and then hangs in a child process.
 pub const HANGS: &str = r#"
 here=$(dirname "$0")
 while [ "$1" != --status ]; do shift; done
@@ -40,22 +40,22 @@ sleep 600 & echo $! > "$here/sleeper"; wait
 const CASE: &str = "spacing_min = 100.0\nkeep = \"all\"\n[root]\norigin = [-32.0, -32.0, -32.0]\nedge = 64.0\n\
                     [generator]\nshape = \"cube\"\nfacets = 12\n";
 
-/// The root as the only leaf, crossing; and as one outside of the body, which it is not.
+/// Meshes of one leaf, the root: crossing, which is correct, or outside, which is wrong.
 const WORDS: [(&str, u64); 3] = [("final", 2), ("base", 2), ("other", 0)];
 
 /// How a run of the harness ended.
-pub struct Done {
+pub struct Outcome {
     /// Its exit code.
     pub code: i32,
-    /// All that it printed.
+    /// Its standard output and standard error.
     pub printed: String,
 }
 
-/// The directory; gone at the end.
+/// The directory, removed on drop.
 pub struct Fixture(TempDir);
 
 impl Fixture {
-    /// With programs that do what they should, and neither MPI, oracles nor p4est.
+    /// Writes correct programs. MPI, oracles and p4est are missing.
     pub fn new() -> Self {
         let fixture = Self(tempfile::tempdir().unwrap());
         fs::create_dir(fixture.path("tmp")).unwrap();
@@ -63,40 +63,40 @@ impl Fixture {
         for (name, word) in WORDS {
             fixture.write_tree(name, word);
         }
-        fixture.play("mesher", HOLDS);
-        fixture.play("reference", HOLDS);
+        fixture.script("mesher", HOLDS);
+        fixture.script("reference", HOLDS);
         fixture
     }
 
-    /// A path below the directory.
+    /// Returns a path below the directory.
     pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    /// The text of a file.
+    /// Returns the text of a file.
     pub fn read(&self, name: &str) -> String {
         fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// Writes a file, its directories too.
+    /// Writes a file and creates its parent directories.
     pub fn write(&self, name: &str, text: &str) {
         fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
         fs::write(self.path(name), text).unwrap();
     }
 
-    /// Has a script play a program.
-    pub fn play(&self, program: &str, script: &str) {
+    /// Replaces a program by a script.
+    pub fn script(&self, program: &str, script: &str) {
         self.write(program, &format!("#!/bin/sh\n{script}\n"));
         fs::set_permissions(self.path(program), fs::Permissions::from_mode(0o755)).unwrap();
     }
 
-    /// An `mpirun` that starts one process for all ranks.
-    pub fn play_mpirun(&self) {
-        self.play("bin/mpirun", "export FAKE_RANKS=$2; shift 2; exec \"$@\"");
+    /// Writes an `mpirun` that starts one process for all ranks.
+    pub fn script_mpirun(&self) {
+        self.script("bin/mpirun", "export FAKE_RANKS=$2; shift 2; exec \"$@\"");
     }
 
-    /// A catalogue with the one case `jet`, whose geometry is not there.
-    pub fn catalogue_of_one_absent(&self) {
+    /// Writes a catalogue of one case, `jet`, with a missing geometry.
+    pub fn catalogue_with_absent_geometry(&self) {
         let catalogue = "[[case]]\nname = \"jet\"\nfile = \"jet.toml\"\nsize = \"small\"\n";
         self.write("root/geometries/catalogue.toml", catalogue);
         let case = "geometry = \"fetched/jet.stl\"\nspacing_min = 1.0\n";
@@ -123,14 +123,14 @@ impl Fixture {
     }
 
     /// Verifies the case on 2 and 3 ranks.
-    pub fn verify(&self, options: &[&str]) -> Done {
+    pub fn verify(&self, options: &[&str]) -> Outcome {
         let case = self.path("case.toml");
         let ours = ["verify", case.to_str().unwrap(), "--ranks", "2,3", "--partitioners", "morton"];
         self.harness(&[&ours[..], &["--level-bases", "auto"], options].concat())
     }
 
     /// Runs the harness in the directory.
-    pub fn harness(&self, arguments: &[&str]) -> Done {
+    pub fn harness(&self, arguments: &[&str]) -> Outcome {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
         command.args(arguments).current_dir(self.0.path());
         if arguments.contains(&"verify") {
@@ -150,11 +150,11 @@ impl Fixture {
         let output = command.output().unwrap();
         let printed =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
-        Done { code: output.status.code().unwrap_or(-1), printed }
+        Outcome { code: output.status.code().unwrap_or(-1), printed }
     }
 
-    /// What is left in the directory for temporary files.
-    pub fn left_behind(&self) -> Vec<PathBuf> {
+    /// Returns the remaining temporary files.
+    pub fn temporary_files(&self) -> Vec<PathBuf> {
         entries(&self.path("tmp"))
     }
 }

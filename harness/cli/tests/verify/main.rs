@@ -1,7 +1,7 @@
-//! `harness verify` as a user or a CI system sees it: exit codes, reports, hangs, what is left behind.
+//! `harness verify` as a user or a CI system sees it: exit codes, reports, hangs, remaining files.
 //!
-//! Mesher, reference and `mpirun` are played by shell scripts, so that each can be made to fail in its way. The
-//! case is the smallest there is: a cube within a root that is one single crossing leaf.
+//! Mesher, reference and `mpirun` are shell scripts, so that each can be made to fail in its own way. The case is
+//! the smallest possible one: a cube in a root that is a single crossing leaf.
 
 mod fixture;
 
@@ -10,20 +10,28 @@ use quick_junit::{Report, TestCaseStatus};
 use std::fs;
 
 #[test]
-fn all_holds() {
+fn a_correct_mesher_passes() {
     let fixture = Fixture::new();
-    let done = fixture.verify(&["--no-mpi"]);
-    assert_eq!(done.code, 0, "{}", done.printed);
-    assert!(done.printed.contains("all hold"), "{}", done.printed);
-    assert!(fixture.left_behind().is_empty(), "{:?}", fixture.left_behind());
+    let outcome = fixture.verify(&["--no-mpi"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    assert!(outcome.printed.contains("all hold"), "{}", outcome.printed);
+    assert!(fixture.temporary_files().is_empty(), "{:?}", fixture.temporary_files());
 }
 
 #[test]
-fn what_was_not_done_is_said_in_every_form() {
+fn every_form_of_the_report_lists_skipped_checks() {
     let fixture = Fixture::new();
-    let done = fixture.verify(&["--no-mpi", "--junit", "junit.xml", "--json", "report.json"]);
-    assert!(done.printed.contains("left out: mpi because --no-mpi was given"), "{}", done.printed);
-    assert!(done.printed.contains("left out: p4est because there is no"), "{}", done.printed);
+    let outcome = fixture.verify(&["--no-mpi", "--junit", "junit.xml", "--json", "report.json"]);
+    assert!(
+        outcome.printed.contains("left out: mpi because --no-mpi was given"),
+        "{}",
+        outcome.printed
+    );
+    assert!(
+        outcome.printed.contains("left out: p4est because /nowhere/p4est is missing"),
+        "{}",
+        outcome.printed
+    );
     let junit = Report::deserialize_from_str(&fixture.read("junit.xml")).unwrap();
     let reasons: Vec<String> = junit.test_suites[0].test_cases.iter().filter_map(skipped).collect();
     assert_eq!(
@@ -48,82 +56,86 @@ fn skipped(test: &quick_junit::TestCase) -> Option<String> {
 }
 
 #[test]
-fn what_is_required_and_missing_is_exit_code_3() {
+fn a_missing_requirement_gives_exit_code_3() {
     let fixture = Fixture::new();
-    let done = fixture.verify(&["--no-mpi", "--require", "p4est"]);
-    assert_eq!(done.code, 3, "{}", done.printed);
-    assert!(done.printed.contains("something required is missing"), "{}", done.printed);
+    let outcome = fixture.verify(&["--no-mpi", "--require", "p4est"]);
+    assert_eq!(outcome.code, 3, "{}", outcome.printed);
+    assert!(outcome.printed.contains("something required is missing"), "{}", outcome.printed);
     fixture.write("mesher", "#!/bin/sh\n");
     fs::remove_file(fixture.path("mesher")).unwrap();
-    let done = fixture.verify(&["--no-mpi"]);
+    let outcome = fixture.verify(&["--no-mpi"]);
     assert_eq!(
-        (done.code, done.printed.contains("there is no mesher at")),
+        (outcome.code, outcome.printed.contains("the mesher is missing")),
         (3, true),
         "{}",
-        done.printed
+        outcome.printed
     );
 }
 
 #[test]
-fn a_case_that_all_refuse_is_the_users_error() {
+fn a_case_that_all_programs_reject_is_invalid_input() {
     let fixture = Fixture::new();
     fixture.write("case.toml", "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n");
-    fixture.play("mesher", REFUSES);
-    let done = fixture.verify(&["--no-mpi"]);
-    assert_eq!(done.code, 2, "{}", done.printed);
-    assert!(done.printed.contains("input: case: spacing_min is negative"), "{}", done.printed);
-}
-
-#[test]
-fn a_case_that_the_mesher_alone_refuses_is_a_failure() {
-    let fixture = Fixture::new();
-    fixture.play("mesher", REFUSES);
-    let done = fixture.verify(&["--no-mpi"]);
-    assert_eq!(done.code, 1, "{}", done.printed);
+    fixture.script("mesher", REFUSES);
+    let outcome = fixture.verify(&["--no-mpi"]);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
     assert!(
-        done.printed.contains("it refuses the case: spacing_min is negative"),
+        outcome.printed.contains("input: case: spacing_min is negative"),
         "{}",
-        done.printed
+        outcome.printed
     );
 }
 
 #[test]
-fn a_case_at_fault_that_the_mesher_takes_is_a_failure() {
+fn a_case_that_only_the_mesher_rejects_is_a_failure() {
     let fixture = Fixture::new();
-    fixture.write("case.toml", "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n");
-    let done = fixture.verify(&["--no-mpi"]);
-    assert_eq!(done.code, 1, "{}", done.printed);
-    assert!(done.printed.contains("the mesher takes a case that is at fault"), "{}", done.printed);
+    fixture.script("mesher", REFUSES);
+    let outcome = fixture.verify(&["--no-mpi"]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    assert!(
+        outcome.printed.contains("it refuses the case: spacing_min is negative"),
+        "{}",
+        outcome.printed
+    );
 }
 
 #[test]
-fn an_unknown_case_is_the_users_error() {
+fn an_invalid_case_that_the_mesher_accepts_is_a_failure() {
     let fixture = Fixture::new();
-    fixture.catalogue_of_one_absent();
-    let done = fixture.harness(&["verify", "unheard-of"]);
+    fixture.write("case.toml", "spacing_min = -1.0\n[generator]\nshape = \"cube\"\nfacets = 12\n");
+    let outcome = fixture.verify(&["--no-mpi"]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    assert!(outcome.printed.contains("the mesher accepts an invalid case"), "{}", outcome.printed);
+}
+
+#[test]
+fn an_unknown_case_is_invalid_input() {
+    let fixture = Fixture::new();
+    fixture.catalogue_with_absent_geometry();
+    let outcome = fixture.harness(&["verify", "unheard-of"]);
     let why = "no case unheard-of in the catalogue, which has jet";
-    assert_eq!(done.code, 2, "{}", done.printed);
-    assert!(done.printed.contains(why), "{}", done.printed);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains(why), "{}", outcome.printed);
     assert_eq!(fixture.harness(&["verify", "--ranks", "none"]).code, 2);
 }
 
 #[test]
 fn a_hang_is_killed_reported_and_kept() {
     let fixture = Fixture::new();
-    fixture.play("mesher", HANGS);
-    let done = fixture.verify(&["--no-mpi", "--timeout", "1", "--out", "out"]);
-    assert_eq!(done.code, 1, "{}", done.printed);
+    fixture.script("mesher", HANGS);
+    let outcome = fixture.verify(&["--no-mpi", "--timeout", "1", "--out", "out"]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
     let why = "did not end within 1 s and was killed; ranks 0, 1 were in: layer 7";
-    assert!(done.printed.contains(why), "{}", done.printed);
+    assert!(outcome.printed.contains(why), "{}", outcome.printed);
     assert!(
-        done.printed.contains("repeat with: ") && done.printed.contains("--no-mpi --keep"),
+        outcome.printed.contains("repeat with: ") && outcome.printed.contains("--no-mpi --keep"),
         "{}",
-        done.printed
+        outcome.printed
     );
-    // Where nobody waits for orphans, a dead one stays listed, as a zombie.
+    // If no process reaps orphans, a killed one remains as a zombie.
     let stat = format!("/proc/{}/stat", fixture.read("sleeper").trim());
     let asleep = fs::read_to_string(stat).is_ok_and(|stat| !stat.contains(") Z "));
-    assert!(!asleep, "a process of the hung mesher is still there");
+    assert!(!asleep, "a process of the hung mesher is still running");
     assert!(fixture.path("out/case/timed/status/rank-00001.txt").is_file());
     for form in ["table.txt", "report.md", "junit.xml", "report.json"] {
         assert!(fixture.path("out").join(form).is_file(), "{form}");
@@ -131,21 +143,22 @@ fn a_hang_is_killed_reported_and_kept() {
 }
 
 #[test]
-fn a_mesh_that_depends_on_ranks_is_found() {
+fn a_mesh_that_depends_on_the_rank_count_is_detected() {
     let fixture = Fixture::new();
-    fixture.play_mpirun();
+    fixture.script_mpirun();
     let good = fixture.verify(&[]);
     assert_eq!(good.code, 0, "{}", good.printed);
-    fixture.play("mesher", &HOLDS.replace("from=", "[ \"$FAKE_RANKS\" = 3 ] && tree=other; from="));
-    let done = fixture.verify(&["--json", "report.json", "--out", "out"]);
-    assert_eq!(done.code, 1, "{}", done.printed);
+    fixture
+        .script("mesher", &HOLDS.replace("from=", "[ \"$FAKE_RANKS\" = 3 ] && tree=other; from="));
+    let outcome = fixture.verify(&["--json", "report.json", "--out", "out"]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
     assert!(
-        done.printed.contains("3 ranks, morton, base auto: identical: first difference"),
+        outcome.printed.contains("3 ranks, morton, base auto: identical: first difference"),
         "{}",
-        done.printed
+        outcome.printed
     );
     let repeat = "--ranks 3 --partitioners morton --level-bases auto --keep";
-    assert!(done.printed.contains(repeat), "{}", done.printed);
+    assert!(outcome.printed.contains(repeat), "{}", outcome.printed);
     let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
     let failed = json["cases"][0]["checks"]
         .as_array()
@@ -153,47 +166,49 @@ fn a_mesh_that_depends_on_ranks_is_found() {
         .iter()
         .filter(|check| check["outcome"] == "fail");
     assert_eq!(failed.map(|check| &check["ranks"]).collect::<Vec<_>>(), [3]);
-    // The rank count that holds leaves nothing, the one that fails leaves its mesh.
+    // The files of a passing rank count are removed, those of a failing one are kept.
     assert!(!fixture.path("out/case/ranks-2-morton-auto").exists());
     assert!(fixture.path("out/case/ranks-3-morton-auto/mesh/mesh.json").is_file());
 }
 
 #[test]
-fn ranks_that_do_not_know_of_each_other_are_no_mpi() {
+fn a_mesher_built_without_mpi_does_not_meet_the_requirement() {
     let fixture = Fixture::new();
-    fixture.play_mpirun();
-    fixture.play("mesher", &HOLDS.replace("$FAKE_RANKS", ""));
-    let done = fixture.verify(&["--require", "mpi"]);
-    assert_eq!(done.code, 3, "{}", done.printed);
-    assert!(done.printed.contains("it was built without MPI"), "{}", done.printed);
+    fixture.script_mpirun();
+    fixture.script("mesher", &HOLDS.replace("$FAKE_RANKS", ""));
+    let outcome = fixture.verify(&["--require", "mpi"]);
+    assert_eq!(outcome.code, 3, "{}", outcome.printed);
+    assert!(outcome.printed.contains("it was built without MPI"), "{}", outcome.printed);
 }
 
 #[test]
-fn a_record_that_is_not_the_mesh_s_is_found() {
+fn a_run_report_that_contradicts_the_mesh_is_detected() {
     let fixture = Fixture::new();
-    fixture.play("mesher", &HOLDS.replace("\"cells\": 1", "\"cells\": 2"));
-    let done = fixture.verify(&["--no-mpi"]);
+    fixture.script("mesher", &HOLDS.replace("\"cells\": 1", "\"cells\": 2"));
+    let outcome = fixture.verify(&["--no-mpi"]);
     assert_eq!(
-        (done.code, done.printed.contains("reports 2 cells")),
+        (outcome.code, outcome.printed.contains("reports 2 cells")),
         (1, true),
         "{}",
-        done.printed
+        outcome.printed
     );
 }
 
 #[test]
 fn a_case_whose_geometry_is_absent_is_left_out_unless_required() {
     let fixture = Fixture::new();
-    fixture.catalogue_of_one_absent();
+    fixture.catalogue_with_absent_geometry();
     let rest = ["--no-mpi", "--no-oracles", "--no-p4est"];
-    let done = fixture.harness(&[&["verify"], &rest[..]].concat());
-    assert_eq!(done.code, 0, "{}", done.printed);
+    let outcome = fixture.harness(&[&["verify"], &rest[..]].concat());
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
     assert!(
-        done.printed.contains("left out: jet: case: geometry because fetched/jet.stl is not here"),
+        outcome
+            .printed
+            .contains("left out: jet: case: geometry because fetched/jet.stl is missing"),
         "{}",
-        done.printed
+        outcome.printed
     );
-    let done =
+    let outcome =
         fixture.harness(&[&["verify", "jet", "--require", "geometries"], &rest[..]].concat());
-    assert_eq!(done.code, 3, "{}", done.printed);
+    assert_eq!(outcome.code, 3, "{}", outcome.printed);
 }

@@ -205,8 +205,8 @@ mod tests {
             for cell in cells {
                 let cell = cell.map(|c| c % CELLS_PER_EDGE);
                 let contains = |w: &&u64| word::octant(**w).contains(&Octant { corner: cell, level: 19 });
-                let want = words.iter().find(contains).map(|&w| (word::octant(w), (w & 3) as Kind));
-                prop_assert_eq!(tree.locate(cell), want);
+                let expected = words.iter().find(contains).map(|&w| (word::octant(w), (w & 3) as Kind));
+                prop_assert_eq!(tree.locate(cell), expected);
             }
         }
 
@@ -226,8 +226,8 @@ mod tests {
                     let above = words.iter().find(|&&w| word::octant(w).contains(&neighbour));
                     if let Some(&w) = above {
                         let (level, kind) = (word::level(w), (w & 3) as Kind);
-                        let want = if level == octant.level { Handle::leaf(kind) } else { Handle::coarser_leaf(kind, level) };
-                        prop_assert_eq!(handle, want);
+                        let expected = if level == octant.level { Handle::leaf(kind) } else { Handle::coarser_leaf(kind, level) };
+                        prop_assert_eq!(handle, expected);
                     } else if inside.is_empty() {
                         prop_assert_eq!(handle, Handle::HOLE);
                     } else {

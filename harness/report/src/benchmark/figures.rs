@@ -109,8 +109,8 @@ fn time_over_layers(groups: &Groups) -> Vec<Figure> {
 }
 
 /// Groups with at most one rank per core, whose wall times are meaningful.
-fn measured(groups: &Groups, wanted: impl Fn(&Setup) -> bool) -> Vec<&Group> {
-    let is_measured = |g: &&Group| provenance(g) == Provenance::Measured && wanted(&g.setup);
+fn measured(groups: &Groups, predicate: impl Fn(&Setup) -> bool) -> Vec<&Group> {
+    let is_measured = |g: &&Group| provenance(g) == Provenance::Measured && predicate(&g.setup);
     groups.all.iter().filter(is_measured).collect()
 }
 

@@ -7,7 +7,7 @@ use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
 use bench::experiments::cause::sentence;
-use bench::experiments::entry::{Line, What};
+use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::experiments::table::grouped;
 use maud::{Markup, html};
@@ -57,7 +57,7 @@ pub fn page(
 
 fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
     let runs: usize = groups.all.iter().map(|g| g.runs.len()).sum();
-    let failed = lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
+    let failed = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
     let network = &groups.network;
     html! {
         p {

@@ -2,7 +2,7 @@
 
 use crate::figure::Figure;
 use crate::figure::tikz::escape;
-use bench::experiments::entry::{Line, Machine, What};
+use bench::experiments::entry::{Entry, Line, Machine};
 use std::fmt::Write;
 
 /// The TikZ figures with captions and labels, for `\input` in a document.
@@ -27,7 +27,7 @@ pub fn fragment(figures: &[Figure]) -> String {
 pub fn machines(lines: &[Line]) -> Vec<Machine> {
     let mut out: Vec<Machine> = Vec::new();
     for line in lines {
-        if let What::Session(s) = &line.what
+        if let Entry::Session(s) = &line.entry
             && !out.contains(&s.machine)
         {
             out.push(s.machine.clone());
@@ -40,7 +40,7 @@ pub fn machines(lines: &[Line]) -> Vec<Machine> {
 pub fn commands(lines: &[Line]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for line in lines {
-        if let What::Session(s) = &line.what {
+        if let Entry::Session(s) = &line.entry {
             let without_directory = |w: &'_ String| match w.starts_with('/') {
                 true => w.rsplit('/').next().unwrap_or(w).to_owned(),
                 false => w.clone(),
@@ -131,7 +131,7 @@ mod tests {
             schema: String::new(),
             session: String::new(),
             time_utc: String::new(),
-            what: What::Session(Box::new(session)),
+            entry: Entry::Session(Box::new(session)),
         };
         let text = artifact(&[], &[line.clone(), line]);
         assert!(text.contains("A Chip") && text.contains("rustc 1.95.0"));

@@ -66,7 +66,7 @@ fn collective_fraction(run: &Run, point_to_point_bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Comm, Spread, What};
+    use bench::experiments::entry::{Comm, Entry, Spread};
     use bench::testing::{line, run};
 
     #[test]
@@ -75,7 +75,7 @@ mod tests {
         warm_up.warm_up = true;
         warm_up.message_matrix = vec![[0, 1, 2, 3_000_000], [2, 0, 1, 1_000_000]];
         warm_up.counters.insert("message_bytes".into(), Spread::brief(&[4e6, 0.0, 1e6]));
-        let figures = figures(&Groups::of(&[line(What::Run(Box::new(warm_up)))]));
+        let figures = figures(&Groups::of(&[line(Entry::Run(Box::new(warm_up)))]));
         let [f] = &figures[..] else { panic!("{figures:?}") };
         assert_eq!(f.id, "messages-cube-2M-3");
         for part in [

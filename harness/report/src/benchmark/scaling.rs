@@ -43,8 +43,8 @@ fn meshes<'a>(all: &[&'a Group]) -> Vec<Vec<&'a Group>> {
 }
 
 /// The groups of one provenance, by ranks.
-fn with_provenance<'a>(all: &[&'a Group], wanted: Provenance) -> Vec<&'a Group> {
-    let mut found: Vec<&Group> = all.iter().copied().filter(|g| provenance(g) == wanted).collect();
+fn with_provenance<'a>(all: &[&'a Group], kind: Provenance) -> Vec<&'a Group> {
+    let mut found: Vec<&Group> = all.iter().copied().filter(|g| provenance(g) == kind).collect();
     found.sort_by_key(|g| g.setup.ranks);
     found
 }
@@ -66,16 +66,16 @@ fn ideal(all: &[&Group], value: impl Fn(f64) -> f64) -> Series {
 fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
     let mut series = vec![ideal(mesh, |r| r)];
     let kinds = [Provenance::Measured, Provenance::Oversubscribed, Provenance::Projected];
-    for (style, wanted) in kinds.into_iter().enumerate() {
+    for (style, kind) in kinds.into_iter().enumerate() {
         let speedup = |g: &&Group| {
             let (base, t) = (groups.reference(g).time_s.value, g.time_s);
             let median =
                 Median { value: base / t.value, low: base / t.high, high: base / t.low, ..t };
             point(g.setup.ranks as f64, median)
         };
-        let points: Vec<Point> = with_provenance(mesh, wanted).iter().map(speedup).collect();
+        let points: Vec<Point> = with_provenance(mesh, kind).iter().map(speedup).collect();
         if !points.is_empty() {
-            series.push(Series::new(wanted.word(), wanted, style, points));
+            series.push(Series::new(kind.word(), kind, style, points));
         }
     }
     let cells = mesh[0].cells();

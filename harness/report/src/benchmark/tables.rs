@@ -81,7 +81,7 @@ fn fields<const N: usize>(texts: [String; N]) -> Vec<Markup> {
     texts.iter().map(|text| html! { (text) }).collect()
 }
 
-/// Projected and measured times of the same meshes on as many ranks; empty if the record has no such pairs.
+/// Projected and measured times of the same meshes on equally many ranks; empty if the record has no such pairs.
 pub fn projections(groups: &Groups) -> Markup {
     let columns = [
         "case",

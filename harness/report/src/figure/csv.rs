@@ -52,7 +52,7 @@ pub fn csv(figure: &Figure) -> String {
 /// A CSV table with its head.
 ///
 /// # Panics
-/// If a row has not as many fields as the head.
+/// If a row and the head have different numbers of fields.
 pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
     let write = || -> Result<(), ::csv::Error> {

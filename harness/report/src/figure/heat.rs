@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn one_value_and_none_have_a_range_too() {
+    fn one_value_and_no_values_have_a_range() {
         assert_eq!(range(&layer(&[(0, 1, 100.0)])), (100.0, 1000.0));
         assert_eq!(range(&layer(&[])), (1.0, 10.0));
         assert_eq!(ticks(64), [0, 16, 32, 48]);
@@ -157,7 +157,7 @@ mod tests {
         let svg = svg::svg(&heat_map());
         let fills = |colour: &str| svg.matches(&format!("fill=\"{colour}\"")).count();
         assert_eq!(fills("#FFFFFF"), 1, "{svg}");
-        // Of either end of the scale: its entries together, and a piece of the colour scale.
+        // Of either end of the scale: its entries together, and a part of the colour scale.
         assert_eq!((fills("#FFEA46"), fills("#00204D")), (2, 2));
         for text in ["from rank", "to rank", "bytes", "10⁵"] {
             assert!(svg.contains(&format!(">{text}<")), "{text} is missing in\n{svg}");

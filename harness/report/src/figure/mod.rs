@@ -204,7 +204,7 @@ impl Body {
 pub struct Figure {
     /// Name of its files, without the extension.
     pub id: String,
-    /// Heading. It is not drawn, because journals want it in the caption.
+    /// Heading. It is not drawn, because journals require it in the caption.
     pub title: String,
     /// Quantities, sample sizes, intervals and the meaning of hollow markers.
     pub caption: String,

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_are_broken_before_they_are_left_out() {
+    fn labels_are_wrapped_before_they_are_omitted() {
         let names: Vec<String> = ["metis unit", "morton area"].map(str::to_owned).to_vec();
         assert_eq!(labels(&names, 500.0), [vec!["metis unit"], vec!["morton area"]]);
         let broken = [vec!["metis", "unit"], vec!["morton", "area"]];

@@ -78,7 +78,7 @@ mod tests {
     use bench::track::analyse;
 
     #[test]
-    fn the_forms_are_those_that_the_tools_document() {
+    fn exports_have_the_documented_formats() {
         let record = Record {
             metrics: [("uav/4 ranks/words".to_owned(), 3.5)].into(),
             ..Record::new("a".into())

@@ -159,7 +159,7 @@ mod tests {
         let [f] = &figures[..] else { panic!("{figures:?}") };
         assert_eq!(f.id, "trend-uav");
         let Body::Points { series, .. } = &f.body else { panic!("not points: {:?}", f.body) };
-        // The number of cells is a result and no cost.
+        // The number of cells is a result, not a cost.
         assert_eq!((series.len(), series[0].name.as_str()), (1, "words"));
         assert_eq!((series[0].points.len(), series[0].points[0].y), (30, 1.0));
         assert!((series[0].points[29].y - 1.1).abs() < 0.01);

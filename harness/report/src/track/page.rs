@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn no_and_one_commit_have_pages_too() {
+    fn histories_of_zero_and_one_commits_have_a_page() {
         assert!(page(&[], &[]).contains("No records"));
         let one = &sample()[..1];
         assert!(page(one, &analyse(one, &Rules::default())).contains("One commit"));

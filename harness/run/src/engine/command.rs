@@ -82,8 +82,8 @@ fn base_words(
     Ok(template.iter().flat_map(expand).collect())
 }
 
-/// The words that ask for files and choices. A run report, a status or a choice that the engine does not offer is
-/// done without; a base tree is not, because the final mesh is no substitute for it.
+/// The arguments for files and choices. A run report, a status or a choice that the engine does not offer is omitted.
+/// A base tree is not, because the final mesh is no substitute for it.
 fn appended<'a>(
     templates: &'a Templates,
     layout: &Layout,
@@ -103,6 +103,6 @@ fn appended<'a>(
         (layout.level_base.is_some(), templates.level_base.as_ref()),
         (layout.weights.is_some(), templates.weights.as_ref()),
     ];
-    let wanted = parts.into_iter().filter(|(wanted, _)| *wanted);
-    Ok(wanted.filter_map(|(_, template)| template).flatten().collect())
+    let requested = parts.into_iter().filter(|(needed, _)| *needed);
+    Ok(requested.filter_map(|(_, template)| template).flatten().collect())
 }

@@ -160,14 +160,14 @@ impl Description {
         Ok(description)
     }
 
-    /// Values of the placeholders for places on this machine.
+    /// Values of the placeholders for paths on this machine.
     pub fn places(&self, paths: &Paths) -> Values<'static> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
-        let beside = paths.harness.parent().unwrap_or(Path::new("."));
+        let target = paths.harness.parent().unwrap_or(Path::new("."));
         Values::from([
             ("here", text(&self.here)),
             ("root", text(&paths.root)),
-            ("target", text(beside)),
+            ("target", text(target)),
             ("python", text(&paths.python)),
             ("mpirun", text(&paths.mpirun)),
         ])
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn errors_name_the_invalid_key_or_placeholder() {
         let why = |text: &str| Description::parse(text).unwrap_err();
         let unknown = why(&LEAST.replace("{case}", "{cas}"));
         assert!(unknown.contains("`serial` has the unknown placeholder {cas}"), "{unknown}");

@@ -9,7 +9,7 @@ pub const CODE_INPUT: i32 = 2;
 /// How a program failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// It cannot be run; why, as in "cannot be started: ...".
+    /// It cannot be run; the reason, as in "cannot be started: ...".
     Missing(String),
     /// It exited with a code other than 0, and this line of its standard error describes the error.
     Exited {
@@ -24,12 +24,12 @@ pub enum End {
     TimedOut {
         /// The limit.
         limit: Duration,
-        /// What its ranks were doing, if they were asked to report that.
+        /// The last activity of its ranks, if they reported it.
         activity: Option<String>,
     },
     /// The user interrupted the harness.
     Interrupted,
-    /// It ended well, but its output cannot be used; why, as in "wrote no mesh".
+    /// It exited with code 0, but its output cannot be used; the reason, as in "wrote no mesh".
     Unusable(String),
 }
 
@@ -64,13 +64,13 @@ impl Failure {
         Self { program: program.into(), end }
     }
 
-    /// Whether the user interrupted the harness, so that there is nothing to report about the program.
+    /// Whether the user interrupted the harness; the failure is then not the program's.
     pub fn is_interrupt(&self) -> bool {
         self.end == End::Interrupted
     }
 }
 
-/// What each rank was doing, with ranks that did the same in one clause.
+/// The activity of each rank. Ranks with the same activity share a clause.
 pub(super) fn describe_activity(status: &[(usize, String)]) -> String {
     let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
     for (rank, activity) in status {
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_end_has_its_sentence() {
+    fn each_kind_of_end_has_its_own_message() {
         let sentence = |end| Failure::new("mesher", end).to_string();
         let error = "no memory".to_owned();
         assert_eq!(sentence(End::Exited { code: 7, error }), "mesher ended with code 7: no memory");

@@ -20,7 +20,7 @@ pub fn install() {
     }
 }
 
-/// Whether the user has asked the harness to stop.
+/// Whether the user has interrupted the harness.
 pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }

@@ -75,7 +75,7 @@ impl Launcher {
     }
 }
 
-/// A run's directory in shared memory, removed on drop with everything that was left in it.
+/// A run's directory in shared memory, removed on drop with all remaining files.
 #[derive(Debug)]
 pub struct SharedMemory(TempDir);
 

@@ -1,4 +1,4 @@
-//! Programs as child processes: how they are found, started, watched and judged, and how their reports are read.
+//! Child processes: finds, starts and monitors programs, classifies how they end, and reads their reports.
 //! This module does not interpret meshes.
 
 mod command;

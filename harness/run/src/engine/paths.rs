@@ -1,4 +1,4 @@
-//! Where programs and data are on this machine.
+//! Paths of programs and data on this machine.
 
 use contract::catalogue::Catalogue;
 use std::env;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Paths of programs and data. A path need not exist: the code that needs the file reports that it is missing.
 #[derive(Clone, Debug)]
 pub struct Paths {
-    /// OpenMPI's or another `mpirun`.
+    /// The program `mpirun`.
     pub mpirun: PathBuf,
     /// A Python with the oracles' packages: `HARNESS_PYTHON`, or that of the repository's `.venv`.
     pub python: PathBuf,
@@ -31,10 +31,10 @@ impl Paths {
     /// it. `HARNESS_ROOT` overrides the search.
     pub fn find() -> Self {
         let harness = env::current_exe().unwrap_or_else(|_| PathBuf::from("harness"));
-        let beside = harness.parent().unwrap_or(Path::new(".")).to_owned();
-        let root = repository(&beside);
+        let directory = harness.parent().unwrap_or(Path::new(".")).to_owned();
+        let root = repository(&directory);
         let from_env = |name| env::var_os(name).map(PathBuf::from);
-        let target = beside.parent().unwrap_or(Path::new("..")).to_owned();
+        let target = directory.parent().unwrap_or(Path::new("..")).to_owned();
         Self {
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
@@ -58,12 +58,12 @@ fn p4est_below(target: &Path, root: &Path) -> PathBuf {
 
 /// The root of the repository: the nearest directory above the harness, or above the current directory, that contains
 /// the oracles.
-fn repository(beside: &Path) -> PathBuf {
+fn repository(directory: &Path) -> PathBuf {
     if let Some(root) = env::var_os("HARNESS_ROOT") {
         return root.into();
     }
     let here = env::current_dir().unwrap_or_default();
-    let mut above = beside.ancestors().chain(here.ancestors());
+    let mut above = directory.ancestors().chain(here.ancestors());
     let root = above.find(|place| place.join("harness/oracles/protocol.py").is_file());
     root.map_or(here.clone(), Path::to_owned)
 }

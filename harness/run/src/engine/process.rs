@@ -1,4 +1,4 @@
-//! Child programs under a time limit, ended together with everything that they started, and judged.
+//! Runs child processes under a time limit, ends them with all their descendants, and classifies the end.
 //!
 //! Invariants:
 //! - a child leads a session of its own, so that its descendants can be found even if they left its process group, as
@@ -29,7 +29,7 @@ pub struct Finished {
     pub peak_rss_bytes: Option<u64>,
 }
 
-/// Which line of the standard error describes an error. A line without a letter, such as a ruler, never does.
+/// The line of the standard error that describes an error. Lines without alphabetic characters are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorLine {
     /// The first: our own programs print one line, and `mpirun` adds many after it.
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_of_the_session_survives_its_leader() {
+    fn no_process_of_a_session_survives_its_leader() {
         let logs = tempfile::tempdir().unwrap();
         let watch = Watch::new("child", Duration::from_secs(30), logs.path());
         // The background process leaves the process group, as the ranks of mpirun do, but not the session.

@@ -16,7 +16,7 @@ pub struct Given {
 /// The programs of a session.
 #[derive(Clone, Debug)]
 pub struct Programs {
-    /// Where everything else is.
+    /// Paths of everything else.
     pub paths: Paths,
     /// The engine under test.
     pub engine: Engine,

@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_and_digest_are_all_that_is_required() {
+    fn only_cells_and_digest_are_required() {
         let least = parse(r#"{"cells": 8, "digest": "00"}"#);
         assert_eq!((least.ranks, least.time_wall_s, least.time_cpu_s()), (1, None, None));
         assert!(least.peak_rss_bytes.is_empty() && least.counters.is_empty());

@@ -24,10 +24,10 @@ pub struct Engine {
     launcher: Launcher,
 }
 
-/// A run that ended well.
+/// A completed run.
 #[derive(Debug)]
 pub struct Completed {
-    /// Its report, completed by what was observed from outside.
+    /// Its report; values that are missing from it were measured from outside.
     pub report: RunReport,
     /// Wall time from start to end of the process, in seconds.
     pub time_process_s: f64,
@@ -90,7 +90,7 @@ impl Engine {
         options.mesh.map(Path::to_owned).or_else(unreported)
     }
 
-    /// A case file that means the same as `case` and that the engine can read: `case` itself, or one with an STL file
+    /// A case file equivalent to `case` that the engine can read: `case` itself, or one with an STL file
     /// and an explicit root, written to `directory`.
     ///
     /// # Errors
@@ -132,7 +132,7 @@ impl Engine {
         options: &RunOptions,
     ) -> Result<Completed, Failure> {
         let mut command = self.command(case, layout, options)?;
-        // An earlier run's report must not pass for this run's.
+        // An earlier run's report must not be mistaken for this run's.
         let _ = fs::remove_file(options.report_path());
         let finished = self.execute(&mut command, layout.ranks, options)?;
         let mesh = self.mesh_path(options);
@@ -183,7 +183,7 @@ impl Engine {
         Failure::new(self.label(), end)
     }
 
-    /// The failure of a run that ended well and whose output cannot be used, as in "wrote no mesh".
+    /// The failure of a run with exit code 0 and unusable output, as in "wrote no mesh".
     pub fn unusable(&self, why: String) -> Failure {
         self.failure(End::Unusable(why))
     }
@@ -206,7 +206,7 @@ impl Completed {
     }
 }
 
-/// The report with what was observed from outside, where the program did not report it.
+/// The report, with values measured from outside where the program reported none.
 fn completed(mut report: RunReport, finished: &Finished) -> RunReport {
     report.time_wall_s.get_or_insert(finished.time_wall_s);
     if report.peak_rss_bytes.is_empty() {

@@ -7,7 +7,7 @@ pub(super) fn pid_of(id: u32) -> Option<Pid> {
     i32::try_from(id).ok().and_then(Pid::from_raw)
 }
 
-/// The living processes of a session; without its leader once that has been waited for.
+/// The live processes of a session. The leader is no longer among them after it was waited for.
 pub(super) fn members(leader: u32) -> Vec<Pid> {
     let Ok(entries) = fs::read_dir("/proc") else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! The independent check of balance: with n = 1 and everything kept, the mesh equals the base tree as balanced by
+//! The independent check of balance: with n = 1 and all leaves kept, the mesh equals the base tree as balanced by
 //! p4est.
 
 use super::case::CaseRun;
@@ -19,7 +19,7 @@ const SUBJECT: &str = "p4est";
 const NAME: &str = "balance";
 
 impl CaseRun<'_> {
-    /// Meshes the case with n = 1 and everything kept, balances the base tree with p4est, and compares the leaves
+    /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
     pub fn verify_balance(&mut self, meshes: &Meshes) {
         if let Some(why) = self.needs.p4est.clone() {
@@ -44,13 +44,13 @@ impl CaseRun<'_> {
             End::Exited { code: EXIT_TOO_DEEP, .. } => {
                 Outcome::LeftOut("the base tree has leaves of level 19, p4est stops at 18".into())
             }
-            // A failure of p4est is no evidence about the mesh, and it must not pass for agreement.
+            // A failure of p4est shows nothing about the mesh, and it must not count as agreement.
             _ => Outcome::Fail(failure.to_string()),
         };
         self.add(Check::new(SUBJECT, NAME, outcome), None);
     }
 
-    /// The leaf words of the same case with n = 1 and everything kept.
+    /// The leaf words of the same case with n = 1 and all leaves kept.
     fn mesh_plainly(&self) -> Result<Vec<u64>, Failure> {
         let case =
             self.plain_case().map_err(|why| Failure::new("the harness", End::Unusable(why)))?;
@@ -88,7 +88,7 @@ impl CaseRun<'_> {
     }
 }
 
-/// The text of the case file with n = 1, everything kept and an absolute path of the geometry.
+/// The text of the case file with n = 1, all leaves kept and an absolute path of the geometry.
 fn plain(text: &str, directory: &Path) -> Result<String, String> {
     let mut case: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
     case.insert("layer_cells_min".into(), Value::Integer(1));

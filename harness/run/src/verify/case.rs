@@ -21,7 +21,7 @@ pub struct CaseRun<'a> {
     pub options: &'a Options,
     /// The programs.
     pub programs: &'a Programs,
-    /// What is missing on this machine.
+    /// Prerequisites that are missing on this machine.
     pub needs: &'a Needs,
     /// The directory of the case.
     pub place: &'a Path,
@@ -157,7 +157,7 @@ fn options_of(layout: &Layout) -> Vec<String> {
     words
 }
 
-/// A word as a shell reads it back.
+/// A word, quoted for a shell.
 fn quoted(word: &str) -> String {
     match word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c)) {
         true => word.to_owned(),

@@ -34,7 +34,7 @@ pub enum VerifyError {
     /// The user's input: an unknown case, or a directory that must not be overwritten.
     #[error("{0}")]
     Input(String),
-    /// A program without which nothing can be verified.
+    /// A required program is missing.
     #[error("{0}")]
     Missing(String),
 }
@@ -49,7 +49,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
         if !engine.program().is_file() {
             let path = engine.program().display();
             return Err(VerifyError::Missing(format!(
-                "there is no {program} at {path}: build it, or give its path with --{program}"
+                "the {program} is missing: build {path}, or give another path with --{program}"
             )));
         }
     }

@@ -15,7 +15,7 @@ use std::time::Duration;
 /// Prerequisites, each with the reason if it is missing.
 #[derive(Clone, Debug, Default)]
 pub struct Needs {
-    /// Why there is no MPI.
+    /// Why MPI is unavailable.
     pub mpi: Option<String>,
     /// Why no oracle can be used.
     pub oracles: Option<String>,
@@ -23,7 +23,7 @@ pub struct Needs {
     pub oracles_found: Vec<&'static str>,
     /// Failures of the other oracles.
     oracles_missing: Vec<Failure>,
-    /// Why there is no p4est.
+    /// Why p4est is unavailable.
     pub p4est: Option<String>,
     /// Why geometries are missing, one reason each.
     geometries: Vec<String>,
@@ -46,9 +46,7 @@ impl Needs {
         let p4est = &programs.paths.p4est;
         needs.p4est = match (options.p4est, p4est.is_file()) {
             (false, _) => Some("--no-p4est was given".to_owned()),
-            (true, false) => {
-                Some(format!("there is no {} (ci/setup compiles it)", p4est.display()))
-            }
+            (true, false) => Some(format!("{} is missing (ci/setup compiles it)", p4est.display())),
             (true, true) => None,
         };
         match options.oracles {
@@ -92,7 +90,7 @@ impl Needs {
         let geometries = match self.geometries.len() {
             0 => None,
             count => Some(format!(
-                "{count} geometries are not here (ci/setup --geometries downloads those that may be downloaded)"
+                "{count} geometries are missing (ci/setup --geometries fetches those that can be fetched)"
             )),
         };
         let all = [
@@ -112,7 +110,7 @@ impl Needs {
 /// Checks that `mpirun` starts ranks that communicate, which the ranks of a mesher without MPI do not.
 fn probe_mpi(programs: &Programs, place: &Path) -> Result<(), String> {
     if !programs.paths.mpirun.is_file() {
-        return Err("there is no mpirun on the PATH (ci/setup installs it)".to_owned());
+        return Err("mpirun is not on the PATH (ci/setup installs it)".to_owned());
     }
     let probe = tempfile::tempdir_in(place).map_err(|error| error.to_string())?;
     let case = probe.path().join("probe.toml");

@@ -51,7 +51,7 @@ pub struct Options {
     pub limit: Duration,
     /// Run on MPI.
     pub mpi: bool,
-    /// Ask the oracles.
+    /// Compare with the oracles.
     pub oracles: bool,
     /// Compare with p4est.
     pub p4est: bool,

@@ -36,7 +36,7 @@ impl CaseRun<'_> {
         };
         let sample = sample::choose(case, &meshes.base.words, most, self.options.seed);
         let (answers, failures) = match self.ask(case, &sample) {
-            Ok(asked) => asked,
+            Ok(answered) => answered,
             Err(failure) if failure.is_interrupt() => return,
             Err(failure) => {
                 let outcome = Outcome::LeftOut(failure.to_string());

@@ -12,7 +12,7 @@ pub enum Outcome {
     Pass,
     /// It does not hold, for this reason.
     Fail(String),
-    /// It was not done, for this reason.
+    /// It was left out, for this reason.
     LeftOut(String),
 }
 
@@ -39,7 +39,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// A check with nothing but its outcome.
+    /// A check without remarks and counts.
     pub fn new(subject: impl Into<String>, name: impl Into<String>, outcome: Outcome) -> Self {
         let (subject, name) = (subject.into(), name.into());
         Self {

@@ -1,6 +1,6 @@
 //! The result of a verification: the one model that every output format prints.
 //!
-//! Invariant: every check that was requested appears in it, if need be as left out with the reason.
+//! Invariant: every requested check appears in it; a check that was not run is listed as left out, with the reason.
 
 pub use super::outcome::{Check, Outcome, Tally};
 use crate::engine::layout::Layout;
@@ -61,7 +61,7 @@ pub struct CaseReport {
     pub runs: Vec<Run>,
     /// All checks.
     pub checks: Vec<Check>,
-    /// The mesher's error message, if the case is at fault.
+    /// The mesher's error message, if the case is invalid.
     pub input_error: Option<String>,
     /// Directory of the results, if they were kept.
     pub kept: Option<String>,
@@ -117,7 +117,7 @@ pub struct Report {
 pub const EXIT_HOLDS: u8 = 0;
 /// Exit code: at least one check failed.
 pub const EXIT_FAILED: u8 = 1;
-/// Exit code: the user's input is at fault.
+/// Exit code: invalid input.
 pub const EXIT_INPUT: u8 = 2;
 /// Exit code: a required prerequisite is missing.
 pub const EXIT_MISSING: u8 = 3;
@@ -149,7 +149,7 @@ impl Report {
         let end = match self.exit_code() {
             EXIT_HOLDS => "all hold",
             EXIT_FAILED => "FAILED",
-            EXIT_INPUT => "the input is at fault",
+            EXIT_INPUT => "invalid input",
             EXIT_MISSING => "something required is missing",
             _ => "interrupted",
         };

@@ -16,11 +16,11 @@ use std::path::{Path, PathBuf};
 pub enum Program {
     /// The reference.
     Reference,
-    /// The engine under test, `mesher` in reports whichever it is.
+    /// The engine under test, always called `mesher` in reports.
     Mesher,
 }
 
-/// A run to be done.
+/// A requested run.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// The program.

@@ -116,7 +116,7 @@ impl CaseRun<'_> {
     pub fn verify_refusal(&mut self, why: &str) {
         match self.run(&serial(Program::Mesher, &self.selected.path, "serial")) {
             Ok(_) => {
-                let why = format!("the mesher takes a case that is at fault: {why}");
+                let why = format!("the mesher accepts an invalid case: {why}");
                 self.add(Check::new("serial", RUNS, Outcome::Fail(why)), None);
             }
             Err(failure) => match failure.end {

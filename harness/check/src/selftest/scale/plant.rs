@@ -148,7 +148,7 @@ fn write_words(words: &[u64], out: &mut impl Write) -> io::Result<()> {
 fn updated_manifest(original: &Manifest, window: &Window, words: &[u64]) -> Manifest {
     let mut manifest = original.clone();
     let (old, new) = (Tally::of(&window.correct.mesh.words), Tally::of(words));
-    // Wrapping, because the counts of the original may be wrong, which is a finding and no error here.
+    // Wrapping, because the counts of the original may be wrong, which is a finding and not an error here.
     let replace = |count: &mut u64, old: u64, new: u64| {
         *count = count.wrapping_sub(old).wrapping_add(new);
     };

@@ -1,7 +1,7 @@
 //! The rules that concern the record.
 
 use super::{Finding, Verdict};
-use bench::experiments::entry::{Line, What};
+use bench::experiments::entry::{Entry, Line};
 
 /// The findings about a record.
 pub fn findings(lines: &[Line]) -> Vec<Finding> {
@@ -12,8 +12,8 @@ pub fn findings(lines: &[Line]) -> Vec<Finding> {
 
 /// Rule 9: machine and software are documented.
 fn setup(lines: &[Line]) -> Vec<Finding> {
-    let session = |line: &'_ Line| match &line.what {
-        What::Session(session) => Some((**session).clone()),
+    let session = |line: &'_ Line| match &line.entry {
+        Entry::Session(session) => Some((**session).clone()),
         _ => None,
     };
     let sessions: Vec<_> = lines.iter().filter_map(session).collect();
@@ -52,8 +52,9 @@ fn setup(lines: &[Line]) -> Vec<Finding> {
 
 /// Rule 2: no run is missing without a reason.
 fn completeness(lines: &[Line]) -> Finding {
-    let failures = lines.iter().filter(|l| matches!(l.what, What::Failure(_))).count();
-    let oversubscribed = lines.iter().any(|l| matches!(&l.what, What::Run(r) if r.oversubscribed));
+    let failures = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
+    let oversubscribed =
+        lines.iter().any(|l| matches!(&l.entry, Entry::Run(r) if r.oversubscribed));
     let suffix = if oversubscribed { "; runs with more ranks than cores are marked" } else { "" };
     match failures {
         0 => {
@@ -83,7 +84,7 @@ mod tests {
             compiler: "r".into(),
             commit: commit.into(),
         };
-        line(What::Session(Box::new(Session { command: vec![], machine, load_average })))
+        line(Entry::Session(Box::new(Session { command: vec![], machine, load_average })))
     }
 
     fn is_broken(lines: &[Line]) -> bool {

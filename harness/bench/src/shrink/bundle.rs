@@ -10,7 +10,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// The options that make `harness shrink` repeat a failure.
+/// The options with which `harness shrink` repeats a failure.
 #[derive(Clone, Debug)]
 pub struct Repeat {
     /// Name or path of the engine description.
@@ -51,7 +51,7 @@ impl Repeat {
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn leave(
+pub fn write(
     shrunk: &Shrunk,
     probe: &Probe,
     repeat: &Repeat,
@@ -87,7 +87,7 @@ fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
         Ok(report) => {
             let indented = report.to_string().replace('\n', "\n    ");
             format!(
-                "\nWhere the meshes differ, A being the engine's and B that of {}:\n\n    {indented}\n",
+                "\nThe difference between the meshes, where A is the engine's and B that of {}:\n\n    {indented}\n",
                 probe.truth_name()
             )
         }

@@ -1,4 +1,4 @@
-//! A directory with an engine that a script plays, described as any other engine is.
+//! A directory with a scripted engine, described by a TOML file like any other engine.
 
 use contract::leafset::LeafSet;
 use serde_json::json;
@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// A mesher whose mesh is wrong on three ranks or more, if its body has a vertex at 0.25 and another at 0.5, and its
-/// cells are below 4: as if a halo had been dropped. It counts one `words` per facet, and SPINS more.
+/// A mesher whose mesh is wrong on three ranks or more if the body has vertices at 0.25 and at 0.5 and the cells are
+/// smaller than 4, as if a halo had been dropped. Its counter `words` is the number of facets plus EXTRA.
 const ENGINE: &str = r#"#!/bin/sh
 here=$(dirname "$0")
 case="$1"; ranks="$2"; shift 2
@@ -27,7 +27,7 @@ if [ "$ranks" -ge 3 ] && grep -q 'vertex 0.25 ' "$body" && grep -q 'vertex 0.5 '
     mesh=wrong
 fi
 [ -z "$out" ] || cp -r "$here/$mesh" "$out"
-[ -z "$json" ] || printf '{"cells": 1, "digest": "%s", "counters": {"words": [%s, SPINS]}}' \
+[ -z "$json" ] || printf '{"cells": 1, "digest": "%s", "counters": {"words": [%s, EXTRA]}}' \
     "$(cat "$here/$mesh.digest")" "$(grep -c outer "$body")" > "$json"
 "#;
 
@@ -45,27 +45,27 @@ const CASE: &str = "geometry = \"body.stl\"\nspacing_min = 1.0\nlayer_cells_min 
                     [root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
 
 /// How a run of the harness ended.
-pub struct Done {
+pub struct Outcome {
     /// Its exit code.
     pub code: i32,
-    /// All that it printed.
+    /// Its standard output and standard error.
     pub printed: String,
 }
 
-/// The directory; gone at the end.
-pub struct Play(TempDir);
+/// The directory, removed on drop.
+pub struct Fixture(TempDir);
 
-impl Play {
-    /// An engine, and a case of 40 facets.
+impl Fixture {
+    /// Writes an engine and a case of 40 facets.
     pub fn new() -> Self {
-        let play = Self(tempfile::tempdir().unwrap());
-        play.write_tree("right", &[2]);
+        let fixture = Self(tempfile::tempdir().unwrap());
+        fixture.write_tree("right", &[2]);
         let child = |digit: u64| digit << 61 | 1 << 2;
-        play.write_tree("wrong", &(0..8).map(child).collect::<Vec<u64>>());
-        play.engine("engine", 0);
-        play.write("engine.toml", DESCRIPTION);
-        play.write("harness/engines/reference.toml", DESCRIPTION);
-        play.write("case.toml", CASE);
+        fixture.write_tree("wrong", &(0..8).map(child).collect::<Vec<u64>>());
+        fixture.engine("engine", 0);
+        fixture.write("engine.toml", DESCRIPTION);
+        fixture.write("harness/engines/reference.toml", DESCRIPTION);
+        fixture.write("case.toml", CASE);
         let facet = |i: u32| {
             let x = f64::from(i) / 16.0;
             format!(
@@ -73,28 +73,28 @@ impl Play {
             )
         };
         let facets: String = (0..40).map(facet).collect();
-        play.write("body.stl", &format!("solid body\n{facets}endsolid body\n"));
-        play.write(
+        fixture.write("body.stl", &format!("solid body\n{facets}endsolid body\n"));
+        fixture.write(
             "gate.toml",
             "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\"]\nranks = [2]\n",
         );
-        play
+        fixture
     }
 
-    /// A path below the directory.
+    /// Returns a path below the directory.
     pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    /// Writes a file, its directories too.
+    /// Writes a file and creates its parent directories.
     pub fn write(&self, name: &str, text: &str) {
         fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
         fs::write(self.path(name), text).unwrap();
     }
 
-    /// An engine that counts so many words more.
+    /// Writes an engine that adds `words` to its counter.
     pub fn engine(&self, name: &str, words: u64) {
-        self.write(name, &ENGINE.replace("SPINS", &words.to_string()));
+        self.write(name, &ENGINE.replace("EXTRA", &words.to_string()));
         fs::set_permissions(self.path(name), fs::Permissions::from_mode(0o755)).unwrap();
     }
 
@@ -117,7 +117,7 @@ impl Play {
     }
 
     /// Runs the harness in the directory.
-    pub fn harness(&self, arguments: &str) -> Done {
+    pub fn harness(&self, arguments: &str) -> Outcome {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
         command
             .args(arguments.split(' '))
@@ -127,6 +127,6 @@ impl Play {
         let output = command.output().unwrap();
         let printed =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
-        Done { code: output.status.code().unwrap_or(-1), printed }
+        Outcome { code: output.status.code().unwrap_or(-1), printed }
     }
 }
