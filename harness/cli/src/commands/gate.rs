@@ -7,7 +7,9 @@ use bench::gate::{GateError, Options, gate};
 use clap::Args;
 use report::gate::{json, junit, markdown, text};
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use run::verify::report::{
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
+};
 use std::path::PathBuf;
 use std::time::Duration;
 use std::{env, fs, io};
@@ -98,7 +100,7 @@ pub fn run(arguments: Arguments) -> u8 {
     print!("{}", text(&report));
     if let Err(error) = write(&report, &arguments) {
         eprintln!("harness: a report could not be written: {error}");
-        return exit_code(&report, &arguments).max(EXIT_INPUT);
+        return exit_first(exit_code(&report, &arguments), EXIT_INPUT);
     }
     exit_code(&report, &arguments)
 }

@@ -8,7 +8,7 @@ use bench::experiments::record::{self, Content};
 use bench::experiments::session::{BenchError, Options};
 use clap::Args;
 use run::engine::launcher::Launcher;
-use run::verify::report::{EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use run::verify::report::{EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -90,7 +90,7 @@ impl SessionArguments {
             Ok(()) => code,
             Err(why) => {
                 eprintln!("harness: {why}");
-                code.max(EXIT_INPUT)
+                exit_first(code, EXIT_INPUT)
             }
         }
     }

@@ -8,7 +8,7 @@ use bench::targets::{self, Overrides, Targets};
 use clap::Args;
 use report::targets as page;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING, exit_first};
 use std::path::{Path, PathBuf};
 
 /// Name of the table in a report's directory.
@@ -85,7 +85,7 @@ fn show(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     let rows = targets::judged(targets, &content.lines);
     Ok(match publish(targets, &rows, &content.lines, arguments.session.report.as_deref()) {
         Ok(()) => code(&rows),
-        Err(()) => EXIT_INPUT.max(code(&rows)),
+        Err(()) => exit_first(EXIT_INPUT, code(&rows)),
     })
 }
 

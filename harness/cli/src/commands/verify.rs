@@ -10,7 +10,7 @@ use report::verification::table::table;
 use run::engine::programs::Programs;
 use run::verify::options::Need;
 use run::verify::options::Options;
-use run::verify::report::{EXIT_INPUT, EXIT_MISSING, Report};
+use run::verify::report::{EXIT_INPUT, EXIT_MISSING, Report, exit_first};
 use run::verify::{VerifyError, verify};
 use std::env;
 use std::fs::{self, OpenOptions};
@@ -117,7 +117,7 @@ pub fn run(arguments: Arguments) -> u8 {
         Ok(()) => report.exit_code(),
         Err(error) => {
             eprintln!("harness: a report could not be written: {error}");
-            report.exit_code().max(EXIT_INPUT)
+            exit_first(report.exit_code(), EXIT_INPUT)
         }
     }
 }

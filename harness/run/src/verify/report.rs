@@ -124,6 +124,12 @@ pub const EXIT_MISSING: u8 = 3;
 /// Exit code: interrupted by the user.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
+/// Returns the exit code of a command for which both codes apply: the first of 130, 1, 2 and 3.
+pub fn exit_first(a: u8, b: u8) -> u8 {
+    let order = [EXIT_INTERRUPTED, EXIT_FAILED, EXIT_INPUT, EXIT_MISSING];
+    order.into_iter().find(|code| [a, b].contains(code)).unwrap_or(EXIT_HOLDS)
+}
+
 impl Report {
     /// The exit code. An interrupt takes precedence, then a failed check, an input error, a missing prerequisite.
     pub fn exit_code(&self) -> u8 {
@@ -161,6 +167,15 @@ impl Report {
 mod tests {
     use super::*;
     use crate::testing::report;
+
+    #[test]
+    fn a_failed_check_takes_precedence_over_a_report_that_cannot_be_written() {
+        assert_eq!(exit_first(EXIT_FAILED, EXIT_INPUT), EXIT_FAILED);
+        assert_eq!(exit_first(EXIT_INPUT, EXIT_MISSING), EXIT_INPUT);
+        assert_eq!(exit_first(EXIT_HOLDS, EXIT_INPUT), EXIT_INPUT);
+        assert_eq!(exit_first(EXIT_INPUT, EXIT_INTERRUPTED), EXIT_INTERRUPTED);
+        assert_eq!(exit_first(EXIT_HOLDS, EXIT_HOLDS), EXIT_HOLDS);
+    }
 
     #[test]
     fn exit_codes_have_an_order_of_precedence() {
