@@ -77,4 +77,13 @@ mod tests {
         deleted[2] = set(&[0, 1]);
         Kept::new(&deleted).check_invariants(&small());
     }
+
+    #[test]
+    fn nothing_is_kept_below_a_deleted_root() {
+        let (mut deleted, split) = (per_level(), per_level());
+        deleted[0] = set(&[0]);
+        let kept = Kept::new(&deleted);
+        assert!(kept.only(&split, 0, set(&[0])).is_empty());
+        assert!(kept.only(&split, 2, set(&[0, 63])).is_empty());
+    }
 }
