@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::ingest::Source;
-use crate::lattice::{Bounds, ExtentBox, Keep, Root, Rules};
+use crate::lattice::{Bounds, Enclosed, ExtentBox, Keep, Root, Rules, Seed};
 use crate::octant::ROOT_EDGE;
 use geometries::Generator;
 use serde::Deserialize;
@@ -25,6 +25,10 @@ pub struct Case {
     pub root: RootSpec,
     /// Extent boxes.
     pub boxes: Vec<BoxSpec>,
+    /// Points that lie in the flow; if there are none, rays decide the sides.
+    pub seeds: Vec<[f64; 3]>,
+    /// The treatment of outside components that do not reach the root's boundary.
+    pub enclosed: Enclosed,
 }
 
 /// Specification of the root cube.
@@ -62,6 +66,10 @@ struct File {
     layer_cells_min: Option<i64>,
     keep: Option<Keep>,
     keep_crossing: Option<bool>,
+    #[serde(default)]
+    seeds: Vec<[f64; 3]>,
+    #[serde(default)]
+    enclosed: Enclosed,
     root_scale: Option<f64>,
     root: Option<RootTable>,
     #[serde(default, rename = "box")]
@@ -123,6 +131,10 @@ impl Case {
             .enumerate()
             .map(|(i, b)| b.on(&root, i + 1))
             .collect::<Result<_, _>>()?;
+        let seeds = (1..)
+            .zip(&self.seeds)
+            .map(|(number, &given)| on_lattice(given, &root, number))
+            .collect::<Result<_, _>>()?;
         Ok(Rules {
             root,
             level_surface,
@@ -130,8 +142,18 @@ impl Case {
             keep: self.keep,
             keep_crossing: self.keep_crossing,
             boxes,
+            seeds,
+            enclosed: self.enclosed,
         })
     }
+}
+
+/// A seed on the lattice; `number`, from 1, identifies it in errors.
+fn on_lattice(given: [f64; 3], root: &Root, number: usize) -> Result<Seed, Error> {
+    if !given.iter().all(|c| c.is_finite()) {
+        return Err(Error::input(format!("seed {number} is not finite: give three numbers")));
+    }
+    Ok(Seed { given, lattice: std::array::from_fn(|a| root.quantise(a, given[a])) })
 }
 
 impl BoxSpec {
@@ -192,6 +214,8 @@ impl File {
             keep_crossing: self.keep_crossing.unwrap_or(true),
             root,
             boxes: self.boxes,
+            seeds: self.seeds,
+            enclosed: self.enclosed,
         })
     }
 }

@@ -100,14 +100,10 @@ pub fn base_tree(tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn C
 }
 
 /// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` asks for them; results are the same on all ranks.
-pub fn sides(sides: &Sides, tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn Comm) {
-    sides.check_invariants(tree, rules.keep, ownership);
+pub fn sides(sides: &Sides, tree: &Tree, ownership: &Ownership, comm: &dyn Comm) {
+    sides.check_invariants(tree, ownership);
     replicas(&[&sides.inside, &sides.deleted], ownership, comm);
-    same(
-        &format!("{:?}", (sides.components, sides.rays, sides.ambiguous)),
-        "results of sides",
-        comm,
-    );
+    same(&format!("{:?}", (sides.rays, sides.summary)), "results of sides", comm);
 }
 
 /// The graded tree is a tree, contains the splits `base` of T0, splits no deleted leaf, and is balanced.

@@ -6,7 +6,7 @@ use clap_complete::Shell;
 use mesher::case::{BoxSpec, Case, LAYER_CELLS_MIN, ROOT_SCALE, RootSpec};
 use mesher::error::Error;
 use mesher::ingest::Source;
-use mesher::lattice::{Keep, Root};
+use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Partitioner, Weights};
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -83,6 +83,13 @@ struct Body {
     /// Extent box: minimum corner, maximum corner, spacing; may be repeated
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1,SPACING", allow_hyphen_values = true, value_parser = numbers::<7>)]
     boxes: Vec<[f64; 7]>,
+    /// Point in the flow, which then consists of the components with a seed, whatever the rays say; may be repeated
+    #[arg(long = "seed", value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
+    seeds: Vec<[f64; 3]>,
+    /// Treatment of outside components that do not reach the root's boundary, such as sealed cavities and
+    /// overlaps of solids [default: delete]
+    #[arg(long, value_enum)]
+    enclosed: Option<Enclosed>,
 }
 
 /// The level of the base leaves; chosen automatically if none.
@@ -212,9 +219,10 @@ pub fn case(args: &Args) -> Result<Case, Error> {
             || b.layer_cells_min.is_some()
             || b.keep.is_some()
             || b.drop_crossing;
-        if given || b.root_scale.is_some() || b.root.is_some() || !b.boxes.is_empty() {
+        let given = given || b.root_scale.is_some() || b.root.is_some() || !b.boxes.is_empty();
+        if given || !b.seeds.is_empty() || b.enclosed.is_some() {
             return Err(Error::input(format!(
-                "{} is a case file: set the spacing, layers, sides, root and boxes there, not on the command line",
+                "{} is a case file: set the spacing, layers, sides, root, boxes and seeds there, not on the command line",
                 args.input.display()
             )));
         }
@@ -241,5 +249,7 @@ pub fn case(args: &Args) -> Result<Case, Error> {
             .iter()
             .map(|v| BoxSpec { min: [v[0], v[1], v[2]], max: [v[3], v[4], v[5]], spacing: v[6] })
             .collect(),
+        seeds: b.seeds.clone(),
+        enclosed: b.enclosed.unwrap_or_default(),
     })
 }

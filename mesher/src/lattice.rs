@@ -218,6 +218,39 @@ pub struct Rules {
     pub keep_crossing: bool,
     /// The extent boxes.
     pub boxes: Vec<ExtentBox>,
+    /// Points that lie in the flow; if there are none, rays decide the sides.
+    pub seeds: Vec<Seed>,
+    /// The treatment of outside components that do not reach the root's boundary.
+    pub enclosed: Enclosed,
+}
+
+/// A point that lies in the flow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seed {
+    /// Its coordinates in the unit of the geometry.
+    pub given: [f64; 3],
+    /// The nearest lattice point, which may lie outside the root.
+    pub lattice: [i64; 3],
+}
+
+impl Seed {
+    /// Whether the point lies in the root, whose upper faces do not belong to it.
+    pub fn is_in_root(&self) -> bool {
+        self.lattice.iter().all(|c| (0..ROOT_EDGE).contains(c))
+    }
+}
+
+/// The treatment of outside components that do not reach the root's boundary, such as sealed cavities.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Enclosed {
+    /// They are deleted if the outside is kept, no seeds are given, and another component reaches the boundary.
+    #[default]
+    Delete,
+    /// They are kept.
+    Keep,
 }
 
 /// The side of the geometry that the mesh keeps.

@@ -58,9 +58,9 @@ pub fn finish(
     let (digests, parts) = write::gather(written, comm);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
-            let ambiguous = mesh.sides.ambiguous;
-            let (rules, is_base) = (&mesh.rules, mesh.is_base);
-            out.manifest(&Manifest::new(rules, is_base, &counts, ambiguous, &digests, &parts))
+            let (rules, summary) = (&mesh.rules, &mesh.sides.summary);
+            let is_base = mesh.is_base;
+            out.manifest(&Manifest::new(rules, is_base, &counts, summary, &digests, &parts))
         }
         _ => Ok(()),
     };

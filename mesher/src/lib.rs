@@ -104,20 +104,20 @@ fn mesh_into(
     Ok(Report::gather(&mesh, &totals, &counters, record, comm))
 }
 
-/// The leaf words that this rank owns, in order, and the components decided by majority: phases 1 to 8, and no
-/// report. Collective.
+/// The leaf words that this rank owns, in order, and a summary of the components: phases 1 to 8, and no report.
+/// Collective.
 pub fn words(
     case: &Case,
     options: &Options,
     comm: &dyn Comm,
-) -> Result<(Vec<u64>, Option<sides::Ambiguous>), Error> {
+) -> Result<(Vec<u64>, sides::Summary), Error> {
     let mesh = make(case, options, comm, &mut Recorder::default(), &mut Counters::default())?;
     let mut words = Vec::new();
     mesh.leaves().emit(|w| {
         words.extend_from_slice(w);
         Ok::<(), Error>(())
     })?;
-    Ok((words, mesh.sides.ambiguous))
+    Ok((words, mesh.sides.summary))
 }
 
 /// Phases 1 to 8, which make the tree. Collective.
@@ -187,10 +187,11 @@ fn make(
     });
     comm.agree(check_interrupt())?;
 
-    // 6. Sides: inside or outside, for every component of non-crossing leaves.
-    let sides =
-        record.phase("sides", comm, || sides::decide(&tree, &ownership, &facets, rules.keep, comm));
-    debug_check(options, comm, || check::sides(&sides, &tree, &ownership, &rules, comm));
+    // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
+    let sides = record.phase("sides", comm, || {
+        sides::decide(&tree, &ownership, &facets, &rules, options.ungraded, comm)
+    })?;
+    debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
     drop(facets);
     comm.agree(check_interrupt())?;
     let tree::Tree { split, crossing } = tree;

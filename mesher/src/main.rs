@@ -130,6 +130,9 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     match result {
         Ok(report) => {
             if first && !args.quiet {
+                for warning in &report.warnings {
+                    eprintln!("mesher: warning: {warning}");
+                }
                 // A closed pipe is no reason to fail.
                 let _ = writeln!(std::io::stdout(), "{report}");
             }

@@ -1,4 +1,7 @@
-//! The report of a run: a table for people, JSON for programs.
+//! The report of a run: a table for people ([`mod@text`]), JSON for programs, and warnings.
+
+mod text;
+mod warnings;
 
 use crate::comm::{Comm, Traffic, matrix};
 use crate::digest::hex;
@@ -6,11 +9,10 @@ use crate::leaves::Totals;
 use crate::mesh::Mesh;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::record::{Phase, Recorder, peak_rss_bytes};
-use crate::sides::Ambiguous;
+use crate::sides::Summary;
 use crate::{grade, voxelise};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fmt;
 
 /// Work done by one rank, in numbers that repeat exactly.
 #[derive(Clone, Copy, Debug, Default)]
@@ -115,12 +117,24 @@ pub struct Report {
     pub level_surface: Level,
     /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
-    /// Components of non-crossing leaves.
+    /// Components of non-crossing leaves of the base tree.
     pub components: u64,
+    /// Those that are outside, enclosed ones included.
+    pub components_outside: u64,
+    /// Those that are inside.
+    pub components_inside: u64,
+    /// Outside components that are deleted because the far field does not reach them.
+    pub components_enclosed: u64,
+    /// Their leaves in the base tree.
+    pub enclosed_leaves: u64,
+    /// A point in one of them.
+    pub enclosed_example: Option<[f64; 3]>,
     /// Components decided by majority.
     pub components_ambiguous: u64,
     /// A point in one of them.
     pub ambiguous_example: Option<[f64; 3]>,
+    /// What is probably not as the user intended, and what to try: a sentence each.
+    pub warnings: Vec<String>,
     /// Number of ranks.
     pub ranks: usize,
     /// Wall time of the slowest rank, in seconds, from reading to the last leaf.
@@ -174,7 +188,7 @@ impl Report {
         let phases: Vec<PhaseEntry> = record.phases().iter().enumerate().map(entry).collect();
         let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
         let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
-        let ambiguous: Option<Ambiguous> = sides.ambiguous;
+        let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
         Self {
             schema: "octree-mesher-run/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
@@ -189,9 +203,15 @@ impl Report {
             root_edge: rules.root.edge,
             level_surface: rules.level_surface,
             level_base: mesh.level_base,
-            components: sides.components,
+            components: outside + inside,
+            components_outside: outside,
+            components_inside: inside,
+            components_enclosed: enclosed.map_or(0, |e| e.count),
+            enclosed_leaves: enclosed.map_or(0, |e| e.leaves),
+            enclosed_example: enclosed.map(|e| rules.root.locate(e.example)),
             components_ambiguous: ambiguous.map_or(0, |a| a.count),
             ambiguous_example: ambiguous.map(|a| rules.root.locate(a.example)),
+            warnings: warnings::of(mesh),
             ranks: comm.size(),
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
             peak_rss_bytes: column(0),
@@ -204,114 +224,5 @@ impl Report {
     /// Adds the message matrix of the run to the report of rank 0. Collective.
     pub fn with_message_matrix(self, comm: &dyn Comm) -> Self {
         Self { message_matrix: Some(matrix::gather(comm)), ..self }
-    }
-}
-
-/// The greatest value divided by the mean: 1 is perfect balance.
-fn imbalance(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    if mean > 0.0 { values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean } else { 1.0 }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [outside, inside, crossing] = self.cells_by_side;
-        let peak: u64 = self.peak_rss_bytes.iter().sum();
-        let cells = self.cells.max(1) as f64;
-        writeln!(f, "facets         {}", grouped(self.facets))?;
-        writeln!(
-            f,
-            "root edge      {} (level 0), surface level {}",
-            self.root_edge, self.level_surface
-        )?;
-        writeln!(f, "cells          {}", grouped(self.cells))?;
-        writeln!(
-            f,
-            "  by side      outside {}, inside {}, crossing {}",
-            grouped(outside),
-            grouped(inside),
-            grouped(crossing)
-        )?;
-        for (l, &n) in self.cells_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
-            writeln!(
-                f,
-                "  level {l:>2}     {:>16}   edge {:e}",
-                grouped(n),
-                self.root_edge / f64::from(1u32 << l)
-            )?;
-        }
-        write!(f, "components     {}", grouped(self.components))?;
-        match self.ambiguous_example {
-            None => writeln!(f)?,
-            Some(p) => writeln!(
-                f,
-                ", {} decided by majority, one at ({}, {}, {})",
-                self.components_ambiguous, p[0], p[1], p[2]
-            )?,
-        }
-        writeln!(f, "digest         {}", self.digest)?;
-        let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
-        writeln!(
-            f,
-            "ranks          {}, cells max/mean {:.3}, base level {}",
-            self.ranks,
-            imbalance(&leaves),
-            self.level_base
-        )?;
-        writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
-        for p in &self.phases {
-            let wall = p.time_wall_s.iter().fold(0.0, |m: f64, v| m.max(*v));
-            let cpu: f64 = p.time_cpu_s.iter().sum();
-            writeln!(
-                f,
-                "  {:<12} {wall:>10.3} {cpu:>9.3}   {:>8.3}",
-                p.name,
-                imbalance(&p.time_cpu_s)
-            )?;
-        }
-        writeln!(
-            f,
-            "time           {:.3} s wall, {:.2} M cells/s",
-            self.time_wall_s,
-            cells / self.time_wall_s.max(1e-9) / 1e6
-        )?;
-        write!(
-            f,
-            "peak memory    {:.1} MB over all ranks, {:.2} bytes per cell",
-            peak as f64 / 1e6,
-            peak as f64 / cells
-        )
-    }
-}
-
-/// A number with a comma before each group of three digits.
-fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::new();
-    for (i, d) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(d);
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn digits_are_grouped_in_threes() {
-        assert_eq!(
-            [0, 12, 123, 1234, 1_234_567].map(grouped),
-            ["0", "12", "123", "1,234", "1,234,567"]
-        );
-    }
-
-    #[test]
-    fn imbalance_is_greatest_over_mean() {
-        assert_eq!(imbalance(&[1.0, 3.0]), 1.5);
-        assert_eq!(imbalance(&[0.0]), 1.0);
     }
 }

@@ -10,7 +10,7 @@
 
 use crate::brick;
 use crate::brickset::{BrickSet, Cursor, ones};
-use crate::lattice::{Keep, Rules};
+use crate::lattice::Keep;
 use crate::octant::{Level, Side, start57};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
@@ -125,9 +125,10 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         let split = cursors.split.get(key) & exists;
         let crossing = cursors.crossing.get(key) | crossing;
         let deleted = cursors.deleted.get(key);
-        let inside = match of.rules.keep {
-            Keep::Outside => deleted,
-            Keep::Inside => !deleted,
+        let inside = match of.sides.keep {
+            // Deleted leaves are not emitted.
+            Keep::Outside => 0,
+            Keep::Inside => u64::MAX,
             Keep::All => cursors.inside.get(key) | inside,
         };
         let mut leaves = exists & !split;

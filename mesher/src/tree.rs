@@ -172,7 +172,7 @@ pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
 pub(crate) mod tests {
     use super::*;
     use crate::brickset::tests::set;
-    use crate::lattice::{ExtentBox, Keep, Root};
+    use crate::lattice::{Enclosed, ExtentBox, Keep, Root};
 
     /// Rules with surface level 3 that keep everything.
     pub fn rules() -> Rules {
@@ -183,6 +183,8 @@ pub(crate) mod tests {
             keep: Keep::All,
             keep_crossing: true,
             boxes: vec![],
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
         }
     }
 

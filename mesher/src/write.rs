@@ -11,9 +11,9 @@ mod draft;
 use crate::comm::Comm;
 use crate::digest::{Digests, hex};
 use crate::error::Error;
-use crate::lattice::{Keep, Rules};
+use crate::lattice::{Enclosed, Keep, Rules};
 use crate::octant::LEVEL_MAX;
-use crate::sides::Ambiguous;
+use crate::sides::Summary;
 use crate::stream::Counts;
 use npyz::WriterBuilder;
 use serde::Serialize;
@@ -204,6 +204,9 @@ pub struct Manifest {
     leaves: u64,
     leaves_by_level: Vec<u64>,
     leaves_by_side: SideEntry,
+    seeds: Vec<[i64; 3]>,
+    enclosed: Enclosed,
+    components: ComponentsEntry,
     components_ambiguous: AmbiguousEntry,
     digest: String,
     octant_digests: Vec<String>,
@@ -228,6 +231,20 @@ struct SideEntry {
     outside: u64,
     inside: u64,
     crossing: u64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct ComponentsEntry {
+    outside: u64,
+    inside: u64,
+    enclosed: EnclosedEntry,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct EnclosedEntry {
+    count: u64,
+    leaves: u64,
+    example: Option<[f64; 3]>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -271,10 +288,11 @@ impl Manifest {
         rules: &Rules,
         base: bool,
         counts: &Counts,
-        ambiguous: Option<Ambiguous>,
+        summary: &Summary,
         digests: &Digests,
         parts: &[PartWords],
     ) -> Self {
+        let &Summary { outside, inside, enclosed, ambiguous, .. } = summary;
         let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
         let entry = |(i, p): (usize, &PartWords)| PartEntry {
             file: part_name(i),
@@ -301,6 +319,17 @@ impl Manifest {
                 .map(|l| l.iter().sum())
                 .collect(),
             leaves_by_side: SideEntry { outside: side(0), inside: side(1), crossing: side(2) },
+            seeds: rules.seeds.iter().map(|seed| seed.lattice).collect(),
+            enclosed: rules.enclosed,
+            components: ComponentsEntry {
+                outside,
+                inside,
+                enclosed: EnclosedEntry {
+                    count: enclosed.map_or(0, |e| e.count),
+                    leaves: enclosed.map_or(0, |e| e.leaves),
+                    example: enclosed.map(|e| rules.root.locate(e.example)),
+                },
+            },
             components_ambiguous: AmbiguousEntry {
                 count: ambiguous.map_or(0, |a| a.count),
                 example: ambiguous.map(|a| rules.root.locate(a.example)),

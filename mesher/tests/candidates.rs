@@ -5,7 +5,7 @@
 mod support;
 
 use mesher::comm::Solo;
-use mesher::lattice::{Bounds, Keep, Root};
+use mesher::lattice::{Bounds, Enclosed, Keep, Root};
 use mesher::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::partition::ownership::Ownership;
 use mesher::sides::{components, global, nodes::Nodes, vote};
@@ -96,6 +96,8 @@ fn a_large_component_has_thirty_two_candidates() {
         keep: Keep::All,
         keep_crossing: true,
         boxes: vec![],
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     };
     let outside = case.solo(true).iter().filter(|w| *w & 3 == 0).count();
     assert!(outside > 32, "{outside} leaves");

@@ -4,7 +4,7 @@
 use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::digest::{Digests, digest, hex, mix};
 use mesher::ingest::Source;
-use mesher::lattice::{Bounds, Keep, Root};
+use mesher::lattice::{Bounds, Enclosed, Keep, Root};
 use mesher::octant::{LEVEL_MAX, Side, corner, morton, position, start57, word};
 use serde_json::Value;
 
@@ -146,6 +146,8 @@ fn boxes_on_the_lattice_equal_the_vectors() {
             keep_crossing: true,
             root: RootSpec::Exact(root),
             boxes: vec![spec],
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
         };
         let rules = case.rules(&Bounds::EMPTY).expect("the box is good");
         assert_eq!(rules.boxes[0].min, integers(&v["lattice_min"]));

@@ -78,6 +78,9 @@ fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
     let side = |s: u64| words.iter().filter(|w| *w & 3 == s).count();
     let sides = json!({"outside": side(0), "inside": side(1), "crossing": side(2)});
     assert_eq!(manifest["leaves_by_side"], sides);
+    assert_eq!((&manifest["seeds"], &manifest["enclosed"]), (&json!([]), &json!("delete")));
+    let enclosed = json!({"count": 0, "leaves": 0, "example": null});
+    assert_eq!(manifest["components"], json!({"outside": 1, "inside": 1, "enclosed": enclosed}));
     assert_eq!(manifest["components_ambiguous"], json!({"count": 0, "example": null}));
     let octants: Vec<String> = (0..512u64)
         .map(|o| words.iter().copied().filter(|w| w >> 55 == o).collect::<Vec<u64>>())
@@ -86,7 +89,7 @@ fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
     assert_eq!(manifest["octant_digests"], json!(octants));
     assert_parts(folder, &manifest, words, ranks);
     let fields = manifest.as_object().expect("an object").len();
-    assert_eq!(fields, 16, "a field is untested, or missing");
+    assert_eq!(fields, 19, "a field is untested, or missing");
 }
 
 fn assert_parts(folder: &Path, manifest: &Value, words: &[u64], ranks: usize) {

@@ -4,18 +4,18 @@
 mod support;
 
 use clap::ValueEnum;
-use mesher::lattice::{Keep, Root};
+use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 use support::symmetry::Symmetry;
 use support::{Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup};
 
-/// Asserts equal leaves and equal ambiguous components.
+/// Asserts equal leaves and equal components.
 macro_rules! assert_equal {
     ($a:expr, $b:expr) => {
         let (a, b) = (&$a, &$b);
         prop_assert!(a.words == b.words, "{}", first_difference(&a.words, &b.words));
-        prop_assert_eq!(a.ambiguous, b.ambiguous);
+        prop_assert_eq!(a.summary, b.summary);
     };
 }
 
@@ -104,12 +104,13 @@ proptest! {
         let base = twice.outcome(&run, true);
         let want = all_outside(&case.outcome(&Run::SOLO, true).words);
         prop_assert!(base.words == want, "{}", first_difference(&base.words, &want));
-        prop_assert_eq!(base.ambiguous, None);
+        prop_assert_eq!(base.summary.ambiguous, None);
 
         let all = Small { keep: Keep::All, ..case.clone() };
         let want = all_outside(&all.outcome(&Run::SOLO, false).words);
         for keep in [Keep::All, Keep::Outside] {
-            let got = Small { keep, ..twice.clone() }.outcome(&run, false).words;
+            // What was inside is outside and enclosed.
+            let got = Small { keep, enclosed: Enclosed::Keep, ..twice.clone() }.outcome(&run, false).words;
             prop_assert!(got == want, "{:?}: {}", keep, first_difference(&got, &want));
         }
 
@@ -144,7 +145,7 @@ proptest! {
             let (got, straight) = (turned.outcome(&run, ungraded), case.outcome(&Run::SOLO, ungraded));
             let want = symmetry.words(&straight.words);
             prop_assert!(got.words == want, "{}", first_difference(&got.words, &want));
-            prop_assert_eq!((got.ambiguous, straight.ambiguous), (None, None));
+            prop_assert_eq!((got.summary.ambiguous, straight.summary.ambiguous), (None, None));
         }
     }
 
@@ -213,6 +214,8 @@ fn crooked() -> Small {
             boxed([8.0, 16.0, 29.0], [10.0, 18.5, 31.0], 0.5),
             boxed([40.0, 2.0, 3.0], [60.0, 30.0, 9.0], 4.0),
         ],
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     }
 }
 

@@ -194,6 +194,8 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
         keep_crossing: true,
         root: mesher::case::RootSpec::Scale(1.5),
         boxes: vec![],
+        seeds: Vec::new(),
+        enclosed: mesher::lattice::Enclosed::Delete,
     };
     let options = support::options(support::Run::SOLO.division, false);
     match mesher::words(&case, &options, &Solo) {

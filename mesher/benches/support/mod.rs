@@ -9,7 +9,7 @@ use mesher::dilate::{Reach, Tile};
 use mesher::facet::{Facet, crossed};
 use mesher::ingest::{Slice, Source, read};
 use mesher::kept::Kept;
-use mesher::lattice::{Bounds, Keep, Rules};
+use mesher::lattice::{Bounds, Enclosed, Keep, Rules};
 use mesher::octant::ROOT_BITS;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
@@ -43,6 +43,8 @@ pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Cas
         keep_crossing: true,
         root: RootSpec::Scale(8.0),
         boxes: vec![],
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     }
 }
 

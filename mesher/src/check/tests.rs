@@ -3,7 +3,7 @@ use crate::case::{Case, RootSpec};
 use crate::comm::{Solo, sim};
 use crate::ingest::{self, Source};
 use crate::lattice::Bounds;
-use crate::lattice::Keep;
+use crate::lattice::{Enclosed, Keep};
 use crate::octant::Side;
 use crate::partition::{Division, Partitioner, Weights};
 use crate::record::Recorder;
@@ -22,6 +22,8 @@ fn case() -> Case {
         keep_crossing: true,
         root: RootSpec::Scale(2.0),
         boxes: vec![],
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     }
 }
 
@@ -53,8 +55,8 @@ fn check_base_tree(mesh: Mesh, comm: &dyn Comm) {
 }
 
 fn check_sides(mesh: Mesh, comm: &dyn Comm) {
-    let Mesh { split, crossing, sides: s, ownership, rules, .. } = mesh;
-    sides(&s, &Tree { split, crossing }, &ownership, &rules, comm);
+    let Mesh { split, crossing, sides: s, ownership, .. } = mesh;
+    sides(&s, &Tree { split, crossing }, &ownership, comm);
 }
 
 fn check_graded(mesh: Mesh, comm: &dyn Comm) {
@@ -208,19 +210,19 @@ fn leaves_that_overlap_a_coarser_one_are_found() {
 #[test]
 #[should_panic(expected = "has a side, but is no leaf off the surface")]
 fn a_crossing_leaf_that_is_deleted_is_found() {
-    run(true, |m| m.sides.deleted = m.crossing.clone(), check_sides);
+    run(true, |m| m.sides.inside = m.crossing.clone(), check_sides);
 }
 
 #[test]
 #[should_panic(expected = "is in the set that this choice of sides leaves empty")]
 fn leaves_stored_as_inside_and_as_deleted_are_found() {
-    run(true, |m| m.sides.inside = m.sides.deleted.clone(), check_sides);
+    run(true, |m| m.sides.deleted = m.sides.inside.clone(), check_sides);
 }
 
 #[test]
 #[should_panic(expected = "results of sides must be the same on all ranks")]
 fn different_numbers_of_components_are_found() {
-    run(true, |m| m.sides.components += 1, check_sides);
+    run(true, |m| m.sides.summary.outside += 1, check_sides);
 }
 
 #[test]

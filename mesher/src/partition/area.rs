@@ -190,7 +190,7 @@ fn centre(f: &Facet) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::comm::Solo;
-    use crate::lattice::{Keep, Root};
+    use crate::lattice::{Enclosed, Keep, Root};
     use crate::partition::curve;
 
     fn rules(level_surface: Level) -> Rules {
@@ -201,6 +201,8 @@ mod tests {
             keep: Keep::Outside,
             keep_crossing: true,
             boxes: Vec::new(),
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
         }
     }
 
@@ -273,6 +275,8 @@ mod tests {
             keep: Keep::All,
             keep_crossing: true,
             boxes: vec![ExtentBox { min, max, level: 6 }],
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
         };
         let weights = |level: Level, light: u64, within: &Range<u64>| {
             let mut bins = Vec::new();

@@ -153,7 +153,7 @@ fn coarse_bins(local: &[Bin], rules: &Rules, level: Level, comm: &dyn Comm) -> (
 mod tests {
     use super::*;
     use crate::comm::sim;
-    use crate::lattice::{Keep, Root};
+    use crate::lattice::{Enclosed, Keep, Root};
     use crate::octant::{ROOT_EDGE, start57};
 
     const RANKS: usize = 9;
@@ -167,6 +167,8 @@ mod tests {
             keep: Keep::All,
             keep_crossing: true,
             boxes,
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
         }
     }
 

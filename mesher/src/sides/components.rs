@@ -17,6 +17,8 @@ pub struct LocalMerge {
     /// What other ranks must merge: octants in their bricks that a component of this rank faces, and
     /// components in replicas of bricks that another rank owns.
     pub faces: Vec<FacedOctants>,
+    /// Components with a face on the root's boundary; some more than once.
+    pub at_boundary: Vec<Component>,
 }
 
 /// Merged components, numbered from 0 on this rank.
@@ -117,7 +119,11 @@ pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
     let mut w = Walk {
         nodes,
         ownership,
-        local: LocalMerge { parent: (0..nodes.component_count()).collect(), faces: Vec::new() },
+        local: LocalMerge {
+            parent: (0..nodes.component_count()).collect(),
+            faces: Vec::new(),
+            at_boundary: Vec::new(),
+        },
         path: Vec::new(),
     };
     let root = Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] };
@@ -167,6 +173,10 @@ impl Walk<'_> {
                 // The owner merges the brick with its neighbours, and this replica's components with its own.
                 self.record_face(l, frame.key, c, bits);
             }
+            if l < 2 {
+                // Every octant of these levels has a face on the root's boundary.
+                self.local.at_boundary.push(c);
+            }
             let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
             self.merge_coarser(l, c, frame.key, inner, None);
             for axis in 0..3 {
@@ -192,7 +202,7 @@ impl Walk<'_> {
     ) {
         let nodes = self.nodes;
         match frame.across[axis][up] {
-            Across::Nothing => {}
+            Across::Nothing => self.local.at_boundary.push(c),
             Across::Coarser => self.merge_coarser(l, c, frame.key, faced, Some((axis, up))),
             Across::Remote => {
                 let sends = match nodes.placement(l, frame.node) {

@@ -1,45 +1,78 @@
 //! Sides: which leaves of the base tree are inside the geometry (the paper's section II.B: flood fill
-//! and rays).
+//! and rays), and which of them are kept.
 //!
 //! Non-crossing leaves that share part of a face belong to one component, and a component has one side.
 //! Within a brick, local components are flood fills by shifts. Across bricks a union-find merges them
 //! in a walk of the tree ([`components`]). Across ranks they receive common labels, by messages about
 //! the faces between ranks ([`global`]). Each component is then put to a vote of rays ([`rays`],
-//! [`vote`]).
+//! [`vote`]) or, if the case has seeds, decided by them ([`seeds`]). Outside components that the far field
+//! does not reach are found last ([`enclosed`]).
 //!
 //! Invariants of [`Sides`]:
 //! - `inside` and `deleted` hold non-crossing leaves of the base tree;
 //! - `deleted` is empty if everything is kept, and `inside` is empty otherwise: only the set that the
 //!   following phases need is stored;
-//! - leaves that share part of a face are on the same side.
+//! - leaves that share part of a face are on the same side, and all kept or all deleted.
 
 pub mod components;
+pub mod enclosed;
 pub mod global;
 pub mod nodes;
 pub mod rays;
+pub mod seeds;
 pub mod vote;
 
 use crate::brick::{self, Brick};
 use crate::comm::Comm;
+use crate::error::Error;
 use crate::facet::Facet;
-use crate::lattice::Keep;
+use crate::lattice::{Keep, Rules};
 use crate::octant::Level;
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, PerLevel, Tree, assert_none, per_level};
+use enclosed::Region;
+use global::Label;
+use std::collections::HashSet;
 
 /// Sides of the base tree's leaves.
 #[derive(Clone, Debug)]
 pub struct Sides {
+    /// The side that is kept. Everything is kept if the mesh is the base tree.
+    pub keep: Keep,
     /// Non-crossing leaves that are inside, if everything is kept.
     pub inside: PerLevel,
     /// Non-crossing leaves that are not kept.
     pub deleted: PerLevel,
-    /// Number of components, over all ranks.
-    pub components: u64,
-    /// Components that were decided by majority.
-    pub ambiguous: Option<Ambiguous>,
+    /// The components, in numbers.
+    pub summary: Summary,
     /// Rays cast, over all ranks.
     pub rays: u64,
+}
+
+/// The components of the base tree, in numbers. The same on all ranks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Number of outside components, enclosed ones included.
+    pub outside: u64,
+    /// Number of inside components.
+    pub inside: u64,
+    /// Outside components that are deleted because the far field does not reach them.
+    pub enclosed: Option<EnclosedComponents>,
+    /// Components that were decided by majority.
+    pub ambiguous: Option<Ambiguous>,
+    /// Whether the inside is kept and reaches the root's boundary.
+    pub inside_reaches_boundary: bool,
+}
+
+/// Outside components that are deleted because the far field does not reach them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EnclosedComponents {
+    /// Number of such components.
+    pub count: u64,
+    /// Number of their leaves in the base tree.
+    pub leaves: u64,
+    /// Centroid, in lattice units, of the first leaf of all of them, by level and Morton code.
+    pub example: [i64; 3],
 }
 
 /// Components whose rays did not agree.
@@ -51,65 +84,132 @@ pub struct Ambiguous {
     pub example: [i64; 3],
 }
 
+/// The sides of all components of the tree. The same on all ranks.
+#[derive(Default)]
+pub struct Verdict {
+    /// The components that are inside.
+    pub inside: HashSet<Label>,
+    /// The components that were decided by majority.
+    pub ambiguous: Option<Ambiguous>,
+    /// Number of rays cast.
+    pub rays: u64,
+}
+
+/// The result of the phase for a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Class {
+    Outside,
+    Inside,
+    /// Outside and deleted.
+    Enclosed,
+}
+
 /// Decides the sides of all leaves. `facets` are this rank's slice of the geometry: each facet is on exactly
-/// one rank. Collective.
+/// one rank. If `is_base`, nothing is deleted. Collective.
+///
+/// # Errors
+/// If a seed is outside the root or in a crossing leaf; the same on all ranks.
 pub fn decide(
     tree: &Tree,
     ownership: &Ownership,
     facets: &[Facet],
-    keep: Keep,
+    rules: &Rules,
+    is_base: bool,
     comm: &dyn Comm,
-) -> Sides {
+) -> Result<Sides, Error> {
     let mut nodes = nodes::Nodes::new(tree, ownership);
     if cfg!(debug_assertions) {
         nodes.check_invariants();
     }
     let mut local = components::merge(&nodes, ownership);
     let faces = std::mem::take(&mut local.faces);
+    let at_boundary = std::mem::take(&mut local.at_boundary);
     let merged = local.numbered();
     let labels = global::labels(&nodes, tree, ownership, faces, &merged, comm);
+    let label = |c| labels[merged.of[c as usize] as usize];
     let candidates = vote::candidates(&nodes, tree, &merged.of, &labels, ownership);
+    let components = vote::all_components(&candidates, comm);
+    let verdict = if rules.seeds.is_empty() {
+        vote::decide(&components, &candidates, facets, comm)
+    } else {
+        let flow = seeds::flow(rules, tree, &nodes, ownership, label, comm)?;
+        seeds::decide(&components, flow, rules.keep)
+    };
     nodes.drop_links();
 
-    let verdict = vote::decide(&candidates, facets, comm);
-    let inside: Vec<bool> = labels.iter().map(|n| verdict.inside.contains(n)).collect();
-    let mut is_inside = Vec::with_capacity(merged.of.len());
-    is_inside.extend(merged.of.iter().map(|&c| inside[c as usize]));
+    let at_boundary = at_boundary.into_iter().map(label).collect();
+    let region = Region::new(rules, &components, &verdict, at_boundary, comm);
+    let class = |label| match () {
+        () if verdict.inside.contains(label) => Class::Inside,
+        () if region.enclosed.contains(label) => Class::Enclosed,
+        () => Class::Outside,
+    };
+    let classes: Vec<Class> = labels.iter().map(class).collect();
+    let mut of_local = Vec::with_capacity(merged.of.len());
+    of_local.extend(merged.of.iter().map(|&c| classes[c as usize]));
     drop(merged);
     let mut sides = Sides {
+        keep: if is_base { Keep::All } else { rules.keep },
         inside: per_level(),
         deleted: per_level(),
-        components: verdict.components,
-        ambiguous: verdict.ambiguous,
+        summary: Summary {
+            outside: (components.len() - verdict.inside.len()) as u64,
+            inside: verdict.inside.len() as u64,
+            enclosed: None,
+            ambiguous: verdict.ambiguous,
+            inside_reaches_boundary: region.inside_reaches_boundary,
+        },
         rays: verdict.rays,
     };
-    for l in 0..LEVELS as Level {
-        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
-            let (mut open, mut within) = (0, 0);
-            for (c, part) in nodes.components(l, n) {
-                open |= part;
-                within |= if is_inside[c as usize] { part } else { 0 };
-            }
-            let (found, deleted) = match keep {
-                Keep::All => (within, 0),
-                Keep::Outside => (0, within),
-                Keep::Inside => (0, open & !within),
-            };
-            sides.inside[l as usize].push(key, found);
-            sides.deleted[l as usize].push(key, deleted);
-        }
-    }
-    sides
+    let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership);
+    sides.summary.enclosed = region.summary(&components, leaves_enclosed, comm);
+    Ok(sides)
 }
 
 impl Sides {
+    /// Stores the leaves of all bricks by the classes of their local components. Returns the number of enclosed
+    /// leaves that this rank owns.
+    fn store(
+        &mut self,
+        tree: &Tree,
+        nodes: &nodes::Nodes,
+        of_local: &[Class],
+        ownership: &Ownership,
+    ) -> u64 {
+        let mut leaves_enclosed = 0;
+        for l in 0..LEVELS as Level {
+            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
+                let (mut open, mut within, mut enclosed) = (0, 0, 0);
+                for (c, part) in nodes.components(l, n) {
+                    open |= part;
+                    match of_local[c as usize] {
+                        Class::Outside => {}
+                        Class::Inside => within |= part,
+                        Class::Enclosed => enclosed |= part,
+                    }
+                }
+                let (inside, deleted) = match self.keep {
+                    Keep::All => (within, 0),
+                    Keep::Outside => (0, within | enclosed),
+                    Keep::Inside => (0, open & !within),
+                };
+                self.inside[l as usize].push(key, inside);
+                self.deleted[l as usize].push(key, deleted);
+                if enclosed != 0 && ownership.owns(l, key) {
+                    leaves_enclosed += u64::from(enclosed.count_ones());
+                }
+            }
+        }
+        leaves_enclosed
+    }
+
     /// Checks the invariants on the bricks that this rank holds; one side per component as far as a
     /// component lies within a brick.
     ///
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
-    pub fn check_invariants(&self, tree: &Tree, keep: Keep, ownership: &Ownership) {
-        let (stored, empty) = match keep {
+    pub fn check_invariants(&self, tree: &Tree, ownership: &Ownership) {
+        let (stored, empty) = match self.keep {
             Keep::All => (&self.inside, &self.deleted),
             Keep::Outside | Keep::Inside => (&self.deleted, &self.inside),
         };
@@ -138,13 +238,14 @@ mod tests {
     use super::*;
     use crate::brickset::tests::set;
     use crate::comm::Solo;
-    use crate::tree::tests::small;
+    use crate::tree::tests::{rules, small};
 
     /// Sides of a tree without facets: all leaves that do not cross are outside.
     fn decided(keep: Keep) -> (Tree, Sides) {
         let tree = small();
-        let sides = decide(&tree, &Ownership::solo(), &[], keep, &Solo);
-        sides.check_invariants(&tree, keep, &Ownership::solo());
+        let rules = Rules { keep, ..rules() };
+        let sides = decide(&tree, &Ownership::solo(), &[], &rules, false, &Solo).unwrap();
+        sides.check_invariants(&tree, &Ownership::solo());
         (tree, sides)
     }
 
@@ -153,7 +254,7 @@ mod tests {
     fn a_side_of_a_crossing_leaf_is_found() {
         let (tree, mut sides) = decided(Keep::Outside);
         sides.deleted[3] = set(&[0]);
-        sides.check_invariants(&tree, Keep::Outside, &Ownership::solo());
+        sides.check_invariants(&tree, &Ownership::solo());
     }
 
     #[test]
@@ -161,7 +262,7 @@ mod tests {
     fn an_inside_leaf_of_a_mesh_that_keeps_the_outside_is_found() {
         let (tree, mut sides) = decided(Keep::Outside);
         sides.inside[1] = set(&[2]);
-        sides.check_invariants(&tree, Keep::Outside, &Ownership::solo());
+        sides.check_invariants(&tree, &Ownership::solo());
     }
 
     #[test]
@@ -169,6 +270,6 @@ mod tests {
     fn a_component_with_two_sides_is_found() {
         let (tree, mut sides) = decided(Keep::All);
         sides.inside[1] = set(&[1]);
-        sides.check_invariants(&tree, Keep::All, &Ownership::solo());
+        sides.check_invariants(&tree, &Ownership::solo());
     }
 }

@@ -1,8 +1,8 @@
 //! The vote: six rays from the centroid of a component's leaf decide the component's side if they agree.
 //! Otherwise the next leaf is tried, and after 32 leaves the majority of all rays decides.
 
-use super::Ambiguous;
 use super::global::Label;
+use super::{Ambiguous, Verdict};
 use super::nodes::Nodes;
 use super::rays::parities;
 use crate::brick::Brick;
@@ -12,17 +12,18 @@ use crate::facet::Facet;
 use crate::octant::{Level, corner, edge};
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, Tree};
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 
 /// Maximum number of leaves of a component whose rays are cast before the majority decides.
 pub const CANDIDATES: usize = 32;
 
 /// A leaf as one number that sorts by level, then by Morton code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Candidate(u64);
+pub struct Candidate(pub u64);
 
 impl Candidate {
-    fn new(l: Level, code: u64) -> Self {
+    /// Leaf `code` of level `l`.
+    pub fn new(l: Level, code: u64) -> Self {
         Self(u64::from(l) << 57 | code)
     }
 
@@ -74,6 +75,16 @@ pub fn candidates(
 /// The first leaves of each component, in order.
 pub type FirstLeaves = BTreeMap<Label, Vec<Candidate>>;
 
+/// A component and its first leaf, by level and Morton code.
+pub type FirstLeaf = (Label, Candidate);
+
+/// All components of the tree, by label. Collective; the result is the same on all ranks.
+pub fn all_components(mine: &FirstLeaves, comm: &dyn Comm) -> Vec<FirstLeaf> {
+    let firsts = mine.iter().map(|(&label, list)| [label, list[0].0]).collect();
+    let firsts = all_gather_reduced(firsts, u64::min, comm);
+    firsts.into_iter().map(|[label, first]| (label, Candidate(first))).collect()
+}
+
 /// The first [`CANDIDATES`] leaves for each label from several lists.
 fn first_of_all(lists: impl Iterator<Item = (Label, Vec<Candidate>)>) -> FirstLeaves {
     let mut all = FirstLeaves::new();
@@ -85,19 +96,6 @@ fn first_of_all(lists: impl Iterator<Item = (Label, Vec<Candidate>)>) -> FirstLe
     all
 }
 
-/// Result of the vote.
-#[derive(Default)]
-pub struct Verdict {
-    /// The components that are inside.
-    pub inside: HashSet<Label>,
-    /// The components that were decided by majority.
-    pub ambiguous: Option<Ambiguous>,
-    /// Number of components of the tree.
-    pub components: u64,
-    /// Number of rays cast.
-    pub rays: u64,
-}
-
 /// A component that is not decided yet.
 struct Open {
     label: Label,
@@ -105,14 +103,16 @@ struct Open {
     votes: u32,
 }
 
-/// Decides all components. Each rank tests the rays against its own facets; `mine` are this rank's
-/// [`candidates`]. Collective; the result is the same on all ranks.
-pub fn decide(mine: &FirstLeaves, facets: &[Facet], comm: &dyn Comm) -> Verdict {
+/// Decides all `components`. Nearly always the rays of a component's first leaf agree, so the other candidates are
+/// gathered only for those whose rays do not. Each rank tests the rays against its own
+/// facets; `mine` are this rank's [`candidates`]. Collective; the result is the same on all ranks.
+pub fn decide(
+    components: &[FirstLeaf],
+    mine: &FirstLeaves,
+    facets: &[Facet],
+    comm: &dyn Comm,
+) -> Verdict {
     let mut verdict = Verdict::default();
-    // Nearly always the rays of the first leaf agree, so only this leaf of each component is gathered.
-    let firsts = mine.iter().map(|(&label, list)| [label, list[0].0]).collect();
-    let firsts = all_gather_reduced(firsts, u64::min, comm);
-    verdict.components = firsts.len() as u64;
     let cast = |queries: Vec<(Open, Candidate)>, verdict: &mut Verdict| -> Vec<Open> {
         let points: Vec<[i64; 3]> = queries.iter().map(|(_, c)| c.centroid()).collect();
         verdict.rays += 6 * points.len() as u64;
@@ -126,7 +126,7 @@ pub fn decide(mine: &FirstLeaves, facets: &[Facet], comm: &dyn Comm) -> Verdict 
         });
         undecided.collect()
     };
-    let queries = firsts.iter().map(|e| (Open { label: e[0], votes: 0 }, Candidate(e[1])));
+    let queries = components.iter().map(|&(label, first)| (Open { label, votes: 0 }, first));
     let mut open = cast(queries.collect(), &mut verdict);
     if open.is_empty() {
         return verdict;

@@ -2,7 +2,7 @@
 
 use super::{Facet, Run, Small};
 use mesher::case::BoxSpec;
-use mesher::lattice::{Keep, Root};
+use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 
@@ -158,13 +158,26 @@ pub fn small(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value =
     let keep = prop_oneof![2 => Just(Keep::Outside), 2 => Just(Keep::Inside), 1 => Just(Keep::All)];
     let boxes = prop_oneof![3 => Just(vec![]), 2 => prop::collection::vec(extent_box(), 1..3)];
     let odd_root = prop_oneof![3 => Just(None), 1 => ([-9.0f64..3.0, -9.0f64..3.0, -9.0f64..3.0], 65.0f64..90.0).prop_map(Some)];
-    (facets, 0u32..=6, 1.0f64..1.99, 1u32..=10, keep, any::<bool>(), boxes, odd_root).prop_map(
-        |(facets, level, slack, layer_cells_min, keep, keep_crossing, boxes, odd_root)| {
+    let enclosed = prop_oneof![Just(Enclosed::Delete), Just(Enclosed::Keep)];
+    let keep = (keep, any::<bool>(), enclosed);
+    (facets, 0u32..=6, 1.0f64..1.99, 1u32..=10, keep, boxes, odd_root).prop_map(
+        |(facets, level, slack, layer_cells_min, keep, boxes, odd_root)| {
+            let (keep, keep_crossing, enclosed) = keep;
             let root = odd_root.map_or(Root { origin: [0.0; 3], edge: 64.0 }, |(origin, edge)| {
                 Root { origin, edge }
             });
             let spacing_min = root.edge / f64::from(1 << level) * slack;
-            Small { facets, root, spacing_min, layer_cells_min, keep, keep_crossing, boxes }
+            Small {
+                facets,
+                root,
+                spacing_min,
+                layer_cells_min,
+                keep,
+                keep_crossing,
+                boxes,
+                seeds: Vec::new(),
+                enclosed,
+            }
         },
     )
 }
@@ -204,6 +217,8 @@ pub fn thin() -> impl Strategy<Value = Small> {
                 keep,
                 keep_crossing,
                 boxes: boxes.into_iter().map(extent).collect(),
+                seeds: Vec::new(),
+                enclosed: Enclosed::Delete,
             }
         },
     )
@@ -221,5 +236,7 @@ pub fn leaky_on_rays() -> impl Strategy<Value = Small> {
         keep: if all { Keep::All } else { Keep::Outside },
         keep_crossing: true,
         boxes: vec![],
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     })
 }

@@ -4,9 +4,10 @@
 use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::comm::{Solo, sim};
 use mesher::ingest::Source;
-use mesher::lattice::{Keep, Root};
+use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
-use mesher::sides::Ambiguous;
+use mesher::error::Error;
+use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};
 
 pub mod draw;
@@ -28,6 +29,8 @@ pub struct Small {
     pub keep: Keep,
     pub keep_crossing: bool,
     pub boxes: Vec<BoxSpec>,
+    pub seeds: Vec<[f64; 3]>,
+    pub enclosed: Enclosed,
 }
 
 impl Small {
@@ -40,6 +43,8 @@ impl Small {
             keep_crossing: self.keep_crossing,
             root: RootSpec::Exact(self.root),
             boxes: self.boxes.clone(),
+            seeds: self.seeds.clone(),
+            enclosed: self.enclosed,
         }
     }
 
@@ -98,16 +103,24 @@ impl Small {
 
     /// The mesher's result with a run configuration. Asserts that ranks agree and that each rank's words are sorted.
     pub fn outcome(&self, run: &Run, ungraded: bool) -> Outcome {
+        self.try_outcome(run, ungraded).expect("the case is good")
+    }
+
+    /// As [`Small::outcome`], for cases that may have unusable seeds.
+    pub fn try_outcome(&self, run: &Run, ungraded: bool) -> Result<Outcome, Error> {
         let options = options(run.division, ungraded);
         let case = self.mesher_case();
-        let parts =
-            sim::run(run.ranks, run.seed, |c| words(&case, &options, c).expect("the case is good"));
-        let ambiguous = parts[0].1;
-        assert!(parts.iter().all(|p| p.1 == ambiguous), "ranks must agree on ambiguous components");
+        let parts = sim::run(run.ranks, run.seed, |c| words(&case, &options, c));
+        let errors: Vec<&Error> = parts.iter().filter_map(|p| p.as_ref().err()).collect();
+        let agree = errors.is_empty() || errors.len() == run.ranks;
+        assert!(agree && errors.iter().all(|e| *e == errors[0]), "ranks must agree on errors");
+        let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let summary = parts[0].1;
+        assert!(parts.iter().all(|p| p.1 == summary), "ranks must agree on components");
         assert!(parts.iter().all(|p| p.0.is_sorted()), "parts must be sorted");
         let mut words: Vec<u64> = parts.into_iter().flat_map(|p| p.0).collect();
         words.sort_unstable();
-        Outcome { words, ambiguous }
+        Ok(Outcome { words, summary })
     }
 
     /// The nearest case on a root of edge 64 at the origin whose coordinates are multiples of 1/128. They are lattice
@@ -150,11 +163,11 @@ impl Run {
     };
 }
 
-/// A mesh: leaf words and components decided by majority.
+/// A mesh: leaf words and a summary of its components.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     pub words: Vec<u64>,
-    pub ambiguous: Option<Ambiguous>,
+    pub summary: Summary,
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {

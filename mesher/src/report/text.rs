@@ -1,0 +1,126 @@
+//! The report as a table for people.
+
+use super::Report;
+use std::fmt;
+
+/// The greatest value divided by the mean: 1 is perfect balance.
+fn imbalance(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    if mean > 0.0 { values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean } else { 1.0 }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [outside, inside, crossing] = self.cells_by_side;
+        let peak: u64 = self.peak_rss_bytes.iter().sum();
+        let cells = self.cells.max(1) as f64;
+        writeln!(f, "facets         {}", grouped(self.facets))?;
+        writeln!(
+            f,
+            "root edge      {} (level 0), surface level {}",
+            self.root_edge, self.level_surface
+        )?;
+        writeln!(f, "cells          {}", grouped(self.cells))?;
+        writeln!(
+            f,
+            "  by side      outside {}, inside {}, crossing {}",
+            grouped(outside),
+            grouped(inside),
+            grouped(crossing)
+        )?;
+        for (l, &n) in self.cells_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
+            writeln!(
+                f,
+                "  level {l:>2}     {:>16}   edge {:e}",
+                grouped(n),
+                self.root_edge / f64::from(1u32 << l)
+            )?;
+        }
+        writeln!(f, "components     {}", components(self))?;
+        writeln!(f, "digest         {}", self.digest)?;
+        let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
+        writeln!(
+            f,
+            "ranks          {}, cells max/mean {:.3}, base level {}",
+            self.ranks,
+            imbalance(&leaves),
+            self.level_base
+        )?;
+        writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
+        for p in &self.phases {
+            let wall = p.time_wall_s.iter().fold(0.0, |m: f64, v| m.max(*v));
+            let cpu: f64 = p.time_cpu_s.iter().sum();
+            writeln!(
+                f,
+                "  {:<12} {wall:>10.3} {cpu:>9.3}   {:>8.3}",
+                p.name,
+                imbalance(&p.time_cpu_s)
+            )?;
+        }
+        writeln!(
+            f,
+            "time           {:.3} s wall, {:.2} M cells/s",
+            self.time_wall_s,
+            cells / self.time_wall_s.max(1e-9) / 1e6
+        )?;
+        write!(
+            f,
+            "peak memory    {:.1} MB over all ranks, {:.2} bytes per cell",
+            peak as f64 / 1e6,
+            peak as f64 / cells
+        )
+    }
+}
+
+/// The components in one line: by side, and those that were deleted as enclosed or decided by majority.
+fn components(report: &Report) -> String {
+    let mut line = format!(
+        "outside {}, inside {}",
+        grouped(report.components_outside),
+        grouped(report.components_inside)
+    );
+    if let Some([x, y, z]) = report.enclosed_example {
+        line += &format!(
+            "; {} outside deleted as enclosed ({} leaves of the base tree, one at ({x}, {y}, {z}))",
+            grouped(report.components_enclosed),
+            grouped(report.enclosed_leaves)
+        );
+    }
+    if let Some([x, y, z]) = report.ambiguous_example {
+        let count = grouped(report.components_ambiguous);
+        line += &format!("; {count} decided by majority, one at ({x}, {y}, {z})");
+    }
+    line
+}
+
+/// A number with a comma before each group of three digits.
+fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, d) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(d);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_grouped_in_threes() {
+        assert_eq!(
+            [0, 12, 123, 1234, 1_234_567].map(grouped),
+            ["0", "12", "123", "1,234", "1,234,567"]
+        );
+    }
+
+    #[test]
+    fn imbalance_is_greatest_over_mean() {
+        assert_eq!(imbalance(&[1.0, 3.0]), 1.5);
+        assert_eq!(imbalance(&[0.0]), 1.0);
+    }
+}

@@ -1,0 +1,49 @@
+//! Warnings: meshes that follow the rules and are probably not what the user wants.
+
+use crate::lattice::Keep;
+use crate::mesh::Mesh;
+use crate::sides::Summary;
+
+/// A sentence for each warning: what was found, and what to try.
+pub fn of(mesh: &Mesh) -> Vec<String> {
+    if mesh.is_base {
+        return Vec::new();
+    }
+    let has_seeds = !mesh.rules.seeds.is_empty();
+    let summary = &mesh.sides.summary;
+    let warnings = [
+        empty_region(mesh.rules.keep, summary),
+        summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
+    ];
+    warnings.into_iter().flatten().collect()
+}
+
+fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
+    let &Summary { outside, inside, enclosed, .. } = summary;
+    let kept = match keep {
+        Keep::Outside => outside - enclosed.map_or(0, |e| e.count),
+        Keep::Inside => inside,
+        Keep::All => outside + inside,
+    };
+    let warning = match keep {
+        _ if kept > 0 => return None,
+        Keep::Inside => {
+            "nothing is inside the geometry, so the mesh has at most crossing leaves: close inlets, outlets and holes that are \
+             wider than a cell (`harness leak` finds them), increase spacing_min, or set keep = outside"
+        }
+        Keep::Outside => {
+            "nothing is outside the geometry, so the mesh has at most crossing leaves: enlarge the root, decrease spacing_min, \
+             or set keep = inside"
+        }
+        Keep::All => "the geometry crosses all leaves: decrease spacing_min",
+    };
+    Some(warning.to_owned())
+}
+
+fn flow_at_boundary(has_seeds: bool) -> String {
+    let cause = match has_seeds {
+        true => "the flow reaches the root's boundary from its seeds through an opening that is wider than a cell",
+        false => "a component that is inside by its rays reaches the root's boundary: the geometry is open or extends beyond the root",
+    };
+    format!("{cause}; `harness leak` finds openings: close them, increase spacing_min, or enlarge the root")
+}

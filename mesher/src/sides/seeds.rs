@@ -1,0 +1,120 @@
+//! Seeds: points that lie in the flow. The flow is every component with a seed, whatever rays would say, so a
+//! hole in the geometry joins to the flow what lies beyond it.
+
+use super::Verdict;
+use super::global::Label;
+use super::nodes::{Component, Nodes, open_bricks};
+use super::vote::{Candidate, FirstLeaf};
+use crate::brickset::ones;
+use crate::comm::Comm;
+use crate::error::Error;
+use crate::lattice::{Keep, Rules, Seed};
+use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
+use crate::partition::ownership::Ownership;
+use crate::tree::{LEVELS, Tree};
+use std::collections::HashSet;
+
+/// Stands for the label of a component where a seed's leaf crosses. No component has it.
+const CROSSING: Label = Label::MAX;
+
+/// The components that have a seed; `label` returns the label of a local component. Collective; the result is
+/// the same on all ranks.
+///
+/// # Errors
+/// If a seed is outside the root or in a crossing leaf.
+pub fn flow(
+    rules: &Rules,
+    tree: &Tree,
+    nodes: &Nodes,
+    ownership: &Ownership,
+    label: impl Fn(Component) -> Label,
+    comm: &dyn Comm,
+) -> Result<HashSet<Label>, Error> {
+    let mut mine = Vec::new();
+    for (number, seed) in (1..).zip(&rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
+        let (l, code) = leaf_at(tree, seed);
+        let (key, bit) = (code >> 6, code & 63);
+        if !ownership.owns(l, key) {
+            continue;
+        }
+        let mut found = CROSSING;
+        nodes.finder().find(l, key, 1 << bit, |c| found = label(c));
+        mine.extend([number, found]);
+    }
+    let all = comm.all_gather(&mine);
+    let found: Vec<[u64; 2]> = all.words().as_chunks().0.to_vec();
+    for (number, seed) in (1..).zip(&rules.seeds) {
+        let problem = match found.iter().find(|f| f[0] == number) {
+            None => "lies outside the root",
+            Some([_, CROSSING]) => "lies in a leaf that the geometry crosses",
+            Some(_) => continue,
+        };
+        return Err(unusable(number, seed, problem, rules, tree, ownership, comm));
+    }
+    Ok(found.into_iter().map(|[_, label]| label).collect())
+}
+
+/// The sides of all components: the flow is on the side that is kept, outside if everything is.
+pub fn decide(components: &[FirstLeaf], flow: HashSet<Label>, keep: Keep) -> Verdict {
+    let inside = match keep {
+        Keep::Inside => flow,
+        Keep::Outside | Keep::All => {
+            components.iter().map(|c| c.0).filter(|label| !flow.contains(label)).collect()
+        }
+    };
+    Verdict { inside, ..Verdict::default() }
+}
+
+/// Level and code of the leaf that contains a seed, or of an octant above it in a brick that this rank does not
+/// own.
+fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
+    let position = seed.lattice.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32);
+    let code = |l: Level| morton(position) >> (3 * (LEVEL_MAX - l));
+    let is_split = |l: &Level| {
+        tree.split[*l as usize].cursor().get(code(*l) >> 6) >> (code(*l) & 63) & 1 == 1
+    };
+    let l = (0..LEVEL_MAX).take_while(is_split).count() as Level;
+    (l, code(l))
+}
+
+/// The error of a seed, with the nearest point that could replace it. Collective.
+fn unusable(
+    number: u64,
+    seed: &Seed,
+    problem: &str,
+    rules: &Rules,
+    tree: &Tree,
+    ownership: &Ownership,
+    comm: &dyn Comm,
+) -> Error {
+    let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
+    let mine: Vec<u64> = nearest(tree, ownership, near).into_iter().flatten().collect();
+    let all = comm.all_gather(&mine);
+    let [x, y, z] = seed.given;
+    let advice = match all.words().as_chunks().0.iter().min() {
+        Some(&[_, first]) => {
+            let [x, y, z] = rules.root.locate(Candidate(first).centroid());
+            format!("the nearest centroid of a leaf that it does not cross is ({x}, {y}, {z})")
+        }
+        None => "the geometry crosses all leaves: decrease spacing_min".to_owned(),
+    };
+    Error::input(format!("seed {number} at ({x}, {y}, {z}) {problem}; {advice}"))
+}
+
+/// The non-crossing leaf, in bricks that this rank holds, whose centroid is nearest to a lattice point: its squared distance
+/// and its [`Candidate`]. Of leaves at the same distance the first, by level and Morton code.
+fn nearest(tree: &Tree, ownership: &Ownership, point: [i64; 3]) -> Option<[u64; 2]> {
+    let mut best = None;
+    for l in 0..LEVELS as Level {
+        for b in open_bricks(tree, ownership, l) {
+            for bit in ones(b.open) {
+                let leaf = Candidate::new(l, b.key << 6 | u64::from(bit));
+                let centroid = leaf.centroid();
+                let squared = |a: usize| (centroid[a] - point[a]).pow(2) as u64;
+                let found = [(0..3).map(squared).sum(), leaf.0];
+                best = Some(best.map_or(found, |best: [u64; 2]| best.min(found)));
+            }
+        }
+    }
+    best
+}
