@@ -10,7 +10,7 @@
 
 use crate::brick;
 use crate::brickset::{BrickSet, Cursor, ones};
-use crate::lattice::Keep;
+use crate::lattice::{Keep, Rules};
 use crate::octant::{Level, Side, start57};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;

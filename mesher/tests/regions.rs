@@ -133,9 +133,18 @@ proptest! {
             message.split(|c| !is_part(c)).filter_map(|n| n.trim_end_matches('.').parse().ok()).collect()
         };
         let got = case.try_outcome(&run, false).map_err(|e| numbers(e.to_string()));
-        let want = reference::mesh(&case.reference_case());
-        let want = want.map(|mesh| mesh.words).map_err(|e| numbers(e.to_string()));
-        prop_assert_eq!(got.map(|outcome| outcome.words), want);
+        match (got, reference::mesh(&case.reference_case())) {
+            (Ok(got), Ok(want)) => prop_assert_eq!(got.words, want.words),
+            (Err(got), Err(want)) => {
+                let mut want = numbers(want.to_string());
+                // The reference counts seeds from 0.
+                want[0] += 1.0;
+                let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
+                let agree = got.len() == want.len() && got.iter().zip(&want).all(near);
+                prop_assert!(agree, "{got:?} instead of {want:?}");
+            }
+            (got, want) => prop_assert!(false, "{got:?} instead of {want:?}"),
+        }
     }
 }
 
@@ -155,7 +164,7 @@ fn meshed(facets: &[Facet], options: &[&str]) -> (Value, String) {
     workspace.write("body.stl", stl(facets));
     let args = ["body.stl", "--spacing-min", "2", "--root", "0,0,0,64", "--json", "report.json"];
     let finished = run(workspace.mesher(&[&args[..], options].concat()));
-    finished.succeeds();
+    assert_eq!(finished.code, Some(0), "{finished:?}");
     (process::read_json(&workspace.path().join("report.json")), finished.stderr)
 }
 
@@ -175,14 +184,20 @@ fn the_report_counts_components_by_side_and_those_that_are_enclosed() {
     assert_eq!(report["enclosed_example"].as_array().map(Vec::len), Some(3));
     assert_eq!(stderr, "");
     let (kept, _) = meshed(&box_in_box(), &["--enclosed", "keep"]);
-    assert_eq!((&kept["components_enclosed"], &kept["enclosed_example"]), (&json!(0), &json!(null)));
+    assert_eq!(
+        (&kept["components_enclosed"], &kept["enclosed_example"]),
+        (&json!(0), &json!(null))
+    );
     assert!(kept["cells"].as_u64() > report["cells"].as_u64());
 }
 
 #[test]
 fn a_seed_in_the_solid_makes_it_the_flow() {
     let (report, _) = meshed(&box_in_box(), &["--keep", "inside", "--seed", "16,32,32"]);
-    assert_eq!((&report["components_inside"], &report["components_outside"]), (&json!(1), &json!(2)));
+    assert_eq!(
+        (&report["components_inside"], &report["components_outside"]),
+        (&json!(1), &json!(2))
+    );
     let seeds = ["--keep", "inside", "--seed", "32,32,32", "--seed", "16,32,32"];
     let (report, _) = meshed(&box_in_box(), &seeds);
     assert_eq!(report["components_inside"], 2);
@@ -192,9 +207,17 @@ fn a_seed_in_the_solid_makes_it_the_flow() {
 fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
     for (facets, options, expected) in [
         (open_box(), &["--keep", "inside"][..], "nothing is inside the geometry"),
-        (open_box(), &["--keep", "inside", "--seed", "32,32,32"], "reaches the root's boundary from its seeds"),
+        (
+            open_box(),
+            &["--keep", "inside", "--seed", "32,32,32"],
+            "reaches the root's boundary from its seeds",
+        ),
         (cuboid([-1.0; 3], [65.0; 3]), &["--keep", "outside"], "nothing is outside the geometry"),
-        (cuboid([-1.0; 3], [65.0; 3]), &["--keep", "inside"], "inside by its rays reaches the root's boundary"),
+        (
+            cuboid([-1.0; 3], [65.0; 3]),
+            &["--keep", "inside"],
+            "inside by its rays reaches the root's boundary",
+        ),
     ] {
         let (report, stderr) = meshed(&facets, options);
         let warnings = report["warnings"].as_array().expect("a list");
@@ -211,7 +234,7 @@ fn an_unusable_seed_is_refused_with_a_point_that_can_be_used() {
     workspace.write("body.stl", stl(&box_in_box()));
     let args = ["body.stl", "--spacing-min", "2", "--root", "0,0,0,64", "--seed"];
     for (seed, expected) in [
-        ("9,32,32", ["seed 1 at (9, 32, 32)", "crosses", "(6, 30, 30)"]),
+        ("9,32,32", ["seed 1 at (9, 32, 32)", "crosses", "(11, 31, 31)"]),
         ("64,32,32", ["seed 1 at (64, 32, 32)", "outside the root", "(60, 28, 28)"]),
         ("1e300,0,0", ["seed 1", "outside the root", "nearest"]),
         ("nan,0,0", ["seed 1", "not finite", "three numbers"]),

@@ -81,7 +81,7 @@ impl Phases {
         let binned = BinnedFacets::new(&facets);
         let depth = Depth { surface: rules.level_surface, boxes: vec![] };
         let (tree, _) = refine(&binned, &depth, &[SubtreeRoot { level: 0, code: 0 }]);
-        let sides = decide(&tree, &ownership, &facets, rules.keep, &Solo);
+        let sides = sides(&tree, &ownership, &facets, &rules);
         let kept = Kept::new(&sides.deleted);
         let (graded, _) =
             grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
@@ -140,7 +140,7 @@ pub fn kernels() -> Vec<Kernel> {
         kernel(
             "sides",
             leaves_of(&p.tree),
-            Box::new(|| decide(&p.tree, &p.ownership, &p.facets, p.rules.keep, &Solo).components),
+            Box::new(|| sides(&p.tree, &p.ownership, &p.facets, &p.rules).summary.outside),
         ),
         kernel("dilate_3", bricks, Box::new(move || dilated(p.surface(), surface, 3))),
         kernel("dilate_9", bricks, Box::new(move || dilated(p.surface(), surface, 9))),
@@ -226,4 +226,8 @@ fn drop_counted<T>(made: T) -> u64 {
 /// Number of leaves of a base tree.
 fn leaves_of(tree: &Tree) -> u64 {
     1 + 7 * tree.split.iter().map(BrickSet::count).sum::<u64>()
+}
+
+fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
+    decide(tree, ownership, facets, rules, false, &Solo).expect("a case without seeds")
 }

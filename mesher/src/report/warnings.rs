@@ -42,8 +42,14 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
 
 fn flow_at_boundary(has_seeds: bool) -> String {
     let cause = match has_seeds {
-        true => "the flow reaches the root's boundary from its seeds through an opening that is wider than a cell",
-        false => "a component that is inside by its rays reaches the root's boundary: the geometry is open or extends beyond the root",
+        true => {
+            "the flow reaches the root's boundary from its seeds through an opening that is wider than a cell"
+        }
+        false => {
+            "a component that is inside by its rays reaches the root's boundary: the geometry is open or extends beyond the root"
+        }
     };
-    format!("{cause}; `harness leak` finds openings: close them, increase spacing_min, or enlarge the root")
+    format!(
+        "{cause}; `harness leak` finds openings: close them, increase spacing_min, or enlarge the root"
+    )
 }

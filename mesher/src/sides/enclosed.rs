@@ -34,9 +34,8 @@ impl Region {
             let mine = at_boundary.into_iter().map(|label| [label, 0]).collect();
             all_gather_reduced(mine, u64::min, comm).into_iter().map(|[label, _]| label).collect()
         };
-        let outside = || {
-            components.iter().map(|c| c.0).filter(|label| !verdict.inside.contains(label))
-        };
+        let outside =
+            || components.iter().map(|c| c.0).filter(|label| !verdict.inside.contains(label));
         let deletes = rules.seeds.is_empty() && rules.enclosed == Enclosed::Delete;
         match rules.keep {
             // A single outside component either reaches the boundary or is the only one and kept.

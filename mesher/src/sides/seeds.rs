@@ -70,9 +70,8 @@ pub fn decide(components: &[FirstLeaf], flow: HashSet<Label>, keep: Keep) -> Ver
 fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
     let position = seed.lattice.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32);
     let code = |l: Level| morton(position) >> (3 * (LEVEL_MAX - l));
-    let is_split = |l: &Level| {
-        tree.split[*l as usize].cursor().get(code(*l) >> 6) >> (code(*l) & 63) & 1 == 1
-    };
+    let is_split =
+        |l: &Level| tree.split[*l as usize].cursor().get(code(*l) >> 6) >> (code(*l) & 63) & 1 == 1;
     let l = (0..LEVEL_MAX).take_while(is_split).count() as Level;
     (l, code(l))
 }

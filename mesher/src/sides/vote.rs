@@ -2,9 +2,9 @@
 //! Otherwise the next leaf is tried, and after 32 leaves the majority of all rays decides.
 
 use super::global::Label;
-use super::{Ambiguous, Verdict};
 use super::nodes::Nodes;
 use super::rays::parities;
+use super::{Ambiguous, Verdict};
 use crate::brick::Brick;
 use crate::brickset::ones;
 use crate::comm::{Comm, all_gather_reduced};

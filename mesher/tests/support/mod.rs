@@ -3,10 +3,11 @@
 
 use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::comm::{Solo, sim};
+use mesher::error::Error;
 use mesher::ingest::Source;
 use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::octant::position;
 use mesher::partition::{Division, Partitioner, Weights};
-use mesher::error::Error;
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};
 
@@ -65,6 +66,11 @@ impl Small {
                 .iter()
                 .map(|b| reference::BoxSpec { min: b.min, max: b.max, spacing: b.spacing })
                 .collect(),
+            seeds: self.seeds.clone(),
+            enclosed: match self.enclosed {
+                Enclosed::Delete => reference::Enclosed::Delete,
+                Enclosed::Keep => reference::Enclosed::Keep,
+            },
         }
     }
 
@@ -86,7 +92,16 @@ impl Small {
         let ambiguous = mesh
             .ambiguous
             .map(|a| Ambiguous { count: a.components, example: on_lattice(a.example) });
-        Outcome { words: mesh.words, ambiguous }
+        let reference::Components { outside, inside, enclosed } = mesh.components;
+        let enclosed = enclosed.example.map(|example| EnclosedComponents {
+            count: enclosed.count,
+            leaves: enclosed.leaves,
+            example: on_lattice(example),
+        });
+        let inside_reaches_boundary = self.keep == Keep::Inside
+            && self.reference_mesh(true).words.into_iter().any(is_inside_at_boundary);
+        let summary = Summary { outside, inside, enclosed, ambiguous, inside_reaches_boundary };
+        Outcome { words: mesh.words, summary }
     }
 
     /// Leaf words by the mesher on one rank.
@@ -161,6 +176,12 @@ impl Run {
             level_base: None,
         },
     };
+}
+
+/// Whether the word is that of an inside leaf with a face on the root's boundary.
+fn is_inside_at_boundary(word: u64) -> bool {
+    let edge = 1 << (19 - (word >> 2 & 31));
+    word & 3 == 1 && position(word >> 7).iter().any(|&c| c == 0 || c + edge == 1 << 19)
 }
 
 /// A mesh: leaf words and a summary of its components.
