@@ -190,9 +190,9 @@ pub fn assign_sides(dense: &mut Dense, case: &Case, facets: &[Facet]) -> u64 {
     let mut ambiguous = 0;
     for component in components(dense) {
         let side = if case.seeds.is_empty() {
-            let odd_of_rays = vote(dense, &component, facets);
-            ambiguous += u64::from(odd_of_rays[0] % odd_of_rays[1] != 0);
-            if 2 * odd_of_rays[0] > odd_of_rays[1] { INSIDE } else { OUTSIDE }
+            let [odd, rays] = vote(dense, &component, facets);
+            ambiguous += u64::from(0 < odd && odd < rays);
+            if 2 * odd > rays { INSIDE } else { OUTSIDE }
         } else {
             let is_flow = case.seeds.iter().any(|&seed| dense.contain(&component, seed));
             if is_flow == (case.keep == Keep::Inside) { INSIDE } else { OUTSIDE }

@@ -35,6 +35,11 @@ impl Leaf {
         self.min.map(|x| x + self.edge)
     }
 
+    /// Whether the half-open cube contains a lattice point.
+    pub fn has(&self, point: [i64; 3]) -> bool {
+        (0..3).all(|a| (self.min[a]..self.max()[a]).contains(&point[a]))
+    }
+
     pub fn contains(&self, other: &Leaf) -> bool {
         self.keys.0 <= other.keys.0 && other.keys.1 <= self.keys.1
     }

@@ -82,6 +82,25 @@ pub fn cases(finest: u32) -> impl Strategy<Value = RandomCase> {
     )
 }
 
+/// Cases like those of [`cases`] for external flow, with a shell around the middle of the root as an
+/// additional body. Most have enclosed space.
+pub fn cases_with_a_cavity(finest: u32) -> impl Strategy<Value = RandomCase> {
+    let unit = ROOT_EDGE >> 4;
+    let outer = (uniform3(1..=2_i64), uniform3(14..=15_i64));
+    let inner = (uniform3(4..=5_i64), uniform3(9..=11_i64));
+    (cases(finest), outer, inner, 0..=unit).prop_map(move |(random, outer, inner, shift)| {
+        let mut facets = random.facets;
+        for (min, max) in [outer, inner] {
+            facets.extend(block(min.map(|x| x * unit + shift), max.map(|x| x * unit + shift)));
+        }
+        let surface = case(&facets, finest);
+        let Case { layer_cells_min, keep_crossing, boxes, enclosed, .. } = random.case;
+        let keep = Keep::Outside;
+        let case = Case { layer_cells_min, keep, keep_crossing, boxes, enclosed, ..surface };
+        RandomCase { facets, level_surface: finest, case }
+    })
+}
+
 /// No seeds or a few, half of them in cell planes.
 fn seeds() -> impl Strategy<Value = Vec<[f64; 3]>> {
     let unit = ROOT_EDGE >> 5;
