@@ -191,7 +191,7 @@ fn seeds_and_enclosed_components_are_reported() {
     assert_eq!((&enclosed["count"], &enclosed["example"]), (&1.into(), &vec![-0.25; 3].into()));
     let message = String::from_utf8(output.stderr).unwrap();
     let leaves = &enclosed["leaves"];
-    assert!(message.contains(&format!("1 outside components with {leaves} leaves")), "{message}");
+    assert!(message.contains(&format!("deleted, 1 components and {leaves} leaves")), "{message}");
 
     let seeded = format!("seeds = [[0.25, 0, -4.0]]\nenclosed = \"keep\"\n{case}");
     fs::write(path.join("case.toml"), &seeded).unwrap();
