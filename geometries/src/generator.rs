@@ -29,6 +29,18 @@ pub enum Shape {
     Uav,
     /// A fighter: chined fuselage, hollow intakes and nozzles, trapezoid wings, two canted fins.
     Fighter,
+    /// Two equal cubes that overlap in a corner.
+    BoxesOverlapping,
+    /// A cubic shell: the inside is the wall around a sealed cubic cavity.
+    BoxInBox,
+    /// Three concentric spheres: by parity, outer shell and core are inside, the shell between them
+    /// outside.
+    ThreeSpheres,
+    /// Two closed pipes, each like `Pipe`, one of which passes through a straight section of the
+    /// other.
+    PipesCrossing,
+    /// A car assembled from eight closed solids that overlap: body, cabin, four wheels, two mirrors.
+    Car,
 }
 
 impl fmt::Display for Shape {
@@ -43,6 +55,11 @@ impl fmt::Display for Shape {
             Self::Pipe => "pipe",
             Self::Uav => "uav",
             Self::Fighter => "fighter",
+            Self::BoxesOverlapping => "boxes_overlapping",
+            Self::BoxInBox => "box_in_box",
+            Self::ThreeSpheres => "three_spheres",
+            Self::PipesCrossing => "pipes_crossing",
+            Self::Car => "car",
         })
     }
 }
@@ -59,11 +76,11 @@ pub struct Generator {
     /// Every shape: the position of its origin, default `[0, 0, 0]`.
     #[serde(default)]
     pub centre: Option<[f64; 3]>,
-    /// `cube`: the edge, default 1.
+    /// `cube`, each of `boxes_overlapping`, and the outer box of `box_in_box`: the edge, default 1.
     #[serde(default)]
     pub edge: Option<f64>,
-    /// `sphere`, and the outer sphere of `nested_spheres`: default 0.5. `torus`: of the centre
-    /// line, default 0.5. `pipe`: of the bore, default 0.1.
+    /// `sphere`, and the outer sphere of `nested_spheres` and `three_spheres`: default 0.5. `torus`:
+    /// of the centre line, default 0.5. `pipe` and `pipes_crossing`: of the bore, default 0.1.
     #[serde(default)]
     pub radius: Option<f64>,
     /// `nested_spheres`: of the inner sphere, default half of `radius`.
@@ -72,20 +89,20 @@ pub struct Generator {
     /// `torus`: of the tube, default 0.2 of `radius`.
     #[serde(default)]
     pub radius_tube: Option<f64>,
-    /// `pipe`: of the bend's centre line, default 3 times `radius`.
+    /// `pipe` and `pipes_crossing`: of the bend's centre line, default 3 times `radius`.
     #[serde(default)]
     pub radius_bend: Option<f64>,
     /// `pipe`: angle of the bend in degrees, at most 180, default 90.
     #[serde(default)]
     pub angle: Option<f64>,
-    /// `plate`: along x, default 1. `pipe`: of each straight section, default 5 times `radius`.
-    /// `uav` and `fighter`: the longest edge of the bounding box, default 1.
+    /// `plate`: along x, default 1. `pipe` and `pipes_crossing`: of each straight section, default 5
+    /// times `radius`. `uav`, `fighter` and `car`: the longest edge of the bounding box, default 1.
     #[serde(default)]
     pub length: Option<f64>,
     /// `plate`: along y, default 0.5.
     #[serde(default)]
     pub width: Option<f64>,
-    /// `plate`: along z, default 0.01.
+    /// `plate`: along z, default 0.01. `box_in_box`: of the wall, default a quarter of `edge`.
     #[serde(default)]
     pub thickness: Option<f64>,
 }

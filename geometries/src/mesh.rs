@@ -82,6 +82,13 @@ impl Mesh {
         }
     }
 
+    /// Multiplies the coordinates along each axis by a positive factor.
+    pub(crate) fn scale(&mut self, by: [f64; 3]) {
+        for vertex in &mut self.vertices {
+            *vertex = std::array::from_fn(|a| vertex[a] * by[a]);
+        }
+    }
+
     /// The surface as facet soup.
     pub fn facets(&self) -> Vec<Facet> {
         self.triangles.iter().map(|&t| self.facet(t)).collect()

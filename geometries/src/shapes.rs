@@ -2,6 +2,7 @@
 
 use crate::{Generator, GeneratorError, Mesh, Shape};
 
+mod assembly;
 mod fighter;
 mod implicit;
 mod pipe;
@@ -20,7 +21,11 @@ pub(crate) fn dimensions(shape: Shape) -> &'static [&'static str] {
         Shape::NestedSpheres => &["radius", "radius_inner"],
         Shape::Plate => &["length", "width", "thickness"],
         Shape::Pipe => &["radius", "radius_bend", "angle", "length"],
-        Shape::Uav | Shape::Fighter => &["length"],
+        Shape::Uav | Shape::Fighter | Shape::Car => &["length"],
+        Shape::BoxesOverlapping => &["edge"],
+        Shape::BoxInBox => &["edge", "thickness"],
+        Shape::ThreeSpheres => &["radius"],
+        Shape::PipesCrossing => &["radius", "radius_bend", "length"],
     }
 }
 
@@ -33,6 +38,10 @@ pub(crate) fn facets_least(shape: Shape) -> usize {
         Shape::Torus => 18,
         Shape::Pipe => 60,
         Shape::Uav | Shape::Fighter => 2_000,
+        Shape::BoxesOverlapping | Shape::BoxInBox => 24,
+        Shape::ThreeSpheres => 60,
+        Shape::PipesCrossing => 120,
+        Shape::Car => 144,
     }
 }
 
@@ -48,6 +57,11 @@ pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
         Shape::Pipe => pipe::pipe(of),
         Shape::Uav => implicit::draw::<uav::Uav>(of),
         Shape::Fighter => implicit::draw::<fighter::Fighter>(of),
+        Shape::BoxesOverlapping => assembly::boxes_overlapping(of),
+        Shape::BoxInBox => assembly::box_in_box(of),
+        Shape::ThreeSpheres => assembly::three_spheres(of),
+        Shape::PipesCrossing => pipe::pipes_crossing(of),
+        Shape::Car => assembly::car(of),
     }
 }
 

@@ -17,7 +17,10 @@ struct Case {
     layer_cells_min: Option<u32>,
     keep: Option<Keep>,
     #[serde(rename = "keep_crossing")]
-    _keep_crossing: Option<bool>,
+    keep_crossing: Option<bool>,
+    #[serde(default)]
+    seeds: Vec<[f64; 3]>,
+    enclosed: Option<Enclosed>,
     root_scale: Option<f64>,
     root: Option<Root>,
     #[serde(default, rename = "box")]
@@ -30,6 +33,13 @@ enum Keep {
     Outside,
     Inside,
     All,
+}
+
+#[derive(Deserialize, PartialEq, Eq, PartialOrd, Ord, Clone, Copy, Debug)]
+#[serde(rename_all = "snake_case")]
+enum Enclosed {
+    Delete,
+    Keep,
 }
 
 #[derive(Deserialize)]
@@ -153,6 +163,7 @@ fn every_case_file_is_valid_and_states_its_origin() {
             assert!((0..3).all(|a| min[a] < max[a]), "{file}: {min:?} {max:?}");
         }
         assert!(case.layer_cells_min.is_none_or(|n| n >= 1), "{file}");
+        assert!(case.seeds.iter().flatten().all(|x| x.is_finite()), "{file}");
         let text = std::fs::read_to_string(here(&file)).unwrap();
         let header: Vec<&str> = text.lines().take_while(|line| line.starts_with("# ")).collect();
         assert!(header.iter().any(|line| line.contains("Origin: ")), "{file}: no origin");
@@ -205,6 +216,8 @@ fn every_geometry_is_in_the_repository_or_in_the_fetch_table() {
 fn numbers_of_cells_match_the_sizes_and_small_cases_vary_all_parameters() {
     let mut layers = BTreeSet::new();
     let mut keeps = BTreeSet::new();
+    let mut keeps_seeded = BTreeSet::new();
+    let mut enclosed = BTreeSet::new();
     for entry in catalogue() {
         let case: Case = read(&entry.file);
         let cells = entry.cells_about.unwrap_or_else(|| panic!("{}: no cells", entry.name));
@@ -217,7 +230,12 @@ fn numbers_of_cells_match_the_sizes_and_small_cases_vary_all_parameters() {
         assert!(entry.inside.is_some(), "{}", entry.name);
         if entry.size == Size::Small {
             layers.insert(case.layer_cells_min.unwrap_or(4));
-            keeps.insert(case.keep.unwrap_or(Keep::Outside));
+            let keep = case.keep.unwrap_or(Keep::Outside);
+            keeps.insert(keep);
+            enclosed.insert(case.enclosed.unwrap_or(Enclosed::Delete));
+            if !case.seeds.is_empty() {
+                keeps_seeded.insert((keep, case.keep_crossing.unwrap_or(true)));
+            }
         }
         if case.keep == Some(Keep::Inside) {
             assert!(entry.inside == Some(Inside::Some), "{}: nothing to keep", entry.name);
@@ -225,4 +243,7 @@ fn numbers_of_cells_match_the_sizes_and_small_cases_vary_all_parameters() {
     }
     assert!(layers.is_superset(&BTreeSet::from([1, 2, 3, 4, 5, 6, 10])), "{layers:?}");
     assert_eq!(keeps, BTreeSet::from([Keep::Outside, Keep::Inside, Keep::All]));
+    let seeded = [(Keep::Outside, false), (Keep::Inside, true), (Keep::All, true)];
+    assert!(keeps_seeded.is_superset(&BTreeSet::from(seeded)), "{keeps_seeded:?}");
+    assert_eq!(enclosed, BTreeSet::from([Enclosed::Delete, Enclosed::Keep]));
 }

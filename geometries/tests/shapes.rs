@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use geometries::{Facet, Generator, Shape};
 
-const SHAPES: [Shape; 8] = [
+const SHAPES: [Shape; 13] = [
     Shape::Cube,
     Shape::Sphere,
     Shape::Torus,
@@ -15,6 +15,11 @@ const SHAPES: [Shape; 8] = [
     Shape::Pipe,
     Shape::Uav,
     Shape::Fighter,
+    Shape::BoxesOverlapping,
+    Shape::BoxInBox,
+    Shape::ThreeSpheres,
+    Shape::PipesCrossing,
+    Shape::Car,
 ];
 
 fn facets(shape: Shape, count: usize) -> Vec<Facet> {
@@ -103,7 +108,10 @@ fn every_shape_is_closed_wound_outward_and_of_the_right_genus() {
             let euler = assert_closed(&facets, &name);
             let expected = match shape {
                 Shape::Torus => 0,
-                Shape::NestedSpheres => 4,
+                Shape::NestedSpheres | Shape::BoxesOverlapping | Shape::BoxInBox => 4,
+                Shape::PipesCrossing => 4,
+                Shape::ThreeSpheres => 6,
+                Shape::Car => 16,
                 _ => 2,
             };
             assert_eq!(euler, expected, "{name}: Euler characteristic");
@@ -113,7 +121,7 @@ fn every_shape_is_closed_wound_outward_and_of_the_right_genus() {
 
 #[test]
 fn every_shape_can_be_drawn_with_its_minimum_number_of_facets() {
-    let least = [12, 20, 18, 40, 12, 60, 2_000, 2_000];
+    let least = [12, 20, 18, 40, 12, 60, 2_000, 2_000, 24, 24, 60, 120, 144];
     for (shape, least) in SHAPES.into_iter().zip(least) {
         let drawn = facets(shape, least);
         assert_eq!(drawn.len(), least);
@@ -147,6 +155,18 @@ fn volumes_agree_with_the_analytic_ones() {
         (
             "shape = 'pipe'\nfacets = 20000\nradius = 0.5\nradius_bend = 2\nangle = 120\nlength = 3",
             PI * 0.25 * (6.0 + 2.0 * TAU / 3.0),
+            3e-3,
+        ),
+        ("shape = 'boxes_overlapping'\nfacets = 1000\nedge = 2", 16.0, 1e-6),
+        ("shape = 'box_in_box'\nfacets = 1000\nedge = 4\nthickness = 0.5", 64.0 - 27.0, 1e-6),
+        (
+            "shape = 'three_spheres'\nfacets = 20000\nradius = 3",
+            4.0 / 3.0 * PI * (27.0 - 8.0 + 1.0),
+            3e-3,
+        ),
+        (
+            "shape = 'pipes_crossing'\nfacets = 40000\nradius = 0.5\nradius_bend = 2\nlength = 3",
+            2.0 * PI * 0.25 * (6.0 + 2.0 * TAU / 4.0),
             3e-3,
         ),
     ];
@@ -206,6 +226,11 @@ fn vertices_are_the_same_on_every_machine() {
         "Pipe e619cd95ecd928a7",
         "Uav d69a389f190928e2",
         "Fighter c8c5ca71f8b4b867",
+        "BoxesOverlapping 96ec59bcba714c59",
+        "BoxInBox 6136c9e36c34ac3c",
+        "ThreeSpheres 6d3acb370afa2fc9",
+        "PipesCrossing 142de534e071ab38",
+        "Car 003c8fd0ad8a0ecc",
     ];
     assert_eq!(found, expected);
 }
@@ -233,6 +258,8 @@ fn invalid_tables_are_refused_with_the_reason() {
         ("shape = 'nested_spheres'\nfacets = 100\nradius_inner = 0.5", "less than radius"),
         ("shape = 'pipe'\nfacets = 100\nradius_bend = 0.1", "must exceed radius"),
         ("shape = 'pipe'\nfacets = 100\nangle = 200", "at most 180"),
+        ("shape = 'pipes_crossing'\nfacets = 200\nangle = 60", "no dimension `angle`"),
+        ("shape = 'box_in_box'\nfacets = 100\nthickness = 0.5", "less than half of edge"),
         ("shape = 'sphere'\nfacets = 99999999999999", "at most 2147483648"),
         ("shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]", "has no area in f32"),
         ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "has no area in f32"),

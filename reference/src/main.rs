@@ -106,8 +106,8 @@ fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
     let enclosed = &mesh.components.enclosed;
     if let Some([x, y, z]) = enclosed.example {
         eprintln!(
-            "note: {} outside components with {} leaves do not reach the root's boundary and are \
-             deleted, for example at ({x}, {y}, {z}); `enclosed = \"keep\"` keeps them",
+            "note: enclosed space is deleted, {} components and {} leaves, for example at \
+             ({x}, {y}, {z}); `enclosed = \"keep\"` keeps it",
             enclosed.count, enclosed.leaves
         );
     }

@@ -1,5 +1,5 @@
 //! Case files: defaults, and an informative message for each kind of error.
-use reference::{BoxSpec, Case, Error, Keep, Root, case_file};
+use reference::{BoxSpec, Case, Enclosed, Error, Keep, Root, case_file};
 use std::fs;
 
 const GENERATED: &str = "[generator]\nshape = \"cube\"\nfacets = 12\n";
@@ -22,19 +22,24 @@ fn missing_keys_take_their_defaults() {
     let case = read(&format!("spacing_min = 0.5\n{GENERATED}")).unwrap();
     assert_eq!((case.facets.len(), case.spacing_min, case.layer_cells_min), (12, 0.5, 4));
     assert_eq!((case.keep, case.keep_crossing, case.boxes.len()), (Keep::Outside, true, 0));
+    assert!(case.seeds.is_empty());
+    assert_eq!(case.enclosed, Enclosed::Delete);
     assert_eq!(case.root, Root::around(&case.facets, 10.0).unwrap());
 }
 
 #[test]
 fn every_key_is_read() {
     let text = format!(
-        "spacing_min = 1\nlayer_cells_min = 2\nkeep = \"inside\"\nkeep_crossing = false\n{ROOT}{GENERATED}\
+        "spacing_min = 1\nlayer_cells_min = 2\nkeep = \"inside\"\nkeep_crossing = false\n\
+         seeds = [[0, 0.5, 1.0], [-1.0, 2.0, 3]]\nenclosed = \"keep\"\n{ROOT}{GENERATED}\
          [[box]]\nmin = [0.0, -1.0, -1.0]\nmax = [4.0, 1.0, 1.0]\nspacing = 0.05\n\
          [[box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nspacing = 0.1\n"
     );
     let case = read(&text).unwrap();
     assert_eq!(case.root, Root { origin: [-4.0; 3], edge: 8.0 });
     assert_eq!((case.keep, case.keep_crossing, case.layer_cells_min), (Keep::Inside, false, 2));
+    assert_eq!(case.seeds, [[0.0, 0.5, 1.0], [-1.0, 2.0, 3.0]]);
+    assert_eq!(case.enclosed, Enclosed::Keep);
     let first = BoxSpec { min: [0.0, -1.0, -1.0], max: [4.0, 1.0, 1.0], spacing: 0.05 };
     let second = BoxSpec { min: [0.0; 3], max: [1.0; 3], spacing: 0.1 };
     assert_eq!(case.boxes, [first, second]);
@@ -68,6 +73,8 @@ fn an_unknown_key_is_refused_with_the_most_similar_known_one() {
     assert_refused(&with("layer_cell_min = 3"), "did you mean `layer_cells_min`?");
     assert_refused(&with("rootscale = 3"), "did you mean `root_scale`?");
     assert_refused(&with("keep = \"outsde\""), "did you mean `outside`?");
+    assert_refused(&with("seed = [[0, 0, 0]]"), "did you mean `seeds`?");
+    assert_refused(&with("enclosed = \"kept\""), "did you mean `keep`?");
     assert_refused(&with("[root]\norigin = [0, 0, 0]\nedges = 1"), "did you mean `edge`?");
     assert_refused(
         &with("[[box]]\nmin = [0, 0, 0]\nmxa = [1, 1, 1]\nspacing = 1"),
@@ -101,6 +108,8 @@ fn invalid_case_files_are_refused() {
     assert_refused(&with("layer_cells_min = -1"), "line 2");
     assert_refused(&with("layer_cells_min = 1.5"), "line 2");
     assert_refused(&with("keep_crossing = 1"), "expected a boolean");
+    assert_refused(&with("seeds = [0, 0, 0]"), "line 2");
+    assert_refused(&with("seeds = [[0, 0]]"), "line 2");
     assert_refused(&with("[root]\norigin = [0, 0]\nedge = 1"), "line 3");
     assert_refused("spacing_min = = 1", "line 1");
     assert_refused("spacing_min = 1\nspacing_min = 2", "line 2");

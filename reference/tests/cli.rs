@@ -110,12 +110,17 @@ fn the_manifest_agrees_with_the_leaves() {
         [{"min": [59_652_324, 65_617_556, 71_582_788], "max": [134_217_728, 95_443_718, 101_408_950], "level": 5}]
     );
     equal("boxes", boxes);
+    equal("seeds", serde_json::json!([]));
+    equal("enclosed", "delete".into());
     equal("leaves", words.len().into());
     equal("leaves_by_level", tally.leaves_by_level.to_vec().into());
     let [outside, inside, crossing] = tally.leaves_by_side;
     assert!(outside > 0 && inside > 0 && crossing > 0);
     let sides = serde_json::json!({"outside": outside, "inside": inside, "crossing": crossing});
     equal("leaves_by_side", sides);
+    let nothing = serde_json::json!({"count": 0, "leaves": 0, "example": null});
+    let components = serde_json::json!({"outside": 1, "inside": 1, "enclosed": nothing});
+    equal("components", components);
     equal("components_ambiguous", serde_json::json!({"count": 0, "example": null}));
     equal("digest", hex(tally.digest).into());
     let octants: Vec<String> = tally.octant_digests.iter().map(|&d| hex(d)).collect();
@@ -169,6 +174,38 @@ fn ambiguous_components_are_reported() {
     assert!(String::from_utf8(output.stderr).unwrap().contains("2 components disagree"));
     let ambiguous = serde_json::json!({"count": 2, "example": [2.0, 2.0, 6.0]});
     assert_eq!(manifest(&directory.path().join("mesh"))["components_ambiguous"], ambiguous);
+}
+
+/// The core of a spherical shell, in a root of 64 cells of edge 0.125.
+#[test]
+fn seeds_and_enclosed_components_are_reported() {
+    let case = "spacing_min = 0.125\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n\
+                [generator]\nshape = \"nested_spheres\"\nfacets = 400\nradius = 2\n";
+    let directory = directory_with_case(case);
+    let path = directory.path();
+    let output = reference(path, &["case.toml", "--out", "mesh"]);
+    assert_eq!(output.status.code(), Some(0));
+    let components = &manifest(&path.join("mesh"))["components"];
+    assert_eq!((&components["outside"], &components["inside"]), (&2.into(), &1.into()));
+    let enclosed = &components["enclosed"];
+    assert_eq!((&enclosed["count"], &enclosed["example"]), (&1.into(), &vec![-0.25; 3].into()));
+    let message = String::from_utf8(output.stderr).unwrap();
+    let leaves = &enclosed["leaves"];
+    assert!(message.contains(&format!("deleted, 1 components and {leaves} leaves")), "{message}");
+
+    let seeded = format!("seeds = [[0.25, 0, -4.0]]\nenclosed = \"keep\"\n{case}");
+    fs::write(path.join("case.toml"), &seeded).unwrap();
+    assert!(reference(path, &["case.toml", "--out", "seeded"]).status.success());
+    let manifest = manifest(&path.join("seeded"));
+    assert_eq!(manifest["seeds"], serde_json::json!([[71_303_168, 67_108_864, 0]]));
+    assert_eq!(manifest["enclosed"], "keep");
+    assert_eq!(manifest["components"]["outside"], 1);
+    assert_eq!(manifest["components"]["inside"], 2);
+
+    fs::write(path.join("case.toml"), seeded.replace("[[0.25", "[[9.0")).unwrap();
+    let message = assert_fails(path, &["case.toml", "--out", "none"], 2);
+    assert!(message.contains("seed 0 at [9.0, 0.0, -4.0] lies outside the root"), "{message}");
+    assert!(!path.join("none").exists());
 }
 
 #[test]

@@ -2,75 +2,15 @@
 //! dense-grid implementation.
 mod support;
 
-use reference::{Case, Keep, base_tree, mesh};
+use reference::{Components, Keep, base_tree, mesh};
 use std::cell::Cell;
-use support::dense::{self, CROSSING, Dense, INSIDE, OUTSIDE};
-use support::random::{RandomCase, cases, for_all};
-use support::{ROOT_EDGE, crosses_by_axes, spacing};
+use support::ROOT_EDGE;
+use support::dense::{self, CROSSING, Dense, INSIDE};
+use support::leaf::{Leaf, leaves};
+use support::random::{RandomCase, cases, cases_with_a_cavity, for_all};
 
 /// The finest level of the random cases of most properties: at most 4,096 leaves.
 const FINEST: u32 = 4;
-
-#[derive(Clone, Copy, Debug)]
-struct Leaf {
-    /// Minimum corner and edge, in lattice units.
-    min: [i64; 3],
-    edge: i64,
-    level: u32,
-    side: u64,
-    /// The Morton keys of the level-19 cells in the leaf.
-    keys: (u64, u64),
-}
-
-impl Leaf {
-    fn of(word: u64) -> Self {
-        let (key, level) = (word >> 7, (word >> 2 & 31) as u32);
-        let mut min = [0; 3];
-        for bit in 0..57 {
-            min[bit % 3] |= ((key >> bit & 1) << (bit / 3)) as i64 * 256;
-        }
-        let keys = (key, key + (1 << (3 * (19 - level))));
-        Self { min, edge: ROOT_EDGE >> level, level, side: word & 3, keys }
-    }
-
-    fn parent(&self) -> Option<Self> {
-        let level = self.level.checked_sub(1)?;
-        let edge = 2 * self.edge;
-        Some(Self { min: self.min.map(|x| x / edge * edge), edge, level, ..*self })
-    }
-
-    fn max(&self) -> [i64; 3] {
-        self.min.map(|x| x + self.edge)
-    }
-
-    fn contains(&self, other: &Leaf) -> bool {
-        self.keys.0 <= other.keys.0 && other.keys.1 <= self.keys.1
-    }
-
-    /// Chebyshev distance of the closed cubes, in lattice units; 0 if they touch.
-    fn distance(&self, other: &Leaf) -> i64 {
-        let gap = |a: usize| (self.min[a] - other.max()[a]).max(other.min[a] - self.max()[a]);
-        (0..3).map(gap).fold(0, i64::max)
-    }
-
-    fn is_crossed(&self, random: &RandomCase) -> bool {
-        random.facets.iter().any(|facet| crosses_by_axes(facet, self.min, self.max()))
-    }
-
-    /// The greatest level of a box that the octant meets.
-    fn level_of_boxes(&self, case: &Case) -> u32 {
-        let meets = |min: [f64; 3], max: [f64; 3]| {
-            (0..3).all(|a| (self.min[a] as f64) < max[a] && min[a] < self.max()[a] as f64)
-        };
-        let met = case.boxes.iter().filter(|b| meets(b.min, b.max));
-        let level = |b: &reference::BoxSpec| (0..=19).find(|&l| spacing(l) <= b.spacing).unwrap();
-        met.map(level).max().unwrap_or(0)
-    }
-}
-
-fn leaves(words: &[u64]) -> Vec<Leaf> {
-    words.iter().copied().map(Leaf::of).collect()
-}
 
 fn base_leaves(random: &RandomCase) -> Vec<Leaf> {
     leaves(&base_tree(&random.case).unwrap().words)
@@ -80,31 +20,25 @@ fn mesh_leaves(random: &RandomCase) -> Vec<Leaf> {
     leaves(&mesh(&random.case).unwrap().words)
 }
 
-fn is_kept(keep: Keep, side: u64) -> bool {
-    match keep {
-        Keep::Outside => side != INSIDE,
-        Keep::Inside => side != OUTSIDE,
-        Keep::All => true,
-    }
-}
-
 /// The results of the dense-grid implementation.
 struct Expected {
     base: Vec<u64>,
+    /// The words of the leaves of T0 that gradation keeps.
+    base_kept: Vec<u64>,
     components_ambiguous: u64,
+    components: Components,
     graded: Dense,
 }
 
 impl Expected {
     fn of(RandomCase { facets, level_surface, case }: &RandomCase, finest: u32) -> Self {
         let mut grid = dense::base(case, facets, finest, *level_surface);
-        let components_ambiguous = dense::assign_sides(&mut grid, facets);
+        let components_ambiguous = dense::assign_sides(&mut grid, case, facets);
         let base = grid.words(|_| true);
-        for cell in &mut grid.cells {
-            cell.kept = is_kept(case.keep, cell.side);
-        }
+        let components = dense::keep(&mut grid, case);
+        let base_kept = grid.words(|leaf| leaf.kept);
         dense::grade(&mut grid, case.layer_cells_min.into(), case.keep_crossing, *level_surface);
-        Self { base, components_ambiguous, graded: grid }
+        Self { base, base_kept, components_ambiguous, components, graded: grid }
     }
 
     /// The words of the kept leaves whose side satisfies `wanted`.
@@ -118,6 +52,7 @@ fn assert_equals_dense_grid(random: &RandomCase, finest: u32) -> Expected {
     let base = base_tree(&random.case).unwrap();
     assert_eq!(base.words, expected.base, "base tree");
     assert_eq!(base.ambiguous.map_or(0, |a| a.components), expected.components_ambiguous);
+    assert_eq!(base.components, expected.components);
     let words = expected.words(|side| random.case.keep_crossing || side != CROSSING);
     assert_eq!(mesh(&random.case).unwrap().words, words, "final mesh");
     expected
@@ -125,8 +60,7 @@ fn assert_equals_dense_grid(random: &RandomCase, finest: u32) -> Expected {
 
 #[test]
 fn base_tree_and_mesh_equal_those_of_the_dense_grid() {
-    let (tested, inside, ambiguous, crossing_deep) =
-        (Cell::new(0), Cell::new(0), Cell::new(0), Cell::new(0));
+    let [tested, inside, ambiguous, crossing_deep, seeded] = [const { Cell::new(0) }; 5];
     for_all(file!(), 400, cases(FINEST), |random| {
         let expected = assert_equals_dense_grid(&random, FINEST);
         let cells = &expected.graded.cells;
@@ -135,15 +69,17 @@ fn base_tree_and_mesh_equal_those_of_the_dense_grid() {
         count(&tested, true);
         count(&inside, cells.iter().any(|cell| cell.side == INSIDE));
         count(&ambiguous, expected.components_ambiguous > 0);
+        count(&seeded, !random.case.seeds.is_empty());
         let is_deep = |level: u32| level > random.level_surface;
         count(&crossing_deep, cells.iter().any(|c| c.side == CROSSING && is_deep(c.level)));
     });
     // Rare situations must occur among the random cases. The bounds are far below the mean rates,
     // so that the test does not fail by chance.
-    let [tested, inside, ambiguous, crossing_deep] =
-        [tested, inside, ambiguous, crossing_deep].map(Cell::into_inner);
+    let [tested, inside, ambiguous, crossing_deep, seeded] =
+        [tested, inside, ambiguous, crossing_deep, seeded].map(Cell::into_inner);
     assert!(inside >= tested / 20, "{inside} of {tested} cases have an inside");
     assert!(ambiguous >= tested / 50, "{ambiguous} of {tested} cases are ambiguous");
+    assert!(seeded >= tested / 20, "{seeded} of {tested} cases have seeds");
     assert!(
         crossing_deep >= tested / 20,
         "{crossing_deep} of {tested} cases have boxes finer than the surface"
@@ -155,6 +91,18 @@ fn base_tree_and_mesh_of_finer_cases_equal_those_of_the_dense_grid() {
     for_all(file!(), 20, cases(5), |random| {
         assert_equals_dense_grid(&random, 5);
     });
+}
+
+#[test]
+fn base_tree_and_mesh_of_cases_with_a_cavity_equal_those_of_the_dense_grid() {
+    let [tested, enclosed] = [const { Cell::new(0) }; 2];
+    for_all(file!(), 100, cases_with_a_cavity(FINEST), |random| {
+        let expected = assert_equals_dense_grid(&random, FINEST);
+        tested.set(tested.get() + 1);
+        enclosed.set(enclosed.get() + u32::from(expected.components.enclosed.count > 0));
+    });
+    let [tested, enclosed] = [tested, enclosed].map(Cell::into_inner);
+    assert!(enclosed >= tested / 5, "{enclosed} of {tested} cases have enclosed space");
 }
 
 #[test]
@@ -197,13 +145,12 @@ fn base_trees_split_no_octant_without_need() {
 #[test]
 fn meshes_are_linear_and_fill_the_kept_leaves_of_the_base_tree() {
     for_all(file!(), 200, cases(FINEST), |random| {
+        let kept = leaves(&Expected::of(&random, FINEST).base_kept);
         let leaves = mesh_leaves(&random);
         assert!(leaves.windows(2).all(|pair| pair[0].keys.1 <= pair[1].keys.0));
         let mut rest = &leaves[..];
-        let stays = |side| {
-            is_kept(random.case.keep, side) && (random.case.keep_crossing || side != CROSSING)
-        };
-        for base in base_leaves(&random).iter().filter(|base| stays(base.side)) {
+        let stays = |base: &&Leaf| random.case.keep_crossing || base.side != CROSSING;
+        for base in kept.iter().filter(stays) {
             let (within, after) =
                 rest.split_at(rest.iter().take_while(|l| base.contains(l)).count());
             assert!(within.iter().all(|leaf| leaf.side == base.side), "{base:?}");

@@ -2,7 +2,7 @@
 use reference::lattice::Input;
 use reference::leaves::{Tally, hex};
 use reference::octant::Octant;
-use reference::{BoxSpec, Case, Error, Keep, Root, Side, digest, mix};
+use reference::{BoxSpec, Case, Enclosed, Error, Keep, Root, Side, digest, mix};
 use serde_json::Value;
 
 fn cases(name: &str) -> Vec<Value> {
@@ -38,6 +38,8 @@ fn empty(origin: [f64; 3], edge: f64) -> Case {
         keep: Keep::All,
         keep_crossing: true,
         boxes: Vec::new(),
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     }
 }
 

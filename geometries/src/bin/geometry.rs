@@ -15,7 +15,8 @@ struct Arguments {
     /// Case file with a [generator] table
     #[arg(required_unless_present = "shape", conflicts_with_all = ["shape", "facets", "size"])]
     case: Option<PathBuf>,
-    /// Shape: cube, sphere, torus, nested_spheres, plate, pipe, uav or fighter
+    /// Shape: cube, sphere, torus, nested_spheres, plate, pipe, uav, fighter, boxes_overlapping,
+    /// box_in_box, three_spheres, pipes_crossing or car
     #[arg(long, requires = "facets")]
     shape: Option<String>,
     /// Number of facets: exact if even, otherwise one less

@@ -10,10 +10,19 @@ use crate::{Generator, GeneratorError, Mesh};
 
 /// The pipe, its bend starting at the origin.
 pub(super) fn pipe(of: &Generator) -> Result<Mesh, GeneratorError> {
+    Ok(CentreLine::of(of)?.draw_finest(of.facets))
+}
+
+/// Two equal pipes with bends of 90 degrees. The first section of the second pipe passes through the
+/// middle of the last section of the first pipe, half a radius above it.
+pub(super) fn pipes_crossing(of: &Generator) -> Result<Mesh, GeneratorError> {
     let line = CentreLine::of(of)?;
-    let facets_at = |pitch| line.divisions(pitch).facets();
-    let pitch = pitch_finest(line.total(), of.facets, facets_at);
-    Ok(draw(&line, &line.divisions(pitch)))
+    let mut mesh = line.draw_finest(of.facets / 2);
+    let mut second = mesh.clone();
+    let along = line.radius_bend + line.straight * 0.5;
+    second.translate([along, along, line.radius * 0.5]);
+    mesh.append(&second);
+    Ok(mesh)
 }
 
 /// The centre line of the pipe, and the radius of its bore.
@@ -45,6 +54,13 @@ impl CentreLine {
             );
         }
         Ok(Self { radius, radius_bend, angle: angle * (TAU / 360.0), straight })
+    }
+
+    /// The finest pipe of at most `facets` facets.
+    fn draw_finest(&self, facets: usize) -> Mesh {
+        let facets_at = |pitch| self.divisions(pitch).facets();
+        let pitch = pitch_finest(self.total(), facets, facets_at);
+        draw(self, &self.divisions(pitch))
     }
 
     fn bend(&self) -> f64 {

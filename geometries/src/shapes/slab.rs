@@ -22,7 +22,8 @@ pub(super) fn plate(of: &Generator) -> Result<Mesh, GeneratorError> {
     Ok(slab(sizes, of.facets))
 }
 
-fn slab(sizes: [f64; 3], facets: usize) -> Mesh {
+/// A box centred on the origin.
+pub(super) fn slab(sizes: [f64; 3], facets: usize) -> Mesh {
     let divisions = divisions(sizes, facets);
     let mut drawing = Drawing { sizes, divisions, mesh: Mesh::default(), indices: HashMap::new() };
     for axis in 0..3 {

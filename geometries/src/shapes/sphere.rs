@@ -31,7 +31,7 @@ pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
 
 /// The finest geodesic sphere of at most `facets` facets. A sphere of frequency f has 20 f^2
 /// facets.
-fn geodesic(radius: f64, facets: usize) -> Mesh {
+pub(super) fn geodesic(radius: f64, facets: usize) -> Mesh {
     let frequency = (facets / 20).isqrt().max(1);
     let mut drawing = Drawing { radius, frequency, mesh: Mesh::default(), indices: HashMap::new() };
     for corners in ICOSAHEDRON {

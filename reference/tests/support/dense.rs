@@ -1,7 +1,8 @@
 //! A second implementation of the whole algorithm, on a dense grid of the finest cells: crossing by
 //! separating axes, flood fill cell by cell, refinement cell by cell.
 use super::{ROOT_EDGE, crosses_by_axes, parities_by_areas, spacing};
-use reference::{BoxSpec, Case};
+use reference::kept::{Components, EnclosedComponents};
+use reference::{BoxSpec, Case, Enclosed, Keep};
 
 pub const OUTSIDE: u64 = 0;
 pub const INSIDE: u64 = 1;
@@ -51,6 +52,25 @@ impl Dense {
     /// One cell of every leaf: the one in its minimum corner.
     pub fn leaves(&self) -> Vec<Cell> {
         self.cells.iter().copied().filter(|&cell| self.leaf(cell).1 == cell.index).collect()
+    }
+
+    /// The leaves that consist of `cells`, coarsest first, then by key.
+    fn leaves_among(&self, cells: &[Cell]) -> Vec<Cell> {
+        let mut leaves = cells.to_vec();
+        leaves.retain(|&cell| self.leaf(cell).1 == cell.index);
+        leaves.sort_by_key(|&leaf| (leaf.level, self.word(leaf)));
+        leaves
+    }
+
+    fn centroid(&self, leaf: Cell) -> [i64; 3] {
+        let (min, max) = self.extent(leaf);
+        std::array::from_fn(|a| (min[a] + max[a]) / 2)
+    }
+
+    /// Whether one of the cells contains a lattice point.
+    pub fn contain(&self, cells: &[Cell], point: [f64; 3]) -> bool {
+        let edge = (ROOT_EDGE >> self.finest) as f64;
+        cells.iter().any(|cell| (0..3).all(|a| cell.index[a] as f64 == (point[a] / edge).floor()))
     }
 
     /// Changes all cells of a leaf.
@@ -137,11 +157,11 @@ pub fn base(case: &Case, facets: &[Facet], finest: u32, level_surface: u32) -> D
     dense
 }
 
-/// Sets the sides of the leaves that do not cross and returns the number of ambiguous components.
-pub fn assign_sides(dense: &mut Dense, facets: &[Facet]) -> u64 {
-    let mut ambiguous = 0;
+/// The components: cells that no facet crosses, connected over faces.
+pub fn components(dense: &mut Dense) -> Vec<Vec<Cell>> {
     let mut reached: std::collections::HashSet<[i64; 3]> =
         dense.cells.iter().filter(|cell| cell.side == CROSSING).map(|cell| cell.index).collect();
+    let mut components = Vec::new();
     for start in dense.cells.clone() {
         if !reached.insert(start.index) {
             continue;
@@ -160,30 +180,84 @@ pub fn assign_sides(dense: &mut Dense, facets: &[Facet]) -> u64 {
             }
             visited += 1;
         }
-        let mut candidates = component.clone();
-        candidates.retain(|&cell| dense.leaf(cell).1 == cell.index);
-        candidates.sort_by_key(|&leaf| (leaf.level, dense.word(leaf)));
-        candidates.truncate(32);
-        let votes: Vec<usize> = candidates
-            .iter()
-            .map(|&leaf| {
-                let (min, max) = dense.extent(leaf);
-                let centroid = std::array::from_fn(|a| (min[a] + max[a]) / 2);
-                (0..3)
-                    .flat_map(|a| parities_by_areas(facets, centroid, a))
-                    .filter(|&odd| odd)
-                    .count()
-            })
-            .collect();
-        let decided = votes.iter().copied().find(|&odd| odd == 0 || odd == 6);
-        ambiguous += u64::from(decided.is_none());
-        let (odd, rays) = decided.map_or((votes.iter().sum(), 6 * votes.len()), |odd| (odd, 6));
-        let side = if odd > rays - odd { INSIDE } else { OUTSIDE };
+        components.push(component);
+    }
+    components
+}
+
+/// Sets the sides of the leaves that do not cross and returns the number of ambiguous components.
+pub fn assign_sides(dense: &mut Dense, case: &Case, facets: &[Facet]) -> u64 {
+    let mut ambiguous = 0;
+    for component in components(dense) {
+        let side = if case.seeds.is_empty() {
+            let [odd, rays] = vote(dense, &component, facets);
+            ambiguous += u64::from(0 < odd && odd < rays);
+            if 2 * odd > rays { INSIDE } else { OUTSIDE }
+        } else {
+            let is_flow = case.seeds.iter().any(|&seed| dense.contain(&component, seed));
+            if is_flow == (case.keep == Keep::Inside) { INSIDE } else { OUTSIDE }
+        };
         for cell in component {
             dense.cell(cell.index).unwrap().side = side;
         }
     }
     ambiguous
+}
+
+/// The numbers of odd rays and of all rays that decide the side of a component: those of the first
+/// leaf whose rays agree, or else those of all candidates.
+fn vote(dense: &Dense, component: &[Cell], facets: &[Facet]) -> [usize; 2] {
+    let mut odd_of_all = 0;
+    let candidates = dense.leaves_among(component);
+    let candidates = &candidates[..candidates.len().min(32)];
+    for &leaf in candidates {
+        let centroid = dense.centroid(leaf);
+        let odd = (0..3).flat_map(|a| parities_by_areas(facets, centroid, a)).filter(|&odd| odd);
+        let odd = odd.count();
+        if odd == 0 || odd == 6 {
+            return [odd, 6];
+        }
+        odd_of_all += odd;
+    }
+    [odd_of_all, 6 * candidates.len()]
+}
+
+/// Marks the kept region and returns the numbers of components.
+pub fn keep(dense: &mut Dense, case: &Case) -> Components {
+    for cell in &mut dense.cells {
+        cell.kept = match case.keep {
+            Keep::Outside => cell.side != INSIDE,
+            Keep::Inside => cell.side != OUTSIDE,
+            Keep::All => true,
+        };
+    }
+    let (outside, inside): (Vec<_>, Vec<_>) =
+        components(dense).into_iter().partition(|component| component[0].side == OUTSIDE);
+    let (outside_count, inside) = (outside.len() as u64, inside.len() as u64);
+    let last = (1 << dense.finest) - 1;
+    let (enclosed, far_field): (Vec<_>, Vec<_>) = outside
+        .into_iter()
+        .partition(|component| component.iter().flat_map(|c| c.index).all(|x| 0 < x && x < last));
+    let applies = case.keep == Keep::Outside
+        && case.seeds.is_empty()
+        && case.enclosed == Enclosed::Delete
+        && !far_field.is_empty();
+    let enclosed = if applies { enclosed } else { Vec::new() };
+    let cells = enclosed.concat();
+    for cell in &cells {
+        dense.cell(cell.index).unwrap().kept = false;
+    }
+    let leaves = dense.leaves_among(&cells);
+    let centroid = |&leaf: &Cell| dense.centroid(leaf).map(|x| x as f64);
+    Components {
+        outside: outside_count,
+        inside,
+        enclosed: EnclosedComponents {
+            count: enclosed.len() as u64,
+            leaves: leaves.len() as u64,
+            example: leaves.first().map(centroid),
+        },
+    }
 }
 
 /// Gradation of the kept leaves, section 6 of the definition.

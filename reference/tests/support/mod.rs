@@ -2,10 +2,11 @@
 #![allow(dead_code)] // Each test is a separate crate and uses a subset.
 
 pub mod dense;
+pub mod leaf;
 pub mod random;
 
 use reference::leaves::Tally;
-use reference::{BoxSpec, Case, Keep, Root};
+use reference::{BoxSpec, Case, Enclosed, Keep, Root};
 
 /// The edge of the root in lattice units. The root of every case here has this edge, so the user's
 /// unit is the lattice unit.
@@ -22,6 +23,8 @@ pub fn case(facets: &[[[i64; 3]; 3]], level: u32) -> Case {
         keep: Keep::All,
         keep_crossing: true,
         boxes: Vec::new(),
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
     }
 }
 

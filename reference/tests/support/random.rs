@@ -1,4 +1,5 @@
 //! Random inputs for property tests.
+use super::dense::{self, CROSSING};
 use super::{ROOT_EDGE, block, box_of_level, case};
 use proptest::array::uniform3;
 use proptest::bool::weighted;
@@ -6,7 +7,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::test_runner::TestRunner;
-use reference::{Case, Keep};
+use reference::{Case, Enclosed, Keep};
 use std::ops::RangeInclusive;
 
 pub type Facet = [[i64; 3]; 3];
@@ -52,7 +53,8 @@ pub struct RandomCase {
     pub case: Case,
 }
 
-/// Cases of any facets and boxes, none of which requires a level beyond `finest`.
+/// Cases of any facets, boxes and valid seeds, none of which requires a level beyond `finest`. Most
+/// have no seeds.
 pub fn cases(finest: u32) -> impl Strategy<Value = RandomCase> {
     let unit = ROOT_EDGE >> 5;
     let extent_box = (uniform3(0..=30_i64), uniform3(1..=12_i64), 0..=finest).prop_map(
@@ -62,13 +64,50 @@ pub fn cases(finest: u32) -> impl Strategy<Value = RandomCase> {
         },
     );
     let keep = select(vec![Keep::Outside, Keep::Inside, Keep::All]);
-    (soup(), 1..=finest, vec(extent_box, 0..=2), 1..=4_u32, keep, any::<bool>()).prop_map(
-        |(facets, level_surface, boxes, layer_cells_min, keep, keep_crossing)| {
+    let enclosed = select(vec![Enclosed::Delete, Enclosed::Keep]);
+    let region = (keep, any::<bool>(), enclosed, seeds());
+    (soup(), 1..=finest, vec(extent_box, 0..=2), 1..=4_u32, region).prop_map(
+        move |(facets, level_surface, boxes, layer_cells_min, region)| {
+            let (keep, keep_crossing, enclosed, seeds) = region;
             let case = case(&facets, level_surface);
-            let case = Case { layer_cells_min, keep, keep_crossing, boxes, ..case };
+            let mut case =
+                Case { layer_cells_min, keep, keep_crossing, boxes, enclosed, seeds, ..case };
+            if !case.seeds.is_empty() {
+                let mut free = dense::base(&case, &facets, finest, level_surface);
+                free.cells.retain(|cell| cell.side != CROSSING);
+                case.seeds.retain(|&seed| free.contain(&free.cells, seed));
+            }
             RandomCase { facets, level_surface, case }
         },
     )
+}
+
+/// Cases like those of [`cases`] for external flow, with a shell around the middle of the root as an
+/// additional body. Most have enclosed space.
+pub fn cases_with_a_cavity(finest: u32) -> impl Strategy<Value = RandomCase> {
+    let unit = ROOT_EDGE >> 4;
+    let outer = (uniform3(1..=2_i64), uniform3(14..=15_i64));
+    let inner = (uniform3(4..=5_i64), uniform3(9..=11_i64));
+    (cases(finest), outer, inner, 0..=unit).prop_map(move |(random, outer, inner, shift)| {
+        let mut facets = random.facets;
+        for (min, max) in [outer, inner] {
+            facets.extend(block(min.map(|x| x * unit + shift), max.map(|x| x * unit + shift)));
+        }
+        let surface = case(&facets, finest);
+        let Case { layer_cells_min, keep_crossing, boxes, enclosed, .. } = random.case;
+        let keep = Keep::Outside;
+        let case = Case { layer_cells_min, keep, keep_crossing, boxes, enclosed, ..surface };
+        RandomCase { facets, level_surface: finest, case }
+    })
+}
+
+/// No seeds or a few, half of them in cell planes.
+fn seeds() -> impl Strategy<Value = Vec<[f64; 3]>> {
+    let unit = ROOT_EDGE >> 5;
+    let planes = uniform3(0..32_i64).prop_map(move |point| point.map(|x| x * unit));
+    let point = prop_oneof![uniform3(0..ROOT_EDGE), planes];
+    let point = point.prop_map(|point| point.map(|x| x as f64));
+    prop_oneof![3 => Just(Vec::new()), 1 => vec(point, 1..=3)]
 }
 
 /// Facets of every kind: blocks, closed or with a hole, triangles, segments and points, in cell
