@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::manifest::{Enclosed, ExtentBox, Keep};
+use crate::seed;
 use crate::stl::{self, StlError};
 
 pub use geometries::Facet;
@@ -156,7 +157,7 @@ impl Case {
             let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
             boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
         }
-        Ok(Self {
+        let case = Self {
             name,
             facets_lattice: on_lattice(&root, &facets)?,
             facets,
@@ -169,7 +170,9 @@ impl Case {
             seeds_lattice: seeds_on_lattice(&root, &file.seeds)?,
             seeds: file.seeds.clone(),
             enclosed: file.enclosed,
-        })
+        };
+        seed::refuse_crossing(&case)?;
+        Ok(case)
     }
 
     /// Deepest level that the surface or a box requires.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
 use crate::lattice::Root;
-use crate::octant::LEVEL_MAX;
+use crate::octant::{LEVEL_MAX, Octant};
 
 /// The only supported schema.
 pub const SCHEMA: &str = "octree-leaf-set/1";
@@ -61,6 +61,14 @@ pub struct ExtentBox {
     pub max: [i64; 3],
     /// Leaves whose interior meets the interior of the box have at least this level.
     pub level: u8,
+}
+
+impl ExtentBox {
+    /// Whether the interiors of the box and of an octant meet.
+    pub fn meets(&self, octant: &Octant) -> bool {
+        let (low, high) = octant.bounds();
+        (0..3).all(|a| low[a].max(self.min[a]) < high[a].min(self.max[a]))
+    }
 }
 
 /// Leaf counts by side.

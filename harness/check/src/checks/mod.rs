@@ -27,7 +27,6 @@ pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::Subject;
 use subject::valid_leaves;
 pub use terms::Terms;
-pub(crate) use terms::interiors_meet;
 
 /// Runs all checks, in the order in which their findings are most helpful. `identical` is omitted without a
 /// reference.

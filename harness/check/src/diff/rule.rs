@@ -242,6 +242,7 @@ pub fn sides(a: Option<u64>, b: Option<u64>, root: &contract::lattice::Root) -> 
 mod tests {
     use super::*;
     use contract::lattice::Root;
+    use contract::manifest::Enclosed;
 
     fn terms(n: u32) -> Terms {
         let root = Root { origin: [0.0; 3], edge: 8.0 };
@@ -252,6 +253,8 @@ mod tests {
             keep: Keep::All,
             keep_crossing: true,
             boxes: vec![],
+            seeds: vec![],
+            enclosed: Enclosed::Delete,
         }
     }
 
