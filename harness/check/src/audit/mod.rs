@@ -107,6 +107,7 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
             checks::complete::check_holes(&tree, &terms),
             checks::spacing::check_tree(&tree, &terms),
             checks::sides::check_tree(&tree, &terms),
+            checks::region::check_tree(&tree, manifest),
             checks::balance::check_tree(&tree, &terms.root),
             checks::layer::check_tree(&tree, &terms),
         ],
@@ -117,6 +118,7 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
                 checks::complete::check_holes(&tree, &terms),
                 checks::spacing::check_tree(&tree, &terms),
                 checks::sides::check_tree(&tree, &terms),
+                checks::region::check_tree(&tree, manifest),
             ]
         }
     };

@@ -16,6 +16,7 @@ pub mod identical;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
+pub mod region;
 mod result;
 pub mod sides;
 pub mod spacing;
@@ -38,6 +39,7 @@ pub fn all(subject: &Subject) -> Vec<CheckResult> {
         spacing::check(subject),
         crossing::check(subject),
         sides::check(subject),
+        region::check(subject),
         balance::check(subject),
         layer::check(subject),
     ];

@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use super::Terms;
+use super::components::{self, Component};
 use super::facets::Facets;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -24,6 +25,7 @@ pub struct Subject<'a> {
     tree: OnceCell<Tree>,
     tree_base: OnceCell<Tree>,
     tree_with_deleted: OnceCell<Tree>,
+    components: OnceCell<(Vec<u64>, Vec<Component>)>,
     facets: OnceCell<Facets>,
 }
 
@@ -39,6 +41,7 @@ impl<'a> Subject<'a> {
             tree: OnceCell::new(),
             tree_base: OnceCell::new(),
             tree_with_deleted: OnceCell::new(),
+            components: OnceCell::new(),
             facets: OnceCell::new(),
         }
     }
@@ -49,6 +52,7 @@ impl<'a> Subject<'a> {
             base: Some(base),
             tree_base: OnceCell::new(),
             tree_with_deleted: OnceCell::new(),
+            components: OnceCell::new(),
             ..self
         }
     }
@@ -89,6 +93,17 @@ impl<'a> Subject<'a> {
             }
             builder.finish()
         })
+    }
+
+    /// The valid leaves of T0 and their components, if T0 is known.
+    pub(super) fn components(&self) -> Option<(&[u64], &[Component])> {
+        let base = self.base?;
+        let (words, found) = self.components.get_or_init(|| {
+            let words = valid_leaves(&base.words);
+            let found = components::find(&words, &self.terms, &self.case.facets_lattice);
+            (words, found)
+        });
+        Some((words, found))
     }
 
     /// The case's facets, prepared for crossing tests.

@@ -77,6 +77,12 @@ impl Terms {
         self.keep == Keep::Outside && self.seeds.is_empty() && self.enclosed == Enclosed::Delete
     }
 
+    /// Whether two points in the user's units are the same: lattice coordinates are exact, but those in the user's
+    /// units are rounded.
+    pub fn same_place(&self, a: [f64; 3], b: [f64; 3]) -> bool {
+        (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 1e-9 * self.root.edge)
+    }
+
     /// Whether a box requires leaves finer than the surface. Gradation may then refine crossing leaves.
     pub fn has_box_finer_than_surface(&self) -> bool {
         self.boxes.iter().any(|b| b.level > self.level_surface)
