@@ -26,7 +26,7 @@ pub mod trail;
 
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::Subject;
-use subject::valid_leaves;
+pub(crate) use subject::valid_leaves;
 pub use terms::Terms;
 
 /// Runs all checks, in the order in which their findings are most helpful. `identical` is omitted without a

@@ -14,8 +14,7 @@
 
 use super::components::{self, Component};
 use super::{CheckResult, Subject, Terms, crossing, identical, valid_leaves};
-use contract::lattice::UNITS_PER_EDGE;
-use contract::manifest::{Components, EnclosedComponents, Keep, Manifest, Tree as Kind};
+use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};
 use contract::octant::{Octant, UNITS_PER_CELL};
 use contract::tree::Tree;
 use contract::word::{self, Side};
@@ -32,13 +31,12 @@ pub fn check(subject: &Subject) -> CheckResult {
     result
 }
 
-/// Checks the places of seeds and of the example in a tree, and whether the counts in the manifest are possible.
-pub fn check_tree(tree: &Tree, manifest: &Manifest) -> CheckResult {
+/// Checks the places of seeds and of the example in a tree, and whether the counts in its manifest are possible.
+pub fn check_tree(tree: &Tree, terms: &Terms, manifest: &Manifest) -> CheckResult {
     let mut result = CheckResult::new(NAME);
-    let terms = Terms::of_manifest(manifest);
-    seeds_in_flow(tree, &terms, &mut result);
+    seeds_in_flow(tree, terms, &mut result);
     if let Some(counted) = &manifest.components {
-        possible(tree, counted, manifest.tree, &terms, &mut result);
+        possible(tree, counted, manifest.tree, terms, &mut result);
     }
     result
 }
@@ -175,7 +173,7 @@ fn note(counts: &Components) -> String {
 /// Checks the mesh by itself.
 fn alone(subject: &Subject) -> CheckResult {
     let (terms, manifest) = (&subject.terms, &subject.mesh.manifest);
-    let mut result = check_tree(subject.tree(), manifest);
+    let mut result = check_tree(subject.tree(), terms, manifest);
     let words = valid_leaves(&subject.mesh.words);
     let groups = components::groups(&words);
     let side = |group: &Vec<u32>| word::side(words[group[0] as usize]);
@@ -229,7 +227,7 @@ fn kept_counts(counted: &Components, terms: &Terms) -> Vec<(Side, u64)> {
 fn seeds_in_flow(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     let flow = terms.side_of_flow();
     for (i, &seed) in terms.seeds.iter().enumerate() {
-        if !in_root(seed) {
+        if !components::in_root(seed) {
             result.report(format!("seed {i} at {seed:?} on the lattice lies outside the root"));
             continue;
         }
@@ -245,10 +243,6 @@ fn seeds_in_flow(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
             result.report(format!("seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"));
         }
     }
-}
-
-fn in_root(point: [i64; 3]) -> bool {
-    point.iter().all(|q| (0..UNITS_PER_EDGE).contains(q))
 }
 
 /// Whether the counts in a manifest can be right, and the example lies in a leaf that is deleted.
