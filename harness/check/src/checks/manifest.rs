@@ -2,7 +2,7 @@
 //!
 //! Section 8 of reference/DEFINITION.md: counts, digests, and inputs. The check cannot detect wrong leaves, or
 //! two sets of leaves with equal digests. `sides` checks the ambiguous components
-//! and `region` the numbers of components.
+//! and `kept` the numbers of components.
 
 use std::fmt::Debug;
 

@@ -13,10 +13,10 @@ pub mod facets;
 pub mod gap;
 pub mod hanging;
 pub mod identical;
+pub mod kept;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
-pub mod region;
 mod result;
 pub mod sides;
 pub mod spacing;
@@ -39,7 +39,7 @@ pub fn all(subject: &Subject) -> Vec<CheckResult> {
         spacing::check(subject),
         crossing::check(subject),
         sides::check(subject),
-        region::check(subject),
+        kept::check(subject),
         balance::check(subject),
         layer::check(subject),
     ];
