@@ -19,7 +19,8 @@ use contract::octant::{Octant, UNITS_PER_CELL};
 use contract::tree::Tree;
 use contract::word::{self, Side};
 
-const NAME: &str = "kept";
+/// Name of the check.
+pub const NAME: &str = "kept";
 
 /// Checks the mesh against the components of T0 or, without T0, by itself.
 pub fn check(subject: &Subject) -> CheckResult {
