@@ -208,7 +208,8 @@ def mesh(case, facets, ungraded):
     cells = [tuple(q * size // UNITS for q in s) for s in seeds]
     for i, cell in enumerate(cells):
         if not all(0 <= c < size for c in cell) or crossing[cell]:
-            sys.exit(f"seed {i} at {case['seeds'][i]} is outside the root or in a crossing leaf; move it into the flow")
+            print(f"seed {i} at {case['seeds'][i]} is outside the root or in a crossing leaf; move it into the flow", file=sys.stderr)
+            sys.exit(2)
     deletes_enclosed = keep == "outside" and not seeds and enclosed == "delete"
     wanted = INSIDE if keep == "inside" else OUTSIDE
     side, within, components = sides(level, crossing, facets, root, (cells, wanted), deletes_enclosed)
