@@ -58,7 +58,7 @@ impl CaseRun<'_> {
 
     /// Adds the numbers of components to the check that has compared them, with remarks about what a user may not expect.
     fn note_components(&mut self, manifest: &Manifest) {
-        let checks = self.report().checks.iter_mut();
+        let mut checks = self.report().checks.iter_mut();
         let Some(check) = checks.rfind(|check| check.name == kept::NAME) else { return };
         let Ambiguous { count: ambiguous, example } = manifest.components_ambiguous;
         check.counts.insert("components_ambiguous".into(), ambiguous);
