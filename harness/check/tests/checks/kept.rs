@@ -6,14 +6,13 @@ use check::checks::{Subject, Terms, components, kept};
 use contract::leafset::LeafSet;
 use contract::word;
 use proptest::prelude::*;
+use std::collections::HashSet;
 
 /// The words of a mesh that lie in these leaves of T0, and the others.
 fn within(mesh: &[u64], base: &[u64], leaves: &[u32]) -> (Vec<u64>, Vec<u64>) {
-    let contains = |w: &u64| {
-        let octant = word::octant(*w);
-        leaves.iter().any(|&i| word::octant(base[i as usize]).contains(&octant))
-    };
-    mesh.iter().partition(|w| contains(w))
+    let leaves: HashSet<usize> = leaves.iter().map(|&i| i as usize).collect();
+    let containing = |w: u64| components::leaf_at(base, word::octant(w).bounds().0);
+    mesh.iter().partition(|&&w| containing(w).is_some_and(|i| leaves.contains(&i)))
 }
 
 fn reported(subject: &Subject) -> bool {
