@@ -114,10 +114,13 @@ impl Tally {
         let sentence = |dissent: &Dissent| {
             let Dissent { name, points, right, wrong } = dissent;
             let undecided = points - right - wrong;
-            format!(
-                "{name} differs from the mesh at {points} of {all} points; by exact rays it is right at {right}, \
-                 wrong at {wrong}, undecided at {undecided}"
-            )
+            let judged = match ballot.seeds {
+                true => format!("exact rays agree with it at {right}"),
+                false => format!(
+                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {undecided}"
+                ),
+            };
+            format!("{name} differs from the mesh at {points} of {all} points; {judged}")
         };
         let mut notes: Vec<String> =
             self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
@@ -228,6 +231,11 @@ mod tests {
         let exact = [Some(true), Some(true), Some(false)];
         let (count, failure, notes) = vote_with_seeds(exact, [no, no, no], true, true);
         assert_eq!((count.exact_against.len(), failure, notes.len()), (2, None, 4));
+        assert!(
+            notes[0].ends_with("at 3 of 3 points; exact rays agree with it at 3"),
+            "{}",
+            notes[0]
+        );
         assert_eq!(
             notes[3],
             "at 2 points all six exact rays contradict the mesh: seeds determine the sides"
