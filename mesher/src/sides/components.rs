@@ -122,7 +122,8 @@ pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
         local: LocalMerge {
             parent: (0..nodes.component_count()).collect(),
             faces: Vec::new(),
-            at_boundary: Vec::new(),
+            // Enough for most meshes, so that it does not grow in many steps.
+            at_boundary: Vec::with_capacity(1 << 12),
         },
         path: Vec::new(),
     };

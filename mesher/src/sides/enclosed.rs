@@ -21,17 +21,18 @@ pub struct Region {
 }
 
 impl Region {
-    /// Compares the components with those at the root's boundary, of which `at_boundary` are this rank's.
+    /// Compares the components with those at the root's boundary, of which `at_boundary` are this rank's, some more
+    /// than once.
     /// Collective.
     pub fn new(
         rules: &Rules,
         components: &[FirstLeaf],
         verdict: &Verdict,
-        at_boundary: HashSet<Label>,
+        at_boundary: impl Iterator<Item = Label>,
         comm: &dyn Comm,
     ) -> Self {
         let of_all_ranks = || -> HashSet<Label> {
-            let mine = at_boundary.into_iter().map(|label| [label, 0]).collect();
+            let mine = at_boundary.map(|label| [label, 0]).collect();
             all_gather_reduced(mine, u64::min, comm).into_iter().map(|[label, _]| label).collect()
         };
         let outside =

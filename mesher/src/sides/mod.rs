@@ -137,7 +137,7 @@ pub fn decide(
     };
     nodes.drop_links();
 
-    let at_boundary = at_boundary.into_iter().map(label).collect();
+    let at_boundary = at_boundary.into_iter().map(label);
     let region = Region::new(rules, &components, &verdict, at_boundary, comm);
     let class = |label| match () {
         () if verdict.inside.contains(label) => Class::Inside,
