@@ -129,9 +129,9 @@ impl Case {
             .boxes
             .iter()
             .enumerate()
-            .map(|(i, b)| b.on(&root, i + 1))
+            .map(|(i, b)| b.on(&root, i))
             .collect::<Result<_, _>>()?;
-        let seeds = (1..)
+        let seeds = (0..)
             .zip(&self.seeds)
             .map(|(number, &given)| on_lattice(given, &root, number))
             .collect::<Result<_, _>>()?;
@@ -148,7 +148,7 @@ impl Case {
     }
 }
 
-/// A seed on the lattice; `number`, from 1, identifies it in errors.
+/// A seed on the lattice; `number`, from 0, identifies it in errors.
 fn on_lattice(given: [f64; 3], root: &Root, number: usize) -> Result<Seed, Error> {
     if !given.iter().all(|c| c.is_finite()) {
         return Err(Error::input(format!("seed {number} is not finite: give three numbers")));
@@ -157,7 +157,7 @@ fn on_lattice(given: [f64; 3], root: &Root, number: usize) -> Result<Seed, Error
 }
 
 impl BoxSpec {
-    /// The box on the lattice; `number`, from 1, identifies it in errors.
+    /// The box on the lattice; `number`, from 0, identifies it in errors.
     fn on(&self, root: &Root, number: usize) -> Result<ExtentBox, Error> {
         let ordered = (0..3).all(|a| {
             self.min[a] < self.max[a] && self.min[a].is_finite() && self.max[a].is_finite()

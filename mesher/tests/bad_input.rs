@@ -158,13 +158,13 @@ fn roots_and_boxes_out_of_range_are_refused() {
             "spacing_min = 0.5\n[[box]]\nmin = [0.0, 0.0, 0.0]\nmax = [1.0, 1.0, 1.0]\nspacing = 1.0\n[[box]]\nmin = [{min}]\nmax = [{max}]\nspacing = {spacing}\n"
         )
     };
-    refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 0.0, 1.0", "0.5"), &["box 2", "below max"]);
-    refused_rules(&boxed("0.0, 2.0, 0.0", "1.0, 1.0, 1.0", "0.5"), &["box 2", "below max"]);
-    refused_rules(&boxed("0.0, -inf, 0.0", "1.0, 1.0, 1.0", "0.5"), &["box 2", "finite"]);
+    refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 0.0, 1.0", "0.5"), &["box 1", "below max"]);
+    refused_rules(&boxed("0.0, 2.0, 0.0", "1.0, 1.0, 1.0", "0.5"), &["box 1", "below max"]);
+    refused_rules(&boxed("0.0, -inf, 0.0", "1.0, 1.0, 1.0", "0.5"), &["box 1", "finite"]);
     for spacing in ["0.0", "-1.0", "nan"] {
-        refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", spacing), &["box 2", "positive"]);
+        refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", spacing), &["box 1", "positive"]);
     }
-    refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", "1e-9"), &["box 2", "too small"]);
+    refused_rules(&boxed("0.0, 0.0, 0.0", "1.0, 1.0, 1.0", "1e-9"), &["box 1", "too small"]);
     let workspace = Workspace::new();
     workspace.write("none.stl", binary_stl(&[]));
     workspace.write("point.stl", binary_stl(&[[[0.25; 3]; 3]]));
@@ -235,7 +235,7 @@ fn options_with_mistakes_are_refused() {
     refused(&workspace, &with(&["--keap", "all"]), INPUT, &["--keap", "--keep"]);
     refused(&workspace, &with(&["--root", "0,0,0"]), INPUT, &["--root", "4 numbers"]);
     refused(&workspace, &with(&["--box", "0,0,0,1,1,1,x"]), INPUT, &["--box", "7 numbers"]);
-    refused(&workspace, &with(&["--box", "0,0,0,1,-1,1,1"]), INPUT, &["box 1", "below max"]);
+    refused(&workspace, &with(&["--box", "0,0,0,1,-1,1,1"]), INPUT, &["box 0", "below max"]);
     refused(&workspace, &with(&["--root-scale", "-2"]), INPUT, &["root_scale is -2"]);
     refused(&workspace, &with(&["--level-base", "20"]), INPUT, &["--level-base"]);
     refused(&workspace, &["case.toml", "--spacing-min", "1"], INPUT, &["case.toml is a case file"]);

@@ -31,7 +31,7 @@ pub fn flow(
     comm: &dyn Comm,
 ) -> Result<HashSet<Label>, Error> {
     let mut mine = Vec::new();
-    for (number, seed) in (1..).zip(&rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
+    for (number, seed) in (0..).zip(&rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
         let (l, code) = leaf_at(tree, seed);
         let (key, bit) = (code >> 6, code & 63);
         if !ownership.owns(l, key) {
@@ -43,7 +43,7 @@ pub fn flow(
     }
     let all = comm.all_gather(&mine);
     let found: Vec<[u64; 2]> = all.words().as_chunks().0.to_vec();
-    for (number, seed) in (1..).zip(&rules.seeds) {
+    for (number, seed) in (0..).zip(&rules.seeds) {
         let problem = match found.iter().find(|f| f[0] == number) {
             None => "lies outside the root",
             Some([_, CROSSING]) => "lies in a leaf that the geometry crosses",
