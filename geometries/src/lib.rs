@@ -1,6 +1,7 @@
 //! Generated shapes: closed surfaces as facet soup, with a given number of facets.
 //!
-//! Every shape is a closed surface wound outward, whose facets share vertices bit for bit. It is
+//! Every shape is a closed surface wound outward, or several that overlap or enclose each other,
+//! whose facets share vertices bit for bit. It is
 //! the same on every machine: only `+ - * /`, square roots and `libm` are used, and nothing depends
 //! on the order of a hash table. [`Generator`] is the `[generator]` table of a case file.
 //!

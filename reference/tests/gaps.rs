@@ -3,7 +3,12 @@
 mod support;
 
 use reference::{Case, Keep, base_tree};
-use support::{ROOT_EDGE, case};
+use std::cell::Cell;
+use std::collections::HashSet;
+use support::dense::{CROSSING, INSIDE};
+use support::leaf::leaves;
+use support::random::{Facet, cases, for_all};
+use support::{ROOT_EDGE, case, crosses_by_axes};
 
 const LEVEL: u32 = 5;
 /// Edge of the cells at the surface, in lattice units.
@@ -118,6 +123,62 @@ fn slits_are_closed_and_open_where_the_definition_guarantees_it() {
         let [closed, open] = [1.0, 2.0 * sum + 1e-3].map(|width| entry(open_places(frame, width)));
         assert_eq!([closed.as_str(), open.as_str()], ["closed", "open"], "{name}");
     }
+}
+
+/// The positions that a cube of two cells' edge, starting at `start`, reaches by steps of half a cell
+/// within the root without touching a facet. A position is the minimum corner of the cube.
+fn reached(facets: &[Facet], cell: i64, start: [i64; 3]) -> HashSet<[i64; 3]> {
+    let is_free = |min: [i64; 3], max: [i64; 3]| {
+        let is_in_root = min.iter().all(|&x| x >= 0) && max.iter().all(|&x| x <= ROOT_EDGE);
+        is_in_root && !facets.iter().any(|facet| crosses_by_axes(facet, min, max))
+    };
+    let max_of = |min: [i64; 3]| min.map(|x| x + 2 * cell);
+    let mut reached = HashSet::new();
+    let mut waiting = vec![start];
+    waiting.retain(|&start| is_free(start, max_of(start)));
+    while let Some(from) = waiting.pop() {
+        if !reached.insert(from) {
+            continue;
+        }
+        for (axis, step) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
+            let mut to = from;
+            to[axis] += step * cell / 2;
+            // The cube sweeps the smallest box around both positions.
+            let min = std::array::from_fn(|a| from[a].min(to[a]));
+            let max = std::array::from_fn(|a| max_of(from)[a].max(max_of(to)[a]));
+            if !reached.contains(&to) && is_free(min, max) {
+                waiting.push(to);
+            }
+        }
+    }
+    reached
+}
+
+/// All places that a cube of two cells' edge reaches are one component, whatever the facets are.
+#[test]
+fn gaps_through_which_a_cube_of_two_cells_passes_always_connect() {
+    const LEVEL: u32 = 3;
+    let cell = ROOT_EDGE >> LEVEL;
+    let start = proptest::array::uniform3(0..7 * cell);
+    let far = Cell::new(0);
+    for_all(file!(), 60, (cases(LEVEL), start), |(random, start)| {
+        let reached = reached(&random.facets, cell, start);
+        // The first whole cell in the cube along each axis.
+        let cell_in = |position: [i64; 3]| position.map(|x| (x + cell - 1) / cell * cell);
+        if reached.is_empty() {
+            return;
+        }
+        let seeds = vec![cell_in(start).map(|x| x as f64)];
+        let seeded = Case { seeds, keep: Keep::Inside, ..case(&random.facets, LEVEL) };
+        let base = leaves(&base_tree(&seeded).unwrap().words);
+        for &position in &reached {
+            let leaf = base.iter().find(|leaf| leaf.has(cell_in(position))).unwrap();
+            assert_eq!(leaf.side, INSIDE, "{position:?}");
+        }
+        let is_divided = base.iter().any(|leaf| leaf.side == CROSSING);
+        far.set(far.get() + u32::from(is_divided && reached.len() > 100));
+    });
+    assert!(far.get() > 5, "cubes must move far in the presence of facets: {}", far.get());
 }
 
 /// Along an axis neither limit can be improved.
