@@ -1,8 +1,9 @@
 //! Generated shapes: closed surfaces as facet soup, with a given number of facets.
 //!
-//! Every shape is a closed surface wound outward, whose facets share vertices bit for bit. It is
-//! the same on every machine: only `+ - * /`, square roots and `libm` are used, and nothing depends
-//! on the order of a hash table. [`Generator`] is the `[generator]` table of a case file.
+//! Every shape is a closed surface wound outward, or several that overlap or enclose each other,
+//! whose facets share vertices bit for bit. It is the same on every machine: only `+ - * /`, square
+//! roots and `libm` are used, and nothing depends on the order of a hash table. [`Generator`] is the
+//! `[generator]` table of a case file.
 //!
 //! A closed surface of triangles has an even number of facets. If the requested number is odd, the
 //! shape has one facet less; otherwise the number is exact. Each shape has a minimum number.

@@ -195,13 +195,13 @@ fn a_translated_case_has_the_same_mesh() {
     });
 }
 
-/// Every leaf of T0 that no facet crosses is tried. Seeds lie in the root or up to half an edge
-/// outside it, many of them in the middle between centroids.
+/// Every leaf of T0 that no facet crosses is tried. Half of the seeds lie in the root, and the others
+/// around it; many are in the middle between centroids.
 #[test]
 fn the_nearest_free_centroid_is_that_of_an_exhaustive_search() {
-    let near = -ROOT_EDGE / 2..ROOT_EDGE * 3 / 2;
+    let near = -ROOT_EDGE / 8..ROOT_EDGE * 9 / 8;
     let unit = ROOT_EDGE >> 5;
-    let even = uniform3(-16..48_i64).prop_map(move |point| point.map(|x| x * unit));
+    let even = uniform3(-4..36_i64).prop_map(move |point| point.map(|x| x * unit));
     let seed = prop_oneof![uniform3(near), even];
     let keep = select(vec![Keep::Outside, Keep::Inside, Keep::All]);
     let [valid, outside, crossing] = [const { Cell::new(0) }; 3];
@@ -235,7 +235,8 @@ fn the_nearest_free_centroid_is_that_of_an_exhaustive_search() {
             (leaf, found) => panic!("seed {seed:?} in {leaf:?}: {found:?}"),
         }
     });
-    assert!([valid, outside, crossing].iter().all(|counter| counter.get() > 10));
+    let counts = [valid, outside, crossing].map(Cell::into_inner);
+    assert!(counts.iter().all(|&count| count > 10), "{counts:?}");
 }
 
 /// A block without one of its faces.
