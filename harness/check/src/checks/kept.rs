@@ -87,11 +87,14 @@ fn kept_or_deleted(
     match (wanted && !component.enclosed, example) {
         (false, Some(leaf)) => result.report_with(|| {
             let leaf = identical::describe(leaf, &terms.root);
-            format!("a component of {total} leaves of T0 {why} and is deleted, but {count} leaves lie in it, first the {leaf}")
+            format!(
+                "a component of {total} leaves of T0 {why} and must be deleted, but the mesh has leaves in it ({count}), \
+                 first the {leaf}"
+            )
         }),
         (true, None) => result.report_with(|| {
             let first = terms.root.describe(first);
-            format!("a component of {total} leaves of T0 {why} and is kept, but the mesh has no leaf in it: {first}")
+            format!("a component of {total} leaves of T0 {why} and must be kept, but the mesh has no leaf in it: {first}")
         }),
         _ => {}
     }
