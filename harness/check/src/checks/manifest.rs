@@ -1,6 +1,6 @@
 //! The manifest agrees with the files and with the case.
 //!
-//! Section 8 of reference/DEFINITION.md: counts, digests, inputs and, if the mesh must equal another one, the
+//! Section 8 of reference/DEFINITION.md: counts, digests, inputs and, if the mesh equals the reference, the
 //! components. The check cannot detect wrong leaves, or
 //! two sets of leaves with equal digests. `sides` checks the ambiguous components
 //! and `kept` the numbers of components.
@@ -25,13 +25,14 @@ pub fn check(subject: &Subject) -> CheckResult {
             against_leaves(prefix, set, &mut result);
         }
     }
-    if let Some(reference) = subject.reference {
+    // Of different leaves, `identical` reports the cause.
+    if let Some(reference) = subject.reference.filter(|r| r.words == subject.mesh.words) {
         against_reference(subject, &reference.manifest, &mut result);
     }
     result
 }
 
-/// The manifest describes the components as that of the reference does, if both count them. This is the only check of
+/// The manifest describes the components as that of the equal reference does, if both count them. This is the only check of
 /// the counts in a mesh whose T0 is not known, such as one made on several ranks.
 fn against_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResult) {
     let mesh = &subject.mesh.manifest;
