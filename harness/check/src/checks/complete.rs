@@ -113,8 +113,11 @@ impl Pair<'_> {
     fn compare_leaf(&mut self, handle: Handle, kind: Kind, octant: Octant) {
         let leaf =
             word::key_of(octant.corner) << 7 | u64::from(octant.level) << 2 | u64::from(kind);
-        let keeps = self.terms.keeps(kind) && self.enclosed.binary_search(&leaf).is_err();
-        if !keeps && handle != Handle::HOLE {
+        let enclosed = self.enclosed.binary_search(&leaf).is_ok();
+        let keeps = self.terms.keeps(kind) && !enclosed;
+        if enclosed && handle != Handle::HOLE {
+            self.report("an enclosed T0 leaf still exists, at least in part:", octant);
+        } else if !keeps && handle != Handle::HOLE {
             self.report("a T0 leaf that must be deleted still exists, at least in part:", octant);
         } else if keeps && self.tree.kinds(handle) & HOLES != 0 {
             let hole = self.first_hole(handle, octant);

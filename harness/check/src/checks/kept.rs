@@ -3,20 +3,15 @@
 //! Section 5 of reference/DEFINITION.md. With T0: no leaf lies in a component that is deleted (enclosed, without a
 //! seed, or on the side that is not wanted), every other component has leaves, and the manifest states the numbers
 //! of components and of enclosed leaves (`complete` establishes that no part of a component is missing). Without T0,
-//! from the components of the mesh itself: if enclosed components are deleted, either all outside components have a
-//! face on the root's boundary or none has; every seed lies in a leaf of flow, and every component of flow has a
-//! seed; and each side has as many components as the manifest counts. Refinement connects and separates nothing, so
-//! these components are those of T0. Without T0 and without counts in the manifest, the check cannot detect that a
-//! whole component is missing.
-//!
-//! The audit checks neither the connection of leaves nor their number of components, only the places of the seeds
-//! and of the example, and whether the counts in the manifest are possible.
+//! see [`check_tree`].
 
-use super::components::{self, Component};
+mod alone;
+
+pub use alone::check_tree;
+
+use super::components::Component;
 use super::{CheckResult, Subject, Terms, crossing, identical, valid_leaves};
-use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};
-use contract::octant::{Octant, UNITS_PER_CELL};
-use contract::tree::Tree;
+use contract::manifest::{Components, EnclosedComponents};
 use contract::word::{self, Side};
 
 /// Name of the check.
@@ -26,19 +21,9 @@ pub const NAME: &str = "kept";
 pub fn check(subject: &Subject) -> CheckResult {
     let mut result = match subject.components() {
         Some((words, components)) => with_base(subject, words, components),
-        None => alone(subject),
+        None => check_tree(subject.tree(), &subject.terms, &subject.mesh.manifest),
     };
     result.examined = subject.mesh.words.len() as u64;
-    result
-}
-
-/// Checks the places of seeds and of the example in a tree, and whether the counts in its manifest are possible.
-pub fn check_tree(tree: &Tree, terms: &Terms, manifest: &Manifest) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    seeds_in_flow(tree, terms, &mut result);
-    if let Some(counted) = &manifest.components {
-        possible(tree, counted, manifest.tree, terms, &mut result);
-    }
     result
 }
 
@@ -102,11 +87,14 @@ fn kept_or_deleted(
     match (wanted && !component.enclosed, example) {
         (false, Some(leaf)) => result.report_with(|| {
             let leaf = identical::describe(leaf, &terms.root);
-            format!("a component of {total} leaves of T0 {why} and is deleted, but {count} leaves lie in it, first the {leaf}")
+            format!(
+                "a component of {total} leaves of T0 {why} and must be deleted, but the mesh has leaves in it ({count}), \
+                 first the {leaf}"
+            )
         }),
         (true, None) => result.report_with(|| {
             let first = terms.root.describe(first);
-            format!("a component of {total} leaves of T0 {why} and is kept, but the mesh has no leaf in it: {first}")
+            format!("a component of {total} leaves of T0 {why} and must be kept, but the mesh has no leaf in it: {first}")
         }),
         _ => {}
     }
@@ -169,134 +157,4 @@ fn note(counts: &Components) -> String {
         );
     }
     text
-}
-
-/// Checks the mesh by itself.
-fn alone(subject: &Subject) -> CheckResult {
-    let (terms, manifest) = (&subject.terms, &subject.mesh.manifest);
-    let mut result = check_tree(subject.tree(), terms, manifest);
-    let words = valid_leaves(&subject.mesh.words);
-    let groups = components::groups(&words);
-    let side = |group: &Vec<u32>| word::side(words[group[0] as usize]);
-    let describe = |group: &Vec<u32>| identical::describe(words[group[0] as usize], &terms.root);
-    let of_side = |side_: Side| groups.iter().filter(move |group| side(group) == side_);
-    if terms.deletes_enclosed() {
-        let (far, enclosed): (Vec<_>, Vec<_>) =
-            of_side(Side::Outside).partition(|group| components::touches_boundary(&words, group));
-        for group in enclosed.iter().filter(|_| !far.is_empty()) {
-            let (count, leaf) = (group.len(), describe(group));
-            result.report_with(|| {
-                format!(
-                    "enclosed components are deleted, but {count} outside leaves form one: no face on the root's \
-                     boundary, although other outside leaves have one; the first is the {leaf}"
-                )
-            });
-        }
-    }
-    if !terms.seeds.is_empty() {
-        let seeded = components::seeded_leaves(&words, terms);
-        for group in of_side(terms.side_of_flow()) {
-            if !group.iter().any(|i| seeded.binary_search(i).is_ok()) {
-                let (count, leaf) = (group.len(), describe(group));
-                result.report_with(|| {
-                    format!("no seed lies in a component of {count} leaves of flow, the first of which is the {leaf}")
-                });
-            }
-        }
-    }
-    if let Some(counted) = &manifest.components {
-        for (side, expected) in kept_counts(counted, terms) {
-            let found = of_side(side).count() as u64;
-            if found != expected {
-                result.report(format!(
-                    "the manifest leaves {expected} {side} components, and the mesh has {found}"
-                ));
-            }
-        }
-    }
-    result
-}
-
-/// The sides that are kept, with the numbers of components that a manifest leaves of them.
-fn kept_counts(counted: &Components, terms: &Terms) -> Vec<(Side, u64)> {
-    let outside = counted.outside.saturating_sub(counted.enclosed.count);
-    let all = [(Side::Outside, outside), (Side::Inside, counted.inside)];
-    all.into_iter().filter(|(side, _)| terms.keeps(*side as u8)).collect()
-}
-
-/// Every seed lies in a leaf of flow.
-fn seeds_in_flow(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
-    let flow = terms.side_of_flow();
-    for (i, &seed) in terms.seeds.iter().enumerate() {
-        if !components::in_root(seed) {
-            result.report(format!("seed {i} at {seed:?} on the lattice lies outside the root"));
-            continue;
-        }
-        let found = tree.locate(seed.map(|q| (q / UNITS_PER_CELL) as u32));
-        if found.is_none_or(|(_, kind)| kind != flow as u8) {
-            let at = terms.root.to_user(seed);
-            let found = match found {
-                Some((leaf, kind)) => {
-                    format!(
-                        "in the {} leaf {}",
-                        super::contact::name(1 << kind),
-                        terms.root.describe(&leaf)
-                    )
-                }
-                None => "in no leaf".to_owned(),
-            };
-            result.report(format!(
-                "seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"
-            ));
-        }
-    }
-}
-
-/// Whether the counts in a manifest can be right, and the example lies in a leaf that is deleted.
-fn possible(
-    tree: &Tree,
-    counted: &Components,
-    kind: Kind,
-    terms: &Terms,
-    result: &mut CheckResult,
-) {
-    let EnclosedComponents { count, leaves, example } = counted.enclosed;
-    let none = count == 0 && leaves == 0 && example.is_none();
-    // The far field is another outside component.
-    let some = terms.deletes_enclosed()
-        && 0 < count
-        && count < counted.outside
-        && count <= leaves
-        && example.is_some_and(|at| deleted_at(tree, at, kind, terms));
-    if !none && !some {
-        result.report(format!(
-            "{count} of {} outside components cannot be enclosed with {leaves} leaves of T0 and one at {example:?}",
-            counted.outside
-        ));
-    }
-    let kinds = tree.kinds(tree.root());
-    let sides = match kind {
-        Kind::Final => kept_counts(counted, terms),
-        Kind::Base => vec![(Side::Outside, counted.outside), (Side::Inside, counted.inside)],
-    };
-    for (side, expected) in sides {
-        if (expected > 0) != (kinds & 1 << side as u8 != 0) {
-            let leaves = if expected > 0 { "no leaf is" } else { "leaves are" };
-            result.report(format!(
-                "the manifest leaves {expected} {side} components, but {leaves} {side}"
-            ));
-        }
-    }
-}
-
-/// Whether a point lies in a leaf that was deleted from a final mesh, or that is outside in T0.
-fn deleted_at(tree: &Tree, at: [f64; 3], kind: Kind, terms: &Terms) -> bool {
-    let Some(point) = terms.root.quantise_seed(at) else { return false };
-    let found = tree.locate(point.map(|q| (q / UNITS_PER_CELL) as u32));
-    match kind {
-        Kind::Final => found.is_none(),
-        Kind::Base => found.is_some_and(|(leaf, side): (Octant, u8)| {
-            side == Side::Outside as u8 && terms.same_place(at, terms.root.to_user(leaf.centre()))
-        }),
-    }
 }

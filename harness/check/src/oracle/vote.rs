@@ -232,7 +232,7 @@ mod tests {
         let (count, failure, notes) = vote_with_seeds(exact, [no, no, no], true, true);
         assert_eq!((count.exact_against.len(), failure, notes.len()), (2, None, 4));
         assert!(
-            notes[0].ends_with("at 3 of 3 points; exact rays agree with it at 3"),
+            notes[0].ends_with("at 2 of 3 points; exact rays agree with it at 2"),
             "{}",
             notes[0]
         );

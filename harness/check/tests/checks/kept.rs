@@ -2,8 +2,9 @@
 
 use crate::no_false_alarms::{hulls, settings, soup};
 use crate::support;
-use check::checks::{Subject, Terms, components, kept};
+use check::checks::{Subject, Terms, components, kept, manifest};
 use contract::leafset::LeafSet;
+use contract::manifest::Manifest;
 use contract::word;
 use proptest::prelude::*;
 use std::collections::HashSet;
@@ -41,4 +42,21 @@ proptest! {
             prop_assert!(reported(&Subject::new(&correct.case, &mesh).with_base(&correct.base)), "{text}");
         }
     }
+}
+
+#[test]
+fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
+    let text = include_str!("../../../selftest-cases/enclosed.toml");
+    let correct = support::selftest_case("enclosed", text);
+    let check = |change: fn(&mut Manifest)| {
+        let mut mesh = correct.mesh.clone();
+        change(&mut mesh.manifest);
+        let subject = Subject::new(&correct.case, &mesh).with_reference(&correct.mesh);
+        manifest::check(&subject).findings_total
+    };
+    assert_eq!(check(|_| ()), 0);
+    assert_eq!(check(|m| m.components = None), 0);
+    assert_eq!(check(|m| m.components.as_mut().unwrap().inside += 1), 1);
+    assert_eq!(check(|m| m.components.as_mut().unwrap().enclosed.example = None), 1);
+    assert_eq!(check(|m| m.components_ambiguous.count += 1), 1);
 }
