@@ -2,7 +2,7 @@
 
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "verify",
     "selftest",
     "gate",
@@ -14,6 +14,7 @@ const COMMANDS: [&str; 13] = [
     "audit",
     "export",
     "diff",
+    "why",
     "completions",
     "man",
 ];

@@ -72,8 +72,11 @@ impl Mesh<'_> {
 
     /// The leaf of T0 that is or contains an octant; `None` if T0 splits the octant.
     pub(super) fn base_leaf(&self, octant: &Octant) -> Option<Octant> {
-        let path = (0..=octant.level).map(|level| octant.ancestor(level));
-        path.into_iter().find(|ancestor| !self.base_splits(ancestor))
+        if self.base_splits(octant) {
+            return None;
+        }
+        let split_above = (0..octant.level).rev().find(|&l| self.base_splits(&octant.ancestor(l)));
+        Some(octant.ancestor(split_above.map_or(0, |level| level + 1)))
     }
 
     /// Whether crossing leaves were deleted after gradation and are known from the facets.

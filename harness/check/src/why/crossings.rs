@@ -43,7 +43,7 @@ impl<'a> Crossings<'a> {
 
     /// A list that contains every facet that crosses an octant: that of its finest ancestor with a list.
     fn near(&self, octant: &Octant) -> Rc<[u32]> {
-        let all = || (0..u32::try_from(self.facets.len()).expect("fewer than 2^32 facets"));
+        let all = || 0..u32::try_from(self.facets.len()).expect("fewer than 2^32 facets");
         let mut list = self.list(&Octant::ROOT, &mut all());
         for level in 1..=octant.level {
             if list.len() <= FACETS_FEW {
@@ -68,9 +68,8 @@ impl<'a> Crossings<'a> {
         let facet = &self.facets[facet as usize];
         let (low, high) = octant.bounds();
         // Most facets are far away. The exact test computes the plane first.
-        let apart = (0..3).any(|a| {
-            facet.iter().all(|v| v[a] < low[a]) || facet.iter().all(|v| v[a] > high[a])
-        });
+        let apart = (0..3)
+            .any(|a| facet.iter().all(|v| v[a] < low[a]) || facet.iter().all(|v| v[a] > high[a]));
         !apart && Triangle::new(facet).meets(low, high)
     }
 }

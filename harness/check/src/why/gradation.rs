@@ -74,9 +74,8 @@ impl Mesh<'_> {
             return known;
         }
         let level = octant.level + 1;
-        let forces = &mut |leaf: Octant| {
-            self.forces_by_layer(&leaf, octant) && self.is_deep(&parent(&leaf))
-        };
+        let forces =
+            &mut |leaf: Octant| self.forces_by_layer(&leaf, octant) && self.is_deep(&parent(&leaf));
         let justified = level <= LEVEL_MAX && self.any_leaf_near(octant, level..=level, forces);
         self.justified.borrow_mut().insert(id, justified);
         justified
