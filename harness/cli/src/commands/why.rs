@@ -11,6 +11,7 @@ use check::why::Mesh;
 use clap::Args;
 use contract::case::Case;
 use contract::files::write_atomically;
+use report::json::pretty;
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
 use run::engine::options::RunOptions;
@@ -80,55 +81,47 @@ pub fn run(arguments: &Arguments) -> u8 {
 fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
     let input = |why: String| (EXIT_INPUT, why);
     let given = Path::new(&arguments.mesh);
-    let (dir, case_file, _made) = match given.is_dir() {
-        true => (given.to_owned(), arguments.case.clone(), None),
-        false if arguments.case.is_some() => {
-            return Err(input(format!(
-                "{} is not a leaf-set directory, which --case requires",
-                given.display()
-            )));
-        }
-        false => {
-            let (made, case) = mesh(arguments)?;
-            (made.path().join("mesh"), Some(case), Some(made))
-        }
+    let (dir, case, _made) = if given.is_dir() {
+        let case = arguments.case.as_deref().map(Case::read).transpose();
+        (given.to_owned(), case.map_err(|error| input(error.to_string()))?, None)
+    } else if arguments.case.is_some() {
+        let what =
+            format!("{} is not a leaf-set directory, which --case requires", given.display());
+        return Err(input(what));
+    } else {
+        let (made, case) = mesh(arguments)?;
+        (made.path().join("mesh"), Some(case), Some(made))
     };
-    let case = case_file.as_deref().map(Case::read).transpose();
-    let case = case.map_err(|error| input(error.to_string()))?;
     let mesh = Mesh::open(&dir, case.as_ref()).map_err(input)?;
     if let Some(Point(point)) = arguments.point {
-        report(&mesh.at(point).map_err(input)?, arguments.json.as_deref())?;
+        print(&mesh.at(point).map_err(input)?, arguments.json.as_deref())?;
         return Ok(EXIT_HOLDS);
     }
     let found = mesh.unneeded(arguments.first.get()).map_err(input)?;
-    report(&found, arguments.json.as_deref())?;
+    print(&found, arguments.json.as_deref())?;
     Ok(if found.unneeded == 0 { EXIT_HOLDS } else { EXIT_FAILED })
 }
 
 /// Prints a result and writes it as JSON.
-fn report<T: Display + Serialize>(result: &T, json: Option<&Path>) -> Result<(), Failure> {
+fn print<T: Display + Serialize>(result: &T, json: Option<&Path>) -> Result<(), Failure> {
     println!("{result}");
     let Some(path) = json else { return Ok(()) };
-    let write = write_atomically(path, |out| {
-        serde_json::to_writer_pretty(&mut *out, result)?;
-        out.write_all(b"\n")
-    });
-    write.map_err(|error| (EXIT_INPUT, format!("{}: {error}", path.display())))
+    let written = write_atomically(path, |out| out.write_all(pretty(result).as_bytes()));
+    written.map_err(|error| (EXIT_INPUT, format!("{}: {error}", path.display())))
 }
 
-/// Meshes a case in a temporary directory, below which the mesh is in `mesh`. Returns it with the case file.
-fn mesh(arguments: &Arguments) -> Result<(TempDir, PathBuf), Failure> {
+/// Meshes a case in a temporary directory, below which the mesh is in `mesh`.
+fn mesh(arguments: &Arguments) -> Result<(TempDir, Case), Failure> {
     let input = |why: String| (EXIT_INPUT, why);
     let find = Programs::find_with_engine(&arguments.engine, arguments.programs.given());
     let Programs { engine, paths, .. } = find.map_err(input)?;
-    let case = paths.catalogue.case_file(&arguments.mesh, Path::new("")).map_err(input)?;
+    let path = paths.catalogue.case_file(&arguments.mesh, Path::new("")).map_err(input)?;
+    let case = Case::read(&path).map_err(|error| input(error.to_string()))?;
     let made = tempfile::Builder::new().prefix("harness-why-").tempdir();
     let made = made.map_err(|error| input(error.to_string()))?;
     let (out, logs) = (made.path().join("mesh"), made.path().join("logs"));
     fs::create_dir(&logs).map_err(|error| input(format!("{}: {error}", logs.display())))?;
-    // An invalid case is reported by the harness itself, in its own words.
-    Case::read(&case).map_err(|error| input(error.to_string()))?;
-    let prepared = engine.prepare(&case, &made.path().join("case")).map_err(input)?;
+    let prepared = engine.prepare(&path, &made.path().join("case")).map_err(input)?;
     let limit = Duration::from_secs(arguments.timeout);
     let options = RunOptions { mesh: Some(&out), report: false, ..RunOptions::new(&logs, limit) };
     engine.run(&prepared, &SERIAL, &options).map_err(|failure| {
