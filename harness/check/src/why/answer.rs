@@ -144,8 +144,10 @@ pub enum SideReason {
         seed: Option<usize>,
         /// Number of leaves of the component that were visited.
         leaves_visited: u64,
-        /// Whether these are all, so that no earlier candidate exists.
+        /// Whether these are all.
         is_complete: bool,
+        /// Whether leaves that were not visited cannot change the decision.
+        is_proven: bool,
     },
     /// The facets are not known.
     Unknown,
@@ -274,6 +276,11 @@ impl Mesh<'_> {
             answer.deleted_by = Some(self.deletion(side, &component));
         }
         let (mut candidate, mut rays_odd, mut seed) = (None, None, None);
+        let is_proven = match &decision {
+            Decision::Seed(_) => true,
+            Decision::NoSeed | Decision::Majority(..) => component.is_complete,
+            Decision::Rays(octant, ..) => self.knows_candidates_before(octant, &component),
+        };
         let text = match decision {
             Decision::Seed(index) => {
                 seed = Some(index);
@@ -306,6 +313,7 @@ impl Mesh<'_> {
             seed,
             leaves_visited: component.leaves.len() as u64,
             is_complete: component.is_complete,
+            is_proven,
         };
     }
 
@@ -343,8 +351,10 @@ impl Mesh<'_> {
                 );
             }
         }
-        if let SideReason::Component { is_complete: false, leaves_visited, .. } =
+        let enclosed = answer.deleted_by.as_ref().is_some_and(|d| d.rule.starts_with("enclosed"));
+        if let SideReason::Component { is_complete: false, is_proven, leaves_visited, .. } =
             answer.side_decided_by
+            && (!is_proven || enclosed)
         {
             add(&format!(
                 "the rest of the component: {leaves_visited} leaves were visited, coarse ones first, so an earlier \

@@ -2,8 +2,11 @@
 //!
 //! A breadth-first search: from an octant to the parents of all leaves that force it to split, until T0 or the extra layer
 //! splits one. The number of octants grows with every step, and far from the surface they would soon be most of the mesh.
-//! So at most [`FRONTIER_MAX`] are pursued per step, those of the finest level first. A chain is reported as the shortest
-//! only if every octant that was dropped can at best lead to one that is no shorter.
+//! So at most [`FRONTIER_MAX`] are pursued per step: those of the finest level, and among them those with the most split
+//! children, which are next to finer leaves. A chain is reported as the shortest only if every octant that was dropped can
+//! at best lead to one that is no shorter.
+
+use std::cmp::Reverse;
 
 use super::Mesh;
 use super::base::Cause;
@@ -127,10 +130,12 @@ impl Mesh<'_> {
         found.map(|(last, cause)| chain(steps, from, last, cause))
     }
 
-    /// Keeps the first octants of the finest levels among the steps from `first` on. All that are kept lead to a cause.
+    /// Keeps the most promising octants among the steps from `first` on. All that are kept lead to a cause.
     fn select(&self, steps: &mut Vec<Step>, first: usize) {
         let mut reached = steps.split_off(first);
-        reached.sort_by_key(|step| std::cmp::Reverse(step.octant.level));
+        let split_children = |octant: &Octant| self.leaves.node(octant).split.count_ones();
+        reached
+            .sort_by_cached_key(|step| Reverse((step.octant.level, split_children(&step.octant))));
         let leads = |step: &Step| match step.is_deep {
             true => self.is_deep(&step.octant),
             false => self.is_justified(&step.octant),

@@ -2,8 +2,8 @@
 //! (section 5).
 //!
 //! Both belong to the whole component, which can have millions of leaves. It is searched coarse leaves first, and at most
-//! [`VISITS_MAX`] octants are visited. So the far field is found quickly from anywhere outside, and the first candidate
-//! usually is, but only a complete component proves that no earlier candidate exists.
+//! [`VISITS_MAX`] octants are visited. So the far field is found quickly from anywhere outside. A candidate is known to be the
+//! first if every leaf of T0 that precedes it was visited or is crossing, even if the component is incomplete.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -18,6 +18,9 @@ use rustc_hash::FxHashSet;
 
 /// Octants that are visited in search of a component.
 pub const VISITS_MAX: usize = 100_000;
+
+/// Coarsest level of a candidate for which all preceding leaves of T0 are looked at.
+const LEVEL_SEARCHED: u8 = 8;
 
 /// Number of candidates whose rays are computed before the majority decides.
 const CANDIDATES_MAX: usize = 32;
@@ -122,6 +125,24 @@ impl Mesh<'_> {
         }
         let count = candidates.len();
         Some((Decision::Majority(count, odd), side(odd > 3 * count)))
+    }
+
+    /// Whether the visited leaves contain every leaf of the component that precedes this one among the candidates.
+    pub(super) fn knows_candidates_before(&self, leaf: &Octant, component: &Component) -> bool {
+        component.is_complete
+            || leaf.level <= LEVEL_SEARCHED
+                && !self.has_unknown_before(leaf, &Octant::ROOT, component)
+    }
+
+    /// Whether an octant contains a leaf of T0 that precedes `leaf`, may belong to its component and was not visited.
+    fn has_unknown_before(&self, leaf: &Octant, at: &Octant, component: &Component) -> bool {
+        let order = |o: &Octant| (o.level, word::key_of(o.corner));
+        if self.base_splits(at) {
+            return at.level < leaf.level
+                && (0..8).any(|d| self.has_unknown_before(leaf, &at.child(d), component));
+        }
+        let is_visited = || component.leaves.binary_search_by_key(&order(at), order).is_ok();
+        order(at) < order(leaf) && !self.is_crossed(at) && !is_visited()
     }
 
     fn decide_by_seeds(&self, component: &Component) -> (Decision, Side) {

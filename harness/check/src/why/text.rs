@@ -52,16 +52,19 @@ impl Answer {
                 writeln!(f, "    no rule that is known requires it (harness why --unneeded)")?;
                 continue;
             };
-            split.links.iter().try_for_each(|link| writeln!(f, "    {}", sentence(link)))?;
+            for (i, link) in split.links.iter().enumerate() {
+                let subject = if i == 0 { "" } else { "its parent is split " };
+                writeln!(f, "    {subject}{}", sentence(link))?;
+            }
             let subject = match split.links.last() {
-                Some(link) if link.rule == "extra_layer" => "crossing: section 3",
-                _ => "whose parent is split by section 3",
+                Some(link) if link.rule == "extra_layer" => "it is crossing by section 4",
+                _ => "its parent is split by section 3",
             };
             writeln!(f, "    {subject}: {}", what(cause))?;
             let links = split.links.len();
             let noun = if links == 1 { "leaf" } else { "leaves" };
             match split.is_shortest {
-                true => writeln!(f, "    the shortest chain, {links} {noun}")?,
+                true => writeln!(f, "    the shortest chain: {links} {noun}")?,
                 false => writeln!(f, "    a chain of {links} {noun}; a shorter one may exist")?,
             }
         }
@@ -117,10 +120,16 @@ fn sentence(link: &LinkRecord) -> String {
     let leaf = user_place(&link.leaf);
     let (section, level) = (link.section, link.leaf.level);
     match link.rule {
-        "layer" => format!(
-            "by section {section} (layer): the leaf {leaf} is {} cells of level {level} away",
-            link.distance_cells
-        ),
+        "layer" if link.distance_cells == 0 => {
+            format!("by section {section} (layer): it touches the leaf {leaf}")
+        }
+        "layer" => {
+            let cells = if link.distance_cells == 1 { "cell" } else { "cells" };
+            format!(
+                "by section {section} (layer): only {} {cells} of level {level} away is the leaf {leaf}",
+                link.distance_cells
+            )
+        }
         "balance" => format!(
             "by section {section} (balance): it touches the leaf {leaf}, {} levels finer",
             level - link.octant.level

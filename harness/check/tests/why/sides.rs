@@ -27,7 +27,7 @@ fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
 
 fn explain(correct: &SelftestCase) -> Vec<Answer> {
     with_mesh(&correct.base, Some(&correct.case), |mesh| {
-        let leaves = correct.base.words.iter().step_by(97).map(|&w| word::octant(w));
+        let leaves = correct.base.words.iter().step_by(7).map(|&w| word::octant(w));
         leaves.map(|leaf| mesh.at(correct.case.root.to_user(leaf.centre())).unwrap()).collect()
     })
 }
