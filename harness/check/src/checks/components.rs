@@ -2,7 +2,7 @@
 //! sections 4 and 5).
 
 use super::Terms;
-use contract::lattice::FacetLattice;
+use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::parity::Parity;
 use contract::word::{self, Side};
@@ -76,11 +76,19 @@ pub fn touches_boundary(words: &[u64], leaves: &[u32]) -> bool {
     })
 }
 
-/// The index of the leaf whose half-open octant contains a lattice point.
+/// The index of the leaf whose half-open octant contains a lattice point; `None` for a point outside the root.
 pub fn leaf_at(words: &[u64], point: [i64; 3]) -> Option<usize> {
+    if !in_root(point) {
+        return None;
+    }
     let key = word::key_of(point.map(|q| (q / UNITS_PER_CELL) as u32));
     let i = words.partition_point(|&w| word::key(w) <= key).checked_sub(1)?;
     (key < word::key(words[i]) + word::span(word::level(words[i]))).then_some(i)
+}
+
+/// Whether a lattice point lies in the root's half-open cube.
+pub fn in_root(point: [i64; 3]) -> bool {
+    point.iter().all(|q| (0..UNITS_PER_EDGE).contains(q))
 }
 
 /// The indices of the leaves that contain seeds, ascending.

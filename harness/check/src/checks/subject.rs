@@ -114,7 +114,7 @@ impl<'a> Subject<'a> {
 
 /// The sorted words that are leaves and overlap no earlier one. A check that needs a linear mesh continues with
 /// these; `linear` reports the others.
-pub(super) fn valid_leaves(words: &[u64]) -> Vec<u64> {
+pub(crate) fn valid_leaves(words: &[u64]) -> Vec<u64> {
     let mut builder = Builder::default();
     words.iter().copied().filter(|&w| builder.push(w).is_ok()).collect()
 }

@@ -4,6 +4,7 @@
 //! The comparison trusts the digests in the manifests; the check `manifest` establishes that they agree with
 //! the leaves.
 
+mod region;
 pub mod rule;
 mod witness;
 
