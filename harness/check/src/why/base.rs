@@ -5,6 +5,7 @@
 
 use super::Mesh;
 use super::crossings::Crossings;
+use super::leaves::id;
 use contract::octant::{LEVEL_MAX, Octant};
 
 /// What is known of the surface.
@@ -41,9 +42,17 @@ impl Mesh<'_> {
 
     /// Whether T0 splits an octant.
     pub(super) fn base_splits(&self, octant: &Octant) -> bool {
-        octant.level < LEVEL_MAX
-            && (self.terms.box_that_splits(octant).is_some()
-                || octant.level < self.terms.level_surface && self.is_crossed(octant))
+        if octant.level == LEVEL_MAX {
+            return false;
+        }
+        let id = id(octant);
+        if let Some(&known) = self.known.base_splits.borrow().get(&id) {
+            return known;
+        }
+        let splits = self.terms.box_that_splits(octant).is_some()
+            || octant.level < self.terms.level_surface && self.is_crossed(octant);
+        self.known.base_splits.borrow_mut().insert(id, splits);
+        splits
     }
 
     /// The facets and boxes that require an octant to be split; `None` if none does.

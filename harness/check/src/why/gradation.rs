@@ -48,7 +48,7 @@ impl Mesh<'_> {
     /// Whether T0, the extra layer or a leaf at least two levels finer forces an octant to split.
     pub(super) fn is_deep(&self, octant: &Octant) -> bool {
         let id = id(octant);
-        if let Some(&known) = self.deep.borrow().get(&id) {
+        if let Some(&known) = self.known.deep.borrow().get(&id) {
             return known;
         }
         let levels = octant.level + 2..=LEVEL_MAX;
@@ -60,7 +60,7 @@ impl Mesh<'_> {
         let deep = self.base_splits(octant)
             || self.extra_layer(octant).is_some()
             || self.any_leaf_near(octant, levels, forces);
-        self.deep.borrow_mut().insert(id, deep);
+        self.known.deep.borrow_mut().insert(id, deep);
         deep
     }
 
@@ -70,14 +70,14 @@ impl Mesh<'_> {
             return true;
         }
         let id = id(octant);
-        if let Some(&known) = self.justified.borrow().get(&id) {
+        if let Some(&known) = self.known.justified.borrow().get(&id) {
             return known;
         }
         let level = octant.level + 1;
         let forces =
             &mut |leaf: Octant| self.forces_by_layer(&leaf, octant) && self.is_deep(&parent(&leaf));
         let justified = level <= LEVEL_MAX && self.any_leaf_near(octant, level..=level, forces);
-        self.justified.borrow_mut().insert(id, justified);
+        self.known.justified.borrow_mut().insert(id, justified);
         justified
     }
 

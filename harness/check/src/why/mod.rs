@@ -44,6 +44,14 @@ pub struct Mesh<'a> {
     is_base: bool,
     /// Whether a split in the mesh counts only if it is justified itself, so that needless splits justify nothing.
     distrusts: bool,
+    /// Answers for octants that were asked about before.
+    known: Known,
+}
+
+/// Answers by [`leaves::id`].
+#[derive(Debug, Default)]
+struct Known {
+    base_splits: RefCell<FxHashMap<u64, bool>>,
     deep: RefCell<FxHashMap<u64, bool>>,
     justified: RefCell<FxHashMap<u64, bool>>,
 }
@@ -71,15 +79,7 @@ impl<'a> Mesh<'a> {
             None if terms.keep_crossing => Surface::Leaves,
             None => Surface::Unknown,
         };
-        Ok(Self {
-            leaves,
-            terms,
-            surface,
-            is_base,
-            distrusts: false,
-            deep: RefCell::default(),
-            justified: RefCell::default(),
-        })
+        Ok(Self { leaves, terms, surface, is_base, distrusts: false, known: Known::default() })
     }
 
     /// The same mesh, in which needless splits justify nothing.

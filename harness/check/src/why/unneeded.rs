@@ -5,7 +5,7 @@
 //! splits that are found are exactly those which the mesh has beyond the least mesh, if it has all that the rules require;
 //! `harness audit` and `harness verify` check that it does. An octant within a needless octant is needless, too.
 //!
-//! Every split octant keeps about 60 bytes; memory and time grow with the mesh.
+//! What is found out about an octant is kept in memory, which therefore grows with the mesh.
 
 use std::fmt;
 
