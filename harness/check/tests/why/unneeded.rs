@@ -16,7 +16,7 @@ proptest! {
 
     #[test]
     fn planted_splits_are_counted_exactly(
-        text in settings(1..6), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 7),
+        text in settings(1..5), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 6),
         plants in prop::collection::vec(any::<prop::sample::Index>(), 0..5), nested in any::<bool>(),
     ) {
         let text = text + &boxes.concat();
