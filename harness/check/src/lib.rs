@@ -5,7 +5,8 @@
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
 //! - [`geometry`]: diagnosis of a geometry before it is meshed;
 //! - [`oracle`]: the sample points of the oracles, and the evaluation of their answers;
-//! - [`selftest`]: corrupted meshes that the checks must detect.
+//! - [`selftest`]: corrupted meshes that the checks must detect;
+//! - [`why`]: the cause of every split, and splits without one.
 
 pub mod audit;
 pub mod checks;
@@ -13,3 +14,4 @@ pub mod diff;
 pub mod geometry;
 pub mod oracle;
 pub mod selftest;
+pub mod why;

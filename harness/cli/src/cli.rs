@@ -42,6 +42,8 @@ pub enum Command {
     Export(commands::export::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides
     Diff(commands::diff::Arguments),
+    /// Explain the size and the side of the leaf at a point, or find splits that nothing requires
+    Why(commands::why::Arguments),
     /// Print a completion script for a shell
     Completions(commands::completions::Arguments),
     /// Print the manual page, or write one page per command into a directory

@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
+        Command::Why(arguments) => commands::why::run(&arguments),
         Command::Completions(arguments) => {
             commands::completions::run(&arguments, &mut Arguments::command())
         }

@@ -1,8 +1,11 @@
 //! The command line itself: version, completions, manual pages and plain output.
 
+use contract::leafset::LeafSet;
+use serde_json::json;
+use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "verify",
     "selftest",
     "gate",
@@ -14,6 +17,7 @@ const COMMANDS: [&str; 13] = [
     "audit",
     "export",
     "diff",
+    "why",
     "completions",
     "man",
 ];
@@ -69,5 +73,43 @@ fn every_command_has_a_manual_page() {
 fn output_to_a_file_has_no_colours() {
     for output in [harness(&["--help"]), harness(&["verify", "--ranks", "0"])] {
         assert!(![output.stdout, output.stderr].concat().contains(&0x1b));
+    }
+}
+
+/// Writes a mesh of these words in which nothing requires refinement.
+fn write_mesh(words: Vec<u64>, to: &Path) {
+    let digests = vec!["0".repeat(32); 512];
+    let manifest = json!({
+        "schema": "octree-leaf-set/1", "program": "test", "tree": "final",
+        "root": {"origin": [-1.0, -1.0, -1.0], "edge": 2.0},
+        "level_surface": 0, "layer_cells_min": 1, "keep": "all", "keep_crossing": true, "boxes": [],
+        "leaves": 0, "leaves_by_level": vec![0; 20],
+        "leaves_by_side": {"outside": 0, "inside": 0, "crossing": 0},
+        "components_ambiguous": {"count": 0, "example": null},
+        "digest": digests[0], "octant_digests": digests, "parts": [],
+    });
+    let empty = LeafSet::new(serde_json::from_value(manifest).unwrap(), vec![]);
+    std::fs::create_dir(to).unwrap();
+    empty.with_parts(vec![words]).write(to).unwrap();
+}
+
+#[test]
+fn why_answers_for_a_directory_and_finds_needless_splits() {
+    let place = tempfile::tempdir().unwrap();
+    let path = |name: &str| place.path().join(name).to_str().unwrap().to_owned();
+    let (least, needless, json) = (path("least"), path("needless"), path("why.json"));
+    write_mesh(vec![0], Path::new(&least));
+    write_mesh((0..8).map(|digit| digit << 61 | 1 << 2).collect(), Path::new(&needless));
+    let answer = printed(&["why", &least, "-0.5,0,0.25", "--json", &json]);
+    assert!(answer.contains("the leaf is the root"), "{answer}");
+    assert!(std::fs::read_to_string(&json).unwrap().contains("\"octree-why/1\""));
+    assert!(printed(&["why", "--unneeded", &least]).contains("every split has a cause"));
+    let found = harness(&["why", "--unneeded", &needless]);
+    assert_eq!(found.status.code(), Some(1), "{found:?}");
+    assert!(String::from_utf8(found.stdout).unwrap().contains("1 of 1 splits"));
+    let nowhere = place.path().to_str().unwrap();
+    for wrong in [&[&least[..], "9,0,0"][..], &[&least, "1,2"], &[&least], &[nowhere, "0,0,0"]] {
+        let output = harness(&[&["why"], wrong].concat());
+        assert_eq!(output.status.code(), Some(2), "{wrong:?}: {output:?}");
     }
 }

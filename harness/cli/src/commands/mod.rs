@@ -18,3 +18,4 @@ pub mod targets;
 pub mod track;
 mod values;
 pub mod verify;
+pub mod why;

@@ -1,0 +1,368 @@
+//! The answer to a question about a point; JSON of the schema `octree-why/1` when serialised.
+
+use super::Mesh;
+use super::base::{Cause, Surface};
+use super::chain::{Chain, Link, Rule};
+use super::side::Decision;
+use contract::lattice::Root;
+use contract::manifest::{self, Keep};
+use contract::octant::{Octant, UNITS_PER_CELL};
+use contract::word::Side;
+use serde::Serialize;
+
+/// Name and version of the JSON form.
+pub const SCHEMA: &str = "octree-why/1";
+
+/// Facets that are listed for a cause; further ones are counted only.
+const FACETS_LISTED: usize = 8;
+
+/// An octant with its bounds in the user's units.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// The octant.
+    #[serde(skip)]
+    pub octant: Octant,
+    /// The digits from the root to the octant, such as `3.1.4`; `root` for the root.
+    pub path: String,
+    /// Its level.
+    pub level: u8,
+    /// Minimum corner.
+    pub min: [f64; 3],
+    /// Maximum corner.
+    pub max: [f64; 3],
+}
+
+impl Place {
+    pub(super) fn new(octant: &Octant, root: &Root) -> Self {
+        let (low, high) = octant.bounds();
+        let (min, max) = (root.to_user(low), root.to_user(high));
+        Self { octant: *octant, path: octant.path(), level: octant.level, min, max }
+    }
+}
+
+/// A place as text.
+pub(super) fn user_place(place: &Place) -> String {
+    let point = |at: [f64; 3]| {
+        let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
+        format!("({x}, {y}, {z})")
+    };
+    let Place { path, level, min, max, .. } = place;
+    format!("octant {path} (level {level}), {} to {}", point(*min), point(*max))
+}
+
+/// The answer.
+#[derive(Clone, Debug, Serialize)]
+pub struct Answer {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// The point, in the user's units.
+    pub point: [f64; 3],
+    /// The leaf at the point; none if the point lies in a deleted part.
+    pub leaf: Option<Place>,
+    /// The leaf of T0 at the point; none if the surface is not known.
+    pub base_leaf: Option<Place>,
+    /// The side of the leaf in the mesh.
+    pub side: Option<Side>,
+    /// What decides the side.
+    pub side_decided_by: SideReason,
+    /// Deleted parts: the rule that deletes the leaf of T0.
+    pub deleted_by: Option<Deletion>,
+    /// Every octant from the root to the parent of the leaf, with the cause of its split.
+    pub splits: Vec<Split>,
+    /// What could not be explained, and why.
+    pub left_out: Vec<String>,
+}
+
+/// An octant that is split, and why.
+#[derive(Clone, Debug, Serialize)]
+pub struct Split {
+    /// The octant.
+    pub octant: Place,
+    /// The leaves from the octant to the cause; none if T0 splits the octant.
+    pub links: Vec<LinkRecord>,
+    /// The cause in the inputs; none if no rule requires the split.
+    pub cause: Option<CauseRecord>,
+    /// Whether no shorter chain exists.
+    pub is_shortest: bool,
+}
+
+/// A leaf that forces the previous octant of a chain to split.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkRecord {
+    /// The rule: `extra_layer`, `layer` or `balance`.
+    pub rule: &'static str,
+    /// Section of reference/DEFINITION.md, with the step.
+    pub section: &'static str,
+    /// The octant that is forced to split: that of the chain, or the parent of the previous leaf.
+    pub octant: Place,
+    /// The leaf that forces it.
+    pub leaf: Place,
+    /// Distance of leaf and octant in cells of the leaf's level.
+    pub distance_cells: i64,
+}
+
+/// A cause in the inputs. Each facet and each box alone is sufficient.
+#[derive(Clone, Debug, Serialize)]
+pub struct CauseRecord {
+    /// Section of reference/DEFINITION.md.
+    pub section: &'static str,
+    /// The octant that facets cross and boxes meet: the split octant, a descendant, the parent of the last leaf, or the
+    /// last leaf itself after the extra layer.
+    pub octant: Place,
+    /// The first facets, counted from 0.
+    pub facets: Vec<u32>,
+    /// Number of facets; 0 if no facet crosses the octant or facets are not known.
+    pub facets_count: u64,
+    /// Whether the surface is a cause, which is known without facets if crossing leaves are kept.
+    pub is_crossed: bool,
+    /// Boxes, counted from 0.
+    pub boxes: Vec<usize>,
+}
+
+/// What decides the side of a leaf.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum SideReason {
+    /// Facets cross the leaf of T0.
+    Facets {
+        /// The first facets, counted from 0.
+        facets: Vec<u32>,
+        /// Their number.
+        facets_count: u64,
+    },
+    /// The component of the leaf has a side.
+    Component {
+        /// The side.
+        side: Side,
+        /// What decides it, in words.
+        decision: String,
+        /// The candidate whose rays decide.
+        candidate: Option<Place>,
+        /// For its rays +x, -x, +y, -y, +z, -z: whether the number of facets is odd.
+        rays_odd: Option<[bool; 6]>,
+        /// The index of the seed that decides.
+        seed: Option<usize>,
+        /// Number of leaves of the component that were visited.
+        leaves_visited: u64,
+        /// Whether these are all.
+        is_complete: bool,
+        /// Whether leaves that were not visited cannot change the decision.
+        is_proven: bool,
+    },
+    /// The facets are not known.
+    Unknown,
+}
+
+/// The rule that deletes a leaf.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Deletion {
+    /// Section of reference/DEFINITION.md.
+    pub section: &'static str,
+    /// The rule in words.
+    pub rule: String,
+}
+
+impl Mesh<'_> {
+    /// Explains the leaf at a point, in the user's units.
+    ///
+    /// # Errors
+    /// One sentence, if the point lies outside the root or the mesh is invalid.
+    pub fn at(&self, point: [f64; 3]) -> Result<Answer, String> {
+        let root = &self.terms.root;
+        let lattice = root.quantise_seed(point).ok_or_else(|| {
+            let (from, to) = (root.origin, root.to_user([contract::lattice::UNITS_PER_EDGE; 3]));
+            format!("the point {point:?} lies outside the root, which is from {from:?} to {to:?}; give a point inside")
+        })?;
+        let cell = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
+        let leaf = self.leaves.leaf_at(cell);
+        let base = (!matches!(self.surface, Surface::Unknown)).then(|| self.base_leaf_at(cell));
+        let octant = leaf.map(|leaf| leaf.octant).or(base);
+        let mut answer = Answer {
+            schema: SCHEMA,
+            point,
+            leaf: leaf.map(|leaf| self.place(&leaf.octant)),
+            base_leaf: base.map(|base| self.place(&base)),
+            side: leaf.map(|leaf| leaf.side),
+            side_decided_by: SideReason::Unknown,
+            deleted_by: None,
+            splits: octant.map_or(Vec::new(), |octant| self.splits_above(&octant)),
+            left_out: Vec::new(),
+        };
+        self.explain_side(base, &mut answer);
+        self.leave_out(&mut answer);
+        self.refuse_invalid()?;
+        Ok(answer)
+    }
+
+    /// The ancestors of an octant, from the root. All that T0 splits have the cause of the finest of them, because what
+    /// crosses or meets an octant does so with its ancestors.
+    fn splits_above(&self, octant: &Octant) -> Vec<Split> {
+        let ancestors = (0..octant.level).map(|level| octant.ancestor(level));
+        let of_base = ancestors.clone().take_while(|ancestor| self.base_splits(ancestor)).count();
+        let cause = of_base.checked_sub(1).and_then(|level| {
+            self.base_cause(&octant.ancestor(level as u8)).map(|cause| self.cause(&cause))
+        });
+        let split = |ancestor: Octant| {
+            let octant = self.place(&ancestor);
+            if usize::from(ancestor.level) < of_base {
+                return Split {
+                    octant,
+                    links: Vec::new(),
+                    cause: cause.clone(),
+                    is_shortest: true,
+                };
+            }
+            let Some(Chain { links, cause, is_shortest, .. }) = self.chain(&ancestor) else {
+                return Split { octant, links: Vec::new(), cause: None, is_shortest: true };
+            };
+            let links = links.iter().map(|link| self.link(link)).collect();
+            Split { octant, links, cause: Some(self.cause(&cause)), is_shortest }
+        };
+        ancestors.map(split).collect()
+    }
+
+    fn link(&self, link: &Link) -> LinkRecord {
+        let (rule, section) = match link.rule {
+            Rule::ExtraLayer => ("extra_layer", "6"),
+            Rule::Layer => ("layer", "6, step 2"),
+            Rule::Balance => ("balance", "6, step 3"),
+        };
+        LinkRecord {
+            rule,
+            section,
+            octant: self.place(&link.octant),
+            leaf: self.place(&link.leaf),
+            distance_cells: link.octant.distance(&link.leaf) / i64::from(link.leaf.edge()),
+        }
+    }
+
+    fn cause(&self, cause: &Cause) -> CauseRecord {
+        CauseRecord {
+            section: "3",
+            octant: self.place(&cause.octant),
+            facets: cause.facets.iter().copied().take(FACETS_LISTED).collect(),
+            facets_count: cause.facets.len() as u64,
+            is_crossed: !cause.facets.is_empty()
+                || cause.octant.level < self.terms.level_surface && self.is_crossed(&cause.octant),
+            boxes: cause.boxes.clone(),
+        }
+    }
+
+    /// Adds what decides the side of the leaf of T0 and, if it was deleted, the rule for that.
+    fn explain_side(&self, base: Option<Octant>, answer: &mut Answer) {
+        let Some(base) = base.filter(|_| matches!(self.surface, Surface::Facets(_))) else {
+            return;
+        };
+        let facets = self.facets_of(&base);
+        if !facets.is_empty() {
+            answer.side_decided_by = SideReason::Facets {
+                facets_count: facets.len() as u64,
+                facets: facets.into_iter().take(FACETS_LISTED).collect(),
+            };
+            if answer.leaf.is_none() {
+                let rule = match self.terms.keep_crossing {
+                    false => {
+                        "keep_crossing is false, so crossing leaves are deleted after gradation"
+                    }
+                    true => "no rule deletes it: the mesh has lost a leaf",
+                };
+                answer.deleted_by = Some(Deletion { section: "7", rule: rule.to_owned() });
+            }
+            return;
+        }
+        let component = self.component(&base);
+        let Some((decision, side)) = self.decide(&component) else { return };
+        if answer.leaf.is_none() {
+            answer.deleted_by = Some(self.deletion(side, &component));
+        }
+        let (mut candidate, mut rays_odd, mut seed) = (None, None, None);
+        let is_proven = match &decision {
+            Decision::Seed(_) => true,
+            Decision::NoSeed | Decision::Majority(..) => component.is_complete,
+            Decision::Rays(octant, ..) => self.knows_candidates_before(octant, &component),
+        };
+        let text = match decision {
+            Decision::Seed(index) => {
+                seed = Some(index);
+                format!("seed {index} lies in its component")
+            }
+            Decision::NoSeed if component.is_complete => "no seed lies in its component".to_owned(),
+            Decision::NoSeed => "no seed was found in its component".to_owned(),
+            Decision::Rays(octant, before, odd) => {
+                (candidate, rays_odd) = (Some(self.place(&octant)), Some(odd));
+                let parity = if odd[0] { "an odd" } else { "an even" };
+                let skipped = match before {
+                    0 => String::new(),
+                    n => format!(", after {n} candidates whose rays disagree"),
+                };
+                format!(
+                    "each of the six rays of the candidate intersects {parity} number of facets{skipped}"
+                )
+            }
+            Decision::Majority(candidates, odd) => format!(
+                "the component is ambiguous: the rays of no candidate agree, and {odd} of the {} rays of {candidates} \
+                 candidates are odd",
+                6 * candidates
+            ),
+        };
+        answer.side_decided_by = SideReason::Component {
+            side,
+            decision: text,
+            candidate,
+            rays_odd,
+            seed,
+            leaves_visited: component.leaves.len() as u64,
+            is_complete: component.is_complete,
+            is_proven,
+        };
+    }
+
+    /// The rule that deletes the leaves of a component.
+    fn deletion(&self, side: Side, component: &super::side::Component) -> Deletion {
+        let terms = &self.terms;
+        let keep = match terms.keep {
+            Keep::Outside => "outside",
+            Keep::Inside => "inside",
+            Keep::All => "all",
+        };
+        let rule = if !terms.keeps(side as u8) {
+            format!("keep is {keep}, so leaves that are {side} are deleted")
+        } else if terms.deletes_enclosed() && !component.is_at_boundary {
+            "enclosed is delete, and no leaf of its component has a face on the root's boundary"
+                .to_owned()
+        } else {
+            "no rule deletes it: the mesh has lost a leaf".to_owned()
+        };
+        Deletion { section: "5", rule }
+    }
+
+    /// Adds what the answer lacks, and why.
+    fn leave_out(&self, answer: &mut Answer) {
+        let mut add = |what: &str| answer.left_out.push(what.to_owned());
+        match self.surface {
+            Surface::Facets(_) => {}
+            Surface::Leaves => {
+                add("facet numbers and the decision on the side: give the case with --case");
+            }
+            Surface::Unknown => {
+                add(
+                    "everything that depends on facets or on crossing leaves, which the mesh does not contain: give \
+                     the case with --case",
+                );
+            }
+        }
+        let enclosed = answer.deleted_by.as_ref().is_some_and(|d| d.rule.starts_with("enclosed"));
+        if let SideReason::Component { is_complete: false, is_proven, leaves_visited, .. } =
+            answer.side_decided_by
+            && (!is_proven || enclosed)
+        {
+            add(&format!(
+                "the rest of the component: {leaves_visited} leaves were visited, coarse ones first, so an earlier \
+                 candidate, a seed or a face on the root's boundary may have been missed"
+            ));
+        }
+        if self.leaves.manifest.tree == manifest::Tree::Base {
+            add("gradation: the mesh is a base tree");
+        }
+    }
+}

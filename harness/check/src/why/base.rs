@@ -1,0 +1,117 @@
+//! T0, octant by octant.
+//!
+//! If section 3 requires the split of an octant, it requires the split of its ancestors. So the leaf of T0 at a
+//! point is the first octant on the way down that no rule splits, and no other part of T0 is needed.
+
+use super::Mesh;
+use super::crossings::Crossings;
+use super::leaves::id;
+use contract::octant::{LEVEL_MAX, Octant};
+
+/// What is known of the surface.
+#[derive(Debug)]
+pub enum Surface<'a> {
+    /// The facets.
+    Facets(Crossings<'a>),
+    /// The crossing leaves, which the mesh keeps. An octant coarser than D contains one iff a facet crosses it.
+    Leaves,
+    /// Nothing: the facets are not given and the mesh has no crossing leaves.
+    Unknown,
+}
+
+/// The causes of an octant in the inputs. Each alone is sufficient.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cause {
+    /// The octant that the facets cross and the boxes meet.
+    pub octant: Octant,
+    /// Facets that cross it, ascending; empty if facets are not known.
+    pub facets: Vec<u32>,
+    /// Boxes of a deeper level that meet it, by index.
+    pub boxes: Vec<usize>,
+}
+
+impl Mesh<'_> {
+    /// Whether the surface crosses an octant. Without facets the answer holds for octants coarser than D only.
+    pub(super) fn is_crossed(&self, octant: &Octant) -> bool {
+        match &self.surface {
+            Surface::Facets(crossings) => crossings.any(octant),
+            Surface::Leaves => self.leaves.has_crossing(octant),
+            Surface::Unknown => false,
+        }
+    }
+
+    /// Whether T0 splits an octant.
+    pub(super) fn base_splits(&self, octant: &Octant) -> bool {
+        if octant.level == LEVEL_MAX {
+            return false;
+        }
+        let id = id(octant);
+        if let Some(&known) = self.known.base_splits.borrow().get(&id) {
+            return known;
+        }
+        let splits = self.terms.box_that_splits(octant).is_some()
+            || octant.level < self.terms.level_surface && self.is_crossed(octant);
+        self.known.base_splits.borrow_mut().insert(id, splits);
+        splits
+    }
+
+    /// The facets and boxes that require an octant to be split; `None` if none does.
+    pub(super) fn base_cause(&self, octant: &Octant) -> Option<Cause> {
+        self.base_splits(octant).then(|| {
+            let facets = match octant.level < self.terms.level_surface {
+                true => self.facets_of(octant),
+                false => Vec::new(),
+            };
+            let splits = |b: usize| {
+                let extent = &self.terms.boxes[b];
+                extent.level > octant.level && extent.meets(octant)
+            };
+            let boxes = (0..self.terms.boxes.len()).filter(|&b| splits(b)).collect();
+            Cause { octant: *octant, facets, boxes }
+        })
+    }
+
+    /// The facets that cross an octant, ascending; empty if facets are not known.
+    pub(super) fn facets_of(&self, octant: &Octant) -> Vec<u32> {
+        match &self.surface {
+            Surface::Facets(crossings) => crossings.all(octant),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The leaf of T0 that is or contains an octant; `None` if T0 splits the octant.
+    pub(super) fn base_leaf(&self, octant: &Octant) -> Option<Octant> {
+        if self.base_splits(octant) {
+            return None;
+        }
+        let split_above = (0..octant.level).rev().find(|&l| self.base_splits(&octant.ancestor(l)));
+        Some(octant.ancestor(split_above.map_or(0, |level| level + 1)))
+    }
+
+    /// Whether crossing leaves were deleted after gradation and are known from the facets.
+    pub(super) fn has_deleted_crossing(&self) -> bool {
+        !self.terms.keep_crossing && matches!(self.surface, Surface::Facets(_))
+    }
+
+    /// A crossing leaf of T0 that by touching an octant forces it to split: the extra layer of section 6.
+    pub(super) fn extra_layer(&self, octant: &Octant) -> Option<Octant> {
+        let applies = self.has_deleted_crossing() && self.terms.layer_cells_min < 3;
+        if !applies || octant.level >= self.terms.level_surface || self.base_splits(octant) {
+            return None;
+        }
+        let around = contract::tree::OFFSETS.iter().filter(|offset| **offset != [0; 3]);
+        let mut neighbours = around.filter_map(|&offset| octant.neighbour(offset));
+        neighbours.find_map(|neighbour| self.crossing_leaf_touching(octant, &neighbour))
+    }
+
+    /// The first crossing leaf of T0 below `below` that touches an octant.
+    fn crossing_leaf_touching(&self, octant: &Octant, below: &Octant) -> Option<Octant> {
+        if octant.distance(below) > 0 || !self.is_crossed(below) {
+            return None;
+        }
+        match self.base_splits(below) {
+            true => (0..8).find_map(|d| self.crossing_leaf_touching(octant, &below.child(d))),
+            false => Some(*below),
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Why a leaf has its size and its side, and which splits of a mesh have no cause.
+//!
+//! - [`leaves`]: the leaves on disk; [`crossings`]: the facets of an octant;
+//! - [`base`](mod@base): T0 where it is needed, octant by octant (section 3 of reference/DEFINITION.md);
+//! - [`gradation`]: the leaves that force an octant to split (section 6);
+//! - [`chain`]: the shortest chain of them to a cause of T0; [`side`]: the rays or the seed of a component (section 4);
+//! - [`answer`]: the result as data, [`text`]: for people; [`unneeded`]: the audit of a whole mesh.
+//!
+//! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
+//! so their parents are split by T0, by the extra layer, or by a step of a deeper level. A chain therefore goes to ever
+//! finer levels, and every question about an octant is answered from finer octants in its neighbourhood.
+
+use std::cell::RefCell;
+use std::path::Path;
+
+use contract::case::Case;
+use contract::manifest;
+use contract::octant::Octant;
+use rustc_hash::FxHashMap;
+
+use crate::checks::Terms;
+
+pub mod answer;
+pub mod base;
+pub mod chain;
+pub mod crossings;
+pub mod gradation;
+pub mod leaves;
+pub mod side;
+pub mod text;
+pub mod unneeded;
+
+use base::Surface;
+use crossings::Crossings;
+use leaves::Leaves;
+
+/// A mesh on disk with the inputs that explain it.
+#[derive(Debug)]
+pub struct Mesh<'a> {
+    leaves: Leaves,
+    terms: Terms,
+    surface: Surface<'a>,
+    /// Whether the leaves are those of T0, which precedes gradation.
+    is_base: bool,
+    /// Whether a split in the mesh counts only if it is justified itself, so that needless splits justify nothing.
+    distrusts: bool,
+    /// Answers for octants that were asked about before.
+    known: Known,
+}
+
+/// Answers by [`leaves::id`].
+#[derive(Debug, Default)]
+struct Known {
+    base_splits: RefCell<FxHashMap<u64, bool>>,
+    deep: RefCell<FxHashMap<u64, bool>>,
+    justified: RefCell<FxHashMap<u64, bool>>,
+}
+
+impl<'a> Mesh<'a> {
+    /// Opens a leaf-set directory. Without its case, facets are not known.
+    ///
+    /// # Errors
+    /// One sentence, if the directory is not a leaf set, or if the case is not that of the mesh.
+    pub fn open(dir: &Path, case: Option<&'a Case>) -> Result<Self, String> {
+        let leaves = Leaves::open(dir).map_err(|error| error.to_string())?;
+        let mut terms = Terms::of_manifest(&leaves.manifest);
+        if case.is_some_and(|case| Terms::of_case(case) != terms) {
+            let dir = dir.display();
+            return Err(format!(
+                "{dir} was made from other inputs than the case; give the case file from which the mesh was made"
+            ));
+        }
+        let is_base = leaves.manifest.tree == manifest::Tree::Base;
+        if is_base {
+            (terms.keep, terms.keep_crossing) = (manifest::Keep::All, true);
+        }
+        let surface = match case {
+            Some(case) => Surface::Facets(Crossings::new(&case.facets_lattice)),
+            None if terms.keep_crossing => Surface::Leaves,
+            None => Surface::Unknown,
+        };
+        Ok(Self { leaves, terms, surface, is_base, distrusts: false, known: Known::default() })
+    }
+
+    /// The same mesh, in which needless splits justify nothing.
+    fn distrusting(self) -> Self {
+        Self { distrusts: true, ..self }
+    }
+
+    /// An error if a search found a word that no correct mesh contains.
+    fn refuse_invalid(&self) -> Result<(), String> {
+        match self.leaves.invalid() {
+            None => Ok(()),
+            Some(word) => Err(format!(
+                "the mesh contains the invalid word {word:#018x}; `harness audit` lists what is wrong with it"
+            )),
+        }
+    }
+
+    /// An octant as text, with its bounds in the user's units.
+    fn place(&self, octant: &Octant) -> answer::Place {
+        answer::Place::new(octant, &self.terms.root)
+    }
+}

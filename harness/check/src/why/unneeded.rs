@@ -1,0 +1,137 @@
+//! Splits of a mesh that no rule requires.
+//!
+//! Refinement is least (section 6 of reference/DEFINITION.md): an octant is split only if a rule requires it. The recursion of
+//! `gradation` decides this for every split octant, and a split that is not required itself justifies no other. So the
+//! splits that are found are exactly those which the mesh has beyond the least mesh, if it has all that the rules require;
+//! `harness audit` and `harness verify` check that it does. An octant within a needless octant is needless, too.
+//!
+//! What is found out about an octant is kept in memory, which therefore grows with the mesh.
+
+use std::fmt;
+
+use super::Mesh;
+use super::answer::{Place, user_place};
+use super::base::Surface;
+use contract::octant::Octant;
+use serde::Serialize;
+
+/// Name and version of the JSON form.
+pub const SCHEMA: &str = "octree-unneeded/1";
+
+/// The result of the audit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Unneeded {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// Number of leaves of the mesh.
+    pub leaves: u64,
+    /// Number of split octants that were examined.
+    pub splits: u64,
+    /// Number of splits without a cause.
+    pub unneeded: u64,
+    /// Number of octants that are split without a cause, and whose parent is not.
+    pub subtrees: u64,
+    /// Number of leaves in them.
+    pub unneeded_leaves: u64,
+    /// The first of these octants, in Morton order.
+    pub first: Vec<Subtree>,
+    /// The one with the most leaves.
+    pub largest: Option<Subtree>,
+}
+
+/// An octant that is split without a cause.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Subtree {
+    /// The octant.
+    #[serde(flatten)]
+    pub octant: Place,
+    /// Number of leaves in it.
+    pub leaves: u64,
+}
+
+impl Mesh<'_> {
+    /// Audits a whole mesh and lists at most `first` octants.
+    ///
+    /// # Errors
+    /// One sentence, if the mesh is invalid or its surface is not known.
+    pub fn unneeded(self, first: usize) -> Result<Unneeded, String> {
+        if matches!(self.surface, Surface::Unknown) {
+            return Err("the mesh has no crossing leaves, so the surface is not known; give its case with --case"
+                .to_owned());
+        }
+        let mesh = self.distrusting();
+        let mut found = Unneeded {
+            schema: SCHEMA,
+            leaves: mesh.leaves.manifest.leaves,
+            splits: 0,
+            unneeded: 0,
+            subtrees: 0,
+            unneeded_leaves: 0,
+            first: Vec::new(),
+            largest: None,
+        };
+        mesh.search_unneeded(&Octant::ROOT, first, &mut found);
+        mesh.refuse_invalid()?;
+        Ok(found)
+    }
+
+    fn search_unneeded(&self, octant: &Octant, first: usize, found: &mut Unneeded) {
+        let node = self.leaves.node(octant);
+        if !node.is_split() {
+            return;
+        }
+        found.splits += 1;
+        if !self.is_justified(octant) {
+            let below = self.count_splits(octant);
+            found.splits += below - 1;
+            found.unneeded += below;
+            found.subtrees += 1;
+            let subtree = Subtree { octant: self.place(octant), leaves: self.leaves.count(octant) };
+            found.unneeded_leaves += subtree.leaves;
+            if found.largest.as_ref().is_none_or(|largest| largest.leaves < subtree.leaves) {
+                found.largest = Some(subtree.clone());
+            }
+            if found.first.len() < first {
+                found.first.push(subtree);
+            }
+            return;
+        }
+        for digit in (0..8).filter(|digit| node.split >> digit & 1 == 1) {
+            self.search_unneeded(&octant.child(digit), first, found);
+        }
+    }
+
+    /// Number of split octants in a split octant, itself included.
+    fn count_splits(&self, octant: &Octant) -> u64 {
+        let split = self.leaves.node(octant).split;
+        let children = (0..8).filter(|digit| split >> digit & 1 == 1);
+        1 + children.map(|digit| self.count_splits(&octant.child(digit))).sum::<u64>()
+    }
+}
+
+impl fmt::Display for Unneeded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, .. } = self;
+        if *unneeded == 0 {
+            return write!(f, "every split has a cause: {splits} splits, {leaves} leaves");
+        }
+        writeln!(
+            f,
+            "{unneeded} of {splits} splits have no cause: no facet, box, layer or balance requires them. They make \
+             {unneeded_leaves} leaves, in {subtrees} octants:"
+        )?;
+        for subtree in &self.first {
+            writeln!(f, "  {}, {} leaves", user_place(&subtree.octant), subtree.leaves)?;
+        }
+        if (self.first.len() as u64) < *subtrees {
+            writeln!(f, "  and {} more (--first)", subtrees - self.first.len() as u64)?;
+        }
+        match &self.largest {
+            Some(largest) => {
+                let place = user_place(&largest.octant);
+                write!(f, "the largest: {place}, {} leaves", largest.leaves)
+            }
+            None => Ok(()),
+        }
+    }
+}

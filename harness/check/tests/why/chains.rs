@@ -1,0 +1,152 @@
+//! Every link of a chain is a leaf of the mesh that forces the split by the stated rule, and no chain is shorter.
+
+use super::brute::Brute;
+use super::*;
+use check::checks::Terms;
+use check::why::answer::{Answer, SideReason};
+use contract::octant::Octant;
+use contract::word::{self, Side};
+
+/// Checks one answer link by link, with the numbers of the definition.
+fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
+    let terms = Terms::of_case(&correct.case);
+    let words = &correct.mesh.words;
+    let brute = Brute { case: &correct.case, terms: terms.clone(), leaves: Vec::new() };
+    let crossing = |octant: &Octant| {
+        let of = |w: &&u64| word::octant(**w).contains(octant) && word::side(**w) == Side::Crossing;
+        correct.base.words.iter().any(|w| of(&w))
+    };
+    for split in &answer.splits {
+        let cause = split.cause.as_ref();
+        prop_assert!(cause.is_some(), "{answer}");
+        let mut octant = split.octant.octant;
+        let mut is_source = false;
+        for link in &split.links {
+            let leaf = link.leaf.octant;
+            prop_assert_eq!(link.octant.octant, octant);
+            let in_mesh = words.iter().any(|&w| word::octant(w) == leaf);
+            prop_assert!(in_mesh || !terms.keep_crossing && crossing(&leaf), "{answer}");
+            let (layer, balance) = brute.forces(&leaf, &octant);
+            match link.rule {
+                "layer" => prop_assert!(layer, "{answer}"),
+                "balance" => prop_assert!(balance, "{answer}"),
+                _ => {
+                    prop_assert!(octant.distance(&leaf) == 0 && octant.level < terms.level_surface)
+                }
+            }
+            prop_assert!(!is_source || leaf.level > octant.level + 1, "{answer}");
+            is_source = link.rule == "layer";
+            octant = if link.rule == "extra_layer" { leaf } else { leaf.ancestor(leaf.level - 1) };
+        }
+        match split.links.last() {
+            Some(link) if link.rule == "extra_layer" => prop_assert!(crossing(&octant)),
+            _ => prop_assert!(brute.base_splits(&octant), "{answer}"),
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn every_split_has_a_chain_and_every_deleted_point_a_rule(
+        text in settings(2..5), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 6),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), 4),
+        points in prop::collection::vec(prop::array::uniform3(-8.0f64..8.0), 4),
+    ) {
+        let text = text + &boxes.concat();
+        let correct = made(&text, &facets);
+        let root = &correct.case.root;
+        let answers = with_mesh(&correct.mesh, Some(&correct.case), |mesh| {
+            let words = correct.mesh.words.iter().copied();
+            let leaves: Vec<Octant> = words.map(word::octant).collect();
+            let picked = picks.iter().filter(|_| !leaves.is_empty());
+            let centres = picked.map(|pick| root.to_user(pick.get(&leaves).centre()));
+            centres.chain(points.iter().copied()).map(|point| mesh.at(point).unwrap()).collect::<Vec<_>>()
+        });
+        for answer in &answers {
+            check(answer, &correct)?;
+            let base = answer.base_leaf.as_ref().unwrap().octant;
+            let word = correct.base.words.iter().find(|&&w| word::octant(w) == base);
+            prop_assert!(word.is_some(), "{answer}");
+            let side = word::side(*word.unwrap());
+            match &answer.side_decided_by {
+                SideReason::Facets { .. } => prop_assert_eq!(side, Side::Crossing),
+                SideReason::Component { side: decided, is_complete, .. } => {
+                    prop_assert!(*is_complete);
+                    prop_assert_eq!(side, *decided);
+                }
+                SideReason::Unknown => prop_assert!(false, "{answer}"),
+            }
+            if let Some(deletion) = &answer.deleted_by {
+                // The enclosed parts are not deleted by every version of the reference.
+                prop_assert!(!deletion.rule.contains("lost"), "{answer}");
+            }
+            prop_assert_eq!(answer.deleted_by.is_some(), answer.leaf.is_none());
+        }
+    }
+
+    #[test]
+    fn no_chain_is_shorter_than_the_one_reported(
+        level in 3i32..=5, n in 1u32..=5, facets in soup(1..4), boxes in boxes(0..2, 6),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), 3),
+    ) {
+        let spacing = 16.0 * 0.5f64.powi(level);
+        let text = format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\nkeep = 'all'\n{ROOT}{}", boxes.concat());
+        let correct = made(&text, &facets);
+        let leaves: Vec<Octant> = correct.mesh.words.iter().map(|&w| word::octant(w)).collect();
+        let brute = Brute { case: &correct.case, terms: Terms::of_case(&correct.case), leaves };
+        with_mesh(&correct.mesh, Some(&correct.case), |mesh| {
+            for pick in &picks {
+                let centre = correct.case.root.to_user(pick.get(&brute.leaves).centre());
+                let answer = mesh.at(centre).unwrap();
+                for split in &answer.splits {
+                    prop_assert!(split.is_shortest);
+                    prop_assert_eq!(brute.links(&split.octant.octant), Some(split.links.len()), "{}", answer);
+                }
+            }
+            Ok(())
+        })?;
+    }
+}
+
+/// Without the case, the surface is known from the crossing leaves, and the chains are the same.
+#[test]
+fn a_directory_alone_explains_the_same_sizes() {
+    let text = include_str!("../../../selftest-cases/outside.toml");
+    let correct = support::selftest_case("outside", text);
+    let centres: Vec<[f64; 3]> = correct
+        .mesh
+        .words
+        .iter()
+        .step_by(101)
+        .map(|&w| correct.case.root.to_user(word::octant(w).centre()))
+        .collect();
+    let explain = |case: Option<&Case>| {
+        with_mesh(&correct.mesh, case, |mesh| {
+            centres.iter().map(|&centre| mesh.at(centre).unwrap()).collect::<Vec<Answer>>()
+        })
+    };
+    for (with, without) in explain(Some(&correct.case)).iter().zip(&explain(None)) {
+        let links = |answer: &Answer| -> Vec<Vec<Octant>> {
+            let links = answer.splits.iter().map(|split| split.links.iter());
+            links.map(|links| links.map(|link| link.leaf.octant).collect()).collect()
+        };
+        assert_eq!(links(with), links(without));
+        assert!(with.left_out.is_empty() && without.left_out[0].contains("--case"), "{without}");
+    }
+}
+
+#[test]
+fn a_point_outside_the_root_and_another_case_are_refused() {
+    let text = include_str!("../../../selftest-cases/all.toml");
+    let correct = support::selftest_case("all", text);
+    let why = with_mesh(&correct.mesh, None, |mesh| mesh.at([99.0, 0.0, 0.0]).unwrap_err());
+    assert!(why.contains("outside the root"), "{why}");
+    let dir = tempfile::tempdir().unwrap();
+    correct.mesh.write(dir.path()).unwrap();
+    let mut other = correct.case.clone();
+    other.layer_cells_min += 1;
+    assert!(Mesh::open(dir.path(), Some(&other)).unwrap_err().contains("other inputs"));
+}

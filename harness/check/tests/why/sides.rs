@@ -1,0 +1,117 @@
+//! What decides a side: facets, the rays of a candidate, a seed; and what is enclosed.
+
+use super::*;
+use check::checks::Terms;
+use check::checks::components;
+use check::why::answer::{Answer, SideReason};
+use contract::word::{self, Side};
+
+/// Two nested spheres: the far field, a wall and a cavity.
+const NESTED: &str = "spacing_min = 0.125\nlayer_cells_min = 1\nkeep = \"all\"\nroot_scale = 4.0\n\
+                      [generator]\nshape = \"nested_spheres\"\nfacets = 640\n";
+
+/// T0 of two nested spheres with seeds, relabelled by the harness's own components.
+fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
+    let mut correct = support::selftest_case("nested", NESTED);
+    correct.case.seeds = seeds.to_vec();
+    correct.case.seeds_lattice =
+        seeds.iter().map(|&seed| correct.case.root.quantise_seed(seed).unwrap()).collect();
+    correct.base.manifest.seeds = correct.case.seeds_lattice.clone();
+    let terms = Terms::of_case(&correct.case);
+    let mut words = correct.base.words.clone();
+    for component in components::find(&words.clone(), &terms, &correct.case.facets_lattice) {
+        for &i in &component.leaves {
+            words[i as usize] = words[i as usize] & !3 | component.side as u64;
+        }
+    }
+    correct.base = correct.base.with_parts(vec![words]);
+    correct
+}
+
+/// The answers for the first leaf of every component, for its last, and for a crossing leaf.
+fn explain(correct: &SelftestCase) -> Vec<Answer> {
+    let words = &correct.base.words;
+    let terms = Terms::of_case(&correct.case);
+    let found = components::find(words, &terms, &correct.case.facets_lattice);
+    let ends = found.iter().flat_map(|component| {
+        [component.leaves[0], *component.leaves.last().unwrap()].map(|i| words[i as usize])
+    });
+    let crossing = words.iter().copied().find(|&w| word::side(w) == Side::Crossing);
+    with_mesh(&correct.base, Some(&correct.case), |mesh| {
+        let centre = |w| correct.case.root.to_user(word::octant(w).centre());
+        ends.chain(crossing).map(|w| mesh.at(centre(w)).unwrap()).collect()
+    })
+}
+
+#[test]
+fn seeds_decide_the_side_of_their_component_and_of_all_others() {
+    // In the middle of the inner sphere, and in the far field.
+    let correct = with_seeds(&[[0.01, 0.01, 0.01], [1.9, 1.9, 1.9]]);
+    let mut seeds = Vec::new();
+    for answer in explain(&correct) {
+        match answer.side_decided_by {
+            SideReason::Component { side, seed, is_complete, rays_odd, .. } => {
+                assert!(is_complete && rays_odd.is_none());
+                assert_eq!((Some(side), seed.is_some()), (answer.side, side == Side::Outside));
+                seeds.push(seed);
+            }
+            SideReason::Facets { .. } => assert_eq!(answer.side, Some(Side::Crossing)),
+            SideReason::Unknown => panic!("{answer}"),
+        }
+    }
+    for seed in [None, Some(0), Some(1)] {
+        assert!(seeds.contains(&seed), "{seed:?} of {seeds:?}");
+    }
+}
+
+#[test]
+fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
+    let correct = with_seeds(&[]);
+    let terms = Terms::of_case(&correct.case);
+    let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);
+    let mut sides = Vec::new();
+    for answer in explain(&correct) {
+        if let SideReason::Component { candidate, rays_odd, side, .. } = &answer.side_decided_by {
+            let candidate = candidate.as_ref().unwrap().octant;
+            assert!(found.iter().any(|c| c.first == candidate && c.side == *side), "{answer}");
+            assert_eq!(rays_odd, &Some([*side == Side::Inside; 6]));
+            assert_eq!(answer.side, Some(*side));
+            sides.push(*side);
+        }
+    }
+    assert!(sides.contains(&Side::Inside) && sides.contains(&Side::Outside));
+}
+
+#[test]
+fn a_point_in_an_enclosed_part_names_the_rule() {
+    let text = NESTED.replace("\"all\"", "\"outside\"");
+    let mut correct = support::selftest_case("outside", &text);
+    let root = correct.case.root;
+    // The cavity of the inner sphere is deleted, if the reference has not done so.
+    let in_cavity = |w: &u64| {
+        let centre = root.to_user(word::octant(*w).centre());
+        word::side(*w) == Side::Outside && centre.iter().map(|c| c * c).sum::<f64>() < 0.2
+    };
+    let words: Vec<u64> = correct.mesh.words.iter().filter(|w| !in_cavity(w)).copied().collect();
+    correct.mesh = correct.mesh.with_parts(vec![words]);
+    let rule = |point| {
+        let answer = with_mesh(&correct.mesh, Some(&correct.case), |mesh| mesh.at(point).unwrap());
+        assert!(answer.leaf.is_none(), "{answer}");
+        let text = answer.to_string();
+        assert!(text.contains("deleted by section 5"), "{text}");
+        answer.deleted_by.unwrap().rule
+    };
+    assert!(rule([0.01, 0.01, 0.01]).contains("enclosed is delete"));
+    let wall = root.to_user(
+        correct
+            .base
+            .words
+            .iter()
+            .map(|&w| (word::octant(w), word::side(w)))
+            .find(|(_, side)| *side == Side::Inside)
+            .unwrap()
+            .0
+            .centre(),
+    );
+    assert!(rule(wall).contains("keep is outside"));
+}

@@ -1,0 +1,79 @@
+//! A correct mesh has no needless split, and every planted one is counted.
+
+use super::*;
+use contract::octant::LEVEL_MAX;
+use contract::word::{self, Leaf};
+
+/// The words with the leaf at an index split.
+fn split(words: &mut Vec<u64>, at: usize) {
+    let Leaf { octant, side } = word::decode(words[at]).unwrap();
+    let children = (0..8).map(|d| word::encode(&Leaf { octant: octant.child(d), side }));
+    words.splice(at..=at, children);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn planted_splits_are_counted_exactly(
+        text in settings(1..5), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 6),
+        plants in prop::collection::vec(any::<prop::sample::Index>(), 0..5), nested in any::<bool>(),
+    ) {
+        let text = text + &boxes.concat();
+        let correct = made(&text, &facets);
+        let mut words = correct.mesh.words.clone();
+        let mut planted = 0;
+        let mut last = None;
+        for plant in plants.iter().filter(|_| !correct.mesh.words.is_empty()) {
+            // Every second split is below the one before.
+            let at = last.take().filter(|_| nested).unwrap_or_else(|| plant.index(words.len()));
+            if word::level(words[at]) < LEVEL_MAX {
+                split(&mut words, at);
+                (planted, last) = (planted + 1, Some(at + planted % 8));
+            }
+        }
+        let case = correct.case.keep_crossing.then_some(None).into_iter();
+        for case in case.chain([Some(&correct.case)]) {
+            let mutated = correct.mesh.with_parts(vec![words.clone()]);
+            let found = with_mesh(&mutated, case, |mesh| mesh.unneeded(100).unwrap());
+            prop_assert_eq!(found.unneeded, planted as u64, "{}{}", text, found);
+            prop_assert_eq!(found.subtrees, found.first.len() as u64);
+            let leaves: u64 = found.first.iter().map(|subtree| subtree.leaves).sum();
+            prop_assert_eq!(leaves, 7 * found.unneeded + found.subtrees, "{}", found);
+        }
+    }
+}
+
+/// The places at which needless refinement is likely: the far field, the surroundings of a box, and of deleted leaves.
+#[test]
+fn a_needless_split_is_found_wherever_it_is() {
+    let cases = [
+        ("outside", include_str!("../../../selftest-cases/outside.toml")),
+        ("inside", include_str!("../../../selftest-cases/inside.toml")),
+        ("all", include_str!("../../../selftest-cases/all.toml")),
+        ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+    ];
+    for (name, text) in cases {
+        let correct = support::selftest_case(name, text);
+        let (case, words) = (Some(&correct.case), &correct.mesh.words);
+        let count = |set: &LeafSet| with_mesh(set, case, |mesh| mesh.unneeded(1).unwrap());
+        assert_eq!(count(&correct.mesh).unneeded, 0, "{name}");
+        assert_eq!(count(&correct.base).unneeded, 0, "{name}");
+        for at in (0..words.len()).step_by(words.len() / 12) {
+            let mut mutated = words.clone();
+            split(&mut mutated, at);
+            let found = count(&correct.mesh.with_parts(vec![mutated]));
+            assert_eq!(found.unneeded, 1, "{name}: {found}");
+            let planted = word::octant(words[at]);
+            assert_eq!(found.largest.as_ref().unwrap().octant.octant, planted, "{name}: {found}");
+        }
+    }
+}
+
+#[test]
+fn without_crossing_leaves_the_case_is_required() {
+    let text = include_str!("../../../selftest-cases/inside.toml");
+    let correct = support::selftest_case("inside", text);
+    let why = with_mesh(&correct.mesh, None, |mesh| mesh.unneeded(1).unwrap_err());
+    assert!(why.contains("--case"), "{why}");
+}
