@@ -1,0 +1,233 @@
+//! Searches over the free leaves of a base tree, joined where they share part of a face.
+
+use std::collections::BinaryHeap;
+
+use super::leaves::{Leaves, centre, is_at_boundary, nearest_boundary};
+
+/// The end of a search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// A leaf.
+    Leaf(u32),
+    /// Any leaf at the root's boundary.
+    Far,
+}
+
+impl Goal {
+    fn is_reached(self, leaves: &Leaves, leaf: u32) -> bool {
+        match self {
+            Self::Leaf(goal) => leaf == goal,
+            Self::Far => is_at_boundary(&leaves.octant(leaf)),
+        }
+    }
+
+    /// The point of the goal nearest to a point, or its centre.
+    fn nearest(self, leaves: &Leaves, at: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Leaf(goal) => centre(&leaves.octant(goal)),
+            Self::Far => nearest_boundary(at),
+        }
+    }
+}
+
+/// The search was interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interrupted;
+
+/// Interrupts are polled once in this many steps.
+const STEPS_PER_POLL: usize = 1 << 14;
+
+const NONE: u32 = u32::MAX;
+
+/// The path of free leaves from `start` to the goal whose least `width` is greatest; `None` if there is no path.
+/// `width` is called once per leaf that is reached, with a neighbour reached before (`start` itself for the first), and
+/// returns a number that is not negative.
+///
+/// Leaves are taken in order of the least width of the best path to them, so the first path to a leaf is one of the
+/// widest (Dijkstra's algorithm with the minimum in place of the sum). Of equal ones the widest leaf is taken first, so
+/// that the search makes for open space once it has passed the narrowest place.
+///
+/// # Errors
+/// If `stop` returns true.
+pub fn widest(
+    leaves: &Leaves,
+    start: u32,
+    goal: Goal,
+    mut width: impl FnMut(u32, u32) -> f32,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Vec<u32>>, Interrupted> {
+    let mut via = vec![NONE; leaves.len()];
+    let mut heap = BinaryHeap::new();
+    via[start as usize] = start;
+    // The bit patterns of floats that are not negative are in the order of the floats.
+    let first = width(start, start).to_bits();
+    heap.push((first, first, start));
+    let mut steps = 0;
+    while let Some((least, _, leaf)) = heap.pop() {
+        if goal.is_reached(leaves, leaf) {
+            return Ok(Some(trace(&via, leaf)));
+        }
+        steps += 1;
+        if steps % STEPS_PER_POLL == 0 && stop() {
+            return Err(Interrupted);
+        }
+        leaves.neighbours(leaf, &mut |next| {
+            if via[next as usize] == NONE && leaves.is_free(next) {
+                via[next as usize] = leaf;
+                let own = width(next, leaf).to_bits();
+                heap.push((least.min(own), own, next));
+            }
+        });
+    }
+    Ok(None)
+}
+
+/// The path of least cost among the leaves of at least the width `least`; `None` if there is none. A step costs its
+/// length, and up to twice as much where the leaf that it enters is narrow, so that the path keeps away from facets
+/// where that is not a detour (the A* algorithm).
+///
+/// # Errors
+/// If `stop` returns true.
+pub fn shortest(
+    leaves: &Leaves,
+    start: u32,
+    goal: Goal,
+    least: f32,
+    mut width: impl FnMut(u32, u32) -> f32,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Vec<u32>>, Interrupted> {
+    let (mut via, mut costs) = (vec![NONE; leaves.len()], vec![f32::INFINITY; leaves.len()]);
+    let mut widths = vec![f32::NAN; leaves.len()];
+    let at = |leaf: u32| centre(&leaves.octant(leaf));
+    let remaining = |leaf: u32| distance(at(leaf), goal.nearest(leaves, at(leaf)));
+    let mut heap = BinaryHeap::new();
+    (via[start as usize], costs[start as usize]) = (start, 0.0);
+    heap.push((std::cmp::Reverse(remaining(start).to_bits()), 0, start));
+    let mut steps = 0;
+    while let Some((_, cost, leaf)) = heap.pop() {
+        let cost = f32::from_bits(cost);
+        if goal.is_reached(leaves, leaf) {
+            return Ok(Some(trace(&via, leaf)));
+        }
+        if cost > costs[leaf as usize] {
+            continue;
+        }
+        steps += 1;
+        if steps % STEPS_PER_POLL == 0 && stop() {
+            return Err(Interrupted);
+        }
+        leaves.neighbours(leaf, &mut |next| {
+            let i = next as usize;
+            if !leaves.is_free(next) {
+                return;
+            }
+            if widths[i].is_nan() {
+                widths[i] = width(next, leaf);
+            }
+            let narrow = least / widths[i].max(f32::MIN_POSITIVE);
+            let through = cost + distance(at(leaf), at(next)) * (1.0 + narrow);
+            if widths[i] >= least && through < costs[i] {
+                (via[i], costs[i]) = (leaf, through);
+                let estimate = through + remaining(next);
+                heap.push((std::cmp::Reverse(estimate.to_bits()), through.to_bits(), next));
+            }
+        });
+    }
+    Ok(None)
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f32 {
+    (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum::<f64>().sqrt() as f32
+}
+
+/// The leaves from the start, which is its own predecessor, to a leaf.
+fn trace(via: &[u32], mut leaf: u32) -> Vec<u32> {
+    let mut path = vec![leaf];
+    while via[leaf as usize] != leaf {
+        leaf = via[leaf as usize];
+        path.push(leaf);
+    }
+    path.reverse();
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::octant::Octant;
+    use contract::testing::words_with_sides;
+    use contract::word::Side;
+    use proptest::prelude::*;
+
+    const NEVER: &dyn Fn() -> bool = &|| false;
+
+    /// A random tree with random crossing leaves, and a random width for every leaf.
+    fn random(seed: u64) -> Vec<u64> {
+        let pick = |o: &Octant, salt: u64| {
+            let key = contract::word::key_of(o.corner) << 5 | u64::from(o.level);
+            (contract::digest::mix(key ^ seed.wrapping_mul(salt)) >> 100) as u64
+        };
+        let side = |o: &Octant| if pick(o, 7) % 3 == 0 { Side::Crossing } else { Side::Outside };
+        words_with_sides(|o| o.level < 3 && pick(o, 3) % 5 < 3, |o| Some(side(o)))
+    }
+
+    fn width_of(leaf: u32) -> f32 {
+        ((leaf.wrapping_mul(2654435761) >> 8) % 50) as f32
+    }
+
+    /// The least width of the widest paths to all leaves, by relaxation until nothing changes.
+    fn relaxed(leaves: &Leaves, start: u32) -> Vec<f32> {
+        let mut best = vec![-1.0f32; leaves.len()];
+        best[start as usize] = width_of(start);
+        loop {
+            let mut changed = false;
+            for leaf in (0..leaves.len() as u32).filter(|&l| leaves.is_free(l)) {
+                leaves.neighbours(leaf, &mut |next| {
+                    if leaves.is_free(next) {
+                        let through = best[next as usize].min(width_of(leaf));
+                        changed |= through > best[leaf as usize];
+                        best[leaf as usize] = best[leaf as usize].max(through);
+                    }
+                });
+            }
+            if !changed {
+                return best;
+            }
+        }
+    }
+
+    fn least_width(path: &[u32]) -> f32 {
+        path.iter().map(|&l| width_of(l)).fold(f32::INFINITY, f32::min)
+    }
+
+    proptest! {
+        #[test]
+        fn the_widest_path_is_as_wide_as_relaxation_finds(seed in any::<u64>()) {
+            let words = random(seed);
+            let leaves = Leaves::new(&words).unwrap();
+            let free: Vec<u32> = (0..leaves.len() as u32).filter(|&l| leaves.is_free(l)).collect();
+            prop_assume!(!free.is_empty());
+            let start = free[seed as usize % free.len()];
+            let best = relaxed(&leaves, start);
+            for &goal in free.iter().step_by(1 + free.len() / 20) {
+                let found = widest(&leaves, start, Goal::Leaf(goal), |l, _| width_of(l), NEVER).unwrap();
+                prop_assert_eq!(found.is_some(), best[goal as usize] >= 0.0);
+                let Some(path) = found else { continue };
+                prop_assert_eq!((path[0], path[path.len() - 1]), (start, goal));
+                let least = least_width(&path);
+                prop_assert_eq!(least, best[goal as usize]);
+                // The path of least cost has the same ends and is as wide.
+                let short = shortest(&leaves, start, Goal::Leaf(goal), least, |l, _| width_of(l), NEVER);
+                let short = short.unwrap().unwrap();
+                prop_assert!(short[1..].iter().all(|&l| width_of(l) >= least));
+                for path in [path, short] {
+                    prop_assert!(path.windows(2).all(|pair| {
+                        let mut joined = false;
+                        leaves.neighbours(pair[0], &mut |next| joined |= next == pair[1]);
+                        joined && leaves.is_free(pair[1])
+                    }));
+                }
+            }
+        }
+    }
+}
