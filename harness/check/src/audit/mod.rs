@@ -107,16 +107,19 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
             checks::complete::check_holes(&tree, &terms),
             checks::spacing::check_tree(&tree, &terms),
             checks::sides::check_tree(&tree, &terms),
+            checks::kept::check_tree(&tree, &terms, manifest),
             checks::balance::check_tree(&tree, &terms.root),
             checks::layer::check_tree(&tree, &terms),
         ],
         // T0 precedes deletion and gradation.
         Kind::Base => {
+            let kept = checks::kept::check_tree(&tree, &terms, manifest);
             let terms = Terms { keep: Keep::All, keep_crossing: true, ..terms };
             vec![
                 checks::complete::check_holes(&tree, &terms),
                 checks::spacing::check_tree(&tree, &terms),
                 checks::sides::check_tree(&tree, &terms),
+                kept,
             ]
         }
     };

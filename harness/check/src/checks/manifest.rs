@@ -1,7 +1,8 @@
 //! The manifest agrees with the files and with the case.
 //!
 //! Section 8 of reference/DEFINITION.md: counts, digests, and inputs. The check cannot detect wrong leaves, or
-//! two sets of leaves with equal digests. `sides` checks the ambiguous components.
+//! two sets of leaves with equal digests. `sides` checks the ambiguous components
+//! and `kept` the numbers of components.
 
 use std::fmt::Debug;
 
@@ -35,6 +36,8 @@ fn against_terms(prefix: &str, manifest: &Manifest, terms: &Terms, result: &mut 
     same(prefix, "keep", &claimed.keep, &terms.keep, result);
     same(prefix, "keep_crossing", &claimed.keep_crossing, &terms.keep_crossing, result);
     same(prefix, "boxes", &claimed.boxes, &terms.boxes, result);
+    same(prefix, "seeds", &claimed.seeds, &terms.seeds, result);
+    same(prefix, "enclosed", &claimed.enclosed, &terms.enclosed, result);
 }
 
 fn against_leaves(prefix: &str, set: &LeafSet, result: &mut CheckResult) {
