@@ -111,7 +111,8 @@ impl Pair<'_> {
 
     /// Compares the content of the mesh with a T0 leaf.
     fn compare_leaf(&mut self, handle: Handle, kind: Kind, octant: Octant) {
-        let leaf = word::key_of(octant.corner) << 7 | u64::from(octant.level) << 2 | u64::from(kind);
+        let leaf =
+            word::key_of(octant.corner) << 7 | u64::from(octant.level) << 2 | u64::from(kind);
         let keeps = self.terms.keeps(kind) && self.enclosed.binary_search(&leaf).is_err();
         if !keeps && handle != Handle::HOLE {
             self.report("a T0 leaf that must be deleted still exists, at least in part:", octant);

@@ -181,8 +181,8 @@ fn alone(subject: &Subject) -> CheckResult {
     let describe = |group: &Vec<u32>| identical::describe(words[group[0] as usize], &terms.root);
     let of_side = |side_: Side| groups.iter().filter(move |group| side(group) == side_);
     if terms.deletes_enclosed() {
-        let (far, enclosed): (Vec<_>, Vec<_>) = of_side(Side::Outside)
-            .partition(|group| components::touches_boundary(&words, group));
+        let (far, enclosed): (Vec<_>, Vec<_>) =
+            of_side(Side::Outside).partition(|group| components::touches_boundary(&words, group));
         for group in enclosed.iter().filter(|_| !far.is_empty()) {
             let (count, leaf) = (group.len(), describe(group));
             result.report_with(|| {
@@ -237,11 +237,17 @@ fn seeds_in_flow(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
             let at = terms.root.to_user(seed);
             let found = match found {
                 Some((leaf, kind)) => {
-                    format!("in the {} leaf {}", super::contact::name(1 << kind), terms.root.describe(&leaf))
+                    format!(
+                        "in the {} leaf {}",
+                        super::contact::name(1 << kind),
+                        terms.root.describe(&leaf)
+                    )
                 }
                 None => "in no leaf".to_owned(),
             };
-            result.report(format!("seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"));
+            result.report(format!(
+                "seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"
+            ));
         }
     }
 }
@@ -276,7 +282,9 @@ fn possible(
     for (side, expected) in sides {
         if (expected > 0) != (kinds & 1 << side as u8 != 0) {
             let leaves = if expected > 0 { "no leaf is" } else { "leaves are" };
-            result.report(format!("the manifest leaves {expected} {side} components, but {leaves} {side}"));
+            result.report(format!(
+                "the manifest leaves {expected} {side} components, but {leaves} {side}"
+            ));
         }
     }
 }

@@ -30,7 +30,9 @@ impl Dispute<'_> {
         let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
         let Component { leaves, seed, .. } = self.component(mesh, leaf)?;
         Some(match seed {
-            Some(i) => (flow, format!("section 4: seed {i} lies in its component of {leaves} leaves")),
+            Some(i) => {
+                (flow, format!("section 4: seed {i} lies in its component of {leaves} leaves"))
+            }
             None => (other, format!("section 4: no seed lies in its component of {leaves} leaves")),
         })
     }
@@ -45,14 +47,17 @@ impl Dispute<'_> {
         {
             return Some(match side == self.terms.side_of_flow() {
                 true => format!("{why}, which is flow and kept (section 5): {has} is right"),
-                false => format!("{why}, which is not flow, and keep is {keep} (section 5): {lacks} is right"),
+                false => format!(
+                    "{why}, which is not flow, and keep is {keep} (section 5): {lacks} is right"
+                ),
             });
         }
         if leaf.side != Side::Outside || self.terms.keep != Keep::Outside {
             return None;
         }
         if self.terms.enclosed == Enclosed::Keep {
-            let kept = "section 5: enclosed is keep, so every outside component is kept, enclosed or not";
+            let kept =
+                "section 5: enclosed is keep, so every outside component is kept, enclosed or not";
             return Some(format!("{kept}: {has} is right, if the leaf is outside"));
         }
         let Component { leaves, at_boundary, .. } = self.component(mesh, leaf)?;
@@ -141,25 +146,36 @@ mod tests {
         let all = cavity();
         let open: Vec<u64> = all.iter().copied().filter(|&w| !in_cavity(w)).collect();
         let text = rule(&all, &open, |_| ());
-        assert!(text.contains("component of 8 outside leaves") && text.ends_with("B is right"), "{text}");
+        assert!(
+            text.contains("component of 8 outside leaves") && text.ends_with("B is right"),
+            "{text}"
+        );
         let text = rule(&all, &open, |m| m.enclosed = Enclosed::Keep);
         assert!(text.contains("enclosed is keep") && text.contains("A is right"), "{text}");
         let text = rule(&open, &[], |_| ());
         assert!(text.contains("has a face on the root's boundary and is kept: A"), "{text}");
-        let closed: Vec<u64> = all.iter().copied().filter(|&w| in_cavity(w) || w & 3 == 2).collect();
+        let closed: Vec<u64> =
+            all.iter().copied().filter(|&w| in_cavity(w) || w & 3 == 2).collect();
         let crossing: Vec<u64> = closed.iter().copied().filter(|w| w & 3 == 2).collect();
         let text = rule(&crossing, &closed, |_| ());
-        assert!(text.contains("no outside component has a face") && text.contains("B is right"), "{text}");
+        assert!(
+            text.contains("no outside component has a face") && text.contains("B is right"),
+            "{text}"
+        );
     }
 
     #[test]
     fn seeds_decide_which_component_is_kept_and_which_side_is_right() {
         let (all, centre) = (cavity(), [UNITS_PER_EDGE / 2; 3]);
         let open: Vec<u64> = all.iter().copied().filter(|&w| !in_cavity(w)).collect();
-        let closed: Vec<u64> = all.iter().copied().filter(|&w| in_cavity(w) || w & 3 == 2).collect();
+        let closed: Vec<u64> =
+            all.iter().copied().filter(|&w| in_cavity(w) || w & 3 == 2).collect();
         let seeded = |m: &mut Manifest| m.seeds = vec![[0; 3], centre];
         let text = rule(&all, &open, seeded);
-        assert!(text.contains("seed 1 lies in its component of 8 leaves") && text.ends_with("A is right"));
+        assert!(
+            text.contains("seed 1 lies in its component of 8 leaves")
+                && text.ends_with("A is right")
+        );
         let text = rule(&closed, &all, |m| m.seeds = vec![centre]);
         assert!(text.contains("no seed lies") && text.ends_with("A is right"), "{text}");
         let flipped: Vec<u64> = all.iter().map(|&w| if in_cavity(w) { w | 1 } else { w }).collect();

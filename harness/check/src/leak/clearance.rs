@@ -34,7 +34,9 @@ impl<'a> Clearance<'a> {
     pub fn facets_within(&self, point: Point, radius: f64) -> Vec<(u32, f64)> {
         let mut found = Vec::new();
         let mut limit = radius * radius;
-        self.within(point, &mut limit, &mut |squared, facet, _| found.push((facet, squared.sqrt())));
+        self.within(point, &mut limit, &mut |squared, facet, _| {
+            found.push((facet, squared.sqrt()))
+        });
         found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         found
     }
@@ -84,11 +86,12 @@ mod tests {
     fn facets() -> impl Strategy<Value = Vec<FacetLattice>> {
         let corner = prop::array::uniform3(0i64..4000);
         // Some facets are segments or points.
-        let facet = (prop::array::uniform3(corner), 0..4).prop_map(|([a, b, c], kind)| match kind {
-            0 => [a, a, a],
-            1 => [a, b, a],
-            _ => [a, b, c],
-        });
+        let facet =
+            (prop::array::uniform3(corner), 0..4).prop_map(|([a, b, c], kind)| match kind {
+                0 => [a, a, a],
+                1 => [a, b, a],
+                _ => [a, b, c],
+            });
         prop::collection::vec(facet, 1..60)
     }
 

@@ -23,7 +23,10 @@ pub fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<[i64; 3], Str
     let inside = |q: &[i64; 3]| q.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));
     root.quantise(at).filter(inside).ok_or_else(|| {
         let far = root.to_user([UNITS_PER_EDGE; 3]);
-        format!("{what} {at:?} is outside the root, which extends from {:?} to {far:?}", root.origin)
+        format!(
+            "{what} {at:?} is outside the root, which extends from {:?} to {far:?}",
+            root.origin
+        )
     })
 }
 
@@ -39,7 +42,9 @@ pub fn free_leaf(what: &str, at: [i64; 3], leaves: &Leaves, root: &Root) -> Resu
     let (point, level) = (root.to_user(at), leaves.octant(leaf).level);
     let place = format!("{what} {point:?} is in a leaf of level {level} that facets cross");
     Err(match nearest_free_centre(at, leaves.words()) {
-        Some(near) => format!("{place}; the nearest centre of a free leaf is {:?}", root.to_user(near)),
+        Some(near) => {
+            format!("{place}; the nearest centre of a free leaf is {:?}", root.to_user(near))
+        }
         None => format!("{place}, and there are no free leaves: use a smaller spacing_min"),
     })
 }
@@ -57,7 +62,11 @@ fn nearest_free_centre(at: [i64; 3], words: &[u64]) -> Option<[i64; 3]> {
 }
 
 /// The ends of a path in one base tree; `None` if an end lies in a crossing leaf of this tree, with the reason.
-pub fn in_tree(from: [i64; 3], to: Option<[i64; 3]>, leaves: &Leaves) -> Result<(u32, Goal), &'static str> {
+pub fn in_tree(
+    from: [i64; 3],
+    to: Option<[i64; 3]>,
+    leaves: &Leaves,
+) -> Result<(u32, Goal), &'static str> {
     let start = leaves.locate(from);
     if !leaves.is_free(start) {
         return Err("facets cross the leaf of the start");
@@ -83,7 +92,8 @@ mod tests {
         let crossing = |digit: u8| if digit < 2 { Side::Crossing } else { Side::Outside };
         let words = words_with_sides(|o| o.level < 1, |o| Some(crossing(o.digit())));
         let leaves = Leaves::new(&words).unwrap();
-        let leaf = |at: [f64; 3]| free_leaf("--from", on_lattice("--from", at, &ROOT)?, &leaves, &ROOT);
+        let leaf =
+            |at: [f64; 3]| free_leaf("--from", on_lattice("--from", at, &ROOT)?, &leaves, &ROOT);
         assert_eq!(leaf([1.0, 5.0, 1.0]), Ok(2));
         // On an upper face of the root, and in the leaf above a common face.
         assert_eq!(leaf([8.0; 3]), Ok(7));

@@ -39,7 +39,8 @@ impl<'a> Leaves<'a> {
             open = open.min(shared_levels(previous, key));
             previous = key;
             while open < level {
-                path[open] = tree.open_node(open.checked_sub(1).map(|parent| (path[parent], key, parent)));
+                path[open] =
+                    tree.open_node(open.checked_sub(1).map(|parent| (path[parent], key, parent)));
                 open += 1;
             }
             if let Some(parent) = level.checked_sub(1) {
@@ -57,7 +58,9 @@ impl<'a> Leaves<'a> {
         let node = self.nodes.len() as u32;
         self.nodes.push([0; 8]);
         match parent {
-            Some((above, key, level)) => self.nodes[above as usize][digit(key, level)] = NODE | node,
+            Some((above, key, level)) => {
+                self.nodes[above as usize][digit(key, level)] = NODE | node
+            }
             None => self.root = NODE | node,
         }
         node
@@ -198,7 +201,8 @@ mod tests {
     fn trees() -> impl Strategy<Value = Vec<u64>> {
         any::<u64>().prop_map(|seed| {
             words_of(|o| {
-                let mixed = contract::digest::mix(word::key_of(o.corner) ^ seed ^ u64::from(o.level)) >> 70;
+                let mixed =
+                    contract::digest::mix(word::key_of(o.corner) ^ seed ^ u64::from(o.level)) >> 70;
                 o.level < 4 && mixed % 5 < 3
             })
         })
@@ -228,7 +232,8 @@ mod tests {
         let ((a_low, a_high), (b_low, b_high)) = (a.bounds(), b.bounds());
         let common = |i: usize| a_high[i].min(b_high[i]) - a_low[i].max(b_low[i]);
         let axes = [0, 1, 2].map(common);
-        axes.iter().filter(|&&c| c == 0).count() == 1 && axes.iter().filter(|&&c| c > 0).count() == 2
+        axes.iter().filter(|&&c| c == 0).count() == 1
+            && axes.iter().filter(|&&c| c > 0).count() == 2
     }
 
     #[test]
@@ -238,7 +243,8 @@ mod tests {
         assert!(Leaves::new(&whole[1..]).is_err());
         assert!(Leaves::new(&whole[..7]).is_err());
         assert!(Leaves::new(&[]).is_err());
-        let hole = words_with_sides(|o| o.level < 2, |o| (o.corner != [0; 3]).then_some(Side::Outside));
+        let hole =
+            words_with_sides(|o| o.level < 2, |o| (o.corner != [0; 3]).then_some(Side::Outside));
         assert!(Leaves::new(&hole).is_err());
         assert_eq!(Leaves::new(&words_of(|_| false)).unwrap().locate([5; 3]), 0);
     }

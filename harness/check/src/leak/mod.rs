@@ -2,7 +2,8 @@
 //! close or open?
 //!
 //! - [`leaves`]: a base tree with neighbours; [`ends`]: the ends of the path; [`search`]: the path through the leaves;
-//! - [`clearance`]: distances to facets; [`path`]: free widths along the path and the narrowest place;
+//! - [`clearance`]: distances to facets; [`path`]: free widths along a path and its narrowest place;
+//! - [`passage`]: the widest path; [`surface`]: whether the facets form a closed surface between the ends;
 //! - [`report`]: the answer as data; [`text`]: the answer for a terminal.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
@@ -12,23 +13,21 @@
 pub mod clearance;
 pub mod ends;
 pub mod leaves;
+pub mod passage;
 pub mod path;
 pub mod report;
 pub mod search;
+pub mod surface;
 pub mod text;
 
 use std::fmt::Display;
 
-use crate::geometry::distance::{dot, sub};
-use clearance::Clearance;
 use contract::case::Case;
-use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::LEVEL_MAX;
 use ends::Target;
 use leaves::Leaves;
-use path::Path;
-use report::{Destination, Meshed, Narrowest, Passage, Point, Report, SCHEMA, Spacing};
-use search::{Goal, Interrupted};
+use report::{Destination, Meshed, Passage, Report, SCHEMA, Spacing};
+use search::Interrupted;
 
 /// A question.
 #[derive(Clone, Copy, Debug)]
@@ -139,6 +138,7 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
             is_leak,
             closes: None,
             opens: None,
+            is_separated: false,
             limit: None,
             passage: None,
             levels: Vec::new(),
@@ -148,6 +148,9 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
             report.closes = closes.map(spacing);
             report.passage = Some(self.passage(&searched)?);
             searched.words
+        } else if surface::separates(case, self.from, self.to) {
+            report.is_separated = true;
+            tree.words
         } else {
             let tree = self.refine(tree, &mut report.limit)?;
             if report.limit.is_none() {
@@ -246,87 +249,11 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         Ok(tree)
     }
 
-    /// The widest path through the free leaves of a base tree that joins the ends.
     fn passage(&self, tree: &Tree) -> Result<Passage, LeakError<E>> {
         self.watch.step("measuring free widths");
-        let case = self.question.case;
         let leaves = Leaves::new(&tree.words).map_err(LeakError::Input)?;
-        let clearance = Clearance::new(&case.facets_lattice);
-        let (start, goal) =
-            ends::in_tree(self.from, self.to, &leaves).expect("the tree joins the ends");
-        let path = widest_path(&leaves, start, goal, &clearance, &|| self.watch.is_interrupted())?;
-        let path = path.expect("the tree joins the ends");
-        Ok(self.described(&Path::through(&leaves, &path, goal, &clearance), tree.level, &clearance))
+        let ends = ends::in_tree(self.from, self.to, &leaves).expect("the tree joins the ends");
+        let stop = || self.watch.is_interrupted();
+        Ok(passage::widest(self.question.case, tree.level, &leaves, ends, &stop)?)
     }
-
-    fn described(&self, path: &Path, level: u8, clearance: &Clearance) -> Passage {
-        /// Facets at the rim, in parts of the ball's radius, and for small balls in lattice units.
-        const RIM: (f64, f64) = (0.02, 2.0);
-        let case = self.question.case;
-        let scale = case.root.edge / UNITS_PER_EDGE as f64;
-        let user = |at: [f64; 3]| std::array::from_fn(|a| case.root.origin[a] + at[a] * scale);
-        let throat = path.throat();
-        let width = 2.0 * throat.clearance * scale;
-        let rim = clearance.facets_within(throat.at, throat.clearance * (1.0 + RIM.0) + RIM.1);
-        let points: Vec<Point> = path
-            .spots
-            .iter()
-            .map(|spot| Point { at: user(spot.at), width: 2.0 * spot.clearance * scale })
-            .collect();
-        let length = |pair: &[Point]| {
-            (0..3).map(|a| (pair[0].at[a] - pair[1].at[a]).powi(2)).sum::<f64>().sqrt()
-        };
-        Passage {
-            spacing: Spacing::of(level, &case.root),
-            narrowest: Narrowest {
-                at: user(throat.at),
-                width,
-                width_cells: width / Spacing::of(case.level_surface, &case.root).spacing,
-                direction: path.direction,
-                touches: clearance.nearest(throat.at).map_or(user(throat.at), user),
-                facets: rim.into_iter().map(|(facet, _)| facet).collect(),
-                index: path.narrowest,
-                is_end: path.is_narrowest_at_end(),
-            },
-            length: points.windows(2).map(length).sum(),
-            points,
-        }
-    }
-}
-
-/// The leaves of the widest path: its narrowest leaf is found first, and the ways from there to both ends are as short as
-/// the width allows. The width of a leaf is the free width at its centre.
-fn widest_path(
-    leaves: &Leaves,
-    start: u32,
-    goal: Goal,
-    clearance: &Clearance,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Vec<u32>>, Interrupted> {
-    /// Exceeds the rounding of clearances to f32.
-    const ROUNDING: f64 = 1.0 + 1e-6;
-    let mut clearances = vec![f32::NAN; leaves.len()];
-    let mut width = |leaf: u32, from: u32| {
-        let known = clearances[leaf as usize];
-        if !known.is_nan() {
-            return known;
-        }
-        let at = leaves::centre(&leaves.octant(leaf));
-        // A step changes the distance to the nearest facet by no more than its length.
-        let step = sub(at, leaves::centre(&leaves.octant(from)));
-        let bound = f64::from(clearances[from as usize]) + dot(step, step).sqrt();
-        let bound = if bound.is_nan() { f64::INFINITY } else { bound * ROUNDING };
-        clearances[leaf as usize] = clearance.at(at, bound) as f32;
-        clearances[leaf as usize]
-    };
-    let Some(path) = search::widest(leaves, start, goal, &mut width, stop)? else { return Ok(None) };
-    let narrowest = path.iter().copied().min_by(|&a, &b| width(a, a).total_cmp(&width(b, b)));
-    let narrowest = narrowest.expect("a path has leaves");
-    let least = width(narrowest, narrowest);
-    let back = search::shortest(leaves, narrowest, Goal::Leaf(start), least, &mut width, stop)?;
-    let on = search::shortest(leaves, narrowest, goal, least, &mut width, stop)?;
-    let (Some(mut path), Some(on)) = (back, on) else { return Ok(None) };
-    path.reverse();
-    path.extend(&on[1..]);
-    Ok(Some(path))
 }

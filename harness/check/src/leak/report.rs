@@ -115,6 +115,8 @@ pub struct Report {
     pub closes: Option<Spacing>,
     /// The finer level, the nearest to the case's, whose base tree joins the ends.
     pub opens: Option<Spacing>,
+    /// Whether the facets form a closed surface between the ends, so that no spacing joins them.
+    pub is_separated: bool,
     /// The limit at which refinement ended without joining the ends.
     pub limit: Option<String>,
     /// The widest path at the case's level or, if there is none, at the level that opens.

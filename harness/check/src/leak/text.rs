@@ -23,11 +23,23 @@ impl fmt::Display for Report {
         self.levels.iter().try_for_each(|level| row(level, f))?;
         match (self.is_leak, &self.closes, &self.opens, &self.limit) {
             (true, Some(closes), ..) => {
-                writeln!(f, "\nLEAK: free leaves join start and end; closed at spacing {}", spacing(closes))?;
+                writeln!(
+                    f,
+                    "\nLEAK: free leaves join start and end; closed at spacing {}",
+                    spacing(closes)
+                )?;
             }
-            (true, None, ..) => writeln!(f, "\nLEAK: free leaves join start and end at every spacing")?,
+            (true, None, ..) => {
+                writeln!(f, "\nLEAK: free leaves join start and end at every spacing")?
+            }
             (false, _, Some(opens), _) => {
                 writeln!(f, "\nno leak; it would open at spacing {}", spacing(opens))?;
+            }
+            (false, ..) if self.is_separated => {
+                writeln!(
+                    f,
+                    "\nno leak at any spacing: the facets form a closed surface between start and end"
+                )?;
             }
             (false, _, _, limit) => {
                 let limit = limit.as_deref().unwrap_or_default();
@@ -63,7 +75,10 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     };
     writeln!(f, "facets    {}{more}", listed.join(", "))?;
     if narrowest.is_end {
-        writeln!(f, "          This is an end of the path: choose a point farther from the facets to find the opening.")?;
+        writeln!(
+            f,
+            "          This is an end of the path: choose a point farther from the facets to find the opening."
+        )?;
     }
     let (points, length) = (&passage.points, number(passage.length));
     writeln!(f, "\nThe path: {} points, length {length}", points.len())?;

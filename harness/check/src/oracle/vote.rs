@@ -123,7 +123,9 @@ impl Tally {
             self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
         let why = match (ballot.seeds, ballot.watertight) {
             (true, _) => "seeds determine the sides",
-            (false, false) => "the body is not watertight, and another leaf determines the side of the component",
+            (false, false) => {
+                "the body is not watertight, and another leaf determines the side of the component"
+            }
             (false, true) => return notes,
         };
         if !self.exact_against.is_empty() {

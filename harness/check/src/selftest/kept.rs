@@ -19,9 +19,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     informed("manifest: one outside component too many", "kept", |s| {
         counted(s, |c| c.outside += 1)
     }),
-    informed("manifest: one inside component too many", "kept", |s| {
-        counted(s, |c| c.inside += 1)
-    }),
+    informed("manifest: one inside component too many", "kept", |s| counted(s, |c| c.inside += 1)),
     informed("manifest: one enclosed component too many", "kept", |s| {
         counted(s, |c| c.enclosed.count += 1)
     }),
