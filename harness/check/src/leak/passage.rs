@@ -1,8 +1,9 @@
 //! The widest path through the free leaves of a base tree, described in the user's units.
 //!
-//! The width of a leaf is the free width at its centre, which differs from the free width of the opening by up to the
-//! leaf's diagonal. So the widest path through the leaves is measured, its narrowest place is closed, and the search is
-//! repeated until no other opening can be wider than the widest that was measured.
+//! The radius of a leaf is the greatest distance to the nearest facet that any of its points can have: the distance from
+//! its centre plus half of its diagonal. So a ball that passes through leaves is never larger than the least of their
+//! radii. The path whose least radius is greatest is measured, its narrowest place is closed, and the search is repeated
+//! until the least radius shows that no other opening is wider than the widest that was measured.
 
 use super::clearance::Clearance;
 use super::leaves::{Leaves, centre};
@@ -28,73 +29,72 @@ pub fn widest(
     stop: &dyn Fn() -> bool,
 ) -> Result<Passage, Interrupted> {
     let clearance = Clearance::new(&case.facets_lattice);
-    let mut field = Field { leaves, clearance: &clearance, known: vec![f32::NAN; leaves.len()] };
+    let mut field = Field { leaves, clearance: &clearance, radii: vec![f32::NAN; leaves.len()] };
     let mut best: Option<Path> = None;
     for _ in 0..OPENINGS_MAX {
-        let Some(route) = search::widest(leaves, start, goal, |l, from| field.at(l, from), stop)?
-        else {
-            break;
-        };
+        let radius = |leaf, from| field.radius(leaf, from);
+        let Some(route) = search::widest(leaves, start, goal, radius, stop)? else { break };
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let narrowest = field.narrowest(&route);
-        if field.most(narrowest) <= measured {
+        if f64::from(field.radii[narrowest as usize]) <= measured {
             break;
         }
         let route = field.shortened(&route, narrowest, goal, stop)?;
         let path = Path::through(leaves, &route, goal, &clearance);
-        field.close(&path);
-        let is_last = path.is_narrowest_at_end();
+        let is_end = path.is_narrowest_at_end();
+        field.close(&path, narrowest);
         if path.throat().clearance > measured {
             best = Some(path);
         }
-        if is_last {
+        if is_end {
             break;
         }
     }
     Ok(described(case, level, &best.expect("free leaves join the ends"), &clearance))
 }
 
-/// Distances from the centres of leaves to the nearest facet, computed when they are needed.
+/// The radii of leaves, computed when they are needed.
 struct Field<'a> {
     leaves: &'a Leaves<'a>,
     clearance: &'a Clearance<'a>,
     /// NaN where unknown, negative where closed.
-    known: Vec<f32>,
+    radii: Vec<f32>,
 }
 
 impl Field<'_> {
-    /// The distance from a leaf's centre; `from` is a neighbour, or the leaf itself.
-    fn at(&mut self, leaf: u32, from: u32) -> f32 {
-        /// Exceeds the rounding of distances to f32.
+    /// The radius of a leaf; `from` is a neighbour, or the leaf itself.
+    fn radius(&mut self, leaf: u32, from: u32) -> f32 {
+        /// Exceeds the rounding of radii to f32.
         const ROUNDING: f64 = 1.0 + 1e-6;
-        let known = self.known[leaf as usize];
+        let known = self.radii[leaf as usize];
         if !known.is_nan() {
             return known;
         }
-        let (at, near) = (self.centre(leaf), self.known[from as usize]);
+        let (at, near) = (self.centre(leaf), f64::from(self.radii[from as usize]));
         // A step changes the distance to the nearest facet by no more than its length.
         let step = sub(at, self.centre(from));
         let bound = match near >= 0.0 {
-            true => (f64::from(near) + dot(step, step).sqrt()) * ROUNDING,
+            true => (near - self.half_diagonal(from) + dot(step, step).sqrt()) * ROUNDING,
             false => f64::INFINITY,
         };
-        self.known[leaf as usize] = self.clearance.at(at, bound) as f32;
-        self.known[leaf as usize]
+        let radius = self.clearance.at(at, bound) + self.half_diagonal(leaf);
+        self.radii[leaf as usize] = (radius * ROUNDING) as f32;
+        self.radii[leaf as usize]
     }
 
     fn centre(&self, leaf: u32) -> [f64; 3] {
         centre(&self.leaves.octant(leaf))
     }
 
-    fn narrowest(&mut self, route: &[u32]) -> u32 {
-        let least = route.iter().copied().min_by(|&a, &b| self.at(a, a).total_cmp(&self.at(b, b)));
-        least.expect("a route has leaves")
+    fn half_diagonal(&self, leaf: u32) -> f64 {
+        let (low, high) = self.leaves.octant(leaf).bounds();
+        3f64.sqrt() / 2.0 * (high[0] - low[0]) as f64
     }
 
-    /// The greatest distance to the nearest facet that a point of a leaf can have.
-    fn most(&self, leaf: u32) -> f64 {
-        let (low, high) = self.leaves.octant(leaf).bounds();
-        f64::from(self.known[leaf as usize]) + 3f64.sqrt() / 2.0 * (high[0] - low[0]) as f64
+    fn narrowest(&self, route: &[u32]) -> u32 {
+        let radius = |leaf: &u32| self.radii[*leaf as usize];
+        let least = route.iter().copied().min_by(|a, b| radius(a).total_cmp(&radius(b)));
+        least.expect("a route has leaves")
     }
 
     /// A route through the same narrowest leaf that is as short as its width allows.
@@ -105,9 +105,9 @@ impl Field<'_> {
         goal: Goal,
         stop: &dyn Fn() -> bool,
     ) -> Result<Vec<u32>, Interrupted> {
-        let (leaves, least, start) = (self.leaves, self.known[narrowest as usize], route[0]);
+        let (leaves, least, start) = (self.leaves, self.radii[narrowest as usize], route[0]);
         let mut to = |goal| {
-            search::shortest(leaves, narrowest, goal, least, |l, from| self.at(l, from), stop)
+            search::shortest(leaves, narrowest, goal, least, |l, from| self.radius(l, from), stop)
         };
         let (Some(mut whole), Some(on)) = (to(Goal::Leaf(start))?, to(goal)?) else {
             unreachable!("the route itself joins its narrowest leaf with both ends")
@@ -117,13 +117,14 @@ impl Field<'_> {
         Ok(whole)
     }
 
-    /// Closes the leaves in the ball at the narrowest place of a path.
-    fn close(&mut self, path: &Path) {
+    /// Closes the leaves in the ball at the narrowest place of a path, and one more leaf in any case.
+    fn close(&mut self, path: &Path, other: u32) {
         let throat = path.throat();
+        self.radii[other as usize] = -1.0;
         for leaf in 0..self.leaves.len() as u32 {
             let from = sub(self.centre(leaf), throat.at);
             if dot(from, from) <= throat.clearance * throat.clearance {
-                self.known[leaf as usize] = -1.0;
+                self.radii[leaf as usize] = -1.0;
             }
         }
     }

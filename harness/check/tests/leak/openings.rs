@@ -184,14 +184,17 @@ impl Body {
 
     /// Whether a segment passes the opening.
     pub fn passes(&self, from: Point, to: Point) -> bool {
-        let normal = cross(sub(self.rim[1], self.rim[0]), sub(self.rim[2], self.rim[0]));
+        let count = self.rim.len();
+        // Some consecutive corners are collinear.
+        let area =
+            |i: usize| cross(sub(self.rim[i], self.rim[0]), sub(self.rim[i + 1], self.rim[0]));
+        let normal = std::array::from_fn(|a| (1..count - 1).map(|i| area(i)[a]).sum());
         let height = |p: Point| dot(sub(p, self.rim[0]), normal);
         let (a, b) = (height(from), height(to));
         if (a > 0.0) == (b > 0.0) {
             return false;
         }
         let at: Point = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * a / (a - b));
-        let count = self.rim.len();
         let side = |i: usize| {
             dot(cross(sub(self.rim[(i + 1) % count], self.rim[i]), sub(at, self.rim[i])), normal)
         };
