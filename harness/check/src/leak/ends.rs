@@ -73,7 +73,7 @@ pub fn in_tree(
     }
     match to.map(|at| leaves.locate(at)) {
         None => Ok((start, Goal::Far)),
-        Some(goal) if leaves.is_free(goal) => Ok((start, Goal::Leaf(goal))),
+        Some(goal) if leaves.is_free(goal) => Ok((start, Goal::Place(goal))),
         Some(_) => Err("facets cross the leaf of the end"),
     }
 }

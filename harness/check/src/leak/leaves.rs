@@ -2,6 +2,7 @@
 //!
 //! Invariants: the leaves tile the root in Morton order; a node has eight children; the root is node 0 or a leaf.
 
+use super::search::Graph;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant, UNITS_PER_CELL};
 use contract::word::{self, KEY_END, Side};
@@ -145,19 +146,33 @@ impl<'a> Leaves<'a> {
     }
 }
 
+/// The free leaves.
+impl Graph for Leaves<'_> {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn position(&self, leaf: u32) -> [f64; 3] {
+        self.octant(leaf).centre().map(|c| c as f64)
+    }
+
+    fn is_far(&self, leaf: u32) -> bool {
+        let octant = self.octant(leaf);
+        octant.corner.iter().any(|&c| c == 0 || c + octant.edge() == CELLS_PER_EDGE)
+    }
+
+    fn joined(&self, leaf: u32, visit: &mut impl FnMut(u32)) {
+        self.neighbours(leaf, &mut |next| {
+            if self.is_free(next) {
+                visit(next);
+            }
+        });
+    }
+}
+
 /// Whether no facet touches a leaf.
 pub fn is_free(word: u64) -> bool {
     word & 3 != Side::Crossing as u64
-}
-
-/// Whether an octant has a face on the root's boundary.
-pub fn is_at_boundary(octant: &Octant) -> bool {
-    octant.corner.iter().any(|&c| c == 0 || c + octant.edge() == CELLS_PER_EDGE)
-}
-
-/// The centre of an octant, in lattice units.
-pub fn centre(octant: &Octant) -> [f64; 3] {
-    octant.centre().map(|c| c as f64)
 }
 
 /// The centre of the face, or part of a face, that two octants share, in lattice units.

@@ -6,10 +6,10 @@
 //! until the least radius shows that no other opening is wider than the widest that was measured.
 
 use super::clearance::Clearance;
-use super::leaves::{Leaves, centre};
+use super::leaves::Leaves;
 use super::path::Path;
 use super::report::{Narrowest, Passage, Point, Spacing};
-use super::search::{self, Goal, Interrupted};
+use super::search::{self, Goal, Graph, Interrupted};
 use crate::geometry::distance::{dot, sub};
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
@@ -36,11 +36,12 @@ pub fn widest(
         let Some(route) = search::widest(leaves, start, goal, radius, stop)? else { break };
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let narrowest = field.narrowest(&route);
-        if f64::from(field.radii[narrowest as usize]) <= measured {
+        let radius = f64::from(field.radii[narrowest as usize]);
+        if radius <= measured {
             break;
         }
         let route = field.shortened(&route, narrowest, goal, stop)?;
-        let path = Path::through(leaves, &route, goal, &clearance);
+        let path = Path::through(leaves, &route, goal, radius, &clearance, stop)?;
         let is_end = path.is_narrowest_at_end();
         field.close(&path, narrowest);
         if path.throat().clearance > measured {
@@ -70,9 +71,9 @@ impl Field<'_> {
         if !known.is_nan() {
             return known;
         }
-        let (at, near) = (self.centre(leaf), f64::from(self.radii[from as usize]));
+        let (at, near) = (self.leaves.position(leaf), f64::from(self.radii[from as usize]));
         // A step changes the distance to the nearest facet by no more than its length.
-        let step = sub(at, self.centre(from));
+        let step = sub(at, self.leaves.position(from));
         let bound = match near >= 0.0 {
             true => (near - self.half_diagonal(from) + dot(step, step).sqrt()) * ROUNDING,
             false => f64::INFINITY,
@@ -80,10 +81,6 @@ impl Field<'_> {
         let radius = self.clearance.at(at, bound) + self.half_diagonal(leaf);
         self.radii[leaf as usize] = (radius * ROUNDING) as f32;
         self.radii[leaf as usize]
-    }
-
-    fn centre(&self, leaf: u32) -> [f64; 3] {
-        centre(&self.leaves.octant(leaf))
     }
 
     fn half_diagonal(&self, leaf: u32) -> f64 {
@@ -109,7 +106,7 @@ impl Field<'_> {
         let mut to = |goal| {
             search::shortest(leaves, narrowest, goal, least, |l, from| self.radius(l, from), stop)
         };
-        let (Some(mut whole), Some(on)) = (to(Goal::Leaf(start))?, to(goal)?) else {
+        let (Some(mut whole), Some(on)) = (to(Goal::Place(start))?, to(goal)?) else {
             unreachable!("the route itself joins its narrowest leaf with both ends")
         };
         whole.reverse();
@@ -122,7 +119,7 @@ impl Field<'_> {
         let throat = path.throat();
         self.radii[other as usize] = -1.0;
         for leaf in 0..self.leaves.len() as u32 {
-            let from = sub(self.centre(leaf), throat.at);
+            let from = sub(self.leaves.position(leaf), throat.at);
             if dot(from, from) <= throat.clearance * throat.clearance {
                 self.radii[leaf as usize] = -1.0;
             }
@@ -153,7 +150,7 @@ fn described(case: &Case, level: u8, path: &Path, clearance: &Clearance) -> Pass
             at: user(throat.at),
             width,
             width_cells: width / Spacing::of(case.level_surface, &case.root).spacing,
-            direction: path.direction,
+            direction: path.direction(),
             touches: clearance.nearest(throat.at).map_or(user(throat.at), user),
             facets: rim.into_iter().map(|(facet, _)| facet).collect(),
             index: path.narrowest,

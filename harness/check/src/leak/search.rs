@@ -1,30 +1,43 @@
-//! Searches over the free leaves of a base tree, joined where they share part of a face.
+//! Searches for the widest and for a short path in a graph: the free leaves of a base tree, joined where they share part
+//! of a face, or the points of a grid.
 
 use std::collections::BinaryHeap;
 
-use super::leaves::{Leaves, centre, is_at_boundary, nearest_boundary};
+use super::leaves::nearest_boundary;
+
+/// Places, numbered from 0, some of which are joined.
+pub trait Graph {
+    /// Number of places.
+    fn count(&self) -> usize;
+    /// Position of a place, in lattice units.
+    fn position(&self, place: u32) -> [f64; 3];
+    /// Whether a place is at the root's boundary.
+    fn is_far(&self, place: u32) -> bool;
+    /// Calls `visit` with every place that is joined to this one.
+    fn joined(&self, place: u32, visit: &mut impl FnMut(u32));
+}
 
 /// The end of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
-    /// A leaf.
-    Leaf(u32),
-    /// Any leaf at the root's boundary.
+    /// A place.
+    Place(u32),
+    /// Any place at the root's boundary.
     Far,
 }
 
 impl Goal {
-    fn is_reached(self, leaves: &Leaves, leaf: u32) -> bool {
+    fn is_reached(self, graph: &impl Graph, place: u32) -> bool {
         match self {
-            Self::Leaf(goal) => leaf == goal,
-            Self::Far => is_at_boundary(&leaves.octant(leaf)),
+            Self::Place(goal) => place == goal,
+            Self::Far => graph.is_far(place),
         }
     }
 
-    /// The point of the goal nearest to a point, or its centre.
-    fn nearest(self, leaves: &Leaves, at: [f64; 3]) -> [f64; 3] {
+    /// The point of the goal nearest to a point, or its position.
+    fn nearest(self, graph: &impl Graph, at: [f64; 3]) -> [f64; 3] {
         match self {
-            Self::Leaf(goal) => centre(&leaves.octant(goal)),
+            Self::Place(goal) => graph.position(goal),
             Self::Far => nearest_boundary(at),
         }
     }
@@ -39,42 +52,41 @@ const STEPS_PER_POLL: usize = 1 << 14;
 
 const NONE: u32 = u32::MAX;
 
-/// The path of free leaves from `start` to the goal whose least `width` is greatest; `None` if there is no path.
-/// `width` is called once per leaf that is reached, with a neighbour reached before (`start` itself for the first). A
-/// leaf with a negative width is not entered.
+/// The path from `start` to the goal whose least `width` is greatest; `None` if there is no path. `width` is called with
+/// a place and a neighbour reached before (`start` itself for the first). A place with a negative width is not entered.
 ///
-/// Leaves are taken in order of the least width of the best path to them, so the first path to a leaf is one of the
-/// widest (Dijkstra's algorithm with the minimum in place of the sum). Of equal ones the widest leaf is taken first, so
+/// Places are taken in order of the least width of the best path to them, so the first path to a place is one of the
+/// widest (Dijkstra's algorithm with the minimum in place of the sum). Of equal ones the widest place is taken first, so
 /// that the search makes for open space once it has passed the narrowest place.
 ///
 /// # Errors
 /// If `stop` returns true.
 pub fn widest(
-    leaves: &Leaves,
+    graph: &impl Graph,
     start: u32,
     goal: Goal,
     mut width: impl FnMut(u32, u32) -> f32,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<u32>>, Interrupted> {
-    let mut via = vec![NONE; leaves.len()];
+    let mut via = vec![NONE; graph.count()];
     let mut heap = BinaryHeap::new();
     via[start as usize] = start;
     // The bit patterns of floats that are not negative are in the order of the floats.
     let first = width(start, start).to_bits();
     heap.push((first, first, start));
     let mut steps = 0;
-    while let Some((least, _, leaf)) = heap.pop() {
-        if goal.is_reached(leaves, leaf) {
-            return Ok(Some(trace(&via, leaf)));
+    while let Some((least, _, place)) = heap.pop() {
+        if goal.is_reached(graph, place) {
+            return Ok(Some(trace(&via, place)));
         }
         steps += 1;
         if steps % STEPS_PER_POLL == 0 && stop() {
             return Err(Interrupted);
         }
-        leaves.neighbours(leaf, &mut |next| {
-            if via[next as usize] == NONE && leaves.is_free(next) {
-                via[next as usize] = leaf;
-                let own = width(next, leaf);
+        graph.joined(place, &mut |next| {
+            if via[next as usize] == NONE {
+                via[next as usize] = place;
+                let own = width(next, place);
                 if own >= 0.0 {
                     heap.push((least.min(own.to_bits()), own.to_bits(), next));
                 }
@@ -84,52 +96,45 @@ pub fn widest(
     Ok(None)
 }
 
-/// The path of least cost among the leaves of at least the width `least`; `None` if there is none. A step costs its
-/// length, and up to twice as much where the leaf that it enters is narrow, so that the path keeps away from facets
+/// The path of least cost among the places of at least the width `least`; `None` if there is none. A step costs its
+/// length, and up to twice as much where the place that it enters is narrow, so that the path keeps away from facets
 /// where that is not a detour (the A* algorithm).
 ///
 /// # Errors
 /// If `stop` returns true.
 pub fn shortest(
-    leaves: &Leaves,
+    graph: &impl Graph,
     start: u32,
     goal: Goal,
     least: f32,
     mut width: impl FnMut(u32, u32) -> f32,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<u32>>, Interrupted> {
-    let (mut via, mut costs) = (vec![NONE; leaves.len()], vec![f32::INFINITY; leaves.len()]);
-    let mut widths = vec![f32::NAN; leaves.len()];
-    let at = |leaf: u32| centre(&leaves.octant(leaf));
-    let remaining = |leaf: u32| distance(at(leaf), goal.nearest(leaves, at(leaf)));
+    let (mut via, mut costs) = (vec![NONE; graph.count()], vec![f32::INFINITY; graph.count()]);
+    let at = |place: u32| graph.position(place);
+    let remaining = |place: u32| distance(at(place), goal.nearest(graph, at(place)));
     let mut heap = BinaryHeap::new();
     (via[start as usize], costs[start as usize]) = (start, 0.0);
     heap.push((std::cmp::Reverse(remaining(start).to_bits()), 0, start));
     let mut steps = 0;
-    while let Some((_, cost, leaf)) = heap.pop() {
+    while let Some((_, cost, place)) = heap.pop() {
         let cost = f32::from_bits(cost);
-        if goal.is_reached(leaves, leaf) {
-            return Ok(Some(trace(&via, leaf)));
+        if goal.is_reached(graph, place) {
+            return Ok(Some(trace(&via, place)));
         }
-        if cost > costs[leaf as usize] {
+        if cost > costs[place as usize] {
             continue;
         }
         steps += 1;
         if steps % STEPS_PER_POLL == 0 && stop() {
             return Err(Interrupted);
         }
-        leaves.neighbours(leaf, &mut |next| {
-            let i = next as usize;
-            if !leaves.is_free(next) {
-                return;
-            }
-            if widths[i].is_nan() {
-                widths[i] = width(next, leaf);
-            }
-            let narrow = least / widths[i].max(f32::MIN_POSITIVE);
-            let through = cost + distance(at(leaf), at(next)) * (1.0 + narrow);
-            if widths[i] >= least && through < costs[i] {
-                (via[i], costs[i]) = (leaf, through);
+        graph.joined(place, &mut |next| {
+            let wide = width(next, place);
+            let narrow = least / wide.max(f32::MIN_POSITIVE);
+            let through = cost + distance(at(place), at(next)) * (1.0 + narrow);
+            if wide >= least && through < costs[next as usize] {
+                (via[next as usize], costs[next as usize]) = (place, through);
                 let estimate = through + remaining(next);
                 heap.push((std::cmp::Reverse(estimate.to_bits()), through.to_bits(), next));
             }
@@ -142,7 +147,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f32 {
     (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum::<f64>().sqrt() as f32
 }
 
-/// The leaves from the start, which is its own predecessor, to a leaf.
+/// The places from the start, which is its own predecessor, to a place.
 fn trace(via: &[u32], mut leaf: u32) -> Vec<u32> {
     let mut path = vec![leaf];
     while via[leaf as usize] != leaf {
@@ -155,6 +160,7 @@ fn trace(via: &[u32], mut leaf: u32) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::leaves::Leaves;
     use super::*;
     use contract::octant::Octant;
     use contract::testing::words_with_sides;
@@ -212,14 +218,14 @@ mod tests {
             let start = free[seed as usize % free.len()];
             let best = relaxed(&leaves, start);
             for &goal in free.iter().step_by(1 + free.len() / 20) {
-                let found = widest(&leaves, start, Goal::Leaf(goal), |l, _| width_of(l), NEVER).unwrap();
+                let found = widest(&leaves, start, Goal::Place(goal), |l, _| width_of(l), NEVER).unwrap();
                 prop_assert_eq!(found.is_some(), best[goal as usize] >= 0.0);
                 let Some(path) = found else { continue };
                 prop_assert_eq!((path[0], path[path.len() - 1]), (start, goal));
                 let least = least_width(&path);
                 prop_assert_eq!(least, best[goal as usize]);
                 // The path of least cost has the same ends and is as wide.
-                let short = shortest(&leaves, start, Goal::Leaf(goal), least, |l, _| width_of(l), NEVER);
+                let short = shortest(&leaves, start, Goal::Place(goal), least, |l, _| width_of(l), NEVER);
                 let short = short.unwrap().unwrap();
                 prop_assert!(short[1..].iter().all(|&l| width_of(l) >= least));
                 for path in [path, short] {
