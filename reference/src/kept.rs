@@ -58,9 +58,8 @@ pub fn delete_the_rest(tree: &mut Tree, input: &Input, components: &[Component])
 /// The outside components that are deleted because they do not reach the boundary of the root. If no
 /// outside component reaches it, there is no far field, and nothing is enclosed.
 fn enclosed<'a>(tree: &Tree, input: &Input, components: &'a [Component]) -> Vec<&'a Component> {
-    let applies = input.keep == Keep::Outside
-        && input.seeds.is_empty()
-        && input.enclosed == Enclosed::Delete;
+    let applies =
+        input.keep == Keep::Outside && input.seeds.is_empty() && input.enclosed == Enclosed::Delete;
     let outside = components.iter().filter(|component| component.side == Side::Outside);
     let (far_field, enclosed): (Vec<_>, Vec<_>) = outside.partition(|component| {
         component.leaves.iter().any(|&leaf| is_at_boundary(&tree.octant(leaf)))

@@ -28,12 +28,18 @@ impl<'a> BaseTrees<'a> {
     ///
     /// # Errors
     /// One sentence, if the case cannot be read or the temporary directory cannot be made.
-    pub fn new(engine: &'a Engine, case: &Path, root: Root, limit: Duration) -> Result<Self, String> {
+    pub fn new(
+        engine: &'a Engine,
+        case: &Path,
+        root: Root,
+        limit: Duration,
+    ) -> Result<Self, String> {
         let mut case = PlainCase::read(case)?;
         // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
         case.table.remove("seeds");
         let place = tempfile::Builder::new().prefix("harness-base-").tempdir();
-        let place = place.map_err(|error| format!("no temporary directory can be made: {error}"))?;
+        let place =
+            place.map_err(|error| format!("no temporary directory can be made: {error}"))?;
         Ok(Self { engine, case, root, place, limit })
     }
 

@@ -219,9 +219,8 @@ mod tests {
                 .and_then(Value::as_array)
                 .is_some_and(|boxes| boxes.iter().any(|b| b["min"][0].as_float() == Some(2.0)));
             let seeds = trial.case.table.get("seeds").and_then(Value::as_array);
-            let seeded = seeds.is_some_and(|seeds| {
-                seeds.iter().any(|seed| seed[0].as_float() == Some(2.0))
-            });
+            let seeded =
+                seeds.is_some_and(|seeds| seeds.iter().any(|seed| seed[0].as_float() == Some(2.0)));
             has(trial, 17.0)
                 && has(trial, 80.0)
                 && seeded
@@ -240,7 +239,10 @@ mod tests {
             (2, 1)
         );
         assert_eq!((table["keep"].as_str(), table.get("keep_crossing")), (Some("all"), None));
-        assert_eq!((table["seeds"].to_string(), table.get("enclosed")), ("[[2.0, 0.0, 0.0]]".into(), None));
+        assert_eq!(
+            (table["seeds"].to_string(), table.get("enclosed")),
+            ("[[2.0, 0.0, 0.0]]".into(), None)
+        );
         assert!(trials < 200, "{trials}");
     }
 

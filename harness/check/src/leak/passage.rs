@@ -16,6 +16,8 @@ use contract::lattice::UNITS_PER_EDGE;
 
 /// Openings that are measured at most.
 const OPENINGS_MAX: usize = 8;
+/// Another opening is of interest if it is wider by this factor.
+const WIDER: f64 = 1.005;
 
 /// The widest path between ends that free leaves join.
 ///
@@ -37,11 +39,12 @@ pub fn widest(
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let narrowest = field.narrowest(&route);
         let radius = f64::from(field.radii[narrowest as usize]);
-        if radius <= measured {
+        let wanted = WIDER * measured;
+        if radius <= wanted {
             break;
         }
         let route = field.shortened(&route, narrowest, goal, stop)?;
-        let path = Path::through(leaves, &route, goal, radius, &clearance, stop)?;
+        let path = Path::through(leaves, &route, goal, (radius, wanted), &clearance, stop)?;
         let is_end = path.is_narrowest_at_end();
         field.close(&path, narrowest);
         if path.throat().clearance > measured {

@@ -42,7 +42,8 @@ pub struct Path {
 impl Path {
     /// The path through leaves, each of which shares part of a face with the next: through their centres and the
     /// centres of the shared faces, and through grids where it is narrow. A path to the far field ends on the root's
-    /// boundary. No ball of a radius greater than `radius` passes.
+    /// boundary. No ball of a radius greater than `radius` passes. The narrowest place is found to full precision only
+    /// if its ball's radius may be `wanted`.
     ///
     /// # Errors
     /// If `stop` returns true.
@@ -50,7 +51,7 @@ impl Path {
         leaves: &Leaves,
         route: &[u32],
         goal: Goal,
-        radius: f64,
+        (radius, wanted): (f64, f64),
         clearance: &Clearance,
         stop: &dyn Fn() -> bool,
     ) -> Result<Self, Interrupted> {
@@ -62,7 +63,10 @@ impl Path {
         for _ in 0..GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
-            if path.is_narrowest_at_end() || spot.step <= PRECISION * spot.clearance {
+            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
+            let is_unwanted = spot.clearance + 3f64.sqrt() * spot.step < wanted;
+            let is_precise = spot.step <= PRECISION * spot.clearance;
+            if path.is_narrowest_at_end() || is_precise || is_unwanted {
                 break;
             }
             let step = (spot.step / FINER).min(EDGE * radius / f64::from(2 * STEPS));
@@ -137,8 +141,6 @@ impl Path {
         let Some(route) = search::widest(&grid, from, goal, &mut width, stop)? else {
             return Ok(false);
         };
-        let least = route.iter().map(|&place| width(place, place)).fold(f32::INFINITY, f32::min);
-        let route = search::shortest(&grid, from, goal, least, &mut width, stop)?.unwrap_or(route);
         let spot = |&place: &u32| Spot {
             at: grid.position(place),
             clearance: f64::from(width(place, place)),

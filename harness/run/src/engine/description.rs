@@ -101,7 +101,14 @@ impl Default for Takes {
     fn default() -> Self {
         let keep = vec![Keep::Outside, Keep::Inside, Keep::All];
         let generator = false;
-        Self { generator, boxes: true, keep, drop_crossing: true, seeds: false, keep_enclosed: false }
+        Self {
+            generator,
+            boxes: true,
+            keep,
+            drop_crossing: true,
+            seeds: false,
+            keep_enclosed: false,
+        }
     }
 }
 
@@ -313,7 +320,8 @@ mod tests {
         assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
         let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
         assert!(seeds.ends_with("does not support seeds"), "{seeds}");
-        let enclosed = declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
+        let enclosed =
+            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
         assert!(enclosed.ends_with("enclosed = keep"), "{enclosed}");
         let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
                      max = [1.0, 1.0, 1.0]\nspacing = 1.0";

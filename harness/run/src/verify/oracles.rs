@@ -20,7 +20,8 @@ const NAME: &str = "oracles";
 const SUBJECT: &str = "sides";
 
 /// Why no vote counts on a case with seeds.
-const ADVISORY: &str = "seeds determine the sides, so the oracles' votes are reported but decide nothing";
+const ADVISORY: &str =
+    "seeds determine the sides, so the oracles' votes are reported but decide nothing";
 
 /// On a small case the oracles classify every leaf, up to this many.
 const POINTS_OF_SMALL: usize = 400_000;
