@@ -39,11 +39,12 @@ pub fn free_leaf(what: &str, at: [i64; 3], leaves: &Leaves, root: &Root) -> Resu
     if leaves.is_free(leaf) {
         return Ok(leaf);
     }
-    let (point, level) = (root.to_user(at), leaves.octant(leaf).level);
+    let user = |at| root.to_user(at).map(|c| c as f32);
+    let (point, level) = (user(at), leaves.octant(leaf).level);
     let place = format!("{what} {point:?} is in a leaf of level {level} that facets cross");
     Err(match nearest_free_centre(at, leaves.words()) {
         Some(near) => {
-            format!("{place}; the nearest centre of a free leaf is {:?}", root.to_user(near))
+            format!("{place}; the nearest centre of a free leaf is {:?}", user(near))
         }
         None => format!("{place}, and there are no free leaves: use a smaller spacing_min"),
     })

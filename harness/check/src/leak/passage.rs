@@ -4,10 +4,12 @@
 //! its centre plus half of its diagonal. So a ball that passes through leaves is never larger than the least of their
 //! radii. The path whose least radius is greatest is measured, its narrowest place is closed, and the search is repeated
 //! until the least radius shows that no other opening is wider than the widest that was measured.
+//!
+//! An end near a facet is not an opening, so both ends are first moved from leaf to leaf to where the radius is greatest.
 
 use super::clearance::Clearance;
 use super::leaves::Leaves;
-use super::path::Path;
+use super::path::{Path, Route};
 use super::report::{Narrowest, Passage, Point, Spacing};
 use super::search::{self, Goal, Graph, Interrupted};
 use crate::geometry::distance::{dot, sub};
@@ -32,10 +34,17 @@ pub fn widest(
 ) -> Result<Passage, Interrupted> {
     let clearance = Clearance::new(&case.facets_lattice);
     let mut field = Field { leaves, clearance: &clearance, radii: vec![f32::NAN; leaves.len()] };
+    let approach = field.approach(start);
+    let departure = match goal {
+        Goal::Place(end) => field.approach(end),
+        Goal::Far => Vec::new(),
+    };
+    let start = approach[approach.len() - 1];
+    let inner_goal = departure.last().map_or(Goal::Far, |&end| Goal::Place(end));
     let mut best: Option<Path> = None;
     for _ in 0..OPENINGS_MAX {
         let radius = |leaf, from| field.radius(leaf, from);
-        let Some(route) = search::widest(leaves, start, goal, radius, stop)? else { break };
+        let Some(route) = search::widest(leaves, start, inner_goal, radius, stop)? else { break };
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let narrowest = field.narrowest(&route);
         let radius = f64::from(field.radii[narrowest as usize]);
@@ -43,8 +52,12 @@ pub fn widest(
         if radius <= wanted {
             break;
         }
-        let route = field.shortened(&route, narrowest, goal, stop)?;
-        let path = Path::through(leaves, &route, goal, (radius, wanted), &clearance, stop)?;
+        let inner = field.shortened(&route, narrowest, inner_goal, stop)?;
+        let on = departure.iter().rev().skip(1);
+        let whole: Vec<u32> = approach.iter().chain(&inner[1..]).chain(on).copied().collect();
+        let approaches = [approach.len() - 1, departure.len().saturating_sub(1)];
+        let route = Route { leaves: &whole, approaches, radius, wanted };
+        let path = Path::through(leaves, &route, goal, &clearance, stop)?;
         let is_end = path.is_narrowest_at_end();
         field.close(&path, narrowest);
         if path.throat().clearance > measured {
@@ -84,6 +97,26 @@ impl Field<'_> {
         let radius = self.clearance.at(at, bound) + self.half_diagonal(leaf);
         self.radii[leaf as usize] = (radius * ROUNDING) as f32;
         self.radii[leaf as usize]
+    }
+
+    /// The leaves from one to a leaf whose radius no neighbour exceeds, each the neighbour of greatest radius of the one
+    /// before it.
+    fn approach(&mut self, leaf: u32) -> Vec<u32> {
+        let (leaves, mut steps) = (self.leaves, vec![leaf]);
+        loop {
+            let here = steps[steps.len() - 1];
+            let mut best = (self.radius(here, here), here);
+            leaves.joined(here, &mut |next| {
+                let radius = self.radius(next, here);
+                if radius > best.0 {
+                    best = (radius, next);
+                }
+            });
+            if best.1 == here {
+                return steps;
+            }
+            steps.push(best.1);
+        }
     }
 
     fn half_diagonal(&self, leaf: u32) -> f64 {

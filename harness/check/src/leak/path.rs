@@ -35,23 +35,35 @@ const GRIDS_MAX: usize = 150;
 pub struct Path {
     /// The points, at least one.
     pub spots: Vec<Spot>,
-    /// Index of the narrowest.
+    /// Index of the narrowest, the points of the approaches excepted.
     pub narrowest: usize,
+    /// Numbers of points at the start and at the end that only lead away from the facets.
+    approaches: [usize; 2],
+}
+
+/// The leaves of a path.
+#[derive(Clone, Copy, Debug)]
+pub struct Route<'a> {
+    /// The leaves, each of which shares part of a face with the next.
+    pub leaves: &'a [u32],
+    /// Numbers of leaves at the start and at the end that only lead away from the facets.
+    pub approaches: [usize; 2],
+    /// No ball of a greater radius passes.
+    pub radius: f64,
+    /// The narrowest place is found to full precision only if its ball's radius may be at least this.
+    pub wanted: f64,
 }
 
 impl Path {
-    /// The path through leaves, each of which shares part of a face with the next: through their centres and the
-    /// centres of the shared faces, and through grids where it is narrow. A path to the far field ends on the root's
-    /// boundary. No ball of a radius greater than `radius` passes. The narrowest place is found to full precision only
-    /// if its ball's radius may be `wanted`.
+    /// The path through leaves: through their centres and the centres of the shared faces, and through grids where it is
+    /// narrow. A path to the far field ends on the root's boundary.
     ///
     /// # Errors
     /// If `stop` returns true.
     pub fn through(
         leaves: &Leaves,
-        route: &[u32],
+        route: &Route,
         goal: Goal,
-        (radius, wanted): (f64, f64),
         clearance: &Clearance,
         stop: &dyn Fn() -> bool,
     ) -> Result<Self, Interrupted> {
@@ -59,17 +71,21 @@ impl Path {
         const EDGE: f64 = 6.0;
         /// Ratio of the steps of successive grids.
         const FINER: f64 = 3.0;
-        let mut path = Self { spots: raw(leaves, route, goal, clearance), narrowest: 0 };
+        let mut path = Self {
+            spots: raw(leaves, route.leaves, goal, clearance),
+            narrowest: 0,
+            approaches: route.approaches.map(|count| 2 * count),
+        };
         for _ in 0..GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
             // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
-            let is_unwanted = spot.clearance + 3f64.sqrt() * spot.step < wanted;
+            let is_unwanted = spot.clearance + 3f64.sqrt() * spot.step < route.wanted;
             let is_precise = spot.step <= PRECISION * spot.clearance;
             if path.is_narrowest_at_end() || is_precise || is_unwanted {
                 break;
             }
-            let step = (spot.step / FINER).min(EDGE * radius / f64::from(2 * STEPS));
+            let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
             if !path.widen(step, clearance, stop)? {
                 break;
             }
@@ -85,7 +101,13 @@ impl Path {
 
     /// Whether the narrowest place is an end of the path and not an opening.
     pub fn is_narrowest_at_end(&self) -> bool {
-        self.narrowest == 0 || self.narrowest + 1 == self.spots.len()
+        let (first, last) = self.inner();
+        self.narrowest == first || self.narrowest == last
+    }
+
+    /// The first and the last index without the approaches.
+    fn inner(&self) -> (usize, usize) {
+        (self.approaches[0], self.spots.len() - 1 - self.approaches[1])
     }
 
     /// The direction of the path at its narrowest place, a unit vector: from where it enters the surroundings to where
@@ -100,7 +122,8 @@ impl Path {
 
     fn find_narrowest(&self) -> usize {
         let clearance = |i: &usize| self.spots[*i].clearance;
-        let least = (0..self.spots.len()).min_by(|i, j| clearance(i).total_cmp(&clearance(j)));
+        let (first, last) = self.inner();
+        let least = (first..=last).min_by(|i, j| clearance(i).total_cmp(&clearance(j)));
         least.expect("a path has points")
     }
 
@@ -108,8 +131,9 @@ impl Path {
     fn surroundings(&self, half: f64) -> (usize, usize) {
         let centre = self.throat().at;
         let is_near = |i: &usize| (0..3).all(|a| (self.spots[*i].at[a] - centre[a]).abs() <= half);
-        let first = (0..self.narrowest).rev().take_while(is_near).last();
-        let last = (self.narrowest + 1..self.spots.len()).take_while(is_near).last();
+        let (begin, end) = self.inner();
+        let first = (begin..self.narrowest).rev().take_while(is_near).last();
+        let last = (self.narrowest + 1..=end).take_while(is_near).last();
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
     }
 
@@ -141,14 +165,16 @@ impl Path {
         let Some(route) = search::widest(&grid, from, goal, &mut width, stop)? else {
             return Ok(false);
         };
+        // Points near the grid's edge depend on where the path enters it, so they are not final.
+        let coarse = self.spots[first].step.max(self.spots[last].step);
         let spot = |&place: &u32| Spot {
             at: grid.position(place),
             clearance: f64::from(width(place, place)),
-            step,
+            step: if Grid::is_inner(place) { step } else { coarse },
         };
         let widened: Vec<Spot> = route.iter().map(spot).collect();
-        let (is_start, is_end) = (first == 0, last + 1 == self.spots.len());
-        let replaced = first + usize::from(is_start)..last + 1 - usize::from(is_end);
+        let (begin, end) = self.inner();
+        let replaced = first + usize::from(first == begin)..last + usize::from(last != end);
         self.spots.splice(replaced, widened);
         Ok(true)
     }
@@ -185,6 +211,11 @@ impl Grid {
             steps.clamp(-STEPS, STEPS) + STEPS
         };
         ((index(2) * SIDE + index(1)) * SIDE + index(0)) as u32
+    }
+
+    /// Whether a place is far from the grid's edge.
+    fn is_inner(place: u32) -> bool {
+        Self::indices(place).iter().all(|i| (i - STEPS).abs() <= STEPS * 3 / 4)
     }
 
     fn indices(place: u32) -> [i32; 3] {

@@ -23,9 +23,11 @@ impl fmt::Display for Report {
         self.levels.iter().try_for_each(|level| row(level, f))?;
         match (self.is_leak, &self.closes, &self.opens, &self.limit) {
             (true, Some(closes), ..) => {
+                let why = self.levels.last().and_then(|level| level.why);
+                let why = why.map_or(String::new(), |why| format!(", where {why}"));
                 writeln!(
                     f,
-                    "\nLEAK: free leaves join start and end; closed at spacing {}",
+                    "\nLEAK: free leaves join start and end; closed at spacing {}{why}",
                     spacing(closes)
                 )?;
             }
