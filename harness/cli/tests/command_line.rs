@@ -2,7 +2,7 @@
 
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "verify",
     "selftest",
     "gate",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 13] = [
     "track",
     "shrink",
     "audit",
+    "leak",
     "export",
     "diff",
     "completions",

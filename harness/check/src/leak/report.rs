@@ -63,7 +63,7 @@ pub struct Narrowest {
     pub facets: Vec<u32>,
     /// Index among the points of the path.
     pub index: usize,
-    /// Whether it is an end of the path instead of an opening.
+    /// Whether it is an end of the path instead of an opening: the widest place near the start or the end.
     pub is_end: bool,
 }
 
