@@ -79,7 +79,7 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     if narrowest.is_end {
         writeln!(
             f,
-            "          This is an end of the path, not an opening: the space around it is nowhere wider."
+            "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends."
         )?;
     }
     let (points, length) = (&passage.points, number(passage.length));
