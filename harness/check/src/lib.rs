@@ -4,6 +4,7 @@
 //! - [`checks`]: one file per property; [`audit`](mod@audit): the checks that need only the leaves, for meshes of any size;
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
 //! - [`geometry`]: diagnosis of a geometry before it is meshed;
+//! - [`leak`]: paths through openings, and their free widths;
 //! - [`oracle`]: the sample points of the oracles, and the evaluation of their answers;
 //! - [`selftest`]: corrupted meshes that the checks must detect;
 //! - [`why`]: the cause of every split, and splits without one.
@@ -12,6 +13,7 @@ pub mod audit;
 pub mod checks;
 pub mod diff;
 pub mod geometry;
+pub mod leak;
 pub mod oracle;
 pub mod selftest;
 pub mod why;

@@ -38,6 +38,8 @@ pub enum Command {
     Audit(commands::audit::Arguments),
     /// Diagnose a geometry before meshing: its defects, and what each means for the mesh
     Geometry(commands::geometry::Arguments),
+    /// Search for an opening through which two places are joined, and the spacing at which it closes or opens
+    Leak(Box<commands::leak::Arguments>),
     /// Write a leaf-set directory as a VTK unstructured grid for ParaView or pyvista
     Export(commands::export::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides

@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Shrink(arguments) => commands::shrink::run(&arguments),
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
+        Command::Leak(arguments) => commands::leak::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Why(arguments) => commands::why::run(&arguments),

@@ -15,6 +15,7 @@ const COMMANDS: [&str; 14] = [
     "track",
     "shrink",
     "audit",
+    "leak",
     "export",
     "diff",
     "why",

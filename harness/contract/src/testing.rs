@@ -3,10 +3,11 @@
 use proptest::prelude::*;
 
 use crate::digest::Digest;
-use crate::lattice::Root;
+use crate::lattice::{FacetLattice, Root};
 use crate::leafset::LeafSet;
 use crate::manifest::{self, Ambiguous, BySide, Enclosed, Keep, Manifest};
 use crate::octant::{CELLS_PER_EDGE, Octant};
+use crate::triangle::Triangle;
 use crate::word::{self, Leaf, Side};
 
 /// The leaves of the tree in which an octant is split iff `split` returns true, all with side outside.
@@ -29,6 +30,24 @@ pub fn words_with_sides(
         }
     }
     words.sort_unstable();
+    words
+}
+
+/// The base tree of facets at a surface level without boxes. All leaves that no facet crosses are outside.
+pub fn base_tree(facets: &[FacetLattice], level: u8) -> Vec<u64> {
+    fn refine(octant: Octant, facets: &[Triangle], level: u8, words: &mut Vec<u64>) {
+        let (low, high) = octant.bounds();
+        let crossing: Vec<Triangle> =
+            facets.iter().filter(|f| f.meets(low, high)).cloned().collect();
+        if !crossing.is_empty() && octant.level < level {
+            return (0..8).for_each(|d| refine(octant.child(d), &crossing, level, words));
+        }
+        let side = if crossing.is_empty() { Side::Outside } else { Side::Crossing };
+        words.push(word::encode(&Leaf { octant, side }));
+    }
+    let facets: Vec<Triangle> = facets.iter().map(Triangle::new).collect();
+    let mut words = Vec::new();
+    refine(Octant::ROOT, &facets, level, &mut words);
     words
 }
 

@@ -5,12 +5,14 @@
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
-//! - [`vtu`](mod@vtu): meshes for VTK.
+//! - [`vtu`](mod@vtu): meshes for VTK;
+//! - [`leak`]: the path of a leak for VTK, and a slice through its narrowest place.
 
 pub mod benchmark;
 pub mod figure;
 pub mod gate;
 pub mod json;
+pub mod leak;
 pub mod markdown;
 pub mod page;
 pub mod targets;

@@ -1,9 +1,11 @@
 //! Runs engines and oracles as processes, and verifies the meshes that engines make.
 //!
+//! - [`base_tree`]: base trees of a case at any level;
 //! - [`engine`]: finds, starts, watches and judges programs, and reads their run reports;
 //! - [`oracle`]: classifies points with trimesh, open3d and pyvista, in Python;
 //! - [`verify`](mod@verify): runs engines on cases and checks the meshes.
 
+pub mod base_tree;
 pub mod engine;
 pub mod oracle;
 #[cfg(any(test, feature = "testing"))]

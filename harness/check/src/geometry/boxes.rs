@@ -1,4 +1,4 @@
-//! A binary tree of bounding boxes over the facets that have an area.
+//! A binary tree of bounding boxes over facets.
 //!
 //! Facets are sorted along the Morton curve of their centres and grouped by `GROUP`; the groups are the
 //! leaves of a complete tree. Every node encloses its facets and their unit normals in boxes.
@@ -57,6 +57,15 @@ impl Bounds {
         (0..3).all(|a| self.low[a] <= other.high[a] && other.low[a] <= self.high[a])
     }
 
+    /// The squared distance of a point from the box, in lattice units.
+    pub fn distance_squared_to(&self, point: [f64; 3]) -> f64 {
+        let along = |a: usize| {
+            let (low, high) = (f64::from(self.low[a]), f64::from(self.high[a]));
+            (low - point[a]).max(point[a] - high).max(0.0)
+        };
+        (0..3).map(|a| along(a) * along(a)).sum()
+    }
+
     /// The squared distance of the boxes, in lattice units.
     pub fn distance_squared(&self, other: &Self) -> f64 {
         let along = |a: usize| {
@@ -92,17 +101,17 @@ impl Bounds {
     }
 }
 
-/// The unit normal of a facet with area.
+/// The unit normal of a facet; zero if the facet has no area.
 pub fn unit_normal(facet: &FacetLattice) -> [f64; 3] {
     let n = normal(facet).map(|x| x as f64);
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    n.map(|x| x / length)
+    if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
 }
 
 /// The tree.
 #[derive(Debug)]
 pub struct Boxes {
-    /// Facets with area, in the order of the tree.
+    /// The facets, in the order of the tree.
     pub facets: Vec<u32>,
     /// Bounds of each of [`Self::facets`].
     pub bounds: Vec<Bounds>,
@@ -114,10 +123,19 @@ pub struct Boxes {
 impl Boxes {
     /// The tree over those of at least one facet that have an area.
     pub fn new(lattice: &[FacetLattice]) -> Self {
-        let has_area = |&(_, facet): &(usize, &FacetLattice)| !is_degenerate(facet);
+        Self::of(lattice, |facet| !is_degenerate(facet))
+    }
+
+    /// The tree over all of at least one facet.
+    pub fn of_all(lattice: &[FacetLattice]) -> Self {
+        Self::of(lattice, |_| true)
+    }
+
+    fn of(lattice: &[FacetLattice], is_included: impl Fn(&FacetLattice) -> bool) -> Self {
         let code = codes(lattice);
         let key = |(i, facet): (usize, &FacetLattice)| u128::from(code(facet)) << 32 | i as u128;
-        let mut keys: Vec<u128> = lattice.iter().enumerate().filter(has_area).map(key).collect();
+        let included = lattice.iter().enumerate().filter(|(_, facet)| is_included(facet));
+        let mut keys: Vec<u128> = included.map(key).collect();
         keys.sort_unstable();
         let facets: Vec<u32> = keys.iter().map(|&key| key as u32).collect();
         let bounds: Vec<Bounds> =

@@ -1,4 +1,4 @@
-//! The distance of two triangles that do not intersect, in f64.
+//! The distance of two triangles that do not intersect, and of a point from a triangle, in f64.
 
 type Point = [f64; 3];
 type Triangle = [Point; 3];
@@ -28,6 +28,22 @@ pub fn nearest(a: &Triangle, b: &Triangle) -> (f64, Point, Point) {
     best
 }
 
+/// Squared distance of a point from a triangle, which may have no area, and the nearest point of the triangle.
+pub fn from_point(p: Point, t: &Triangle) -> (f64, Point) {
+    let to = |q: Point| (dot(sub(q, p), sub(q, p)), q);
+    if let Some(foot) = foot(p, t) {
+        return to(foot);
+    }
+    let on_edge = |i: usize| {
+        let along_edge = sub(t[(i + 1) % 3], t[i]);
+        let squared = dot(along_edge, along_edge);
+        let s = if squared > 0.0 { dot(sub(p, t[i]), along_edge) / squared } else { 0.0 };
+        to(along(t[i], along_edge, s.clamp(0.0, 1.0)))
+    };
+    let nearest = (0..3).map(on_edge).min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.expect("a triangle has edges")
+}
+
 /// Nearest points of two segments (Ericson, Real-Time Collision Detection, section 5.1.9).
 fn segments(p: Point, p_end: Point, q: Point, q_end: Point) -> (Point, Point) {
     let (d, e, r) = (sub(p_end, p), sub(q_end, q), sub(p, q));
@@ -45,15 +61,21 @@ fn segments(p: Point, p_end: Point, q: Point, q_end: Point) -> (Point, Point) {
     (along(p, d, s), along(q, e, t))
 }
 
-/// The foot of the perpendicular from a point on a triangle's plane, if it is in the triangle.
+/// The foot of the perpendicular from a point on a triangle's plane, if it is in the triangle. None where the triangle
+/// is so thin that its edges are as near and its normal is mostly rounding error.
 fn foot(p: Point, t: &Triangle) -> Option<Point> {
-    let n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
+    let (u, v) = (sub(t[1], t[0]), sub(t[2], t[0]));
+    let n = cross(u, v);
+    if dot(n, n) <= 1e-20 * dot(u, u) * dot(v, v) {
+        return None;
+    }
     let within = |i: usize| dot(cross(sub(t[(i + 1) % 3], t[i]), sub(p, t[i])), n) >= 0.0;
     let height = dot(sub(p, t[0]), n) / dot(n, n);
     (0..3).all(within).then(|| along(p, n, -height))
 }
 
-fn along(p: Point, d: Point, t: f64) -> Point {
+/// The point at `t` times a vector from a point.
+pub fn along(p: Point, d: Point, t: f64) -> Point {
     std::array::from_fn(|a| p[a] + t * d[a])
 }
 
@@ -67,7 +89,8 @@ pub fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn cross(u: Point, v: Point) -> Point {
+/// Vector product.
+pub fn cross(u: Point, v: Point) -> Point {
     std::array::from_fn(|a| {
         let (b, c) = ((a + 1) % 3, (a + 2) % 3);
         u[b] * v[c] - u[c] * v[b]
@@ -86,6 +109,18 @@ mod tests {
         assert_eq!(nearest(&a, &above), (9.0, [1.0, 1.0, 0.0], [1.0, 1.0, 3.0]));
         let across = [[4.0, -9.0, 2.0], [4.0, 9.0, 2.0], [4.0, 0.0, 9.0]];
         assert_eq!(nearest(&a, &across).0, 4.0);
+    }
+
+    #[test]
+    fn the_nearest_point_of_a_triangle_is_in_its_interior_on_an_edge_or_a_corner() {
+        let t = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]];
+        assert_eq!(from_point([1.0, 2.0, 3.0], &t), (9.0, [1.0, 2.0, 0.0]));
+        assert_eq!(from_point([3.0, -4.0, 3.0], &t), (25.0, [3.0, 0.0, 0.0]));
+        assert_eq!(from_point([-3.0, -4.0, 0.0], &t), (25.0, [0.0, 0.0, 0.0]));
+        assert_eq!(from_point([8.0, 8.0, 0.0], &t), (32.0, [4.0, 4.0, 0.0]));
+        let segment = [[0.0; 3], [4.0, 0.0, 0.0], [0.0; 3]];
+        assert_eq!(from_point([2.0, 3.0, 0.0], &segment), (9.0, [2.0, 0.0, 0.0]));
+        assert_eq!(from_point([2.0, 3.0, 6.0], &[[0.0; 3]; 3]).0, 49.0);
     }
 
     proptest! {

@@ -135,6 +135,13 @@ impl Canvas {
         self.put(html! { path d=(path) fill=(colour) shape-rendering="crispEdges" {} });
     }
 
+    /// Outlined polygons as one element.
+    pub fn polygons(&mut self, polygons: &[Vec<(f64, f64)>], fill: &str, stroke: &str) {
+        let path = |polygon: &Vec<(f64, f64)>| format!("M{}z", coordinates(polygon));
+        let path: String = polygons.iter().map(path).collect();
+        self.put(html! { path d=(path) fill=(fill) stroke=(stroke) stroke-width="1.5" {} });
+    }
+
     /// A text.
     pub fn text(&mut self, text: &str, (x, y): (f64, f64), anchor: Anchor) {
         let (x, y) = (round(x), round(y));

@@ -1,0 +1,112 @@
+//! The distance from a point to the nearest facet, in lattice units.
+
+use contract::lattice::FacetLattice;
+
+use crate::geometry::boxes::Boxes;
+use crate::geometry::distance;
+
+/// A point, in lattice units.
+pub type Point = [f64; 3];
+
+/// The facets, arranged for nearest-facet queries. Facets without area count too: they cross leaves like all others.
+#[derive(Debug)]
+pub struct Clearance<'a> {
+    facets: &'a [FacetLattice],
+    boxes: Option<Boxes>,
+}
+
+impl<'a> Clearance<'a> {
+    /// The facets of a case.
+    pub fn new(facets: &'a [FacetLattice]) -> Self {
+        Self { facets, boxes: (!facets.is_empty()).then(|| Boxes::of_all(facets)) }
+    }
+
+    /// Distance from a point to the nearest facet; infinite without facets. `bound` is an upper bound that the caller
+    /// knows, and limits the search.
+    pub fn at(&self, point: Point, bound: f64) -> f64 {
+        // Rounding must not exclude the facet that the bound comes from.
+        let mut best = (bound + 1.0) * (bound + 1.0);
+        self.within(point, &mut best, &mut |squared, _, best| *best = squared.min(*best));
+        best.sqrt()
+    }
+
+    /// The facets nearer than `radius`, each with its distance, nearest first.
+    pub fn facets_within(&self, point: Point, radius: f64) -> Vec<(u32, f64)> {
+        let mut found = Vec::new();
+        let mut limit = radius * radius;
+        self.within(point, &mut limit, &mut |squared, facet, _| {
+            found.push((facet, squared.sqrt()))
+        });
+        found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+        found
+    }
+
+    /// A nearest point of the nearest facet.
+    pub fn nearest(&self, point: Point) -> Option<Point> {
+        let mut nearest = None;
+        let mut best = f64::INFINITY;
+        self.within(point, &mut best, &mut |squared, facet, best| {
+            *best = squared;
+            nearest = Some(distance::from_point(point, &self.triangle(facet)).1);
+        });
+        nearest
+    }
+
+    fn triangle(&self, facet: u32) -> [Point; 3] {
+        self.facets[facet as usize].map(|v| v.map(|c| c as f64))
+    }
+
+    /// Calls `visit` with the squared distance and the number of every facet that is nearer than the square root of
+    /// `limit`, which `visit` may lower.
+    fn within(&self, point: Point, limit: &mut f64, visit: &mut impl FnMut(f64, u32, &mut f64)) {
+        let Some(boxes) = &self.boxes else { return };
+        boxes.search(
+            |bounds, members| {
+                if bounds.distance_squared_to(point) >= *limit {
+                    return false;
+                }
+                for &facet in members.map_or(&[][..], |m| &boxes.facets[m]) {
+                    let squared = distance::from_point(point, &self.triangle(facet)).0;
+                    if squared < *limit {
+                        visit(squared, facet, limit);
+                    }
+                }
+                true
+            },
+            |bounds| bounds.distance_squared_to(point),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn facets() -> impl Strategy<Value = Vec<FacetLattice>> {
+        let corner = prop::array::uniform3(0i64..4000);
+        // Some facets are segments or points.
+        let facet =
+            (prop::array::uniform3(corner), 0..4).prop_map(|([a, b, c], kind)| match kind {
+                0 => [a, a, a],
+                1 => [a, b, a],
+                _ => [a, b, c],
+            });
+        prop::collection::vec(facet, 1..60)
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_facet_is_found_among_all(facets in facets(), point in prop::array::uniform3(-99.0f64..4099.0)) {
+            let clearance = Clearance::new(&facets);
+            let triangle = |f: &FacetLattice| f.map(|v| v.map(|c| c as f64));
+            let distances: Vec<f64> = facets.iter().map(|f| distance::from_point(point, &triangle(f)).0.sqrt()).collect();
+            let expected = distances.iter().copied().fold(f64::INFINITY, f64::min);
+            prop_assert_eq!(clearance.at(point, f64::INFINITY), expected);
+            prop_assert_eq!(clearance.at(point, expected), expected);
+            let within = clearance.facets_within(point, expected * 1.5 + 1.0);
+            prop_assert_eq!(within.len(), distances.iter().filter(|&&d| d < expected * 1.5 + 1.0).count());
+            prop_assert_eq!(within[0].1, expected);
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Searches for the widest and for a short path in a graph: the free leaves of a base tree, joined where they share part
+//! of a face, or the points of a grid.
+
+use std::collections::BinaryHeap;
+
+use super::leaves::nearest_boundary;
+
+/// Places, numbered from 0, some of which are joined.
+pub trait Graph {
+    /// Number of places.
+    fn count(&self) -> usize;
+    /// Position of a place, in lattice units.
+    fn position(&self, place: u32) -> [f64; 3];
+    /// Whether a place is at the root's boundary.
+    fn is_far(&self, place: u32) -> bool;
+    /// Calls `visit` with every place that is joined to this one.
+    fn joined(&self, place: u32, visit: &mut impl FnMut(u32));
+}
+
+/// The end of a search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// A place.
+    Place(u32),
+    /// Any place at the root's boundary.
+    Far,
+}
+
+impl Goal {
+    fn is_reached(self, graph: &impl Graph, place: u32) -> bool {
+        match self {
+            Self::Place(goal) => place == goal,
+            Self::Far => graph.is_far(place),
+        }
+    }
+
+    /// The point of the goal nearest to a point, or its position.
+    fn nearest(self, graph: &impl Graph, at: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Place(goal) => graph.position(goal),
+            Self::Far => nearest_boundary(at),
+        }
+    }
+}
+
+/// The search was interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interrupted;
+
+/// Interrupts are polled once in this many steps.
+const STEPS_PER_POLL: usize = 1 << 14;
+
+const NONE: u32 = u32::MAX;
+
+/// The path from `start` to the goal whose least `width` is greatest; `None` if there is no path. `width` is called with
+/// a place and a neighbour reached before (`start` itself for the first). A place with a negative width is not entered.
+///
+/// Places are taken in order of the least width of the best path to them, so the first path to a place is one of the
+/// widest (Dijkstra's algorithm with the minimum in place of the sum). Of equal ones the widest place is taken first, so
+/// that the search makes for open space once it has passed the narrowest place.
+///
+/// # Errors
+/// If `stop` returns true.
+pub fn widest(
+    graph: &impl Graph,
+    start: u32,
+    goal: Goal,
+    mut width: impl FnMut(u32, u32) -> f32,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Vec<u32>>, Interrupted> {
+    let mut via = vec![NONE; graph.count()];
+    let mut heap = BinaryHeap::new();
+    via[start as usize] = start;
+    // The bit patterns of floats that are not negative are in the order of the floats.
+    let first = width(start, start).to_bits();
+    heap.push((first, first, start));
+    let mut steps = 0;
+    while let Some((least, _, place)) = heap.pop() {
+        if goal.is_reached(graph, place) {
+            return Ok(Some(trace(&via, place)));
+        }
+        steps += 1;
+        if steps % STEPS_PER_POLL == 0 && stop() {
+            return Err(Interrupted);
+        }
+        graph.joined(place, &mut |next| {
+            if via[next as usize] == NONE {
+                via[next as usize] = place;
+                let own = width(next, place);
+                if own >= 0.0 {
+                    heap.push((least.min(own.to_bits()), own.to_bits(), next));
+                }
+            }
+        });
+    }
+    Ok(None)
+}
+
+/// The path of least cost among the places of at least the width `least`; `None` if there is none. A step costs its
+/// length, and up to twice as much where the place that it enters is narrow, so that the path keeps away from facets
+/// where that is not a detour (the A* algorithm).
+///
+/// # Errors
+/// If `stop` returns true.
+pub fn shortest(
+    graph: &impl Graph,
+    start: u32,
+    goal: Goal,
+    least: f32,
+    mut width: impl FnMut(u32, u32) -> f32,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Vec<u32>>, Interrupted> {
+    let (mut via, mut costs) = (vec![NONE; graph.count()], vec![f32::INFINITY; graph.count()]);
+    let at = |place: u32| graph.position(place);
+    let remaining = |place: u32| distance(at(place), goal.nearest(graph, at(place)));
+    let mut heap = BinaryHeap::new();
+    (via[start as usize], costs[start as usize]) = (start, 0.0);
+    heap.push((std::cmp::Reverse(remaining(start).to_bits()), 0, start));
+    let mut steps = 0;
+    while let Some((_, cost, place)) = heap.pop() {
+        let cost = f32::from_bits(cost);
+        if goal.is_reached(graph, place) {
+            return Ok(Some(trace(&via, place)));
+        }
+        if cost > costs[place as usize] {
+            continue;
+        }
+        steps += 1;
+        if steps % STEPS_PER_POLL == 0 && stop() {
+            return Err(Interrupted);
+        }
+        graph.joined(place, &mut |next| {
+            let wide = width(next, place);
+            let narrow = least / wide.max(f32::MIN_POSITIVE);
+            let through = cost + distance(at(place), at(next)) * (1.0 + narrow);
+            if wide >= least && through < costs[next as usize] {
+                (via[next as usize], costs[next as usize]) = (place, through);
+                let estimate = through + remaining(next);
+                heap.push((std::cmp::Reverse(estimate.to_bits()), through.to_bits(), next));
+            }
+        });
+    }
+    Ok(None)
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f32 {
+    (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum::<f64>().sqrt() as f32
+}
+
+/// The places from the start, which is its own predecessor, to a place.
+fn trace(via: &[u32], mut leaf: u32) -> Vec<u32> {
+    let mut path = vec![leaf];
+    while via[leaf as usize] != leaf {
+        leaf = via[leaf as usize];
+        path.push(leaf);
+    }
+    path.reverse();
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::leaves::Leaves;
+    use super::*;
+    use contract::octant::Octant;
+    use contract::testing::words_with_sides;
+    use contract::word::Side;
+    use proptest::prelude::*;
+
+    const NEVER: &dyn Fn() -> bool = &|| false;
+
+    /// A random tree with random crossing leaves, and a random width for every leaf.
+    fn random(seed: u64) -> Vec<u64> {
+        let pick = |o: &Octant, salt: u64| {
+            let key = contract::word::key_of(o.corner) << 5 | u64::from(o.level);
+            (contract::digest::mix(key ^ seed.wrapping_mul(salt)) >> 100) as u64
+        };
+        let side = |o: &Octant| if pick(o, 7) % 3 == 0 { Side::Crossing } else { Side::Outside };
+        words_with_sides(|o| o.level < 3 && pick(o, 3) % 5 < 3, |o| Some(side(o)))
+    }
+
+    fn width_of(leaf: u32) -> f32 {
+        ((leaf.wrapping_mul(2654435761) >> 8) % 50) as f32
+    }
+
+    /// The least width of the widest paths to all leaves, by relaxation until nothing changes.
+    fn relaxed(leaves: &Leaves, start: u32) -> Vec<f32> {
+        let mut best = vec![-1.0f32; leaves.len()];
+        best[start as usize] = width_of(start);
+        loop {
+            let mut changed = false;
+            for leaf in (0..leaves.len() as u32).filter(|&l| leaves.is_free(l)) {
+                leaves.neighbours(leaf, &mut |next| {
+                    if leaves.is_free(next) {
+                        let through = best[next as usize].min(width_of(leaf));
+                        changed |= through > best[leaf as usize];
+                        best[leaf as usize] = best[leaf as usize].max(through);
+                    }
+                });
+            }
+            if !changed {
+                return best;
+            }
+        }
+    }
+
+    fn least_width(path: &[u32]) -> f32 {
+        path.iter().map(|&l| width_of(l)).fold(f32::INFINITY, f32::min)
+    }
+
+    proptest! {
+        #[test]
+        fn the_widest_path_is_as_wide_as_relaxation_finds(seed in any::<u64>()) {
+            let words = random(seed);
+            let leaves = Leaves::new(&words).unwrap();
+            let free: Vec<u32> = (0..leaves.len() as u32).filter(|&l| leaves.is_free(l)).collect();
+            prop_assume!(!free.is_empty());
+            let start = free[seed as usize % free.len()];
+            let best = relaxed(&leaves, start);
+            for &goal in free.iter().step_by(1 + free.len() / 20) {
+                let found = widest(&leaves, start, Goal::Place(goal), |l, _| width_of(l), NEVER).unwrap();
+                prop_assert_eq!(found.is_some(), best[goal as usize] >= 0.0);
+                let Some(path) = found else { continue };
+                prop_assert_eq!((path[0], path[path.len() - 1]), (start, goal));
+                let least = least_width(&path);
+                prop_assert_eq!(least, best[goal as usize]);
+                // The path of least cost has the same ends and is as wide.
+                let short = shortest(&leaves, start, Goal::Place(goal), least, |l, _| width_of(l), NEVER);
+                let short = short.unwrap().unwrap();
+                prop_assert!(short[1..].iter().all(|&l| width_of(l) >= least));
+                for path in [path, short] {
+                    let is_joined = path.windows(2).all(|pair| {
+                        let mut joined = false;
+                        leaves.neighbours(pair[0], &mut |next| joined |= next == pair[1]);
+                        joined && leaves.is_free(pair[1])
+                    });
+                    prop_assert!(is_joined);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Whether the facets form a closed surface between two places, which then no path joins at any spacing.
+
+use crate::oracle::watertight::is_watertight;
+use contract::case::Case;
+use contract::lattice::UNITS_PER_EDGE;
+use contract::parity::Parity;
+
+/// Whether a closed surface separates two lattice points off the facets; `to` is `None` for the root's boundary.
+///
+/// If every edge belongs to an even number of facets, all curves from a point to another one that avoid the facets'
+/// edges cross the same number of facets modulo two. If that number is odd, no curve avoids the facets. The result is
+/// exact, but false does not mean that a path exists: an open sheet or two closed surfaces can separate places too.
+pub fn separates(case: &Case, from: [i64; 3], to: Option<[i64; 3]>) -> bool {
+    let facets = &case.facets_lattice;
+    let interior = 1..UNITS_PER_EDGE;
+    let is_interior = || facets.iter().flatten().flatten().all(|c| interior.contains(c));
+    // Without facets at the root's boundary, all of it is outside.
+    if (to.is_none() && !is_interior()) || !is_watertight(facets) {
+        return false;
+    }
+    let parity = Parity::new(facets);
+    let is_odd = |at| parity.inside(at)[0];
+    is_odd(from) != to.is_some_and(is_odd)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron in a root of edge 8, without the facets from number `count`.
+    fn tetrahedron(count: usize) -> Case {
+        let [a, b, c, d] = [[1.0f32; 3], [7.0, 1.0, 1.0], [1.0, 7.0, 1.0], [1.0, 1.0, 7.0]];
+        let facets = [[a, b, c], [a, b, d], [a, c, d], [b, c, d]];
+        let text = "spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0";
+        Case::from_parts(text, facets[..count].to_vec()).unwrap()
+    }
+
+    #[test]
+    fn a_closed_surface_separates_inside_from_outside_and_nothing_else() {
+        let closed = tetrahedron(4);
+        let (inside, outside) = ([2 << 24; 3], [6 << 24; 3]);
+        assert!(separates(&closed, inside, None));
+        assert!(
+            separates(&closed, inside, Some(outside)) && separates(&closed, outside, Some(inside))
+        );
+        assert!(!separates(&closed, outside, None));
+        assert!(!separates(&closed, inside, Some([3 << 23; 3])));
+        assert!(!separates(&tetrahedron(3), inside, None));
+    }
+
+    #[test]
+    fn facets_at_the_boundary_of_the_root_prove_nothing_about_the_far_field() {
+        let mut case = tetrahedron(4);
+        for corner in case.facets_lattice.iter_mut().flatten() {
+            corner[0] -= 1 << 24;
+        }
+        assert!(!separates(&case, [1 << 23, 2 << 24, 2 << 24], None));
+    }
+}

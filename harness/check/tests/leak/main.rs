@@ -1,0 +1,148 @@
+//! Leaks through openings of known width: holes, slits, cracks at T-junctions and missing facets, in several
+//! orientations.
+
+mod openings;
+
+use check::leak::ends::Target;
+use check::leak::report::Report;
+use check::leak::{LeakError, Question, Watch, answer};
+use contract::case::{Case, Facet};
+use contract::lattice::Root;
+use contract::testing::base_tree;
+use openings::{Body, ROTATIONS, bodies, two_holes};
+use std::convert::Infallible;
+
+/// Neither the bodies' centre nor their walls are in the planes of cells.
+const ROOT: Root = Root { origin: [-3.91, -4.13, -4.07], edge: 8.0 };
+
+struct Silent;
+
+impl Watch for Silent {
+    fn step(&self, _: &str) {}
+
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+fn case(facets: &[Facet], level: u8) -> Case {
+    let spacing = ROOT.edge / f64::from(1u32 << level);
+    let Root { origin, edge } = ROOT;
+    let text = format!("spacing_min = {spacing:?}\n[root]\norigin = {origin:?}\nedge = {edge:?}");
+    Case::from_parts(&text, facets.to_vec()).unwrap()
+}
+
+fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report, LeakError<Infallible>> {
+    let question = Question { case, from, to, leaves_max: 1_000_000 };
+    answer(&question, |level| Ok(base_tree(&case.facets_lattice, level)), &Silent)
+        .map(|answer| answer.report)
+}
+
+fn from_centre(facets: &[Facet], level: u8) -> Report {
+    ask(&case(facets, level), [0.0; 3], Target::Far).unwrap()
+}
+
+/// The narrowest place is the opening: its width to half a percent, and its rim.
+fn assert_describes(report: &Report, body: &Body, what: &str) {
+    let passage = report.passage.as_ref().unwrap();
+    let narrowest = &passage.narrowest;
+    let error = narrowest.width / body.width - 1.0;
+    assert!(error.abs() < 0.005, "{what}: width {} instead of {}", narrowest.width, body.width);
+    let (rim, near) = (body.at_rim(2), body.at_rim(1));
+    assert!(!narrowest.facets.is_empty() && !narrowest.is_end, "{what}");
+    assert!(narrowest.facets.iter().all(|f| near.contains(f)), "{what}: {:?}", narrowest.facets);
+    if body.is_round {
+        assert!(rim.iter().all(|f| narrowest.facets.contains(f)), "{what}: {:?}", narrowest.facets);
+    }
+    let points = &passage.points;
+    assert!(points.iter().all(|p| p.width >= narrowest.width * 0.998), "{what}");
+    let passes = points.windows(2).filter(|pair| body.passes(pair[0].at, pair[1].at)).count();
+    assert_eq!(passes % 2, 1, "{what}: the path crosses the opening {passes} times");
+}
+
+#[test]
+fn the_widest_path_leads_through_the_opening_and_its_width_and_rim_are_right() {
+    for body in bodies() {
+        for (turn, rotation) in ROTATIONS.into_iter().enumerate() {
+            let body = body.rotated(rotation);
+            let what = format!("{}, rotation {turn}", body.name);
+            // An opening wider than 2 sqrt(3) cells joins the leaves at both sides.
+            let wide = ROOT.level_for(body.width / 12f64.sqrt()).unwrap();
+            let report = from_centre(&body.facets, wide);
+            assert!(report.is_leak && report.opens.is_none(), "{what}");
+            assert_describes(&report, &body, &what);
+            // One narrower than a cell does not.
+            let closes = report.closes.expect("a coarse tree is closed");
+            assert!(closes.spacing > body.width / 12f64.sqrt(), "{what}");
+            assert!(closes.spacing / 2.0 <= body.width, "{what}");
+
+            let closed = from_centre(&body.facets, closes.level);
+            assert!(!closed.is_leak && closed.limit.is_none(), "{what}");
+            assert_eq!(closed.opens.unwrap().level, closes.level + 1, "{what}");
+            assert_describes(&closed, &body, &format!("{what}, when it opens"));
+            let (last, open) = report.levels.split_last().unwrap();
+            assert!(!last.is_joined && open.iter().all(|level| level.is_joined), "{what}");
+        }
+    }
+}
+
+#[test]
+fn of_several_openings_the_widest_is_reported_even_if_they_differ_little() {
+    for rotation in ROTATIONS {
+        // The radii differ by an eighth of a cell.
+        for (level, radius, opposite) in [(7, 0.2, 0.19), (8, 0.15, 0.145), (8, 0.1, 0.096)] {
+            let body = two_holes(radius, opposite);
+            let body = body.rotated(rotation);
+            let report = from_centre(&body.facets, level);
+            assert_describes(&report, &body, &format!("level {level}, radius {radius}"));
+        }
+    }
+}
+
+#[test]
+fn a_closed_body_never_opens_and_that_is_proven_without_refinement() {
+    let body = &bodies()[3];
+    let rim: Facet = [0, 1, 2].map(|i| body.rim[i].map(|c| c as f32));
+    let closed: Vec<Facet> = body.facets.iter().copied().chain([rim]).collect();
+    let report = from_centre(&closed, 4);
+    assert!(!report.is_leak && report.is_separated && report.passage.is_none());
+    assert_eq!(report.levels.len(), 1);
+}
+
+#[test]
+fn refinement_ends_at_the_limit_of_leaves_and_that_is_reported() {
+    let body = bodies().remove(2);
+    let case = case(&body.facets, 3);
+    let question = Question { case: &case, from: [0.0; 3], to: Target::Far, leaves_max: 10_000 };
+    let report = answer(
+        &question,
+        |level| Ok::<_, Infallible>(base_tree(&case.facets_lattice, level)),
+        &Silent,
+    );
+    let report = report.unwrap().report;
+    assert!(!report.is_leak && report.opens.is_none());
+    assert!(report.limit.unwrap().contains("more than the limit of 10000"));
+    assert!(report.levels.len() > 1 && report.levels.iter().all(|l| l.leaves <= 10_000));
+}
+
+#[test]
+fn a_path_to_a_point_ends_in_its_leaf_and_bad_points_are_input_errors() {
+    let body = bodies().remove(0);
+    let case = case(&body.facets, 8);
+    let report = ask(&case, [0.0; 3], Target::Point([0.0, 0.0, 3.0])).unwrap();
+    assert_describes(&report, &body, "to a point");
+    let passage = report.passage.unwrap();
+    let last = passage.points.last().unwrap().at;
+    assert!((last[2] - 3.0).abs() < 1.0, "{last:?}");
+    let same = ask(&case, [0.0; 3], Target::Point([0.01; 3])).unwrap();
+    assert!(same.is_leak && same.passage.unwrap().narrowest.is_end);
+    let why = |from, to| match ask(&case, from, to) {
+        Err(LeakError::Input(why)) => why,
+        other => panic!("{other:?}"),
+    };
+    assert!(why([9.0; 3], Target::Far).contains("--from [9.0, 9.0, 9.0] is outside the root"));
+    let crossing = why([0.3, 0.2, -1.0], Target::Far);
+    assert!(crossing.contains("--from") && crossing.contains("nearest centre"), "{crossing}");
+    let crossing = why([0.0; 3], Target::Point([0.3, 0.2, -1.0]));
+    assert!(crossing.contains("--to") && crossing.contains("nearest centre"), "{crossing}");
+}

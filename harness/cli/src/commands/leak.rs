@@ -1,0 +1,205 @@
+//! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
+
+use super::programs::ProgramArguments;
+use super::values::cell_count;
+use check::leak::ends::Target;
+use check::leak::report::Report;
+use check::leak::{Answer, LeakError, Question, Watch, answer};
+use clap::Args;
+use contract::case::Case;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use report::leak::{picture, polyline};
+use report::write::replace;
+use run::base_tree::BaseTrees;
+use run::engine::interrupt;
+use run::engine::programs::Programs;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// `harness leak`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Two places are joined if a path of leaves of the base tree that no facet touches leads from one to the other, through \
+shared parts of faces. The widest path is the one whose narrowest place is widest. The width of a place is the diameter \
+of the largest ball centred there that no facet enters; the narrowest place is reported with the width of the largest \
+ball that passes it, to within 1 %.
+
+Examples:
+  harness leak car.toml --from 0,0,1                     does the cabin leak?
+  harness leak duct.toml --from 0,0,0 --to 9,0,0         are two rooms joined?
+  harness leak car.toml --from 0,0,1 --picture leak.svg --vtk leak.vtp
+
+Exit codes: 0 no path at the case's spacing; 1 a path was found; 2 invalid input; 3 mesher and reference are missing; \
+130 interrupted.")]
+pub struct Arguments {
+    /// Name in geometries/catalogue.toml or path of a case file
+    case: String,
+    /// Start of the path [default: the case's first seed]
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    from: Option<[f64; 3]>,
+    /// End of the path: a point, or `far` for the root's boundary
+    #[arg(long, value_name = "X,Y,Z|far", default_value = "far", value_parser = target, allow_hyphen_values = true)]
+    to: Target,
+    /// Write the answer as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the path as a VTK polyline with the free width at each point
+    #[arg(long, value_name = "FILE.vtp", value_parser = with_extension("vtp"))]
+    vtk: Option<PathBuf>,
+    /// Write a picture of a slice through the narrowest place
+    #[arg(long, value_name = "FILE.svg", value_parser = with_extension("svg"))]
+    picture: Option<PathBuf>,
+    /// Refinement in search of an opening ends before a base tree of more leaves
+    #[arg(long, value_name = "N", default_value = "2e7", value_parser = cell_count)]
+    leaves_max: u64,
+    /// Time limit of every single run of the mesher
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    timeout: u64,
+    /// Paths of the programs.
+    #[command(flatten)]
+    programs: ProgramArguments,
+}
+
+/// Searches, prints and writes; returns the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    let answered = answered(arguments).and_then(|(case, answer)| {
+        print!("{}", answer.report);
+        write(arguments, &case, &answer).map_err(|why| (EXIT_INPUT, why))?;
+        Ok(if answer.report.is_leak { EXIT_FAILED } else { EXIT_HOLDS })
+    });
+    answered.unwrap_or_else(|(code, why)| {
+        eprintln!("harness: {why}");
+        code
+    })
+}
+
+fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
+    let input = |why: String| (EXIT_INPUT, why);
+    let programs = Programs::find(arguments.programs.given()).map_err(input)?;
+    let path = programs.paths.catalogue.case_file(&arguments.case, Path::new("")).map_err(input)?;
+    let case = Case::read(&path).map_err(|error| input(error.to_string()))?;
+    let from = arguments.from.or(case.seeds.first().copied()).ok_or_else(|| {
+        input("the case has no seeds: give a start with --from X,Y,Z, in the space that should be closed".into())
+    })?;
+    let engine =
+        [&programs.mesher, &programs.reference].into_iter().find(|e| e.program().is_file());
+    let engine = engine.ok_or_else(|| {
+        let path = programs.mesher.program().display();
+        (
+            EXIT_MISSING,
+            format!("the mesher is missing: build {path}, or give another path with --mesher"),
+        )
+    })?;
+    let limit = Duration::from_secs(arguments.timeout);
+    let mut trees = BaseTrees::new(engine, &path, case.root, limit).map_err(input)?;
+    let question =
+        Question { case: &case, from, to: arguments.to, leaves_max: arguments.leaves_max };
+    let progress = Progress::new();
+    let answer = answer(&question, |level| trees.at(level), &progress);
+    progress.0.finish_and_clear();
+    let answer = answer.map_err(|error| match error {
+        LeakError::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+        LeakError::Source(failure) if failure.is_interrupt() => {
+            (EXIT_INTERRUPTED, "interrupted by the user".to_owned())
+        }
+        LeakError::Source(failure) => (EXIT_INPUT, failure.to_string()),
+        LeakError::Input(why) => (EXIT_INPUT, why),
+    })?;
+    Ok((case, answer))
+}
+
+/// Writes the requested files. Without a path there is none to draw.
+fn write(arguments: &Arguments, case: &Case, answer: &Answer) -> Result<(), String> {
+    let Answer { report, words } = answer;
+    if let Some(file) = &arguments.json {
+        write_json(report, file)?;
+    }
+    let Some(passage) = &report.passage else {
+        if arguments.vtk.is_some() || arguments.picture.is_some() {
+            eprintln!("harness: there is no path to draw, so --vtk and --picture write nothing");
+        }
+        return Ok(());
+    };
+    if let Some(file) = &arguments.vtk {
+        polyline::vtp(passage, file).map_err(|error| error.to_string())?;
+    }
+    if let Some(file) = &arguments.picture {
+        picture::write(case, words, passage, file).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+fn write_json(report: &Report, file: &Path) -> Result<(), String> {
+    let json = serde_json::to_string_pretty(report).map_err(|error| error.to_string())? + "\n";
+    replace(file, |out| out.write_all(json.as_bytes())).map_err(|error| error.to_string())
+}
+
+/// A line on standard error that names the current step, only if that is a terminal.
+struct Progress(ProgressBar);
+
+impl Progress {
+    fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{spinner} [{elapsed}] {wide_msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        Self(bar)
+    }
+}
+
+impl Watch for Progress {
+    fn step(&self, what: &str) {
+        self.0.set_message(what.to_owned());
+    }
+
+    fn is_interrupted(&self) -> bool {
+        interrupt::requested()
+    }
+}
+
+/// Parses three numbers.
+fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let three = numbers.ok().and_then(|n| <[f64; 3]>::try_from(n).ok());
+    three
+        .filter(|p| p.iter().all(|c| c.is_finite()))
+        .ok_or_else(|| "give three numbers: X,Y,Z".to_owned())
+}
+
+fn target(text: &str) -> Result<Target, String> {
+    match text {
+        "far" => Ok(Target::Far),
+        _ => point(text).map(Target::Point).map_err(|why| format!("{why}, or far")),
+    }
+}
+
+/// A parser of file names with an extension: the format does not depend on the name, so another one would mislead.
+fn with_extension(extension: &'static str) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
+    move |text| {
+        let path = PathBuf::from(text);
+        match path.extension().is_some_and(|e| e == extension) {
+            true => Ok(path),
+            false => Err(format!("the file name must end in .{extension}")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_have_three_finite_numbers() {
+        assert_eq!(point("-1, 2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
+        for wrong in ["1,2", "1,2,3,4", "1,2,x", "1,2,nan", ""] {
+            assert!(point(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(target("far"), Ok(Target::Far));
+        assert_eq!(target("0,0,1"), Ok(Target::Point([0.0, 0.0, 1.0])));
+        assert!(with_extension("vtp")("a.vtk").unwrap_err().contains(".vtp"));
+    }
+}

@@ -1,0 +1,123 @@
+//! `harness leak` against a scripted mesher, whose base trees are those of a box without a lid.
+
+use contract::case::Case;
+use contract::testing::{base_tree, leaf_set};
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Copies the base tree of the spacing in the case file.
+const MESHER: &str = r#"#!/bin/sh
+spacing=$(sed -n 's/^spacing_min = //p' "$1")
+from="$(dirname "$0")/$spacing"
+while [ $# -gt 0 ]; do
+    case "$1" in
+    --out) cp -r "$from" "$2" ;;
+    --json) echo '{"cells": 1, "digest": "", "ranks": 1, "time_wall_s": 0.5, "peak_rss_bytes": [9]}' > "$2" ;;
+    esac
+    shift
+done
+"#;
+
+const ROOT: &str = "[root]\norigin = [-8.1, -8.2, -8.3]\nedge = 16.0\n";
+const SPACINGS: [&str; 6] = ["16.0", "8.0", "4.0", "2.0", "1.0", "0.5"];
+
+struct Fixture(TempDir);
+
+impl Fixture {
+    /// A box from -2 to 2 without the wall at the highest z, and its base trees.
+    fn new() -> Self {
+        let fixture = Self(tempfile::tempdir().unwrap());
+        fs::create_dir(fixture.path("tmp")).unwrap();
+        let text = format!("geometry = \"box.stl\"\nspacing_min = 0.5\n{ROOT}");
+        fs::write(fixture.path("case.toml"), text).unwrap();
+        let mut stl = "solid box\n".to_owned();
+        for (axis, side) in [(0, -2.0), (0, 2.0), (1, -2.0), (1, 2.0), (2, -2.0)] {
+            let corner = |u: f64, v: f64| {
+                let mut at = [side; 3];
+                (at[(axis + 1) % 3], at[(axis + 2) % 3]) = (u, v);
+                at
+            };
+            let [a, b, c, d] =
+                [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)].map(|(u, v)| corner(u, v));
+            for facet in [[a, b, c], [a, c, d]] {
+                let vertices = facet.map(|[x, y, z]| format!("vertex {x} {y} {z}\n")).concat();
+                stl += &format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n");
+            }
+        }
+        fs::write(fixture.path("box.stl"), stl + "endsolid box\n").unwrap();
+        let case = Case::read(&fixture.path("case.toml")).unwrap();
+        for (level, spacing) in (0..).zip(SPACINGS) {
+            let tree = fixture.path(spacing);
+            fs::create_dir(&tree).unwrap();
+            leaf_set(vec![base_tree(&case.facets_lattice, level)]).write(&tree).unwrap();
+        }
+        let mesher = fixture.path("mesher");
+        fs::write(&mesher, MESHER).unwrap();
+        fs::set_permissions(&mesher, fs::Permissions::from_mode(0o755)).unwrap();
+        fixture
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Exit code, and standard output and error, of `harness leak case.toml`.
+    fn leak(&self, arguments: &[&str]) -> (i32, String) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(["leak", "case.toml", "--mesher", "mesher"]).args(arguments);
+        let output =
+            command.current_dir(self.0.path()).env("TMPDIR", self.path("tmp")).output().unwrap();
+        let text =
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+        assert_eq!(fs::read_dir(self.path("tmp")).unwrap().count(), 0, "temporary files remain");
+        (output.status.code().unwrap(), text)
+    }
+}
+
+#[test]
+fn a_leak_is_described_in_text_json_vtk_and_a_picture() {
+    let fixture = Fixture::new();
+    let files = ["--json", "leak.json", "--vtk", "leak.vtp", "--picture", "leak.svg"];
+    let (code, text) = fixture.leak(&[&["--from", "0,0,0"], &files[..]].concat());
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("LEAK") && text.contains("to        the far field"), "{text}");
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(fixture.path("leak.json")).unwrap()).unwrap();
+    assert_eq!(
+        (json["schema"].as_str(), json["is_leak"].as_bool()),
+        (Some("octree-leak/1"), Some(true))
+    );
+    let width = json["passage"]["narrowest"]["width"].as_f64().unwrap();
+    assert!((width / 4.0 - 1.0).abs() < 0.01, "{width}");
+    let closes = json["closes"]["spacing"].as_f64().unwrap();
+    assert!((4.0 / 3.47..=8.0).contains(&closes), "{closes}");
+    let line = fs::read_to_string(fixture.path("leak.vtp")).unwrap();
+    assert!(line.contains("PolyData") && line.contains("width"), "{line}");
+    assert!(fs::read_to_string(fixture.path("leak.svg")).unwrap().starts_with("<svg"));
+}
+
+#[test]
+fn invalid_input_is_refused_in_one_sentence() {
+    let fixture = Fixture::new();
+    let refused = |arguments: &[&str], why: &str| {
+        let (code, text) = fixture.leak(arguments);
+        assert!(code == 2 && text.contains(why), "{code}: {text}");
+    };
+    refused(&[], "give a start with --from X,Y,Z");
+    refused(&["--from", "0,0"], "give three numbers");
+    refused(&["--from", "0,0,-2"], "the nearest centre of a free leaf is");
+    refused(&["--from", "0,0,90"], "outside the root");
+    refused(&["--from", "0,0,0", "--to", "0,-2,0"], "--to");
+    refused(&["--from", "0,0,0", "--vtk", "leak.vtk"], "must end in .vtp");
+}
+
+#[test]
+fn missing_programs_have_their_own_exit_code() {
+    let fixture = Fixture::new();
+    fs::remove_file(fixture.path("mesher")).unwrap();
+    let (code, text) = fixture.leak(&["--from", "0,0,0", "--reference", "/nowhere"]);
+    assert!(code == 3 && text.contains("the mesher is missing"), "{code}: {text}");
+}

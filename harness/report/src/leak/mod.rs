@@ -1,0 +1,5 @@
+//! Leaks: the path as a polyline for VTK ([`polyline`]), and a slice through its narrowest place ([`picture`]).
+
+pub mod picture;
+pub mod polyline;
+mod section;

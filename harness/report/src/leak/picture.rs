@@ -1,0 +1,209 @@
+//! A slice through the narrowest place of a leak as SVG: the plane that contains the direction of the path and a point
+//! of the rim. It shows the leaves, the section of the facets, the largest ball that passes and the path.
+
+use super::section::{Planar, Window};
+use crate::figure::canvas::{Anchor, Canvas, DOTTED, FAINT, INK, SIZE, WIDTH, width};
+use crate::figure::palette::{colour, hex};
+use crate::write::replace;
+use check::geometry::distance::{cross, dot, sub};
+use check::geometry::meaning::number;
+use check::leak::report::Passage;
+use contract::case::Case;
+use contract::word::{self, Side};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Half of the window's edge, in widths of the narrowest place and in cells; the larger one counts.
+const HALF: (f64, f64) = (2.0, 6.0);
+/// Space above the window for the legend, and below it for the scale.
+const MARGIN: (f64, f64) = (150.0, 190.0);
+/// Space at the left and at the right of the window.
+const SIDES: f64 = 40.0;
+/// Fill of crossing leaves.
+const CROSSING: &str = "#D9D9D9";
+
+/// Writes the slice; `words` are the leaves of the base tree that the path leads through.
+///
+/// # Errors
+/// If the file cannot be written; the message names it.
+pub fn write(case: &Case, words: &[u64], passage: &Passage, path: &Path) -> io::Result<()> {
+    let text = svg(case, words, passage);
+    replace(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// The slice as an SVG document.
+pub fn svg(case: &Case, words: &[u64], passage: &Passage) -> String {
+    let window = window(passage);
+    let mut canvas = Canvas::new("leak");
+    draw_leaves(&mut canvas, &window, case, words);
+    draw_facets(&mut canvas, &window, case);
+    draw_passage(&mut canvas, &window, passage);
+    let (left, top) = on_page(&window, [-window.half, window.half]);
+    let (right, bottom) = on_page(&window, [window.half, -window.half]);
+    canvas.frame((left, top), (right, bottom));
+    draw_legend(&mut canvas);
+    draw_scale(&mut canvas, &window, passage);
+    let title =
+        format!("The narrowest place of the widest path, {} wide", number(passage.narrowest.width));
+    canvas.document(&title, (bottom + MARGIN.1) as u32)
+}
+
+/// The square around the narrowest place. Its abscissa is the direction of the path.
+fn window(passage: &Passage) -> Window {
+    let narrowest = &passage.narrowest;
+    let along = narrowest.direction;
+    let to_rim = sub(narrowest.touches, narrowest.at);
+    let across = perpendicular(to_rim, along).unwrap_or_else(|| {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        axes.into_iter().find_map(|axis| perpendicular(axis, along)).expect("two axes differ")
+    });
+    let half = (HALF.0 * narrowest.width).max(HALF.1 * passage.spacing.spacing);
+    Window { centre: narrowest.at, axes: [along, across], half }
+}
+
+/// The unit vector perpendicular to `along` in the plane of both; `None` if they are nearly parallel.
+fn perpendicular(v: [f64; 3], along: [f64; 3]) -> Option<[f64; 3]> {
+    let w = cross(along, cross(v, along));
+    let length = dot(w, w).sqrt();
+    (length > 0.1 * dot(v, v).sqrt()).then(|| w.map(|c| c / length))
+}
+
+fn on_page(window: &Window, p: Planar) -> (f64, f64) {
+    let edge = f64::from(WIDTH) - 2.0 * SIDES;
+    let scale = edge / (2.0 * window.half);
+    (SIDES + (p[0] + window.half) * scale, MARGIN.0 + (window.half - p[1]) * scale)
+}
+
+fn draw_leaves(canvas: &mut Canvas, window: &Window, case: &Case, words: &[u64]) {
+    let (mut crossing, mut free) = (Vec::new(), Vec::new());
+    let reach = window.half * 2f64.sqrt();
+    for &w in words {
+        let (low, high) = word::octant(w).bounds();
+        let (low, high) = (case.root.to_user(low), case.root.to_user(high));
+        let is_near = (0..3)
+            .all(|a| low[a] <= window.centre[a] + reach && high[a] >= window.centre[a] - reach);
+        let polygon = if is_near { window.of_box(low, high) } else { Vec::new() };
+        if polygon.len() > 2 {
+            let polygon: Vec<_> = polygon.into_iter().map(|p| on_page(window, p)).collect();
+            if w & 3 == Side::Crossing as u64 { crossing.push(polygon) } else { free.push(polygon) }
+        }
+    }
+    canvas.polygons(&free, "none", FAINT);
+    canvas.polygons(&crossing, CROSSING, FAINT);
+}
+
+fn draw_facets(canvas: &mut Canvas, window: &Window, case: &Case) {
+    for facet in &case.facets {
+        if let Some(ends) = window.of_facet(facet.map(|v| v.map(f64::from))) {
+            canvas.line(&ends.map(|p| on_page(window, p)), INK, 5.0, None);
+        }
+    }
+}
+
+fn draw_passage(canvas: &mut Canvas, window: &Window, passage: &Passage) {
+    for pair in passage.points.windows(2) {
+        if let Some(ends) =
+            window.of_segment([window.project(pair[0].at), window.project(pair[1].at)])
+        {
+            canvas.line(&ends.map(|p| on_page(window, p)), &hex(colour(0)), 5.0, None);
+        }
+    }
+    let radius = passage.narrowest.width / 2.0;
+    let on_circle = |i: usize| {
+        let (sin, cos) = (i as f64 * std::f64::consts::TAU / 96.0).sin_cos();
+        on_page(window, [radius * cos, radius * sin])
+    };
+    let circle: Vec<_> = (0..=96).map(on_circle).collect();
+    canvas.line(&circle, &hex(colour(1)), 6.0, None);
+}
+
+fn draw_legend(canvas: &mut Canvas) {
+    let entries = [
+        ("leaf crossed by facets", None),
+        ("facets", Some(INK.to_owned())),
+        ("projected path", Some(hex(colour(0)))),
+        ("largest ball", Some(hex(colour(1)))),
+    ];
+    let (mut x, y) = (SIDES, 70.0);
+    for (name, line) in entries {
+        match line {
+            Some(ink) => canvas.line(&[(x, y), (x + 50.0, y)], &ink, 6.0, None),
+            None => {
+                let box_ =
+                    vec![(x, y - 22.0), (x + 50.0, y - 22.0), (x + 50.0, y + 22.0), (x, y + 22.0)];
+                canvas.polygons(&[box_], CROSSING, FAINT);
+            }
+        }
+        canvas.text(name, (x + 64.0, y), Anchor::Start);
+        x += 64.0 + width(name) + 46.0;
+    }
+}
+
+/// A bar as long as a cell of the base tree and one as long as the width, and the place and orientation of the plane.
+fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
+    let narrowest = &passage.narrowest;
+    let (left, bottom) = on_page(window, [-window.half, -window.half]);
+    let length = |l: f64| on_page(window, [l, 0.0]).0 - on_page(window, [0.0, 0.0]).0;
+    let bars = [
+        (format!("width {}", number(narrowest.width)), narrowest.width, hex(colour(1)), None),
+        (
+            format!("cell {}", number(passage.spacing.spacing)),
+            passage.spacing.spacing,
+            INK.to_owned(),
+            Some(DOTTED),
+        ),
+    ];
+    let (mut x, y) = (left, bottom + 46.0);
+    for (name, long, ink, dashes) in bars {
+        canvas.line(&[(x, y), (x + length(long), y)], &ink, 8.0, dashes);
+        canvas.text(&name, (x + length(long) + 16.0, y), Anchor::Start);
+        x += length(long) + width(&name) + 70.0;
+    }
+    let vector = |v: [f64; 3]| {
+        let [x, y, z] = v.map(|c| format!("{:?}", (c * 1e3).round() / 1e3 + 0.0));
+        format!("({x}, {y}, {z})")
+    };
+    let centre = narrowest.at.map(|c| format!("{:?}", c as f32)).join(", ");
+    let [along, across] = window.axes.map(vector);
+    canvas.text(&format!("centre ({centre})"), (left, y + SIZE + 10.0), Anchor::Start);
+    let axes = format!("to the right {along}, upwards {across}");
+    canvas.text(&axes, (left, y + 2.0 * (SIZE + 8.0)), Anchor::Start);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use check::leak::report::{Narrowest, Point, Spacing};
+    use contract::testing::words_with_sides;
+
+    #[test]
+    fn the_slice_shows_leaves_facets_path_and_ball() {
+        let facet = [[2.0f32, 0.0, 0.0], [2.0, 8.0, 0.0], [2.0, 0.0, 8.0]];
+        let text = "spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0";
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let side = |corner: u32| if corner == 1 << 17 { Side::Crossing } else { Side::Outside };
+        let words = words_with_sides(|o| o.level < 3, |o| Some(side(o.corner[0])));
+        let point = |x: f64| Point { at: [x, 4.5, 4.5], width: 1.0 };
+        let passage = Passage {
+            spacing: Spacing::of(3, &case.root),
+            narrowest: Narrowest {
+                at: [2.0, 4.5, 4.5],
+                width: 1.0,
+                width_cells: 1.0,
+                direction: [1.0, 0.0, 0.0],
+                touches: [2.0, 4.0, 4.5],
+                facets: vec![0],
+                index: 1,
+                is_end: false,
+            },
+            length: 3.0,
+            points: vec![point(1.0), point(2.0), point(4.0)],
+        };
+        let svg = svg(&case, &words, &passage);
+        assert!(svg.contains("width 1.00") && svg.contains("cell 1.00"));
+        let strokes = |ink: &str| svg.matches(&format!("stroke=\"{ink}\"")).count();
+        // Two segments of the path and its symbol, the ball with its symbol and the bar.
+        assert_eq!((strokes(&hex(colour(0))), strokes(&hex(colour(1)))), (3, 3));
+        assert_eq!(svg.matches(CROSSING).count(), 2);
+    }
+}
