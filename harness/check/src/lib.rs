@@ -4,6 +4,7 @@
 //! - [`checks`]: one file per property; [`audit`](mod@audit): the checks that need only the leaves, for meshes of any size;
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
 //! - [`geometry`]: diagnosis of a geometry before it is meshed;
+//! - [`promises`]: what an engine guarantees, and so what is checked;
 //! - [`oracle`]: the sample points of the oracles, and the evaluation of their answers;
 //! - [`selftest`]: corrupted meshes that the checks must detect.
 
@@ -12,4 +13,5 @@ pub mod checks;
 pub mod diff;
 pub mod geometry;
 pub mod oracle;
+pub mod promises;
 pub mod selftest;

@@ -16,21 +16,27 @@ pub mod identical;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
+mod premise;
+mod promised;
+mod region;
 mod result;
 pub mod sides;
 pub mod spacing;
 mod subject;
+mod surface;
 mod terms;
 pub mod trail;
 
+pub use premise::note_missing;
+pub use promised::promised;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::Subject;
 use subject::valid_leaves;
 pub use terms::Terms;
 pub(crate) use terms::interiors_meet;
 
-/// Runs all checks, in the order in which their findings are most helpful. `identical` is omitted without a
-/// reference.
+/// Runs all checks of the definition, in the order in which their findings are most helpful. `identical` is omitted
+/// without a reference.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
     let mut results = vec![
         manifest::check(subject),
@@ -42,6 +48,7 @@ pub fn all(subject: &Subject) -> Vec<CheckResult> {
         balance::check(subject),
         layer::check(subject),
     ];
+    note_missing(&mut results, subject.tree_with_deleted(), subject.tree_base(), &subject.terms);
     results.extend(identical::check(subject));
     results
 }

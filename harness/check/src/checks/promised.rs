@@ -1,0 +1,64 @@
+//! The checks of promises that an engine makes instead of the definition. They need the leaves and the geometry only:
+//! no base tree, no reference, and no sides.
+
+use super::facets::Facets;
+use super::region::{BAND_CELLS, Survey};
+use super::surface::Crossed;
+use super::{CheckResult, Terms, balance, complete, layer, note_missing, spacing};
+use crate::promises::Promises;
+use contract::case::Case;
+use contract::manifest::Keep;
+use contract::parity::Parity;
+use contract::tree::Tree;
+
+/// Checks what is promised about a mesh, in the order in which findings are most helpful. Without a case, promises that
+/// concern the geometry have nothing to check.
+pub fn promised(
+    tree: &Tree,
+    terms: &Terms,
+    case: Option<&Case>,
+    promises: &Promises,
+) -> Vec<CheckResult> {
+    let geometry = case.map(|case| {
+        (Facets::new(&case.facets_lattice), Parity::new(&case.facets_lattice))
+    });
+    let mut results = Vec::new();
+    let without = |name| CheckResult::nothing(name, "the geometry is unknown without a case");
+    let survey = geometry.as_ref().map(|(facets, parity)| Survey {
+        tree,
+        terms,
+        facets,
+        parity,
+        band_cells: promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells),
+    });
+    let crossed =
+        geometry.as_ref().map(|(facets, _)| Crossed::new(facets, terms, promises.surface));
+    if promises.complete {
+        // If nothing is deleted, every hole is an error, and no geometry is needed to see it.
+        results.push(match (&survey, terms.keep == Keep::All && terms.keep_crossing) {
+            (_, true) => complete::check_holes(tree, terms),
+            (Some(survey), _) => survey.check_complete(),
+            (None, _) => without("complete"),
+        });
+    }
+    if promises.surface.is_some() {
+        results.push(crossed.as_ref().map_or_else(|| without("surface"), |c| c.check(tree)));
+    }
+    if promises.boxes {
+        results.push(spacing::check_boxes(tree, terms));
+    }
+    if promises.sides.is_some() {
+        results.push(survey.as_ref().map_or_else(|| without("sides"), Survey::check_sides));
+    }
+    if let Some(touching) = promises.balance {
+        results.push(balance::check_touching(tree, &terms.root, touching, promises.levels()));
+    }
+    if promises.layers {
+        results.push(match &crossed {
+            Some(crossed) => layer::check_tree(&crossed.labelled(tree), terms),
+            None => layer::check_tree(tree, terms),
+        });
+    }
+    note_missing(&mut results, tree, None, terms);
+    results
+}
