@@ -8,7 +8,6 @@
 use super::facets::Facets;
 use super::{CheckResult, Terms, contact};
 use contract::lattice::UNITS_PER_EDGE;
-use contract::manifest::Keep;
 use contract::octant::Octant;
 use contract::parity::Parity;
 use contract::tree::{Handle, Kind, Tree};
@@ -69,14 +68,13 @@ impl Survey<'_> {
         self.unless_examined(result)
     }
 
-    /// Checks that the leaves fill the region to be kept, and nothing else.
+    /// Checks that the leaves fill the region to be kept, and nothing else. A hole that the geometry crosses is a finding
+    /// only if the band has no width.
     pub fn check_complete(&self) -> CheckResult {
         let mut result = CheckResult::new("complete");
-        let everything = self.terms.keep == Keep::All && self.terms.keep_crossing;
         let exact = self.band_cells == 0.0 && self.terms.keep_crossing;
         self.visit(&mut |octant, kind, position| {
             let wanted = match position {
-                _ if everything => Some(true),
                 Position::On(side) => Some(self.terms.keeps(side as Kind)),
                 Position::Near => (exact && kind.is_none()).then_some(true),
                 Position::Undecided => None,

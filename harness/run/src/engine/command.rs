@@ -42,6 +42,7 @@ fn add_values_of_run(values: &mut Values, case: &Path, layout: &Layout, options:
     values.extend([
         ("case", text(case)),
         ("ranks", layout.ranks.count().to_string()),
+        ("threads", layout.threads.unwrap_or(1).to_string()),
         ("json", text(&options.report_path())),
         ("status", text(&options.status_path())),
     ]);
@@ -92,9 +93,9 @@ fn appended<'a>(
     if options.ungraded && templates.ungraded.is_none() {
         return Err(cannot("stopped at the base tree", "`ungraded`"));
     }
-    let mesh = options.mesh.is_some() || templates.json.is_none();
+    let mesh = options.mesh.is_some() || templates.always_writes_mesh();
     let parts = [
-        (mesh, Some(&templates.out)),
+        (mesh, templates.out.as_ref()),
         (options.report, templates.json.as_ref()),
         (options.report && options.message_matrix, templates.message_matrix.as_ref()),
         (options.status, templates.status.as_ref()),
@@ -102,6 +103,7 @@ fn appended<'a>(
         (layout.partitioner.is_some(), templates.partitioner.as_ref()),
         (layout.level_base.is_some(), templates.level_base.as_ref()),
         (layout.weights.is_some(), templates.weights.as_ref()),
+        (layout.threads.is_some(), templates.threads.as_ref()),
     ];
     let requested = parts.into_iter().filter(|(needed, _)| *needed);
     Ok(requested.filter_map(|(_, template)| template).flatten().collect())

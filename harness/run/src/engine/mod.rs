@@ -16,3 +16,4 @@ pub mod programs;
 pub mod report;
 pub mod runner;
 mod session;
+pub mod takes;
