@@ -1,5 +1,6 @@
 //! The options of a verification.
 
+use crate::engine::description::Templates;
 use crate::engine::layout::{Layout, Ranks};
 use contract::catalogue::Size;
 use std::fmt;
@@ -17,6 +18,8 @@ pub enum Need {
     P4est,
     /// The geometries that are downloaded and not kept in the repository.
     Geometries,
+    /// At least one check of every case.
+    Checks,
 }
 
 impl fmt::Display for Need {
@@ -26,6 +29,7 @@ impl fmt::Display for Need {
             Self::Oracles => "oracles",
             Self::P4est => "p4est",
             Self::Geometries => "geometries",
+            Self::Checks => "checks",
         })
     }
 }
@@ -90,15 +94,21 @@ impl Options {
         }
     }
 
-    /// Every layout of a run on MPI, in the order of rank counts.
-    pub fn layouts(&self) -> Vec<Layout> {
+    /// Every layout of a run on MPI, in the order of rank counts. A choice that the engine does not offer is not varied.
+    pub fn layouts(&self, templates: &Templates) -> Vec<Layout> {
+        let varied = |offered: bool, values: &[String]| match offered {
+            true => values.iter().cloned().map(Some).collect(),
+            false => vec![None],
+        };
+        let partitioners = varied(templates.partitioner.is_some(), &self.partitioners);
+        let level_bases = varied(templates.level_base.is_some(), &self.level_bases);
         let mut layouts = Vec::new();
         for &ranks in &self.ranks {
-            for partitioner in &self.partitioners {
-                for level_base in &self.level_bases {
+            for partitioner in &partitioners {
+                for level_base in &level_bases {
                     layouts.push(Layout {
-                        partitioner: Some(partitioner.clone()),
-                        level_base: Some(level_base.clone()),
+                        partitioner: partitioner.clone(),
+                        level_base: level_base.clone(),
                         ..Layout::on(Ranks::Mpi(ranks))
                     });
                 }
