@@ -210,7 +210,7 @@ impl Templates {
             None => (&["out"], &["seed", "out"]),
             Some(_) => (&[], &["seed"]),
         };
-        let templates: [(&str, Option<&Vec<String>>, &[&str]); 13] = [
+        let templates: [(_, _, &[&str]); 13] = [
             ("serial", Some(&self.serial), in_command),
             ("parallel", self.parallel.as_ref(), in_command),
             ("simulated", self.simulated.as_ref(), in_simulated),

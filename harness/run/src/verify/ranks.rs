@@ -76,7 +76,10 @@ impl CaseRun<'_> {
             write: true,
         })?;
         self.report().runs.push(meshed.run);
-        self.add(Check::of_layout(layout, RUNS, Outcome::Pass), Some(layout));
+        let mut check = Check::of_layout(layout, RUNS, Outcome::Pass);
+        let is_first = self.report().checks.iter().all(|check| check.ranks.is_none());
+        check.notes.extend(self.needs.mpi_doubt.clone().filter(|_| is_first && check.ranks.is_some()));
+        self.add(check, Some(layout));
         let Some(mesh) = meshed.mesh else { return Ok(()) };
         let results = match self.must_equal_serial(layout) {
             false => self.promised(case, &mesh),
