@@ -129,7 +129,10 @@ mod tests {
         assert!(fault(Promises::default()).contains("empty"));
         assert!(fault(Promises { definition: true, ..balanced.clone() }).contains("includes all"));
         assert!(fault(Promises { ratio: Some(3), ..balanced.clone() }).contains("power of two"));
-        assert!(fault(Promises { ratio: Some(2), layers: true, ..Promises::default() }).contains("without"));
+        assert!(
+            fault(Promises { ratio: Some(2), layers: true, ..Promises::default() })
+                .contains("without")
+        );
         let surface = Some(Surface { tolerance_cells: f64::NAN });
         assert!(fault(Promises { surface, ..Promises::default() }).contains("tolerance_cells"));
         let sides = Some(Sides { band_cells: -1.0 });

@@ -106,13 +106,16 @@ mod tests {
     #[test]
     fn a_plain_case_defines_the_same_mesh() {
         let forms = [(StlForm::Any, true), (StlForm::Ascii, true), (StlForm::Binary, false)];
-        for (facets, (form, text)) in ["20", "5000"].into_iter().flat_map(|f| forms.map(|form| (f, form))) {
+        for (facets, (form, text)) in
+            ["20", "5000"].into_iter().flat_map(|f| forms.map(|form| (f, form)))
+        {
             let place = tempfile::tempdir().unwrap();
             let path = place.path().join("given.toml");
             fs::write(&path, CASE.replace("FACETS", facets)).unwrap();
             let given = Case::read(&path).unwrap();
             let plain = PlainCase::read(&path).unwrap().write(place.path(), form).unwrap();
-            let is_text = fs::read(place.path().join("body.stl")).unwrap().starts_with(b"solid body");
+            let is_text =
+                fs::read(place.path().join("body.stl")).unwrap().starts_with(b"solid body");
             assert_eq!(is_text, text && (form == StlForm::Ascii || facets == "20"));
             let plain = Case::read(&plain).unwrap();
             assert_eq!(

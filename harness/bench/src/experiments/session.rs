@@ -213,8 +213,7 @@ impl Bench<'_> {
 
     /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result.
     fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
-        let promises =
-            &self.runner.programs.labelled(&self.options.engine).description().promises;
+        let promises = &self.runner.programs.labelled(&self.options.engine).description().promises;
         if !promises.is_deterministic() {
             return Ok(());
         }

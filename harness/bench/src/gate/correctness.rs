@@ -14,7 +14,8 @@ use run::verify::{VerifyError, verify};
 /// If verification cannot start.
 pub fn layer(bench: &Bench) -> Result<Layer, GateError> {
     let mut layer = Layer::new(LayerName::Correctness);
-    let runnable = bench.cases_of(LayerName::Correctness).filter_map(|case| case.path.as_ref().ok());
+    let runnable =
+        bench.cases_of(LayerName::Correctness).filter_map(|case| case.path.as_ref().ok());
     let cases: Vec<String> = runnable.map(|path| path.to_string_lossy().into_owned()).collect();
     if cases.is_empty() {
         return Ok(layer);

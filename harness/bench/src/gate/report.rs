@@ -232,7 +232,9 @@ mod tests {
     fn a_layer_has_the_worst_verdict_of_its_findings() {
         let mut layer = Layer::new(LayerName::Time);
         assert_eq!(layer.verdict(), Verdict::LeftOut);
-        for verdict in [Verdict::LeftOut, Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed] {
+        for verdict in
+            [Verdict::LeftOut, Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed]
+        {
             layer.findings.push(Finding::without_numbers("c", "m", verdict, ""));
         }
         assert_eq!(layer.verdict(), Verdict::Inconclusive);

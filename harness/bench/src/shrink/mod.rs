@@ -44,7 +44,11 @@ pub struct Shrunk {
 ///
 /// # Errors
 /// If the engine declines the case, or no program can be run on it.
-pub fn failure(trial: &Trial, probe: &Probe, check: Option<&str>) -> Result<Option<Failure>, Unknown> {
+pub fn failure(
+    trial: &Trial,
+    probe: &Probe,
+    check: Option<&str>,
+) -> Result<Option<Failure>, Unknown> {
     let failures = probe.failures(trial)?;
     Ok(failures.into_iter().find(|failure| check.is_none_or(|name| failure.check == name)))
 }

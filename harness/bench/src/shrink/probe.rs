@@ -187,10 +187,7 @@ impl Probe {
             made.map(|_| self.place.path().join(name).join("mesh")).map_err(|why| why.to_string())
         };
         let (truth, _) = self.truth_engine().ok_or("there is no mesh to compare with")?;
-        Ok([
-            run(&self.engine, trial.ranks, "engine")?,
-            run(truth, Ranks::Serial, "truth")?,
-        ])
+        Ok([run(&self.engine, trial.ranks, "engine")?, run(truth, Ranks::Serial, "truth")?])
     }
 
     fn write(&self, case: &PlainCase) -> Result<PathBuf, Unknown> {

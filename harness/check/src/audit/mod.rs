@@ -154,7 +154,7 @@ fn checks(manifest: &Manifest, pass: Pass, requirements: Requirements) -> Vec<Ch
 /// The checks of the definition that need the leaves only.
 fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
     let terms = Terms::of_manifest(manifest);
-    let (mut results, terms) = match manifest.tree {
+    let (results, terms) = match manifest.tree {
         Kind::Final => {
             let results = vec![
                 checks::complete::check_holes(tree, &terms),
@@ -176,8 +176,7 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
             (results, terms)
         }
     };
-    checks::note_missing(&mut results, tree, None, &terms);
-    results
+    results.into_iter().map(|result| checks::with_premise(result, tree, None, &terms)).collect()
 }
 
 #[cfg(test)]

@@ -36,12 +36,7 @@ impl Facets {
     }
 
     /// The first of some facets that shares a point with a closed box.
-    pub fn first_meeting(
-        &self,
-        candidates: &[u32],
-        low: [i64; 3],
-        high: [i64; 3],
-    ) -> Option<u32> {
+    pub fn first_meeting(&self, candidates: &[u32], low: [i64; 3], high: [i64; 3]) -> Option<u32> {
         candidates.iter().copied().find(|&i| self.0[i as usize].meets(low, high))
     }
 

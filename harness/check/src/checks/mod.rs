@@ -27,7 +27,7 @@ mod surface;
 mod terms;
 pub mod trail;
 
-pub use premise::note_missing;
+pub use premise::with_premise;
 pub use promised::promised;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::Subject;
@@ -38,7 +38,7 @@ pub(crate) use terms::interiors_meet;
 /// Runs all checks of the definition, in the order in which their findings are most helpful. `identical` is omitted
 /// without a reference.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
-    let mut results = vec![
+    let results = [
         manifest::check(subject),
         linear::check(subject),
         complete::check(subject),
@@ -48,7 +48,7 @@ pub fn all(subject: &Subject) -> Vec<CheckResult> {
         balance::check(subject),
         layer::check(subject),
     ];
-    note_missing(&mut results, subject.tree_with_deleted(), subject.tree_base(), &subject.terms);
-    results.extend(identical::check(subject));
-    results
+    let (tree, base) = (subject.tree_with_deleted(), subject.tree_base());
+    let noted = results.map(|result| with_premise(result, tree, base, &subject.terms));
+    noted.into_iter().chain(identical::check(subject)).collect()
 }

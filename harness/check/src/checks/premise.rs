@@ -7,11 +7,17 @@ use contract::word::Side;
 
 const CROSSING: u8 = 1 << Side::Crossing as u8;
 
-/// Marks every result without findings whose premise is missing. `tree` is the mesh, with the deleted crossing leaves
-/// where they are known; `base` is T0.
-pub fn note_missing(results: &mut [CheckResult], tree: &Tree, base: Option<&Tree>, terms: &Terms) {
-    for result in results.iter_mut().filter(|result| result.holds() && result.was_run()) {
-        result.nothing_to_check = missing(result.name, tree, base, terms);
+/// The result of a check, marked if it has no findings because its premise is missing. `tree` is the mesh, with the deleted
+/// crossing leaves where they are known; `base` is T0.
+pub fn with_premise(
+    result: CheckResult,
+    tree: &Tree,
+    base: Option<&Tree>,
+    terms: &Terms,
+) -> CheckResult {
+    match result.holds() && result.was_run() {
+        true => CheckResult { nothing_to_check: missing(result.name, tree, base, terms), ..result },
+        false => result,
     }
 }
 
@@ -74,18 +80,18 @@ mod tests {
     fn a_mesh_of_one_cell_that_claims_level_8_gives_hardly_any_check_something_to_check() {
         let tree = Tree::of_words(&[0]);
         let names = ["spacing", "sides", "balance", "layer"];
-        let mut results: Vec<_> = names.into_iter().map(CheckResult::new).collect();
-        note_missing(&mut results, &tree, None, &terms(4));
-        assert!(results.iter().all(|result| !result.was_run()), "{results:?}");
+        for result in names.into_iter().map(CheckResult::new) {
+            let result = with_premise(result, &tree, None, &terms(4));
+            assert!(!result.was_run(), "{result}");
+        }
     }
 
     #[test]
     fn a_finding_is_never_hidden() {
         let mut result = CheckResult::new("sides");
         result.report("wrong".to_owned());
-        let mut results = [result];
-        note_missing(&mut results, &Tree::of_words(&[0]), None, &terms(4));
-        assert!(results[0].was_run() && !results[0].holds());
+        let result = with_premise(result, &Tree::of_words(&[0]), None, &terms(4));
+        assert!(result.was_run() && !result.holds());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use super::facets::Facets;
 use super::region::{BAND_CELLS, Survey};
 use super::surface::Crossed;
-use super::{CheckResult, Terms, balance, complete, layer, note_missing, spacing};
+use super::{CheckResult, Terms, balance, complete, layer, spacing, with_premise};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::manifest::Keep;
@@ -19,10 +19,10 @@ pub fn promised(
     case: Option<&Case>,
     promises: &Promises,
 ) -> Vec<CheckResult> {
-    let geometry = case.map(|case| {
-        (Facets::new(&case.facets_lattice), Parity::new(&case.facets_lattice))
-    });
+    let geometry =
+        case.map(|case| (Facets::new(&case.facets_lattice), Parity::new(&case.facets_lattice)));
     let mut results = Vec::new();
+    let noted = |result| with_premise(result, tree, None, terms);
     let without = |name| CheckResult::nothing(name, "the geometry is unknown without a case");
     let survey = geometry.as_ref().map(|(facets, parity)| Survey {
         tree,
@@ -36,7 +36,7 @@ pub fn promised(
     if promises.complete {
         // If nothing is deleted, every hole is an error, and no geometry is needed to see it.
         results.push(match (&survey, terms.keep == Keep::All && terms.keep_crossing) {
-            (_, true) => complete::check_holes(tree, terms),
+            (_, true) => noted(complete::check_holes(tree, terms)),
             (Some(survey), _) => survey.check_complete(),
             (None, _) => without("complete"),
         });
@@ -51,14 +51,12 @@ pub fn promised(
         results.push(survey.as_ref().map_or_else(|| without("sides"), Survey::check_sides));
     }
     if let Some(touching) = promises.balance {
-        results.push(balance::check_touching(tree, &terms.root, touching, promises.levels()));
+        let levels = promises.levels();
+        results.push(noted(balance::check_touching(tree, &terms.root, touching, levels)));
     }
     if promises.layers {
-        results.push(match &crossed {
-            Some(crossed) => layer::check_tree(&crossed.labelled(tree), terms),
-            None => layer::check_tree(tree, terms),
-        });
+        let labelled = crossed.map(|crossed| crossed.labelled(tree));
+        results.push(noted(layer::check_tree(labelled.as_ref().unwrap_or(tree), terms)));
     }
-    note_missing(&mut results, tree, None, terms);
     results
 }

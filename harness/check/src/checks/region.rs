@@ -113,8 +113,7 @@ impl Survey<'_> {
         let (low, high) = octant.bounds();
         let cell = (UNITS_PER_EDGE >> self.terms.level_surface) as f64;
         let band = (self.band_cells * cell) as i64;
-        let near =
-            self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
+        let near = self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
         if near.is_empty() {
             return self.uniform(handle, octant, self.position(&octant), visit);
         }

@@ -38,7 +38,9 @@ impl<'a> Crossed<'a> {
             if octant.level < level {
                 result.report_with(|| {
                     let leaf = self.terms.root.describe(&octant);
-                    format!("facet {facet} crosses the leaf {leaf}, which is coarser than level {level}")
+                    format!(
+                        "facet {facet} crosses the leaf {leaf}, which is coarser than level {level}"
+                    )
                 });
             }
         });

@@ -45,7 +45,8 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
         return Err(format!("{} is not a directory", mesh.display()));
     }
     let paths = Paths::find();
-    let engine = arguments.promises.as_ref().map(|name| Description::find(name, &paths)).transpose()?;
+    let engine =
+        arguments.promises.as_ref().map(|name| Description::find(name, &paths)).transpose()?;
     let case = arguments.case.as_ref().map(|name| read_case(name, &paths)).transpose()?;
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)

@@ -194,7 +194,9 @@ impl Templates {
         match needs.iter().find(lacks) {
             Some((of, _, what)) => {
                 let of = format!("{of:?}").to_lowercase();
-                Err(format!("`independent_of` names {of}, but [run] has no {what} with which to vary it"))
+                Err(format!(
+                    "`independent_of` names {of}, but [run] has no {what} with which to vary it"
+                ))
             }
             None => Ok(()),
         }

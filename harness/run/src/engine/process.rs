@@ -232,7 +232,9 @@ mod tests {
     #[test]
     fn what_mpirun_adds_to_an_error_is_not_shown() {
         let rule = "-".repeat(74);
-        let text = format!("too deep\n{rule}\nPrimary job terminated\n{rule}\n{rule}\nmpirun detected\n{rule}\n");
+        let text = format!(
+            "too deep\n{rule}\nPrimary job terminated\n{rule}\n{rule}\nmpirun detected\n{rule}\n"
+        );
         assert_eq!(last_lines(&text), "too deep");
     }
 

@@ -9,8 +9,8 @@ use super::options::RunOptions;
 use super::paths::{Paths, on_path};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
-use contract::leafset::{self, LeafSet};
 use contract::case::Case;
+use contract::leafset::{self, LeafSet};
 use contract::manifest::{self, Manifest, Tree};
 use contract::plain::{PlainCase, StlForm};
 use std::fs;
@@ -48,7 +48,9 @@ impl Engine {
     pub fn find(name: &str, given: Option<&Path>, paths: &Paths) -> Result<Self, String> {
         let description = Description::find(name, paths)?;
         if description.run.serial.is_empty() {
-            return Err(format!("{name} cannot be run: its engine file has no command `serial` in [run]"));
+            return Err(format!(
+                "{name} cannot be run: its engine file has no command `serial` in [run]"
+            ));
         }
         let places = description.places(paths);
         let program = match given {
@@ -149,9 +151,8 @@ impl Engine {
         let mesh = self.mesh_path(options);
         if let Some(mesh) = mesh.as_ref().filter(|mesh| !mesh.join(manifest::FILE).exists()) {
             let tree = if options.ungraded { Tree::Base } else { Tree::Final };
-            self.describe(mesh, case, tree).map_err(|why| {
-                self.unusable(format!("wrote a mesh that cannot be read: {why}"))
-            })?;
+            self.describe(mesh, case, tree)
+                .map_err(|why| self.unusable(format!("wrote a mesh that cannot be read: {why}")))?;
         }
         let report = match &mesh {
             Some(mesh) if !options.report || !self.writes_report() => {

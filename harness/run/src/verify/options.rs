@@ -1,7 +1,8 @@
 //! The options of a verification.
 
-use crate::engine::description::Templates;
+use crate::engine::description::Description;
 use crate::engine::layout::{Layout, Ranks};
+use check::promises::Independence;
 use contract::catalogue::Size;
 use std::fmt;
 use std::path::PathBuf;
@@ -94,9 +95,12 @@ impl Options {
         }
     }
 
-    /// Every layout of a run on MPI, in the order of rank counts. A choice that the engine does not offer is not varied.
-    pub fn layouts(&self, templates: &Templates) -> Vec<Layout> {
-        let varied = |offered: bool, values: &[String]| match offered {
+    /// Every layout of a run on MPI, in the order of rank counts. The partition is varied as far as the engine offers a choice
+    /// and promises that its mesh does not depend on it.
+    pub fn layouts(&self, engine: &Description) -> Vec<Layout> {
+        let templates = &engine.run;
+        let independent = engine.promises.is_independent_of(Independence::Partitioner);
+        let varied = |offered: bool, values: &[String]| match offered && independent {
             true => values.iter().cloned().map(Some).collect(),
             false => vec![None],
         };

@@ -79,7 +79,12 @@ impl CaseRun<'_> {
     pub fn promised(&self, case: &Case, mesh: &LeafSet) -> Vec<CheckResult> {
         let subject = Subject::new(case, mesh);
         let mut results = vec![checks::manifest::check(&subject), checks::linear::check(&subject)];
-        results.extend(checks::promised(subject.tree(), &subject.terms, Some(case), self.promises()));
+        results.extend(checks::promised(
+            subject.tree(),
+            &subject.terms,
+            Some(case),
+            self.promises(),
+        ));
         results
     }
 
