@@ -17,3 +17,4 @@ pub mod report;
 pub mod runner;
 mod session;
 pub mod takes;
+pub mod templates;

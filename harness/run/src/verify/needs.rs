@@ -151,7 +151,8 @@ fn probe_mpi(programs: &Programs, place: &Path) -> Result<Option<String>, String
     let ranks = completed.map_err(|failure| format!("on MPI, {failure}"))?.report.ranks;
     match (engine.writes_report(), ranks) {
         (false, _) => {
-            let why = "the engine has no run report, which would show that its ranks communicate";
+            let why =
+                "it is unknown whether the ranks communicate: the engine writes no run report";
             Ok(Some(why.to_owned()))
         }
         (true, PROBE_RANKS) => Ok(None),
