@@ -19,6 +19,10 @@ pub struct Case {
     pub keep_crossing: bool,
     /// Extent boxes, each with its own spacing.
     pub boxes: Vec<BoxSpec>,
+    /// Points in the flow. If there are any, they and not rays determine the sides.
+    pub seeds: Vec<[f64; 3]>,
+    /// The treatment of outside components that do not reach the boundary of the root.
+    pub enclosed: Enclosed,
 }
 
 /// The cube that the mesh fills.
@@ -75,6 +79,18 @@ impl Keep {
             Keep::All => true,
         }
     }
+}
+
+/// The treatment of outside components that do not reach the boundary of the root, such as a sealed
+/// cavity or the overlap of two closed bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Enclosed {
+    /// They are deleted.
+    #[default]
+    Delete,
+    /// They are kept.
+    Keep,
 }
 
 /// An axis-aligned box with its own spacing.

@@ -1,5 +1,5 @@
 //! Reader of case files: TOML in which an unknown key is an error.
-use crate::case::{BoxSpec, Case, Keep, Root};
+use crate::case::{BoxSpec, Case, Enclosed, Keep, Root};
 use crate::error::Error;
 use crate::stl;
 use serde::Deserialize;
@@ -21,6 +21,10 @@ struct CaseFile {
     root: Option<Root>,
     #[serde(default, rename = "box")]
     boxes: Vec<BoxSpec>,
+    #[serde(default)]
+    seeds: Vec<[f64; 3]>,
+    #[serde(default)]
+    enclosed: Enclosed,
 }
 
 fn layer_cells_min() -> u32 {
@@ -64,6 +68,8 @@ pub fn read(path: &Path) -> Result<Case, Error> {
         keep: file.keep,
         keep_crossing: file.keep_crossing,
         boxes: file.boxes,
+        seeds: file.seeds,
+        enclosed: file.enclosed,
     })
 }
 

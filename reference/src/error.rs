@@ -97,6 +97,34 @@ pub enum Error {
         /// The root.
         root: Root,
     },
+    /// A seed is not finite.
+    #[error("seed {index} is {seed:?}: give three finite numbers")]
+    SeedNotFinite {
+        /// Index of the seed, from 0.
+        index: usize,
+        /// The seed.
+        seed: [f64; 3],
+    },
+    /// A seed lies outside the root.
+    #[error("seed {index} at {seed:?} lies outside the root: {}", remedy(*nearest))]
+    SeedOutside {
+        /// Index of the seed, from 0.
+        index: usize,
+        /// The seed.
+        seed: [f64; 3],
+        /// The nearest centroid of a leaf of T0 that no facet crosses, if there is such a leaf.
+        nearest: Option<[f64; 3]>,
+    },
+    /// A seed lies in a crossing leaf.
+    #[error("seed {index} at {seed:?} lies in a cell that a facet crosses: {}", remedy(*nearest))]
+    SeedCrossing {
+        /// Index of the seed, from 0.
+        index: usize,
+        /// The seed.
+        seed: [f64; 3],
+        /// The nearest centroid of a leaf of T0 that no facet crosses, if there is such a leaf.
+        nearest: Option<[f64; 3]>,
+    },
     /// The output directory is not empty.
     #[error("output directory {} is not empty: empty it or choose another", path.display())]
     OutputNotEmpty {
@@ -111,6 +139,14 @@ pub enum Error {
         /// The cause.
         source: io::Error,
     },
+}
+
+/// The remedy for a seed that marks no flow.
+fn remedy(nearest: Option<[f64; 3]>) -> String {
+    nearest.map_or_else(
+        || "facets cross every cell, so choose a smaller spacing_min".to_owned(),
+        |point| format!("move it into the flow; the nearest centroid of a free cell is {point:?}"),
+    )
 }
 
 impl Error {

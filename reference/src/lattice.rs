@@ -1,5 +1,5 @@
 //! Quantisation of a case to the integer lattice, on which every geometric decision is exact.
-use crate::case::{Case, Root};
+use crate::case::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
 use crate::octant::{Extent, LEVEL_MAX, ROOT_EDGE};
 
@@ -28,8 +28,23 @@ pub struct Input {
     pub level_surface: u32,
     /// Minimum thickness of a layer, in cells.
     pub layer_cells_min: u32,
+    /// The region that the final mesh covers.
+    pub keep: Keep,
     /// Whether crossing leaves stay in the final mesh.
     pub keep_crossing: bool,
+    /// The seeds.
+    pub seeds: Vec<Seed>,
+    /// The treatment of outside components that do not reach the boundary of the root.
+    pub enclosed: Enclosed,
+}
+
+/// A point in the flow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seed {
+    /// The seed in the user's unit, used only in messages.
+    pub given: [f64; 3],
+    /// The seed on the lattice. A coordinate outside the root is -1 or 2^27, which no leaf contains.
+    pub point: [i64; 3],
 }
 
 impl Input {
@@ -39,7 +54,7 @@ impl Input {
     /// An edge or a spacing is not finite and positive; the origin is not finite; a layer has no
     /// cells; a spacing requires a level beyond 19; along an axis, a box has a corner that is not
     /// finite or a minimum that is not less than its maximum; a vertex is not finite or more than
-    /// one root edge outside the root.
+    /// one root edge outside the root; a seed is not finite.
     pub fn new(case: &Case) -> Result<Self, Error> {
         let root = case.root;
         if !root.origin.iter().all(|x| x.is_finite()) {
@@ -64,6 +79,7 @@ impl Input {
             boxes.push(LatticeBox { extent, level });
         }
         let facets = case.facets.iter().enumerate();
+        let seeds = case.seeds.iter().enumerate();
         Ok(Self {
             root,
             facets: facets
@@ -72,7 +88,12 @@ impl Input {
             boxes,
             level_surface,
             layer_cells_min: case.layer_cells_min,
+            keep: case.keep,
             keep_crossing: case.keep_crossing,
+            seeds: seeds
+                .map(|(index, &seed)| quantised_seed(&root, index, seed))
+                .collect::<Result<_, _>>()?,
+            enclosed: case.enclosed,
         })
     }
 }
@@ -104,6 +125,14 @@ fn level(root: &Root, name: &str, spacing: f64) -> Result<u32, Error> {
 fn quantised(root: &Root, x: [f64; 3]) -> [f64; 3] {
     let scale = ROOT_EDGE as f64 / root.edge;
     std::array::from_fn(|a| ((x[a] - root.origin[a]) * scale).round_ties_even())
+}
+
+fn quantised_seed(root: &Root, index: usize, seed: [f64; 3]) -> Result<Seed, Error> {
+    if !seed.iter().all(|x| x.is_finite()) {
+        return Err(Error::SeedNotFinite { index, seed });
+    }
+    let point = quantised(root, seed).map(|q| q.clamp(-1.0, ROOT_EDGE as f64) as i64);
+    Ok(Seed { given: seed, point })
 }
 
 fn quantised_facet(root: &Root, index: usize, facet: &[[f64; 3]; 3]) -> Result<Facet, Error> {

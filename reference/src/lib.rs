@@ -2,8 +2,8 @@
 //! workspace.
 //!
 //! The root is refined wherever a facet crosses it or an extent box requires it ([`tree`],
-//! [`crossing`]). A flood fill and rays determine which leaves are inside ([`sides`], [`ray`]).
-//! Leaves outside the kept region are deleted. For each level from the finest to the coarsest,
+//! [`crossing`]). A flood fill and either rays or seeds determine which leaves are inside
+//! ([`sides`], [`ray`], [`seeds`]). Leaves outside the kept region are deleted ([`kept`]). For each level from the finest to the coarsest,
 //! every cell refines two enlarged extent boxes, one for its layer and one for balance
 //! ([`gradation`]). The remaining leaves are written as leaf words ([`leaves`], [`mod@write`]). Nothing
 //! here is fast: each step is the shortest implementation of the corresponding section of
@@ -15,22 +15,26 @@ pub mod case_file;
 pub mod crossing;
 pub mod error;
 pub mod gradation;
+pub mod kept;
 pub mod lattice;
 pub mod leaves;
 pub mod octant;
 pub mod ray;
+pub mod seeds;
 pub mod sides;
 pub mod stl;
 pub mod tree;
 pub mod write;
 
-pub use case::{BoxSpec, Case, Keep, Root};
+pub use case::{BoxSpec, Case, Enclosed, Keep, Root};
 pub use error::Error;
+pub use kept::Components;
 pub use leaves::{digest, mix};
 pub use octant::Side;
 pub use sides::Ambiguous;
 
-use lattice::{Input, LatticeBox};
+use lattice::{Input, LatticeBox, Seed};
+use sides::Component;
 use tree::Tree;
 
 /// The leaves of a mesh, and the results that its manifest reports about them.
@@ -42,6 +46,10 @@ pub struct Mesh {
     pub level_surface: u32,
     /// The extent boxes, on the lattice.
     pub boxes: Vec<LatticeBox>,
+    /// The seeds, on the lattice.
+    pub seeds: Vec<Seed>,
+    /// The numbers of components of T0.
+    pub components: Components,
     /// The components that no candidate decided; `None` if every component was decided.
     pub ambiguous: Option<Ambiguous>,
 }
@@ -49,28 +57,28 @@ pub struct Mesh {
 /// The final mesh of a case.
 ///
 /// # Errors
-/// Those of [`Input::new`].
+/// Those of [`Input::new`] and [`sides::assign`].
 pub fn mesh(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
-    let (mut tree, ambiguous) = base(&input);
-    tree.delete(|side| !case.keep.keeps(side));
+    let (mut tree, components) = base(&input)?;
+    kept::delete_the_rest(&mut tree, &input, &components);
     gradation::grade(&mut tree, &input);
     debug_check(&tree);
     let words = tree.words(|side| case.keep_crossing || side != Side::Crossing);
-    Ok(Mesh::new(words, input, ambiguous))
+    Ok(Mesh::new(words, &tree, &components, input))
 }
 
 /// The base tree T0 of a case: all leaves with their sides, before deletion and gradation.
 ///
 /// # Errors
-/// Those of [`Input::new`].
+/// Those of [`Input::new`] and [`sides::assign`].
 pub fn base_tree(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
-    let (tree, ambiguous) = base(&input);
-    Ok(Mesh::new(tree.words(|_| true), input, ambiguous))
+    let (tree, components) = base(&input)?;
+    Ok(Mesh::new(tree.words(|_| true), &tree, &components, input))
 }
 
-fn base(input: &Input) -> (Tree, Option<Ambiguous>) {
+fn base(input: &Input) -> Result<(Tree, Vec<Component>), Error> {
     let mut tree = Tree::root();
     for extent_box in &input.boxes {
         tree.refine(&extent_box.extent, extent_box.level);
@@ -78,9 +86,9 @@ fn base(input: &Input) -> (Tree, Option<Ambiguous>) {
     for facet in &input.facets {
         tree.insert(facet, input.level_surface);
     }
-    let ambiguous = sides::assign(&mut tree, input);
+    let components = sides::assign(&mut tree, input)?;
     debug_check(&tree);
-    (tree, ambiguous)
+    Ok((tree, components))
 }
 
 fn debug_check(tree: &Tree) {
@@ -90,8 +98,17 @@ fn debug_check(tree: &Tree) {
 }
 
 impl Mesh {
-    fn new(words: Vec<u64>, input: Input, ambiguous: Option<Ambiguous>) -> Self {
+    /// `components` are those of T0, from which `tree` may have been refined: an octant keeps its
+    /// index.
+    fn new(words: Vec<u64>, tree: &Tree, components: &[Component], input: Input) -> Self {
         assert!(words.is_sorted_by(|a, b| a < b), "leaves are traversed in Morton order");
-        Self { words, level_surface: input.level_surface, boxes: input.boxes, ambiguous }
+        Self {
+            words,
+            level_surface: input.level_surface,
+            components: Components::of(tree, &input, components),
+            ambiguous: Ambiguous::of(tree, &input, components),
+            boxes: input.boxes,
+            seeds: input.seeds,
+        }
     }
 }

@@ -103,6 +103,14 @@ fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
             ambiguous.components
         );
     }
+    let enclosed = &mesh.components.enclosed;
+    if let Some([x, y, z]) = enclosed.example {
+        eprintln!(
+            "note: {} outside components with {} leaves do not reach the root's boundary and are \
+             deleted, for example at ({x}, {y}, {z}); `enclosed = \"keep\"` keeps them",
+            enclosed.count, enclosed.leaves
+        );
+    }
     let Run { cells, digest, time_wall_s, .. } = record;
     writeln!(std::io::stdout(), "{cells} cells, digest {digest}, {time_wall_s:.2} s")
         .map_err(|source| Error::Write { path: PathBuf::from("standard output"), source })

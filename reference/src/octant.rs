@@ -12,9 +12,9 @@ pub const ROOT_EDGE: i64 = 1 << 27;
 /// The position of a leaf relative to the facets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The rays found its component outside.
+    /// The rays or seeds found its component outside.
     Outside = 0,
-    /// The rays found its component inside.
+    /// The rays or seeds found its component inside.
     Inside = 1,
     /// A facet crosses the leaf or the leaf of T0 from which it descends.
     Crossing = 2,

@@ -1,11 +1,25 @@
-//! Sides: a flood fill over faces finds the components, and rays decide the side of each.
+//! Sides: a flood fill over faces finds the components, and either rays or seeds decide the side of
+//! each.
+use crate::case::Keep;
+use crate::error::Error;
 use crate::lattice::{Facet, Input, location};
 use crate::octant::{Extent, Octant, Side};
-use crate::ray;
 use crate::tree::{Index, Tree};
+use crate::{ray, seeds};
 
 /// Maximum number of leaves of a component whose rays are cast.
 const CANDIDATES_MAX: usize = 32;
+
+/// A component of T0: leaves that no facet crosses, connected through shared parts of faces.
+#[derive(Clone, Debug)]
+pub struct Component {
+    /// Its leaves, coarsest first, those of the same level by key.
+    pub leaves: Vec<Index>,
+    /// The side of all its leaves.
+    pub side: Side,
+    /// Whether a majority of rays decided, because no candidate's six rays agreed.
+    pub is_ambiguous: bool,
+}
 
 /// Summary of the components that a majority of rays decided, because no candidate's six rays
 /// agreed.
@@ -18,31 +32,65 @@ pub struct Ambiguous {
     pub example: [f64; 3],
 }
 
-/// Sets the side of every leaf that is not `Crossing` to the side of its component. Returns the
-/// ambiguous components, `None` if there are none.
-pub fn assign(tree: &mut Tree, input: &Input) -> Option<Ambiguous> {
-    let mut ambiguous: Vec<Octant> = Vec::new();
-    for mut component in components(tree) {
-        component.sort_by_cached_key(|&leaf| coarsest_first(&tree.octant(leaf)));
-        let candidates = component.iter().take(CANDIDATES_MAX).map(|&leaf| tree.octant(leaf));
-        let verdict = vote(candidates, &input.facets);
-        if !verdict.unanimous {
-            ambiguous.push(tree.octant(component[0]));
-        }
-        for leaf in component {
-            tree.set_side(leaf, verdict.side);
-        }
+impl Ambiguous {
+    /// The summary; `None` if no component is ambiguous.
+    #[must_use]
+    pub fn of(tree: &Tree, input: &Input, components: &[Component]) -> Option<Self> {
+        let ambiguous: Vec<_> = components.iter().filter(|c| c.is_ambiguous).collect();
+        let example = example(tree, input, &ambiguous)?;
+        Some(Self { components: ambiguous.len() as u64, example })
     }
-    let example = ambiguous.iter().min_by_key(|octant| coarsest_first(octant))?;
-    let components = ambiguous.len() as u64;
-    Some(Ambiguous { components, example: location(&input.root, example.centroid()) })
 }
 
-fn coarsest_first(octant: &Octant) -> (u32, u64) {
+/// Sets the side of every leaf that is not `Crossing` to the side of its component, and returns the
+/// components.
+///
+/// # Errors
+/// Those of [`seeds::leaves`].
+pub fn assign(tree: &mut Tree, input: &Input) -> Result<Vec<Component>, Error> {
+    let seeded = seeds::leaves(tree, input)?;
+    let mut assigned = Vec::new();
+    for mut leaves in components(tree) {
+        leaves.sort_by_cached_key(|&leaf| coarsest_first(&tree.octant(leaf)));
+        let verdict = if seeded.is_empty() {
+            let candidates = leaves.iter().take(CANDIDATES_MAX).map(|&leaf| tree.octant(leaf));
+            vote(candidates, &input.facets)
+        } else {
+            let is_flow = seeded.iter().any(|leaf| leaves.contains(leaf));
+            Verdict { side: side_of_flow(is_flow, input.keep), unanimous: true }
+        };
+        for &leaf in &leaves {
+            tree.set_side(leaf, verdict.side);
+        }
+        let Verdict { side, unanimous } = verdict;
+        assigned.push(Component { leaves, side, is_ambiguous: !unanimous });
+    }
+    Ok(assigned)
+}
+
+/// The side of a component where seeds decide.
+fn side_of_flow(is_flow: bool, keep: Keep) -> Side {
+    match (keep, is_flow) {
+        (Keep::Inside, true) | (Keep::Outside | Keep::All, false) => Side::Inside,
+        (Keep::Inside, false) | (Keep::Outside | Keep::All, true) => Side::Outside,
+    }
+}
+
+/// The centroid of the coarsest leaf of `components`, the first by key among leaves of the same
+/// level, in the user's unit; `None` without components.
+#[must_use]
+pub fn example(tree: &Tree, input: &Input, components: &[&Component]) -> Option<[f64; 3]> {
+    let first = components.iter().map(|component| tree.octant(component.leaves[0]));
+    let octant = first.min_by_key(coarsest_first)?;
+    Some(location(&input.root, octant.centroid()))
+}
+
+/// The order of candidates, and of octants that are reported as examples.
+pub(crate) fn coarsest_first(octant: &Octant) -> (u32, u64) {
     (octant.level, octant.key())
 }
 
-/// The components: sets of leaves that no facet crosses, connected through shared parts of faces.
+/// The components, each a set of leaves.
 fn components(tree: &Tree) -> Vec<Vec<Index>> {
     let mut components = Vec::new();
     let leaves = tree.leaves();

@@ -92,14 +92,14 @@ impl Tree {
         self.nodes[index].level_least = levels.min().unwrap_or(NOTHING_KEPT);
     }
 
-    /// Deletes the leaves whose side satisfies `unwanted`. They stay in the tree, which must tile
-    /// the root, but they are never refined and no longer among the kept leaves.
-    pub fn delete(&mut self, unwanted: impl Fn(Side) -> bool) {
+    /// Deletes the leaves that satisfy `unwanted`. They stay in the tree, which must tile the root,
+    /// but they are never refined and no longer among the kept leaves.
+    pub fn delete(&mut self, unwanted: impl Fn(Index, Side) -> bool) {
         // Children have higher indices than their parents, so the reverse order visits them first.
         for index in (0..self.nodes.len()).rev() {
             if self.nodes[index].children.is_some() {
                 self.update_level_least(index);
-            } else if unwanted(self.nodes[index].side) {
+            } else if unwanted(index, self.nodes[index].side) {
                 self.nodes[index].level_least = NOTHING_KEPT;
             }
         }

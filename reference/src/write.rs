@@ -1,8 +1,9 @@
 //! Writer of leaf-set directories: one file of leaf words and the manifest. A reader never sees an
 //! incomplete file.
 use crate::Mesh;
-use crate::case::{Case, Keep, Root};
+use crate::case::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
+use crate::kept::Components;
 use crate::leaves::{Tally, hex};
 use serde::Serialize;
 use std::fs::{self, File};
@@ -36,9 +37,12 @@ struct Manifest {
     keep: Keep,
     keep_crossing: bool,
     boxes: Vec<ManifestBox>,
+    seeds: Vec<[i64; 3]>,
+    enclosed: Enclosed,
     leaves: u64,
     leaves_by_level: [u64; 20],
     leaves_by_side: BySide,
+    components: Components,
     components_ambiguous: AmbiguousCount,
     digest: String,
     octant_digests: Vec<String>,
@@ -101,9 +105,12 @@ impl Manifest {
             boxes: boxes
                 .map(|b| ManifestBox { min: b.extent.min, max: b.extent.max, level: b.level })
                 .collect(),
+            seeds: mesh.seeds.iter().map(|seed| seed.point).collect(),
+            enclosed: case.enclosed,
             leaves,
             leaves_by_level: tally.leaves_by_level,
             leaves_by_side: BySide { outside, inside, crossing },
+            components: mesh.components.clone(),
             components_ambiguous: AmbiguousCount::of(mesh),
             digest: digest.clone(),
             octant_digests: tally.octant_digests.into_iter().map(hex).collect(),

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::lattice::{FacetLattice, Root};
-use crate::manifest::{ExtentBox, Keep};
+use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
+use crate::manifest::{Enclosed, ExtentBox, Keep};
+use crate::seed;
 use crate::stl::{self, StlError};
 
 pub use geometries::Facet;
@@ -31,6 +32,12 @@ pub struct Case {
     pub keep_crossing: bool,
     /// Extent boxes on the lattice.
     pub boxes: Vec<ExtentBox>,
+    /// Points that lie in the flow, in the user's units. If there are any, they and not rays determine all sides.
+    pub seeds: Vec<[f64; 3]>,
+    /// The seeds on the lattice. Each lies in the root's half-open cube.
+    pub seeds_lattice: Vec<[i64; 3]>,
+    /// The treatment of outside components that the far field does not reach.
+    pub enclosed: Enclosed,
 }
 
 /// Why a case cannot be used.
@@ -77,6 +84,10 @@ struct CaseFile {
     keep_crossing: bool,
     root_scale: Option<f64>,
     root: Option<Root>,
+    #[serde(default)]
+    seeds: Vec<[f64; 3]>,
+    #[serde(default)]
+    enclosed: Enclosed,
     #[serde(default, rename = "box")]
     boxes: Vec<BoxFile>,
 }
@@ -146,7 +157,7 @@ impl Case {
             let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
             boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
         }
-        Ok(Self {
+        let case = Self {
             name,
             facets_lattice: on_lattice(&root, &facets)?,
             facets,
@@ -156,7 +167,12 @@ impl Case {
             keep: file.keep,
             keep_crossing: file.keep_crossing,
             boxes,
-        })
+            seeds_lattice: seeds_on_lattice(&root, &file.seeds)?,
+            seeds: file.seeds.clone(),
+            enclosed: file.enclosed,
+        };
+        seed::refuse_crossing(&case)?;
+        Ok(case)
     }
 
     /// Deepest level that the surface or a box requires.
@@ -227,6 +243,19 @@ fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String
     Ok(all)
 }
 
+fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {
+    let on_lattice = |(i, &seed): (usize, &[f64; 3])| {
+        let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
+        let outside = || {
+            format!(
+                "seed {i} at {seed:?} lies outside the root, from {from:?} to {to:?}; move it into the flow"
+            )
+        };
+        root.quantise_seed(seed).ok_or_else(outside)
+    };
+    seeds.iter().enumerate().map(on_lattice).collect()
+}
+
 fn positive(what: &str, value: f64) -> Result<(), String> {
     let good = value.is_finite() && value > 0.0;
     if good {
@@ -280,6 +309,24 @@ mod tests {
             ExtentBox { min: [0, unit, 2 * unit], max: [4 * unit, 8 * unit, 3 * unit], level: 5 };
         assert_eq!(case.boxes, [expected]);
         assert_eq!(case.level_deepest(), 5);
+    }
+
+    #[test]
+    fn seeds_are_points_of_the_root_and_enclosed_components_are_deleted_by_default() {
+        let with = |keys: &str| {
+            let root = "[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0";
+            Case::from_parts(&format!("spacing_min = 1.0\n{keys}\n{root}"), vec![UNIT])
+        };
+        let case = with("").unwrap();
+        assert_eq!((case.seeds, case.enclosed), (vec![], Enclosed::Delete));
+        let case = with("seeds = [[0, 1.5, -4], [1, 1, 1]]\nenclosed = 'keep'").unwrap();
+        assert_eq!(case.seeds, [[0.0, 1.5, -4.0], [1.0; 3]]);
+        assert_eq!(case.seeds_lattice, [[4 << 24, 11 << 23, 0], [5 << 24; 3]]);
+        assert_eq!(case.enclosed, Enclosed::Keep);
+        let why = with("seeds = [[0, 0, 0], [4, 0, 0]]").unwrap_err();
+        assert!(why.starts_with("seed 1 at [4.0, 0.0, 0.0] lies outside the root"), "{why}");
+        assert!(with("seeds = [[0, 0, nan]]").unwrap_err().contains("seed 0"));
+        assert!(with("enclosed = 'drop'").is_err());
     }
 
     #[test]

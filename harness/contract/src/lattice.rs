@@ -32,6 +32,14 @@ impl Root {
         self.units(at).map(|v| v.clamp(0.0, UNITS_PER_EDGE as f64) as i64)
     }
 
+    /// A seed on the lattice; `None` if it is not finite or lies outside the root, and so in no leaf. Leaves are
+    /// half-open, so the root's maximum faces are outside.
+    pub fn quantise_seed(&self, at: [f64; 3]) -> Option<[i64; 3]> {
+        let q = self.units(at);
+        let inside = 0.0..UNITS_PER_EDGE as f64;
+        q.iter().all(|v| inside.contains(v)).then(|| q.map(|v| v as i64))
+    }
+
     /// Lattice coordinates as floating-point numbers.
     fn units(&self, at: [f64; 3]) -> [f64; 3] {
         let scale = UNITS_PER_EDGE as f64 / self.edge;
@@ -79,6 +87,20 @@ mod tests {
         assert!(ROOT.quantise([7.001, 0.0, 2.0]).is_none());
         assert!(ROOT.quantise([f64::NAN, 0.0, 2.0]).is_none());
         assert_eq!(ROOT.quantise_clamped([-9.0, 1.0, 99.0]), [0, 1 << 25, UNITS_PER_EDGE]);
+    }
+
+    #[test]
+    fn a_seed_lies_in_the_half_open_root() {
+        assert_eq!(ROOT.quantise_seed([-1.0, 0.0, 2.0]), Some([0; 3]));
+        assert_eq!(ROOT.quantise_seed([2.0, 0.0, 2.0]), Some([3 << 25, 0, 0]));
+        for outside in
+            [[3.0, 0.0, 2.0], [-1.0, -1e-3, 2.0], [f64::NAN, 0.0, 2.0], [0.0, 1e300, 2.0]]
+        {
+            assert_eq!(ROOT.quantise_seed(outside), None, "{outside:?}");
+        }
+        // Rounding comes first, as for a vertex.
+        assert_eq!(ROOT.quantise_seed([-1.0 - 1e-9, 0.0, 2.0]), Some([0; 3]));
+        assert_eq!(ROOT.quantise_seed([3.0 - 1e-9, 0.0, 2.0]), None);
     }
 
     #[test]

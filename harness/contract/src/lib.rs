@@ -17,6 +17,7 @@ pub mod npy;
 pub mod octant;
 pub mod parity;
 pub mod plain;
+mod seed;
 pub mod stl;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::case::Case;
 use crate::digest::Digest;
 use crate::lattice::Root;
-use crate::octant::LEVEL_MAX;
+use crate::octant::{LEVEL_MAX, Octant};
 
 /// The only supported schema.
 pub const SCHEMA: &str = "octree-leaf-set/1";
@@ -29,6 +29,17 @@ pub enum Keep {
     Inside,
     /// Both sides.
     All,
+}
+
+/// The treatment of outside components that the far field does not reach.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Enclosed {
+    /// They are deleted.
+    #[default]
+    Delete,
+    /// They are kept like any other outside component.
+    Keep,
 }
 
 /// The tree that a leaf set holds.
@@ -53,6 +64,14 @@ pub struct ExtentBox {
     pub level: u8,
 }
 
+impl ExtentBox {
+    /// Whether the interiors of the box and of an octant meet.
+    pub fn meets(&self, octant: &Octant) -> bool {
+        let (low, high) = octant.bounds();
+        (0..3).all(|a| low[a].max(self.min[a]) < high[a].min(self.max[a]))
+    }
+}
+
 /// Leaf counts by side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -72,6 +91,31 @@ pub struct Ambiguous {
     /// Their number.
     pub count: u64,
     /// Centroid of the first candidate leaf of one of them, in the user's units; `None` if there are none.
+    pub example: Option<[f64; 3]>,
+}
+
+/// Components of T0 by side.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Components {
+    /// Outside components, enclosed ones included.
+    pub outside: u64,
+    /// Inside components.
+    pub inside: u64,
+    /// Outside components that were deleted because the far field does not reach them.
+    pub enclosed: EnclosedComponents,
+}
+
+/// Enclosed components of T0, which were deleted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnclosedComponents {
+    /// Their number.
+    pub count: u64,
+    /// Number of their leaves in T0.
+    pub leaves: u64,
+    /// Centroid of the first of these leaves (coarsest, then by key), in the user's units; `None` if there are
+    /// none.
     pub example: Option<[f64; 3]>,
 }
 
@@ -109,12 +153,21 @@ pub struct Manifest {
     pub keep_crossing: bool,
     /// Extent boxes.
     pub boxes: Vec<ExtentBox>,
+    /// Seeds, in lattice units. A manifest without this key means none.
+    #[serde(default)]
+    pub seeds: Vec<[i64; 3]>,
+    /// The treatment of enclosed components. A manifest without this key means [`Enclosed::Delete`].
+    #[serde(default)]
+    pub enclosed: Enclosed,
     /// Leaves in all parts.
     pub leaves: u64,
     /// Leaves by level.
     pub leaves_by_level: [u64; LEVEL_MAX as usize + 1],
     /// Leaves by side.
     pub leaves_by_side: BySide,
+    /// Components of T0 by side; `None` if the program does not count them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub components: Option<Components>,
     /// Components decided by majority.
     pub components_ambiguous: Ambiguous,
     /// Digest of all leaves.
@@ -139,9 +192,12 @@ impl Manifest {
             keep: case.keep,
             keep_crossing: case.keep_crossing,
             boxes: case.boxes.clone(),
+            seeds: case.seeds_lattice.clone(),
+            enclosed: case.enclosed,
             leaves,
             leaves_by_level: by_level,
             leaves_by_side: by_side,
+            components: None,
             components_ambiguous: Ambiguous::default(),
             digest,
             octant_digests: octants,
@@ -241,4 +297,27 @@ impl Tally {
 /// Index of the level-3 octant that contains the minimum corner of a leaf: the top nine bits of its word.
 pub fn octant_index(word: u64) -> usize {
     (word >> 55) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_seeds_and_components_are_optional_and_survive_a_round_trip() {
+        let mut manifest = crate::testing::leaf_set(vec![vec![0]]).manifest;
+        let text = serde_json::to_string(&manifest).unwrap();
+        assert!(!text.contains("components\":"), "{text}");
+        let older = text.replace("\"seeds\":[],\"enclosed\":\"delete\",", "");
+        assert_ne!(older, text);
+        assert_eq!(serde_json::from_str::<Manifest>(&older).unwrap(), manifest);
+        let enclosed = EnclosedComponents { count: 1, leaves: 512, example: Some([0.5, 1.0, 2.0]) };
+        manifest.components = Some(Components { outside: 3, inside: 1, enclosed });
+        (manifest.seeds, manifest.enclosed) = (vec![[1, 2, 3]], Enclosed::Keep);
+        let text = serde_json::to_string(&manifest).unwrap();
+        assert!(
+            text.contains("\"enclosed\":{\"count\":1,\"leaves\":512,\"example\":[0.5,1.0,2.0]}")
+        );
+        assert_eq!(serde_json::from_str::<Manifest>(&text).unwrap(), manifest);
+    }
 }

@@ -100,7 +100,7 @@ fn ascii(facets: &[Facet]) -> String {
 mod tests {
     use super::*;
 
-    const CASE: &str = "spacing_min = 0.3\nkeep = \"all\"\nroot_scale = 3.7\n[generator]\nshape = \"sphere\"\n\
+    const CASE: &str = "spacing_min = 0.3\nkeep = \"all\"\nroot_scale = 3.7\nenclosed = \"keep\"\nseeds = [[0.0, 0.0, 0.7]]\n[generator]\nshape = \"sphere\"\n\
                         facets = FACETS\n[[box]]\nmin = [0.1, 0.0, 0.0]\nmax = [0.7, 0.3, 0.9]\nspacing = 0.1\n";
 
     #[test]
@@ -123,6 +123,11 @@ mod tests {
                 (given.facets, given.root, given.boxes)
             );
             assert_eq!(plain.level_surface, given.level_surface);
+            assert_eq!(
+                (plain.seeds_lattice, plain.enclosed),
+                (given.seeds_lattice, given.enclosed)
+            );
+            assert_eq!(plain.seeds, [[0.0, 0.0, 0.7]]);
         }
     }
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
-use crate::manifest::{self, Ambiguous, BySide, Keep, Manifest};
+use crate::manifest::{self, Ambiguous, BySide, Enclosed, Keep, Manifest};
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word::{self, Leaf, Side};
 
@@ -83,9 +83,12 @@ pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
         keep: Keep::All,
         keep_crossing: true,
         boxes: Vec::new(),
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
         leaves: 0,
         leaves_by_level: [0; 20],
         leaves_by_side: BySide::default(),
+        components: None,
         components_ambiguous: Ambiguous::default(),
         digest: Digest::default(),
         octant_digests: vec![Digest::default(); manifest::OCTANTS],

@@ -3,6 +3,7 @@ levels. It is the example of an external program that `harness verify --engine p
 
 import argparse
 import json
+import sys
 import tomllib
 from pathlib import Path
 
@@ -118,17 +119,29 @@ def centroid(word):
     return [256 * sum((word >> (7 + 3 * bit + a) & 1) << bit for bit in range(19)) + half for a in range(3)]
 
 
-def sides(level, crossing, facets, root):
-    """The side of every cell, and the number and one location of the ambiguous components (section 4)."""
+def at_boundary(component):
+    """Whether a component has a face on the root's boundary."""
+    return any(face.any() for a in range(3) for face in np.moveaxis(component, a, 0)[[0, -1]])
+
+
+def sides(level, crossing, facets, root, flow, deletes_enclosed):
+    """The side of every cell, by the cells with seeds, `flow`, or by rays (section 4); the cells that are enclosed
+    (section 5); and the entries of the manifest about components."""
+    seeds, flow_side = flow
     side = np.where(crossing, CROSSING, OUTSIDE).astype(np.uint8)
-    unassigned, firsts = ~crossing, []
+    unassigned, firsts, outside = ~crossing, [], []
+    to_user = lambda c: [o + c * (root["edge"] / UNITS) for o, c in zip(root["origin"], c)]
+    key = lambda word: (word >> 2 & 31, word)
+    count = 0
     while unassigned.any():
         seed = np.zeros_like(unassigned)
         seed.flat[unassigned.argmax()] = True
         component = flood(seed, unassigned)
-        leaves = sorted(map(int, words_of(level, side, component)), key=lambda w: (w >> 2 & 31, w))
-        total = []
+        leaves, total, count = sorted(map(int, words_of(level, side, component)), key=key), [], count + 1
         for word in leaves[:32]:
+            if seeds:
+                inside = any(component[seed] for seed in seeds) == (flow_side == INSIDE)
+                break
             votes = rays(np.array(centroid(word)), facets)
             total += votes
             if len(set(votes)) == 1:
@@ -136,11 +149,20 @@ def sides(level, crossing, facets, root):
                 break
         else:
             inside = 2 * sum(total) > len(total)
-            firsts.append(((leaves[0] >> 2 & 31, leaves[0]), centroid(leaves[0])))
+            firsts.append(leaves[0])
         side[component] = INSIDE if inside else OUTSIDE
         unassigned &= ~component
-    example = [o + c * (root["edge"] / UNITS) for o, c in zip(root["origin"], min(firsts)[1])] if firsts else None
-    return side, {"count": len(firsts), "example": example}
+        if not inside:
+            outside.append((at_boundary(component), leaves, component))
+    far_field = any(reached for reached, _, _ in outside)
+    enclosed = [o for o in outside if deletes_enclosed and far_field and not o[0]]
+    place = lambda words: to_user(centroid(min(words, key=key))) if words else None
+    within = np.logical_or.reduce([np.zeros_like(crossing)] + [component for _, _, component in enclosed])
+    leaves = [word for _, leaves, _ in enclosed for word in leaves]
+    return side, within, {
+        "components": {"outside": len(outside), "inside": count - len(outside),
+                       "enclosed": {"count": len(enclosed), "leaves": len(leaves), "example": place(leaves)}},
+        "components_ambiguous": {"count": len(firsts), "example": place(firsts)}}
 
 
 def grade(split, kept, level_of, n, deep):
@@ -181,9 +203,17 @@ def mesh(case, facets, ungraded):
     level, crossing = level_of(), np.zeros((size,) * 3, bool)
     for l in range(deep + 1):
         crossing |= (level == l) & spread(pool(touched, l), size)
-    side, ambiguous = sides(level, crossing, facets, root)
     keep, keep_crossing = case.get("keep", "outside"), case.get("keep_crossing", True)
-    kept = crossing | (keep == "all") | (side == (INSIDE if keep == "inside" else OUTSIDE))
+    seeds, enclosed = [on_lattice(s).astype(int).tolist() for s in case.get("seeds", [])], case.get("enclosed", "delete")
+    cells = [tuple(q * size // UNITS for q in s) for s in seeds]
+    for i, cell in enumerate(cells):
+        if not all(0 <= c < size for c in cell) or crossing[cell]:
+            print(f"seed {i} at {case['seeds'][i]} is outside the root or in a crossing leaf; move it into the flow", file=sys.stderr)
+            sys.exit(2)
+    deletes_enclosed = keep == "outside" and not seeds and enclosed == "delete"
+    wanted = INSIDE if keep == "inside" else OUTSIDE
+    side, within, components = sides(level, crossing, facets, root, (cells, wanted), deletes_enclosed)
+    kept = crossing | (keep == "all") | (side == wanted) & ~within
     if ungraded:
         kept, keep_crossing = np.ones_like(kept), True
     else:
@@ -194,7 +224,7 @@ def mesh(case, facets, ungraded):
         grade(split, kept, level_of, n, deep)
     words = words_of(level_of(), side, kept if keep_crossing else kept & ~crossing)
     terms = {"level_surface": surface, "layer_cells_min": n, "keep": keep, "keep_crossing": case.get("keep_crossing", True)}
-    return words, terms | {"root": root, "boxes": boxes, "components_ambiguous": ambiguous}
+    return words, terms | components | {"root": root, "boxes": boxes, "seeds": seeds, "enclosed": enclosed}
 
 
 def digest(words):

@@ -16,7 +16,7 @@ pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Tri
     let mut smallest = trial;
     loop {
         let before = smallest.clone();
-        for step in [depth, facets, plainness, layer, boxes, ranks] {
+        for step in [depth, facets, plainness, layer, boxes, seeds, ranks] {
             smallest = step(smallest, fails);
         }
         if smallest == before {
@@ -30,11 +30,12 @@ pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Tri
 pub fn size(trial: &Trial) -> String {
     let number =
         |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
-    let boxes = trial.case.table.get("box").and_then(Value::as_array).map_or(0, Vec::len);
+    let count = |key: &str| trial.case.table.get(key).and_then(Value::as_array).map_or(0, Vec::len);
+    let (boxes, seeds) = (count("box"), count("seeds"));
     let facets = trial.case.facets.len();
     let (spacing, n) = (number("spacing_min"), number("layer_cells_min"));
     format!(
-        "{facets} facets, spacing_min {spacing}, layer_cells_min {n}, {boxes} boxes, {}",
+        "{facets} facets, spacing_min {spacing}, layer_cells_min {n}, {boxes} boxes, {seeds} seeds, {}",
         trial.ranks
     )
 }
@@ -116,12 +117,14 @@ fn facets(trial: Trial, fails: Fails) -> Trial {
     of(kept)
 }
 
-/// Keeps all leaves, including crossing ones: deletion is then ruled out as a cause.
+/// Keeps all leaves, including crossing and enclosed ones: deletion is then ruled out as a cause.
 fn plainness(trial: Trial, fails: Fails) -> Trial {
     let all = with(&trial, "keep", Some(Value::String("all".into())));
     let trial = first(trial, fails, [all]);
     let crossing = with(&trial, "keep_crossing", None);
-    first(trial, fails, [crossing])
+    let trial = first(trial, fails, [crossing]);
+    let default = with(&trial, "enclosed", None);
+    first(trial, fails, [default])
 }
 
 /// Reduces the layer to the smallest n.
@@ -134,15 +137,26 @@ fn layer(trial: Trial, fails: Fails) -> Trial {
 
 /// Removes as many boxes as possible.
 fn boxes(trial: Trial, fails: Fails) -> Trial {
-    let none = with(&trial, "box", None);
+    shorten(trial, fails, "box")
+}
+
+/// Removes as many seeds as possible. Those that remain stay where they are: a case in which one has come to lie in a
+/// crossing leaf is refused by every program and does not fail.
+fn seeds(trial: Trial, fails: Fails) -> Trial {
+    shorten(trial, fails, "seeds")
+}
+
+/// Removes as many entries of a list as possible.
+fn shorten(trial: Trial, fails: Fails, key: &str) -> Trial {
+    let none = with(&trial, key, None);
     let mut smallest = first(trial, fails, [none]);
     let mut at = 0;
-    while let Some(boxes) =
-        smallest.case.table.get("box").and_then(Value::as_array).filter(|boxes| at < boxes.len())
+    while let Some(list) =
+        smallest.case.table.get(key).and_then(Value::as_array).filter(|list| at < list.len())
     {
-        let mut rest = boxes.clone();
+        let mut rest = list.clone();
         rest.remove(at);
-        let fewer = with(&smallest, "box", Some(Value::Array(rest)));
+        let fewer = with(&smallest, key, Some(Value::Array(rest)));
         match fails(&fewer) {
             true => smallest = fewer,
             false => at += 1,
@@ -175,6 +189,7 @@ mod tests {
 
     fn given() -> Trial {
         let text = "spacing_min = 0.01\nlayer_cells_min = 5\nkeep = 'inside'\nkeep_crossing = false\n\
+                    enclosed = 'keep'\nseeds = [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]\n\
                     [root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n\
                     [[box]]\nmin = [1.0]\nspacing = 1.0\n[[box]]\nmin = [2.0]\nspacing = 1\n";
         let facets = (0..100).map(|x| facet(x as f32)).collect();
@@ -203,8 +218,12 @@ mod tests {
                 .get("box")
                 .and_then(Value::as_array)
                 .is_some_and(|boxes| boxes.iter().any(|b| b["min"][0].as_float() == Some(2.0)));
+            let seeds = trial.case.table.get("seeds").and_then(Value::as_array);
+            let seeded =
+                seeds.is_some_and(|seeds| seeds.iter().any(|seed| seed[0].as_float() == Some(2.0)));
             has(trial, 17.0)
                 && has(trial, 80.0)
+                && seeded
                 && ranks
                 && deep
                 && boxed
@@ -220,6 +239,10 @@ mod tests {
             (2, 1)
         );
         assert_eq!((table["keep"].as_str(), table.get("keep_crossing")), (Some("all"), None));
+        assert_eq!(
+            (table["seeds"].to_string(), table.get("enclosed")),
+            ("[[2.0, 0.0, 0.0]]".into(), None)
+        );
         assert!(trials < 200, "{trials}");
     }
 

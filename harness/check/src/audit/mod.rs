@@ -160,6 +160,7 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
                 checks::complete::check_holes(tree, &terms),
                 checks::spacing::check_tree(tree, &terms),
                 checks::sides::check_tree(tree, &terms),
+                checks::kept::check_tree(tree, &terms, manifest),
                 checks::balance::check_tree(tree, &terms.root),
                 checks::layer::check_tree(tree, &terms),
             ];
@@ -167,11 +168,13 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
         }
         // T0 precedes deletion and gradation.
         Kind::Base => {
+            let kept = checks::kept::check_tree(tree, &terms, manifest);
             let terms = Terms { keep: Keep::All, keep_crossing: true, ..terms };
             let results = vec![
                 checks::complete::check_holes(tree, &terms),
                 checks::spacing::check_tree(tree, &terms),
                 checks::sides::check_tree(tree, &terms),
+                kept,
             ];
             (results, terms)
         }

@@ -1,7 +1,7 @@
 //! Kept and deleted leaves tile the root.
 //!
 //! Sections 5 and 7 of reference/DEFINITION.md. With T0 the check is exact: leaves fill every kept T0 leaf,
-//! every deleted T0 leaf is empty, and no leaf is coarser than T0. Without T0 the boundary of every hole must
+//! every deleted T0 leaf is empty, those in enclosed components included, and no leaf is coarser than T0. Without T0 the boundary of every hole must
 //! be one that deletion can leave: a leaf lacks a neighbour across a face only if the definition may delete the
 //! neighbours of such a leaf. Without T0 the check cannot detect a missing leaf if all leaves around it may
 //! lack neighbours, for example a crossing leaf among crossing leaves.
@@ -22,8 +22,8 @@ pub fn check(subject: &Subject) -> CheckResult {
     let tree = subject.tree();
     let mut result = match subject.tree_base() {
         Some(base) => {
-            let mut pair =
-                Pair { tree, base, terms: &subject.terms, result: CheckResult::new(NAME) };
+            let (terms, result) = (&subject.terms, CheckResult::new(NAME));
+            let mut pair = Pair { tree, base, terms, enclosed: enclosed(subject), result };
             pair.compare(tree.root(), base.root(), Octant::ROOT);
             pair.result
         }
@@ -72,11 +72,22 @@ pub fn check_holes(tree: &Tree, terms: &Terms) -> CheckResult {
     result
 }
 
+/// The leaves of T0 in enclosed components, sorted.
+fn enclosed(subject: &Subject) -> Vec<u64> {
+    let Some((words, components)) = subject.components() else { return Vec::new() };
+    let leaves = components.iter().filter(|c| c.enclosed).flat_map(|c| &c.leaves);
+    let mut enclosed: Vec<u64> = leaves.map(|&i| words[i as usize]).collect();
+    enclosed.sort_unstable();
+    enclosed
+}
+
 /// The final tree and T0, traversed together.
 struct Pair<'a> {
     tree: &'a Tree,
     base: &'a Tree,
     terms: &'a Terms,
+    /// Leaves of T0 that are deleted whatever their side.
+    enclosed: Vec<u64>,
     result: CheckResult,
 }
 
@@ -100,8 +111,13 @@ impl Pair<'_> {
 
     /// Compares the content of the mesh with a T0 leaf.
     fn compare_leaf(&mut self, handle: Handle, kind: Kind, octant: Octant) {
-        let keeps = self.terms.keeps(kind);
-        if !keeps && handle != Handle::HOLE {
+        let leaf =
+            word::key_of(octant.corner) << 7 | u64::from(octant.level) << 2 | u64::from(kind);
+        let enclosed = self.enclosed.binary_search(&leaf).is_ok();
+        let keeps = self.terms.keeps(kind) && !enclosed;
+        if enclosed && handle != Handle::HOLE {
+            self.report("an enclosed T0 leaf still exists, at least in part:", octant);
+        } else if !keeps && handle != Handle::HOLE {
             self.report("a T0 leaf that must be deleted still exists, at least in part:", octant);
         } else if keeps && self.tree.kinds(handle) & HOLES != 0 {
             let hole = self.first_hole(handle, octant);

@@ -1,6 +1,9 @@
-//! The components of T0's leaves, and their sides (reference/DEFINITION.md, section 4).
+//! The components of T0's leaves, their sides, and which of them are enclosed (reference/DEFINITION.md,
+//! sections 4 and 5).
 
-use contract::octant::Octant;
+use super::Terms;
+use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::parity::Parity;
 use contract::word::{self, Side};
 
@@ -12,16 +15,44 @@ const CANDIDATES_MAX: usize = 32;
 pub struct Component {
     /// Indices of its leaves, by level and then by key.
     pub leaves: Vec<u32>,
-    /// The side that rays determine.
+    /// The side that seeds or, without seeds, rays determine.
     pub side: Side,
     /// Whether the rays of no candidate agreed.
     pub ambiguous: bool,
     /// The first candidate.
     pub first: Octant,
+    /// Whether it is outside and yet deleted, because the far field does not reach it.
+    pub enclosed: bool,
 }
 
-/// The components of sorted leaves that tile the root, with their sides.
-pub fn find(words: &[u64], parity: &Parity) -> Vec<Component> {
+/// The components of sorted leaves that tile the root.
+pub fn find(words: &[u64], terms: &Terms, facets: &[FacetLattice]) -> Vec<Component> {
+    let groups = groups(words);
+    let at_boundary: Vec<bool> =
+        groups.iter().map(|group| touches_boundary(words, group)).collect();
+    let mut components: Vec<Component> = match terms.seeds.is_empty() {
+        true => {
+            let parity = Parity::new(facets);
+            groups.into_iter().map(|group| by_rays(group, words, &parity)).collect()
+        }
+        false => {
+            let seeded = seeded_leaves(words, terms);
+            groups.into_iter().map(|group| by_seeds(group, words, &seeded, terms)).collect()
+        }
+    };
+    let outside = |component: &Component| component.side == Side::Outside;
+    let far_field = components.iter().zip(&at_boundary).any(|(c, at)| *at && outside(c));
+    if terms.deletes_enclosed() && far_field {
+        for (component, at) in components.iter_mut().zip(&at_boundary) {
+            component.enclosed = !at && outside(component);
+        }
+    }
+    components
+}
+
+/// Leaves that are not crossing, grouped by connection through faces. A group has the indices of its leaves, by
+/// level and then by key. The words are sorted leaves that do not overlap.
+pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(words.len());
     for (i, &w) in words.iter().enumerate().filter(|(_, w)| !crossing(**w)) {
         for j in coarse_neighbours(words, &word::octant(w)).filter(|&j| !crossing(words[j])) {
@@ -33,8 +64,39 @@ pub fn find(words: &[u64], parity: &Parity) -> Vec<Component> {
         members.push((sets.root(i as u32), word::level(w), i as u32));
     }
     members.sort_unstable();
-    let components = members.chunk_by(|a, b| a.0 == b.0);
-    components.map(|m| decide(m.iter().map(|&(_, _, i)| i).collect(), words, parity)).collect()
+    let groups = members.chunk_by(|a, b| a.0 == b.0);
+    groups.map(|group| group.iter().map(|&(_, _, i)| i).collect()).collect()
+}
+
+/// Whether any of these leaves has a face on the root's boundary.
+pub fn touches_boundary(words: &[u64], leaves: &[u32]) -> bool {
+    leaves.iter().any(|&i| {
+        let octant = word::octant(words[i as usize]);
+        octant.corner.iter().any(|&c| c == 0 || c + octant.edge() == CELLS_PER_EDGE)
+    })
+}
+
+/// The index of the leaf whose half-open octant contains a lattice point; `None` for a point outside the root.
+pub fn leaf_at(words: &[u64], point: [i64; 3]) -> Option<usize> {
+    if !in_root(point) {
+        return None;
+    }
+    let key = word::key_of(point.map(|q| (q / UNITS_PER_CELL) as u32));
+    let i = words.partition_point(|&w| word::key(w) <= key).checked_sub(1)?;
+    (key < word::key(words[i]) + word::span(word::level(words[i]))).then_some(i)
+}
+
+/// Whether a lattice point lies in the root's half-open cube.
+pub fn in_root(point: [i64; 3]) -> bool {
+    point.iter().all(|q| (0..UNITS_PER_EDGE).contains(q))
+}
+
+/// The indices of the leaves that contain seeds, ascending.
+pub fn seeded_leaves(words: &[u64], terms: &Terms) -> Vec<u32> {
+    let leaves = terms.seeds.iter().filter_map(|&seed| leaf_at(words, seed));
+    let mut seeded: Vec<u32> = leaves.map(|i| i as u32).collect();
+    seeded.sort_unstable();
+    seeded
 }
 
 fn crossing(word: u64) -> bool {
@@ -49,29 +111,39 @@ fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usi
         octant.neighbour(offset)
     });
     across.filter_map(|neighbour| {
-        let key = word::key_of(neighbour.corner);
-        let i = words.partition_point(|&w| word::key(w) <= key).checked_sub(1)?;
-        let level = word::level(words[i]);
-        (level <= neighbour.level && key < word::key(words[i]) + word::span(level)).then_some(i)
+        let i = leaf_at(words, neighbour.bounds().0)?;
+        (word::level(words[i]) <= neighbour.level).then_some(i)
     })
 }
 
-/// The first candidate whose rays agree decides. Without one, the majority of all rays decides.
-fn decide(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
+fn component(leaves: Vec<u32>, words: &[u64], side: Side, ambiguous: bool) -> Component {
     let first = word::octant(words[leaves[0] as usize]);
+    Component { leaves, side, ambiguous, first, enclosed: false }
+}
+
+/// A component with a seed is flow; any other has the other side.
+fn by_seeds(leaves: Vec<u32>, words: &[u64], seeded: &[u32], terms: &Terms) -> Component {
+    let flow = terms.side_of_flow();
+    let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
+    let has_seed = leaves.iter().any(|i| seeded.binary_search(i).is_ok());
+    component(leaves, words, if has_seed { flow } else { other }, false)
+}
+
+/// The first candidate whose rays agree decides. Without one, the majority of all rays decides.
+fn by_rays(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
     let (mut rays, mut inside) = (0, 0);
     for &i in leaves.iter().take(CANDIDATES_MAX) {
         let votes = parity.inside(word::octant(words[i as usize]).centre());
         let odd = votes.iter().filter(|&&v| v).count();
         if odd == 0 || odd == 6 {
             let side = if odd == 6 { Side::Inside } else { Side::Outside };
-            return Component { leaves, side, ambiguous: false, first };
+            return component(leaves, words, side, false);
         }
         rays += 6;
         inside += odd;
     }
     let side = if 2 * inside > rays { Side::Inside } else { Side::Outside };
-    Component { leaves, side, ambiguous: true, first }
+    component(leaves, words, side, true)
 }
 
 /// Disjoint sets. The root of each is its smallest index.

@@ -7,7 +7,7 @@
 //! (`complete` does).
 
 use super::facets::{Facets, Visit};
-use super::{CheckResult, Subject, identical, valid_leaves};
+use super::{CheckResult, Subject, components, identical, valid_leaves};
 use contract::word::{self, Side};
 
 const NAME: &str = "crossing";
@@ -55,7 +55,7 @@ pub(super) fn inherited(
 ) {
     let root = &subject.terms.root;
     for &w in &valid_leaves(&subject.mesh.words) {
-        if let Some(from) = enclosing(base, w)
+        if let Some(from) = enclosing(base, w).map(|i| base[i])
             && differs(w, from)
         {
             result.report_with(|| {
@@ -66,13 +66,10 @@ pub(super) fn inherited(
     }
 }
 
-/// The one of some sorted leaves that equals or contains this leaf.
-fn enclosing(words: &[u64], leaf: u64) -> Option<u64> {
-    let after = words.partition_point(|&w| word::key(w) <= word::key(leaf));
-    let &w = words.get(after.checked_sub(1)?)?;
-    let encloses = word::level(w) <= word::level(leaf)
-        && word::key(leaf) < word::key(w) + word::span(word::level(w));
-    encloses.then_some(w)
+/// The index of the one of some sorted leaves that equals or contains this leaf.
+pub(super) fn enclosing(words: &[u64], leaf: u64) -> Option<usize> {
+    let i = components::leaf_at(words, word::octant(leaf).bounds().0)?;
+    (word::level(words[i]) <= word::level(leaf)).then_some(i)
 }
 
 /// Checks the mesh alone.

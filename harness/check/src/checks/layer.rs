@@ -123,13 +123,23 @@ impl SurfaceLayer<'_> {
 mod tests {
     use super::*;
     use contract::lattice::Root;
+    use contract::manifest::Enclosed;
     use contract::testing::graded_words;
     use contract::word;
     use proptest::prelude::*;
 
     fn terms(n: u32, level_surface: u8, keep: Keep, keep_crossing: bool) -> Terms {
         let root = Root { origin: [0.0; 3], edge: 1.0 };
-        Terms { root, level_surface, layer_cells_min: n, keep, keep_crossing, boxes: Vec::new() }
+        Terms {
+            root,
+            level_surface,
+            layer_cells_min: n,
+            keep,
+            keep_crossing,
+            boxes: Vec::new(),
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
+        }
     }
 
     /// Whether a layer is too thin, literally by the definition and over all pairs of leaves.

@@ -1,14 +1,15 @@
 //! The manifest agrees with the files and with the case.
 //!
-//! Section 8 of reference/DEFINITION.md: counts, digests, and inputs. The check cannot detect wrong leaves, or
-//! two sets of leaves with equal digests. `sides` checks the ambiguous components.
+//! Section 8 of reference/DEFINITION.md: counts, digests, inputs and, if the mesh equals the reference, the
+//! components. The check cannot detect wrong leaves, or two sets of leaves with equal digests. `sides` checks the
+//! ambiguous components and `kept` the numbers of components.
 
 use std::fmt::Debug;
 
 use super::{CheckResult, Subject, Terms};
 use contract::digest::Digest;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Tally, Tree};
+use contract::manifest::{Components, Manifest, Tally, Tree};
 
 const NAME: &str = "manifest";
 
@@ -23,7 +24,42 @@ pub fn check(subject: &Subject) -> CheckResult {
             against_leaves(prefix, set, &mut result);
         }
     }
+    // Of different leaves, `identical` reports the cause.
+    if let Some(reference) = subject.reference.filter(|r| r.words == subject.mesh.words) {
+        against_reference(subject, &reference.manifest, &mut result);
+    }
     result
+}
+
+/// The manifest describes the components as that of the equal reference does, if both count them. This is the only check of
+/// the counts in a mesh whose T0 is not known, such as one made on several ranks.
+fn against_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResult) {
+    let mesh = &subject.mesh.manifest;
+    let mut place = |field: &str, claimed: Option<[f64; 3]>, found: Option<[f64; 3]>| {
+        let equal = match (claimed, found) {
+            (Some(a), Some(b)) => subject.terms.same_place(a, b),
+            (a, b) => a == b,
+        };
+        if !equal {
+            result.report(format!(
+                "{field}: {claimed:?} in the manifest, but {found:?} in the reference's"
+            ));
+        }
+    };
+    let (a, b) = (&mesh.components_ambiguous, &reference.components_ambiguous);
+    place("example of an ambiguous component", a.example, b.example);
+    if let (Some(a), Some(b)) = (&mesh.components, &reference.components) {
+        place("example of an enclosed component", a.enclosed.example, b.enclosed.example);
+        let counts = |c: &Components| [c.outside, c.inside, c.enclosed.count, c.enclosed.leaves];
+        same(
+            "",
+            "components (outside, inside, enclosed, their leaves)",
+            &counts(a),
+            &counts(b),
+            result,
+        );
+    }
+    same("", "components_ambiguous.count", &a.count, &b.count, result);
 }
 
 /// The inputs in the manifest are those of the case.
@@ -35,6 +71,8 @@ fn against_terms(prefix: &str, manifest: &Manifest, terms: &Terms, result: &mut 
     same(prefix, "keep", &claimed.keep, &terms.keep, result);
     same(prefix, "keep_crossing", &claimed.keep_crossing, &terms.keep_crossing, result);
     same(prefix, "boxes", &claimed.boxes, &terms.boxes, result);
+    same(prefix, "seeds", &claimed.seeds, &terms.seeds, result);
+    same(prefix, "enclosed", &claimed.enclosed, &terms.enclosed, result);
 }
 
 fn against_leaves(prefix: &str, set: &LeafSet, result: &mut CheckResult) {

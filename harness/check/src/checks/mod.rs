@@ -13,6 +13,7 @@ pub mod facets;
 pub mod gap;
 pub mod hanging;
 pub mod identical;
+pub mod kept;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
@@ -31,9 +32,8 @@ pub use premise::with_premise;
 pub use promised::promised;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::Subject;
-use subject::valid_leaves;
+pub(crate) use subject::valid_leaves;
 pub use terms::Terms;
-pub(crate) use terms::interiors_meet;
 
 /// Runs all checks of the definition, in the order in which their findings are most helpful. `identical` is omitted
 /// without a reference.
@@ -45,6 +45,7 @@ pub fn all(subject: &Subject) -> Vec<CheckResult> {
         spacing::check(subject),
         crossing::check(subject),
         sides::check(subject),
+        kept::check(subject),
         balance::check(subject),
         layer::check(subject),
     ];

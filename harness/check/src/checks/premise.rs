@@ -27,7 +27,7 @@ fn missing(name: &str, tree: &Tree, base: Option<&Tree>, terms: &Terms) -> Optio
     let known = base.is_some();
     match name {
         "manifest" | "identical" => None,
-        "complete" | "spacing" | "crossing" if known => None,
+        "complete" | "spacing" | "crossing" | "kept" if known => None,
         "sides" if known => {
             let all = base.map_or(0, |base| base.kinds(base.root()) & !HOLES);
             (all == CROSSING).then(|| "all leaves of T0 are crossing".to_owned())
@@ -61,7 +61,7 @@ fn one_level(tree: &Tree) -> Option<String> {
 mod tests {
     use super::*;
     use contract::lattice::Root;
-    use contract::manifest::Keep;
+    use contract::manifest::{Enclosed, Keep};
     use contract::testing::words_of;
 
     fn terms(layer_cells_min: u32) -> Terms {
@@ -73,6 +73,8 @@ mod tests {
             keep: Keep::All,
             keep_crossing: true,
             boxes: Vec::new(),
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
         }
     }
 

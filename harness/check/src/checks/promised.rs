@@ -2,13 +2,12 @@
 //! no base tree, no reference, and no sides.
 
 use super::facets::Facets;
-use super::region::{BAND_CELLS, Survey};
+use super::region::{BAND_CELLS, Space, Survey};
 use super::surface::Crossed;
 use super::{CheckResult, Terms, balance, complete, layer, spacing, with_premise};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::manifest::Keep;
-use contract::parity::Parity;
 use contract::tree::Tree;
 
 /// Checks what is promised about a mesh, in the order in which findings are most helpful. Without a case, promises that
@@ -19,24 +18,21 @@ pub fn promised(
     case: Option<&Case>,
     promises: &Promises,
 ) -> Vec<CheckResult> {
-    let geometry =
-        case.map(|case| (Facets::new(&case.facets_lattice), Parity::new(&case.facets_lattice)));
+    let facets = case.map(|case| Facets::new(&case.facets_lattice));
+    let deletes = terms.keep != Keep::All || !terms.keep_crossing;
+    let needs_space = promises.sides.is_some() || promises.complete && deletes;
+    let space = case.zip(facets.as_ref()).filter(|_| needs_space);
+    let space = space.map(|(case, facets)| Space::new(terms, facets, &case.facets_lattice));
+    let band_cells = promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells);
+    let survey = space.as_ref().map(|space| Survey { tree, space, band_cells });
+    let crossed = facets.as_ref().map(|facets| Crossed::new(facets, terms, promises.surface));
     let mut results = Vec::new();
     let noted = |result| with_premise(result, tree, None, terms);
     let without = |name| CheckResult::nothing(name, "the geometry is unknown without a case");
-    let survey = geometry.as_ref().map(|(facets, parity)| Survey {
-        tree,
-        terms,
-        facets,
-        parity,
-        band_cells: promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells),
-    });
-    let crossed =
-        geometry.as_ref().map(|(facets, _)| Crossed::new(facets, terms, promises.surface));
     if promises.complete {
         // If nothing is deleted, every hole is an error, and no geometry is needed to see it.
-        results.push(match (&survey, terms.keep == Keep::All && terms.keep_crossing) {
-            (_, true) => noted(complete::check_holes(tree, terms)),
+        results.push(match (&survey, deletes) {
+            (_, false) => noted(complete::check_holes(tree, terms)),
             (Some(survey), _) => survey.check_complete(),
             (None, _) => without("complete"),
         });

@@ -1,35 +1,32 @@
-//! Each component has one side, and it is the side that rays determine.
+//! Each component has one side, and it is the side that seeds or, without seeds, rays determine.
 //!
 //! Section 4 of reference/DEFINITION.md. With T0: the components of its leaves (connected through faces) are
-//! found by union-find, the harness's own exact rays determine the side of each, and every leaf must have the
-//! side of its component. The manifest must state the number of ambiguous components. Every leaf of the mesh
+//! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf must
+//! have the side of its component. The manifest must state the number of ambiguous components. Every leaf of the mesh
 //! must have the side of the T0 leaf that contains it. Without T0: no outside leaf shares part of a face with
 //! an inside leaf, and no leaf has a side that is deleted. The check cannot detect that all rays are wrong,
 //! which is possible on a body that is not watertight; the oracles can.
 
-use super::components::{self, Component};
+use super::components::Component;
 use super::contact::{self, Contacts};
-use super::{CheckResult, Subject, Terms, crossing, identical, valid_leaves};
+use super::{CheckResult, Subject, Terms, crossing, identical};
 use contract::leafset::LeafSet;
 use contract::manifest::Ambiguous;
 use contract::octant::Octant;
-use contract::parity::Parity;
 use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
 const NAME: &str = "sides";
 
-/// Checks the mesh against T0 and T0 against rays or, without T0, the mesh alone.
+/// Checks the mesh against T0 and T0 against seeds or rays or, without T0, the mesh alone.
 pub fn check(subject: &Subject) -> CheckResult {
     let mut result = check_tree(subject.tree(), &subject.terms);
     result.examined = subject.mesh.words.len() as u64;
-    if let Some(base) = subject.base {
-        let words = valid_leaves(&base.words);
-        crossing::inherited(subject, &words, &|w, base| w & 3 != base & 3, &mut result);
-        let components = components::find(&words, &Parity::new(&subject.case.facets_lattice));
-        labelled(&components, &words, &subject.terms, &mut result);
+    if let (Some(base), Some((words, components))) = (subject.base, subject.components()) {
+        crossing::inherited(subject, words, &|w, base| w & 3 != base & 3, &mut result);
+        labelled(components, words, &subject.terms, &mut result);
         for (prefix, set) in [("", subject.mesh), ("T0: ", base)] {
-            ambiguous(prefix, set, &components, &subject.terms, &mut result);
+            ambiguous(prefix, set, components, &subject.terms, &mut result);
         }
         let undecided = components.iter().filter(|c| c.ambiguous).count();
         result.note = format!("{} components, {undecided} ambiguous", components.len());
@@ -75,13 +72,14 @@ fn not_kept(tree: &Tree, handle: Handle, octant: Octant, terms: &Terms, result: 
 
 /// Every leaf of T0 has the side of its component.
 fn labelled(components: &[Component], words: &[u64], terms: &Terms, result: &mut CheckResult) {
+    let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
     for component in components {
         for &i in &component.leaves {
             if word::side(words[i as usize]) != component.side {
                 let (side, count) = (component.side, component.leaves.len());
                 result.report_with(|| {
                     let leaf = identical::describe(words[i as usize], &terms.root);
-                    format!("rays show that a component of {count} leaves is {side}, but it contains the T0 {leaf}")
+                    format!("{judges} show that a component of {count} leaves is {side}, but it contains the T0 {leaf}")
                 });
             }
         }
@@ -101,14 +99,12 @@ fn ambiguous(
     if count != found.len() as u64 {
         let total = found.len();
         result.report(format!(
-            "{prefix}the manifest counts {count} ambiguous components, but rays find {total}"
+            "{prefix}the manifest counts {count} ambiguous components, but there are {total}"
         ));
     }
     let near = |c: &&Component| {
         let centre = terms.root.to_user(c.first.centre());
-        // Lattice coordinates are exact, but those in the user's units are rounded.
-        let equal = |a: usize, e: f64| (e - centre[a]).abs() <= 1e-9 * terms.root.edge;
-        example.is_some_and(|e| (0..3).all(|a| equal(a, e[a])))
+        example.is_some_and(|e| terms.same_place(e, centre))
     };
     let placed = if found.is_empty() { example.is_none() } else { found.iter().any(near) };
     if !placed {

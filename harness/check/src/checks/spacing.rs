@@ -7,7 +7,7 @@
 //! refinement by gradation; `identical` does.
 
 use super::facets::{Facets, Visit};
-use super::{CheckResult, Subject, Terms, identical, interiors_meet, valid_leaves};
+use super::{CheckResult, Subject, Terms, identical, valid_leaves};
 use contract::manifest::ExtentBox;
 use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
@@ -66,7 +66,7 @@ fn box_met(
     report: &mut dyn FnMut(Octant),
 ) {
     let fine_enough = tree.coarsest_level(handle, octant.level) >= extent.level;
-    if fine_enough || !interiors_meet(&octant, extent) {
+    if fine_enough || !extent.meets(&octant) {
         return;
     }
     if handle.is_node() {

@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use super::Terms;
+use super::components::{self, Component};
 use super::facets::Facets;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -24,6 +25,7 @@ pub struct Subject<'a> {
     tree: OnceCell<Tree>,
     tree_base: OnceCell<Tree>,
     tree_with_deleted: OnceCell<Tree>,
+    components: OnceCell<(Vec<u64>, Vec<Component>)>,
     facets: OnceCell<Facets>,
 }
 
@@ -39,6 +41,7 @@ impl<'a> Subject<'a> {
             tree: OnceCell::new(),
             tree_base: OnceCell::new(),
             tree_with_deleted: OnceCell::new(),
+            components: OnceCell::new(),
             facets: OnceCell::new(),
         }
     }
@@ -49,6 +52,7 @@ impl<'a> Subject<'a> {
             base: Some(base),
             tree_base: OnceCell::new(),
             tree_with_deleted: OnceCell::new(),
+            components: OnceCell::new(),
             ..self
         }
     }
@@ -91,6 +95,17 @@ impl<'a> Subject<'a> {
         })
     }
 
+    /// The valid leaves of T0 and their components, if T0 is known.
+    pub(super) fn components(&self) -> Option<(&[u64], &[Component])> {
+        let base = self.base?;
+        let (words, found) = self.components.get_or_init(|| {
+            let words = valid_leaves(&base.words);
+            let found = components::find(&words, &self.terms, &self.case.facets_lattice);
+            (words, found)
+        });
+        Some((words, found))
+    }
+
     /// The case's facets, prepared for crossing tests.
     pub(super) fn facets(&self) -> &Facets {
         self.facets.get_or_init(|| Facets::new(&self.case.facets_lattice))
@@ -99,7 +114,7 @@ impl<'a> Subject<'a> {
 
 /// The sorted words that are leaves and overlap no earlier one. A check that needs a linear mesh continues with
 /// these; `linear` reports the others.
-pub(super) fn valid_leaves(words: &[u64]) -> Vec<u64> {
+pub(crate) fn valid_leaves(words: &[u64]) -> Vec<u64> {
     let mut builder = Builder::default();
     words.iter().copied().filter(|&w| builder.push(w).is_ok()).collect()
 }

@@ -2,7 +2,7 @@
 
 use contract::case::Case;
 use contract::lattice::Root;
-use contract::manifest::{ExtentBox, Keep, Manifest};
+use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest};
 use contract::octant::Octant;
 use contract::tree::Kind;
 use contract::word::Side;
@@ -22,6 +22,10 @@ pub struct Terms {
     pub keep_crossing: bool,
     /// Extent boxes on the lattice.
     pub boxes: Vec<ExtentBox>,
+    /// Seeds on the lattice.
+    pub seeds: Vec<[i64; 3]>,
+    /// The treatment of enclosed components.
+    pub enclosed: Enclosed,
 }
 
 impl Terms {
@@ -34,6 +38,8 @@ impl Terms {
             keep: case.keep,
             keep_crossing: case.keep_crossing,
             boxes: case.boxes.clone(),
+            seeds: case.seeds_lattice.clone(),
+            enclosed: case.enclosed,
         }
     }
 
@@ -46,6 +52,8 @@ impl Terms {
             keep: manifest.keep,
             keep_crossing: manifest.keep_crossing,
             boxes: manifest.boxes.clone(),
+            seeds: manifest.seeds.clone(),
+            enclosed: manifest.enclosed,
         }
     }
 
@@ -59,6 +67,22 @@ impl Terms {
         }
     }
 
+    /// The side of components with a seed, if there are seeds. All other components have the other side.
+    pub fn side_of_flow(&self) -> Side {
+        if self.keep == Keep::Inside { Side::Inside } else { Side::Outside }
+    }
+
+    /// Whether outside components that the far field does not reach are deleted.
+    pub fn deletes_enclosed(&self) -> bool {
+        self.keep == Keep::Outside && self.seeds.is_empty() && self.enclosed == Enclosed::Delete
+    }
+
+    /// Whether two points in the user's units are the same: lattice coordinates are exact, but those in the user's
+    /// units are rounded.
+    pub fn same_place(&self, a: [f64; 3], b: [f64; 3]) -> bool {
+        (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 1e-9 * self.root.edge)
+    }
+
     /// Whether a box requires leaves finer than the surface. Gradation may then refine crossing leaves.
     pub fn has_box_finer_than_surface(&self) -> bool {
         self.boxes.iter().any(|b| b.level > self.level_surface)
@@ -66,12 +90,6 @@ impl Terms {
 
     /// A box that requires the octant to be split.
     pub fn box_that_splits(&self, octant: &Octant) -> Option<&ExtentBox> {
-        self.boxes.iter().find(|b| b.level > octant.level && interiors_meet(octant, b))
+        self.boxes.iter().find(|b| b.level > octant.level && b.meets(octant))
     }
-}
-
-/// Whether the interiors of an octant and a box meet.
-pub(crate) fn interiors_meet(octant: &Octant, extent: &ExtentBox) -> bool {
-    let (low, high) = octant.bounds();
-    (0..3).all(|a| low[a].max(extent.min[a]) < high[a].min(extent.max[a]))
 }

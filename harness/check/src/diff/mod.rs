@@ -4,6 +4,7 @@
 //! The comparison trusts the digests in the manifests; the check `manifest` establishes that they agree with
 //! the leaves.
 
+mod region;
 pub mod rule;
 mod witness;
 
@@ -117,6 +118,9 @@ fn fields(a: &Manifest, b: &Manifest) -> Vec<String> {
     same("keep", &a.keep, &b.keep);
     same("keep_crossing", &a.keep_crossing, &b.keep_crossing);
     same("boxes", &a.boxes, &b.boxes);
+    same("seeds", &a.seeds, &b.seeds);
+    same("enclosed", &a.enclosed, &b.enclosed);
+    same("components", &a.components, &b.components);
     same("components_ambiguous", &a.components_ambiguous, &b.components_ambiguous);
     same("leaves", &a.leaves, &b.leaves);
     same("leaves_by_side", &a.leaves_by_side, &b.leaves_by_side);

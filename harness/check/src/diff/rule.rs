@@ -42,11 +42,11 @@ pub(super) enum Mesh {
 }
 
 impl Mesh {
-    fn name(self) -> char {
+    pub(super) fn name(self) -> char {
         if self == Self::A { 'A' } else { 'B' }
     }
 
-    fn other(self) -> Self {
+    pub(super) fn other(self) -> Self {
         if self == Self::A { Self::B } else { Self::A }
     }
 }
@@ -86,6 +86,10 @@ impl Dispute<'_> {
 
     /// The rule for an octant that has different sides.
     fn side(&self, a: &Leaf, b: &Leaf) -> String {
+        let crossing = a.side == Side::Crossing || b.side == Side::Crossing;
+        if !crossing && let Some((side, why)) = self.side_by_seeds(Mesh::A, a) {
+            return format!("{why}: {} is right", if a.side == side { "A" } else { "B" });
+        }
         let Some(case) = self.case else {
             return "section 4 (side): give the case file (--case) to decide it".into();
         };
@@ -94,6 +98,9 @@ impl Dispute<'_> {
             return format!(
                 "section 4: facet {facet} crosses it, so it is crossing: {right} is right"
             );
+        }
+        if !self.terms.seeds.is_empty() {
+            return "section 4: no facet crosses it, so the seeds decide".into();
         }
         let rays = Parity::new(&case.facets_lattice).inside(a.octant.centre());
         let inside = rays.iter().filter(|&&inside| inside).count();
@@ -117,6 +124,11 @@ impl Dispute<'_> {
         let (has, lacks, side) = (mesh.name(), mesh.other().name(), leaf.side);
         let kept = self.terms.keeps(side as Kind);
         let keep = format!("{:?}", self.terms.keep).to_lowercase();
+        if side != Side::Crossing
+            && let Some(rule) = self.kept_or_deleted(mesh, leaf)
+        {
+            return rule;
+        }
         match (side, kept) {
             (Side::Crossing, false) => {
                 format!("section 7: keep_crossing is false, so {has} must not have a crossing leaf")
@@ -242,6 +254,7 @@ pub fn sides(a: Option<u64>, b: Option<u64>, root: &contract::lattice::Root) -> 
 mod tests {
     use super::*;
     use contract::lattice::Root;
+    use contract::manifest::Enclosed;
 
     fn terms(n: u32) -> Terms {
         let root = Root { origin: [0.0; 3], edge: 8.0 };
@@ -252,6 +265,8 @@ mod tests {
             keep: Keep::All,
             keep_crossing: true,
             boxes: vec![],
+            seeds: vec![],
+            enclosed: Enclosed::Delete,
         }
     }
 

@@ -53,7 +53,9 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
                                                                hundredth of the finest cell. No volumes overlap."
             .into(),
         Kind::Intersections => "Where two closed shells overlap by more than a cell, rays count both surfaces, and \
-                                the overlap is outside rather than inside. Unite the shells if that is not meant."
+                                the overlap is outside rather than inside. If the outside is kept, an overlap that \
+                                the far field does not reach is deleted, unless enclosed = keep. If seeds are given, \
+                                the overlap is flow only if a seed lies in it. Unite the shells if that is not meant."
             .into(),
         Kind::Contacts => {
             "No effect: facets that touch without a common vertex cross the same leaves.".into()

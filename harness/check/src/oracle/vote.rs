@@ -3,7 +3,7 @@
 //! Every point has a side in the mesh, an answer of each oracle, and the result of the harness's own six exact
 //! rays, which decide if they agree. On a watertight body they always agree, and the mesh fails if the rays or
 //! three unanimous oracles contradict it. On any other body the side belongs to a component and not to a point,
-//! so contradictions are reported only.
+//! so contradictions are reported only. So are all contradictions of a case with seeds, which decide instead of rays.
 
 /// One oracle's answers.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub struct Ballot<'a> {
     pub oracles: &'a [Answer],
     /// Whether the body is watertight.
     pub watertight: bool,
+    /// Whether seeds and not rays determine the sides. Then no vote can contradict the mesh.
+    pub seeds: bool,
 }
 
 /// The contradictions between one oracle and the mesh.
@@ -88,7 +90,7 @@ const MAJORITY: usize = 3;
 impl Tally {
     /// The reason why the mesh fails; `None` if it does not. `points` are the coordinates of the points.
     pub fn failure(&self, ballot: &Ballot, points: &[[f64; 3]]) -> Option<String> {
-        if !ballot.watertight {
+        if ballot.seeds || !ballot.watertight {
             return None;
         }
         let sentence = |subject: &str, against: &[usize]| {
@@ -112,19 +114,26 @@ impl Tally {
         let sentence = |dissent: &Dissent| {
             let Dissent { name, points, right, wrong } = dissent;
             let undecided = points - right - wrong;
-            format!(
-                "{name} differs from the mesh at {points} of {all} points; by exact rays it is right at {right}, \
-                 wrong at {wrong}, undecided at {undecided}"
-            )
+            let judged = match ballot.seeds {
+                true => format!("exact rays agree with it at {right}"),
+                false => format!(
+                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {undecided}"
+                ),
+            };
+            format!("{name} differs from the mesh at {points} of {all} points; {judged}")
         };
         let mut notes: Vec<String> =
             self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
-        if !ballot.watertight && !self.exact_against.is_empty() {
-            notes.push(format!(
-                "the body is not watertight: at {} points all six rays contradict the side of the \
-                 component, which another leaf determines",
-                self.exact_against.len()
-            ));
+        let why = match (ballot.seeds, ballot.watertight) {
+            (true, _) => "seeds determine the sides",
+            (false, false) => {
+                "the body is not watertight, and another leaf determines the side of the component"
+            }
+            (false, true) => return notes,
+        };
+        if !self.exact_against.is_empty() {
+            let count = self.exact_against.len();
+            notes.push(format!("at {count} points all six exact rays contradict the mesh: {why}"));
         }
         notes
     }
@@ -148,9 +157,17 @@ mod tests {
         all: [&[u8]; 3],
         watertight: bool,
     ) -> (Tally, Option<String>, Vec<String>) {
-        let oracles = answers(all);
-        let ballot =
-            Ballot { mesh: &[false, true, true], exact: &exact, oracles: &oracles, watertight };
+        vote_with_seeds(exact, all, watertight, false)
+    }
+
+    fn vote_with_seeds(
+        exact: [Option<bool>; 3],
+        all: [&[u8]; 3],
+        watertight: bool,
+        seeds: bool,
+    ) -> (Tally, Option<String>, Vec<String>) {
+        let (oracles, mesh) = (answers(all), [false, true, true]);
+        let ballot = Ballot { mesh: &mesh, exact: &exact, oracles: &oracles, watertight, seeds };
         let count = count(&ballot);
         let points = [[0.0; 3], [1.0; 3], [2.0; 3]];
         let (failure, notes) = (count.failure(&ballot, &points), count.notes(&ballot));
@@ -206,5 +223,23 @@ mod tests {
         let (count, failure, notes) = vote(exact, [no, no, no], false);
         assert_eq!((failure, count.exact_undecided, notes.len()), (None, 1, 4));
         assert!(notes[0].ends_with("right at 1, wrong at 0, undecided at 1"), "{}", notes[0]);
+    }
+
+    #[test]
+    fn with_seeds_no_vote_fails_the_mesh_and_every_contradiction_is_noted() {
+        let no: &[u8] = &[1, 1, 0];
+        let exact = [Some(true), Some(true), Some(false)];
+        let (count, failure, notes) = vote_with_seeds(exact, [no, no, no], true, true);
+        assert_eq!((count.exact_against.len(), failure, notes.len()), (2, None, 4));
+        assert!(
+            notes[0].ends_with("at 2 of 3 points; exact rays agree with it at 2"),
+            "{}",
+            notes[0]
+        );
+        assert_eq!(
+            notes[3],
+            "at 2 points all six exact rays contradict the mesh: seeds determine the sides"
+        );
+        assert!(vote(exact, [no, no, no], true).1.is_some());
     }
 }

@@ -4,7 +4,6 @@
 use super::SelftestCase;
 use super::edit::{self, has_side, merge, sibling_groups, split};
 use super::mutant::{Mutant, Mutation, audited, informed};
-use crate::checks::interiors_meet;
 use contract::octant::Octant;
 use contract::word::{self, Side};
 
@@ -57,7 +56,7 @@ fn merged_where_box_requires(s: &SelftestCase, words: &[u64]) -> Option<Vec<u64>
         let octant = word::octant(words[i]);
         let parent = octant.ancestor(octant.level - 1);
         let boxes = &s.case.boxes;
-        boxes.iter().any(|b| b.level == octant.level && interiors_meet(&parent, b))
+        boxes.iter().any(|b| b.level == octant.level && b.meets(&parent))
     };
     let i = sibling_groups(words).into_iter().find(required)?;
     Some(merge(words, &[i]))

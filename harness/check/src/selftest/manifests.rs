@@ -4,7 +4,7 @@ use super::SelftestCase;
 use super::edit::other_side;
 use super::mutant::{Mutant, Mutation, audited, informed};
 use contract::digest::Digest;
-use contract::manifest::{ExtentBox, Keep, Manifest, Tree};
+use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
 
 pub(super) const MUTANTS: &[Mutant] = &[
     audited("manifest: one leaf too many", "manifest", |s| edited(s, |m| m.leaves += 1)),
@@ -33,6 +33,13 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     informed("manifest: one box too many", "manifest", |s| edited(s, box_added)),
     informed("manifest: boxes missing", "manifest", boxes_removed),
+    informed("manifest: one seed too many", "manifest", |s| {
+        edited(s, |m| m.seeds.push([1 << 20; 3]))
+    }),
+    informed("manifest: seeds missing", "manifest", seeds_removed),
+    informed("manifest: wrong treatment of enclosed components", "manifest", |s| {
+        edited(s, |m| m.enclosed = other(m.enclosed))
+    }),
     informed("manifest: final mesh labelled T0", "manifest", |s| {
         edited(s, |m| m.tree = Tree::Base)
     }),
@@ -85,6 +92,18 @@ fn box_added(m: &mut Manifest) {
 fn boxes_removed(s: &SelftestCase) -> Option<Mutation> {
     let any = !s.case.boxes.is_empty();
     any.then(|| edited(s, |m| m.boxes.clear())).flatten()
+}
+
+fn seeds_removed(s: &SelftestCase) -> Option<Mutation> {
+    let any = !s.case.seeds.is_empty();
+    any.then(|| edited(s, |m| m.seeds.clear())).flatten()
+}
+
+fn other(enclosed: Enclosed) -> Enclosed {
+    match enclosed {
+        Enclosed::Delete => Enclosed::Keep,
+        Enclosed::Keep => Enclosed::Delete,
+    }
 }
 
 fn base_labelled_final(s: &SelftestCase) -> Option<Mutation> {

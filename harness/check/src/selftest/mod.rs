@@ -18,6 +18,7 @@ mod base;
 mod edit;
 mod files;
 mod grading;
+mod kept;
 mod leaves;
 mod manifests;
 mod mutant;
@@ -32,6 +33,7 @@ pub fn catalogue() -> Vec<Mutant> {
     [
         leaves::MUTANTS,
         sides::MUTANTS,
+        kept::MUTANTS,
         base::MUTANTS,
         grading::MUTANTS,
         manifests::MUTANTS,

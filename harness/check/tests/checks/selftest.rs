@@ -3,11 +3,13 @@
 use crate::support;
 use check::selftest;
 
-const CASES: [(&str, &str); 4] = [
+const CASES: [(&str, &str); 6] = [
     ("outside", include_str!("../../../selftest-cases/outside.toml")),
     ("inside", include_str!("../../../selftest-cases/inside.toml")),
     ("all", include_str!("../../../selftest-cases/all.toml")),
     ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
+    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
 ];
 
 #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// Every corruption that a mesh can have applies to at least one of these cases. The first has more than 20 000
 /// leaves.
-const CASES: [(&str, &str); 4] = [
+const CASES: [(&str, &str); 6] = [
     // The faces of the cube bisect octants, so that eight siblings are crossing.
     (
         "outside",
@@ -17,6 +17,8 @@ const CASES: [(&str, &str); 4] = [
     ("inside", include_str!("../../../selftest-cases/inside.toml")),
     ("all", include_str!("../../../selftest-cases/all.toml")),
     ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
+    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
 ];
 
 fn written(name: &str, correct: &SelftestCase, place: &Path) -> Source {

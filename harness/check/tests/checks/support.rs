@@ -15,14 +15,25 @@ pub fn selftest_case(name: &str, text: &str) -> SelftestCase {
     read_meshes(&path, dir.path())
 }
 
-/// Final mesh and T0 of a body given as facets. `text` is the case file without the geometry.
-pub fn selftest_case_of_facets(text: &str, facets: &[geometries::Facet]) -> SelftestCase {
+/// Final mesh and T0 of a body given as facets, or the errors of the harness and of the reference if both refuse the
+/// case. `text` is the case file without the geometry.
+pub fn meshes_of_facets(
+    text: &str,
+    facets: &[geometries::Facet],
+) -> Result<SelftestCase, [String; 2]> {
     let dir = tempfile::tempdir().unwrap();
     let stl = std::fs::File::create(dir.path().join("body.stl")).unwrap();
     geometries::write_stl_binary(facets, stl).unwrap();
     let path = dir.path().join("body.toml");
     std::fs::write(&path, format!("geometry = \"body.stl\"\n{text}")).unwrap();
-    read_meshes(&path, dir.path())
+    match (Case::read(&path), reference::mesh(&reference::case_file::read(&path).unwrap())) {
+        (Err(a), Err(b)) => Err([a.to_string(), b.to_string()]),
+        (a, b) => {
+            let (a, b) = (a.err(), b.err());
+            assert!(a.is_none() && b.is_none(), "one refuses the case: {a:?}, {b:?}");
+            Ok(read_meshes(&path, dir.path()))
+        }
+    }
 }
 
 fn read_meshes(path: &Path, dir: &Path) -> SelftestCase {

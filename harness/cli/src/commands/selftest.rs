@@ -51,11 +51,13 @@ pub struct Arguments {
 }
 
 /// The built-in cases: every corruption applies to at least one of them.
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 6] = [
     ("outside", include_str!("../../../selftest-cases/outside.toml")),
     ("inside", include_str!("../../../selftest-cases/inside.toml")),
     ("all", include_str!("../../../selftest-cases/all.toml")),
     ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
+    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
 ];
 
 /// Meshes the cases, corrupts the meshes and prints the table; returns the exit code.

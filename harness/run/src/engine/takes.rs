@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use contract::case::Case;
-use contract::manifest::Keep;
+use contract::manifest::{Enclosed, Keep};
 use contract::plain::StlForm;
 use serde::Deserialize;
 
@@ -18,6 +18,11 @@ pub struct Takes {
     pub keep: Vec<Keep>,
     /// `keep_crossing = false`.
     pub drop_crossing: bool,
+    /// `seeds`.
+    pub seeds: bool,
+    /// `enclosed = "keep"`. The default, `delete`, cannot be declined: whether anything is enclosed is known after
+    /// meshing only.
+    pub keep_enclosed: bool,
     /// The form of its STL file.
     pub stl: StlForm,
 }
@@ -25,7 +30,15 @@ pub struct Takes {
 impl Default for Takes {
     fn default() -> Self {
         let keep = vec![Keep::Outside, Keep::Inside, Keep::All];
-        Self { generator: false, boxes: true, keep, drop_crossing: true, stl: StlForm::Any }
+        Self {
+            generator: false,
+            boxes: true,
+            keep,
+            drop_crossing: true,
+            seeds: false,
+            keep_enclosed: false,
+            stl: StlForm::Any,
+        }
     }
 }
 
@@ -69,6 +82,12 @@ impl Description {
         if !case.keep_crossing && !self.takes.drop_crossing {
             return Some(format!("{name} does not support keep_crossing = false"));
         }
+        if !case.seeds.is_empty() && !self.takes.seeds {
+            return Some(format!("{name} does not support seeds"));
+        }
+        if case.enclosed == Enclosed::Keep && !self.takes.keep_enclosed {
+            return Some(format!("{name} does not support enclosed = keep"));
+        }
         None
     }
 }
@@ -91,6 +110,11 @@ mod tests {
         let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
         assert!(deep.contains("levels up to 3"), "{deep}");
         assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
+        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
+        assert!(seeds.ends_with("does not support seeds"), "{seeds}");
+        let enclosed =
+            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
+        assert!(enclosed.ends_with("enclosed = keep"), "{enclosed}");
         let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
                      max = [1.0, 1.0, 1.0]\nspacing = 1.0";
         assert!(declines(boxed).unwrap().contains("boxes"));

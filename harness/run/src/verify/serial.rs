@@ -6,9 +6,10 @@ use super::run::{Meshed, Program, Request};
 use crate::engine::failure::{CODE_INPUT, End};
 use crate::engine::layout::SERIAL;
 use crate::engine::report::RunReport;
-use check::checks::{self, CheckResult, Subject, identical};
+use check::checks::{self, CheckResult, Subject, identical, kept};
 use contract::case::Case;
 use contract::leafset::LeafSet;
+use contract::manifest::{Ambiguous, Components, Manifest};
 use std::path::{Path, PathBuf};
 
 /// Meshes that later steps use.
@@ -72,6 +73,7 @@ impl CaseRun<'_> {
         };
         let results = checks::all(&subject);
         self.add_results("serial", None, results);
+        self.note_components(&mesh.manifest);
         Some(Meshes { mesh, base: Some(base) })
     }
 
@@ -103,6 +105,39 @@ impl CaseRun<'_> {
             )),
         };
         self.add(Check::new("serial", "deterministic", outcome), None);
+    }
+
+    /// Adds the numbers of components to the check that has compared them, with remarks about what a user may not expect.
+    fn note_components(&mut self, manifest: &Manifest) {
+        let mut checks = self.report().checks.iter_mut();
+        let Some(check) = checks.rfind(|check| check.name == kept::NAME) else { return };
+        let Ambiguous { count: ambiguous, example } = manifest.components_ambiguous;
+        check.counts.insert("components_ambiguous".into(), ambiguous);
+        if let Some(components) = &manifest.components {
+            let Components { outside, inside, enclosed } = components;
+            check.counts.extend([
+                ("components_outside".to_owned(), *outside),
+                ("components_inside".to_owned(), *inside),
+                ("components_enclosed".to_owned(), enclosed.count),
+                ("enclosed_leaves".to_owned(), enclosed.leaves),
+            ]);
+            if let (count @ 1.., Some(at)) = (enclosed.count, enclosed.example) {
+                check.notes.push(format!(
+                    "{count} of {outside} outside components are enclosed, and their {} leaves of T0 are deleted, for \
+                     example at {at:?}",
+                    enclosed.leaves
+                ));
+            }
+        }
+        if let Some(at) = example {
+            check.notes.push(format!(
+                "the rays of {ambiguous} components disagree, and their majority decides, for example at {at:?}"
+            ));
+        }
+        if !manifest.seeds.is_empty() {
+            let seeds = manifest.seeds.len();
+            check.notes.push(format!("{seeds} seeds determine the sides instead of rays"));
+        }
     }
 
     /// One run, whose failure ends the case.

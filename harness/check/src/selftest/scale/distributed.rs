@@ -178,6 +178,9 @@ impl DistributedMesh {
             keep: m.keep,
             keep_crossing: m.keep_crossing,
             boxes: m.boxes.clone(),
+            seeds: m.seeds.iter().map(|&seed| m.root.to_user(seed)).collect(),
+            seeds_lattice: m.seeds.clone(),
+            enclosed: m.enclosed,
         }
     }
 }

@@ -1,0 +1,62 @@
+//! The check `kept` on meshes of random bodies to which a whole component is added, or from which one is removed.
+
+use crate::no_false_alarms::{hulls, settings, soup};
+use crate::support;
+use check::checks::{Subject, Terms, components, kept, manifest};
+use contract::leafset::LeafSet;
+use contract::manifest::Manifest;
+use contract::word;
+use proptest::prelude::*;
+use std::collections::HashSet;
+
+/// The words of a mesh that lie in these leaves of T0, and the others.
+fn within(mesh: &[u64], base: &[u64], leaves: &[u32]) -> (Vec<u64>, Vec<u64>) {
+    let leaves: HashSet<usize> = leaves.iter().map(|&i| i as usize).collect();
+    let containing = |w: u64| components::leaf_at(base, word::octant(w).bounds().0);
+    mesh.iter().partition(|&&w| containing(w).is_some_and(|i| leaves.contains(&i)))
+}
+
+fn reported(subject: &Subject) -> bool {
+    !kept::check(subject).holds()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn a_component_that_is_added_or_removed_is_reported(facets in prop_oneof![1 => soup(), 3 => hulls()], text in settings()) {
+        let Ok(correct) = support::meshes_of_facets(&text, &facets) else { return Ok(()) };
+        let (terms, base) = (Terms::of_case(&correct.case), &correct.base.words);
+        let counted = |words| -> LeafSet { correct.mesh.with_parts(vec![words]) };
+        for component in components::find(base, &terms, &correct.case.facets_lattice) {
+            let (removed, mut words) = within(&correct.mesh.words, base, &component.leaves);
+            let is_kept = !removed.is_empty();
+            prop_assert_eq!(is_kept, terms.keeps(component.side as u8) && !component.enclosed);
+            if !is_kept {
+                words.extend(component.leaves.iter().map(|&i| base[i as usize]));
+            }
+            let mesh = counted(words);
+            let alone = Subject::new(&correct.case, &mesh);
+            // Without T0, `sides` reports leaves of the side that is not kept.
+            prop_assert!(reported(&alone) || !is_kept && !component.enclosed, "without T0: {text}");
+            prop_assert!(reported(&Subject::new(&correct.case, &mesh).with_base(&correct.base)), "{text}");
+        }
+    }
+}
+
+#[test]
+fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
+    let text = include_str!("../../../selftest-cases/enclosed.toml");
+    let correct = support::selftest_case("enclosed", text);
+    let check = |change: fn(&mut Manifest)| {
+        let mut mesh = correct.mesh.clone();
+        change(&mut mesh.manifest);
+        let subject = Subject::new(&correct.case, &mesh).with_reference(&correct.mesh);
+        manifest::check(&subject).findings_total
+    };
+    assert_eq!(check(|_| ()), 0);
+    assert_eq!(check(|m| m.components = None), 0);
+    assert_eq!(check(|m| m.components.as_mut().unwrap().inside += 1), 1);
+    assert_eq!(check(|m| m.components.as_mut().unwrap().enclosed.example = None), 1);
+    assert_eq!(check(|m| m.components_ambiguous.count += 1), 1);
+}
