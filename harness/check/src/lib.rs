@@ -5,6 +5,7 @@
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
 //! - [`geometry`]: diagnosis of a geometry before it is meshed;
 //! - [`leak`]: paths through openings, and their free widths;
+//! - [`promises`]: what an engine guarantees, and so what is checked;
 //! - [`oracle`]: the sample points of the oracles, and the evaluation of their answers;
 //! - [`selftest`]: corrupted meshes that the checks must detect;
 //! - [`why`]: the cause of every split, and splits without one.
@@ -15,5 +16,6 @@ pub mod diff;
 pub mod geometry;
 pub mod leak;
 pub mod oracle;
+pub mod promises;
 pub mod selftest;
 pub mod why;

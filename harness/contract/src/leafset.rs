@@ -74,6 +74,29 @@ pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
     Ok(LeafSet::new(manifest, parts))
 }
 
+/// Reads the arrays of leaves in a directory without a manifest, in the order of their names.
+///
+/// # Errors
+/// If the directory or an array cannot be read, or if there is none.
+pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, ReadError> {
+    let io = |source| ReadError::Io { path: dir.to_owned(), source };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(dir).map_err(io)? {
+        let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
+        names.extend(Path::new(&name).extension().is_some_and(|e| e == "npy").then_some(name));
+    }
+    if names.is_empty() {
+        return Err(io(std::io::Error::other("it has neither mesh.json nor an array of leaves")));
+    }
+    names.sort_unstable();
+    let read = |name: String| {
+        let path = dir.join(&name);
+        let part = PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?;
+        part.read_all().map(|words| (name, words)).map_err(|error| ReadError::part(&part, error))
+    };
+    names.into_iter().map(read).collect()
+}
+
 impl ReadError {
     /// A part that was opened, but cannot be read.
     pub fn part(part: &PartFile, error: std::io::Error) -> Self {

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::case::Case;
 use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::octant::{LEVEL_MAX, Octant};
@@ -178,6 +179,32 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// The manifest of a mesh of this case, without leaves.
+    pub fn of_case(case: &Case, tree: Tree, program: &str) -> Self {
+        let Tally { leaves, by_level, by_side, digest, octants } = Tally::default();
+        Self {
+            schema: SCHEMA.to_owned(),
+            program: program.to_owned(),
+            tree,
+            root: case.root,
+            level_surface: case.level_surface,
+            layer_cells_min: case.layer_cells_min,
+            keep: case.keep,
+            keep_crossing: case.keep_crossing,
+            boxes: case.boxes.clone(),
+            seeds: case.seeds_lattice.clone(),
+            enclosed: case.enclosed,
+            leaves,
+            leaves_by_level: by_level,
+            leaves_by_side: by_side,
+            components: None,
+            components_ambiguous: Ambiguous::default(),
+            digest,
+            octant_digests: octants,
+            parts: Vec::new(),
+        }
+    }
+
     /// Replaces all entries that depend on the leaves.
     pub fn set_tally(&mut self, tally: Tally) {
         self.leaves = tally.leaves;

@@ -4,6 +4,7 @@
 //! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
+use serde::Deserialize;
 use std::fmt::Write as _;
 use std::fs;
 use std::io;
@@ -40,17 +41,17 @@ impl PlainCase {
         Ok(Self { table, facets: case.facets })
     }
 
-    /// Writes `case.toml` and `body.stl` into an existing directory, and returns the path of the case file. A
-    /// body of at most [`FACETS_AS_TEXT`] facets is written as ASCII.
+    /// Writes `case.toml` and `body.stl` into an existing directory, and returns the path of the case file.
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn write(&self, directory: &Path) -> io::Result<PathBuf> {
+    pub fn write(&self, directory: &Path, form: StlForm) -> io::Result<PathBuf> {
         let mut table = Table::new();
         table.insert("geometry".into(), Value::String("body.stl".into()));
         table.extend(self.table.clone());
         let body = directory.join("body.stl");
-        match self.facets.len() <= FACETS_AS_TEXT {
+        let few = self.facets.len() <= FACETS_AS_TEXT;
+        match form == StlForm::Ascii || form == StlForm::Any && few {
             true => fs::write(body, ascii(&self.facets))?,
             false => geometries::write_stl_binary(
                 &self.facets,
@@ -64,8 +65,21 @@ impl PlainCase {
     }
 }
 
-/// Largest body that is written as ASCII, which people can read.
-pub const FACETS_AS_TEXT: usize = 1000;
+/// The form of an STL file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StlForm {
+    /// ASCII for a small body, which people can read, and binary for a large one.
+    #[default]
+    Any,
+    /// ASCII.
+    Ascii,
+    /// Binary.
+    Binary,
+}
+
+/// Largest body that is written as ASCII if the form is [`StlForm::Any`].
+const FACETS_AS_TEXT: usize = 1000;
 
 /// An ASCII STL file. Each number has the fewest digits that identify its f32 value.
 fn ascii(facets: &[Facet]) -> String {
@@ -91,12 +105,18 @@ mod tests {
 
     #[test]
     fn a_plain_case_defines_the_same_mesh() {
-        for facets in ["20", "5000"] {
+        let forms = [(StlForm::Any, true), (StlForm::Ascii, true), (StlForm::Binary, false)];
+        for (facets, (form, text)) in
+            ["20", "5000"].into_iter().flat_map(|f| forms.map(|form| (f, form)))
+        {
             let place = tempfile::tempdir().unwrap();
             let path = place.path().join("given.toml");
             fs::write(&path, CASE.replace("FACETS", facets)).unwrap();
             let given = Case::read(&path).unwrap();
-            let plain = PlainCase::read(&path).unwrap().write(place.path()).unwrap();
+            let plain = PlainCase::read(&path).unwrap().write(place.path(), form).unwrap();
+            let is_text =
+                fs::read(place.path().join("body.stl")).unwrap().starts_with(b"solid body");
+            assert_eq!(is_text, text && (form == StlForm::Ascii || facets == "20"));
             let plain = Case::read(&plain).unwrap();
             assert_eq!(
                 (plain.facets, plain.root, plain.boxes),

@@ -87,6 +87,11 @@ fn test(finding: &Finding) -> TestCase {
             status.set_message(format!("inconclusive: {}", finding.note));
             status
         }
+        Verdict::LeftOut => {
+            let mut status = TestCaseStatus::skipped();
+            status.set_message(format!("left out: {}", finding.note));
+            status
+        }
         _ => TestCaseStatus::success(),
     };
     let mut test = TestCase::new(format!("{}: {}", finding.case, finding.metric), status);
@@ -109,7 +114,9 @@ fn verdict(report: &Report) -> String {
         .filter(|layer| layer.verdict() == Verdict::Regression)
         .map(|layer| layer.name.to_string())
         .collect();
+    let nothing = report.layers.iter().all(|layer| layer.left_out.is_some());
     let end = match (report.interrupted, bad.is_empty()) {
+        (false, true) if nothing => "nothing was compared".to_owned(),
         (true, _) => "interrupted".to_owned(),
         (_, true) => "nothing got worse".to_owned(),
         (_, false) => format!("REGRESSION in {}", bad.join(", ")),
@@ -129,12 +136,12 @@ fn summary(layer: &Layer) -> String {
         Verdict::Changed,
         Verdict::Improvement,
         Verdict::Unchanged,
+        Verdict::LeftOut,
     ];
     let counts = all.map(|verdict| (count(verdict), verdict));
     let present = counts.iter().filter(|(n, _)| *n > 0);
     let present: Vec<String> = present.map(|(n, verdict)| format!("{n} {verdict}")).collect();
-    let counts = if present.is_empty() { "nothing compared".into() } else { present.join(", ") };
-    format!("{counts} ({:.1} s)", layer.time_s)
+    format!("{} ({:.1} s)", present.join(", "), layer.time_s)
 }
 
 /// Unchanged values are shown for the layers whose notes matter then, too: they state how certain a time is.

@@ -3,7 +3,7 @@
 
 use crate::engine::failure::{End, Failure};
 use crate::engine::paths::Paths;
-use crate::engine::process::{self, ErrorLine, Watch};
+use crate::engine::process::{self, Watch};
 use check::oracle::vote::Answer;
 use contract::case::Facet;
 use contract::npy;
@@ -68,7 +68,6 @@ impl Question {
         command.arg("-B").arg(paths.oracles.join(format!("{oracle}_sides.py")));
         command.args([&self.points, &self.body, &sides]);
         let watch = Watch::new(oracle, limit, &self.place);
-        let watch = Watch { error_line: ErrorLine::Last, ..watch };
         process::run(&mut command, &watch).map_err(|other| match other.end {
             End::Exited { code: CODE_MISSING, error } => {
                 failure(End::Missing(format!("is not installed: {error}")))

@@ -3,6 +3,8 @@
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use check::audit::record::AuditRecord;
+use check::audit::{AuditOptions, Requirements, audit_against};
+use contract::case::Case;
 use run::engine::failure::{End, Failure};
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks};
@@ -57,10 +59,11 @@ impl From<Failure> for Failed {
 }
 
 impl Runner<'_> {
-    /// Runs `setup` on the case file `case`.
+    /// Runs `setup` on the case file `case`. The mesh of a warm-up run is checked against the promises of an engine that
+    /// does not promise the definition.
     ///
     /// # Errors
-    /// If the run gives no result.
+    /// If the run gives no result, or the mesh breaks a promise.
     pub fn run(
         &self,
         setup: &Setup,
@@ -68,16 +71,25 @@ impl Runner<'_> {
         repeat: usize,
         warm_up: bool,
     ) -> Result<Run, Failed> {
+        let engine = self.engine(setup);
+        let checked = warm_up && !engine.description().promises.definition;
+        let mesh = self.place.join("mesh");
         let options = RunOptions {
+            mesh: checked.then_some(&mesh),
             // All runs of a setup send the same messages, and recording them should disturb no timed run.
             message_matrix: warm_up && has_message_matrix(setup),
             sample_memory: true,
             ..RunOptions::new(self.place, self.limit)
         };
-        let completed = self.engine(setup).run(case, &layout(setup), &options);
+        let completed = engine.run(case, &layout(setup), &options);
+        let kept = match checked && completed.is_ok() {
+            true => keeps_promises(&engine, case, &mesh),
+            false => Ok(()),
+        };
         // The next run needs a place without a mesh, also after a failure.
-        let _ = fs::remove_dir_all(self.place.join("mesh"));
+        let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, command, .. } = completed?;
+        kept.map_err(Failed::Reason)?;
         if setup.comm == Comm::Sim && report.phases.is_empty() {
             let why =
                 "its run report has no phases, without which simulated ranks cannot be projected";
@@ -150,6 +162,20 @@ impl Runner<'_> {
         let watch = Watch::new("pingpong", PING_PONG_LIMIT, self.place);
         let finished = process::run(&mut command, &watch).map_err(|failure| failure.to_string())?;
         fs::read_to_string(&finished.stdout).map_err(|error| error.to_string())
+    }
+}
+
+/// Audits a mesh against the promises of the engine that made it.
+fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), String> {
+    let case = Case::read(case).map_err(|error| error.to_string())?;
+    let requirements = Requirements::Promises(&engine.description().promises, Some(&case));
+    let report = audit_against(mesh, &AuditOptions::default(), requirements);
+    let broken = report.checks.iter().find_map(|check| check.findings.first());
+    match broken {
+        Some(finding) => {
+            Err(format!("the mesh breaks the promise {}: {}", finding.check, finding.detail))
+        }
+        None => Ok(()),
     }
 }
 

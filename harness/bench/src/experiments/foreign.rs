@@ -19,6 +19,8 @@ mod tests {
     use super::*;
     use crate::experiments::entry::{Comm, Run, Setup};
     use crate::experiments::execute::Runner;
+    use contract::octant::Octant;
+    use contract::word::{self, Leaf, Side};
     use run::engine::launcher::Launcher;
     use run::engine::programs::{Given, Programs};
     use std::time::Duration;
@@ -26,24 +28,55 @@ mod tests {
     /// The measured run of a shell script.
     fn scripted(script: &str, json: &str, comm: Comm) -> Result<Run, String> {
         let place = tempfile::tempdir().unwrap();
-        std::fs::write(place.path().join("engine.sh"), script).unwrap();
+        run_in(place.path(), script, json, comm, false)
+    }
+
+    /// The run of a shell script in a directory with the case file `case.toml`; `more` continues the table [run].
+    fn run_in(
+        place: &Path,
+        script: &str,
+        more: &str,
+        comm: Comm,
+        warm_up: bool,
+    ) -> Result<Run, String> {
+        std::fs::write(place.join("engine.sh"), script).unwrap();
         let words =
             "serial = ['sh', '{program}', '{case}']\nsimulated = ['sh', '{program}', '{case}']\n";
         let text = format!(
-            "about = 'x'\nprogram = '{{here}}/engine.sh'\n[run]\n{words}out = ['{{out}}']\n{json}"
+            "about = 'x'\nprogram = '{{here}}/engine.sh'\n[run]\n{words}out = ['{{out}}']\n{more}"
         );
-        let file = place.path().join("scripted.toml");
+        let file = place.join("scripted.toml");
         std::fs::write(&file, text).unwrap();
         let limit = Duration::from_secs(60);
         let file = file.to_str().unwrap();
         let programs = Programs::find_with_engine(file, Given::default()).unwrap();
         let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
-        let runner =
-            Runner { programs: &programs, launcher: &launcher, limit, place: place.path() };
+        let runner = Runner { programs: &programs, launcher: &launcher, limit, place };
         let setup = crate::testing::run(comm, 1, &[("a", &[0.0, 0.0])]).setup;
         let ranks = if comm == Comm::Solo { 1 } else { 2 };
         let setup = Setup { engine: label(file), ranks, ..setup };
-        runner.run(&setup, Path::new("case.toml"), 0, false).map_err(|why| format!("{why:?}"))
+        let case = place.join("case.toml");
+        runner.run(&setup, &case, 0, warm_up).map_err(|why| format!("{why:?}"))
+    }
+
+    #[test]
+    fn a_mesh_that_breaks_a_promise_is_not_measured() {
+        let place = tempfile::tempdir().unwrap();
+        let case = "spacing_min = 2.0\nkeep = 'all'\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n\
+                    [generator]\nshape = 'cube'\nfacets = 12\n";
+        std::fs::write(place.path().join("case.toml"), case).unwrap();
+        // The root without its first octant has a hole.
+        let octant = |digit| Leaf { octant: Octant::ROOT.child(digit), side: Side::Outside };
+        let words: Vec<u64> = (1..8).map(|digit| word::encode(&octant(digit))).collect();
+        contract::npy::write(&place.path().join("leaves.npy"), &words).unwrap();
+        let script = "mkdir -p $2 && cp ${0%/*}/leaves.npy $2/leaves-00000.npy";
+        let run = |promise: &str, warm_up| {
+            let promises = format!("[promises]\n{promise} = true\n");
+            run_in(place.path(), script, &promises, Comm::Solo, warm_up).map(|run| run.cells)
+        };
+        assert!(run("complete", true).unwrap_err().contains("breaks the promise complete"));
+        // Only warm-ups are checked, and nothing but promises.
+        assert_eq!((run("complete", false), run("deterministic", true)), (Ok(7), Ok(7)));
     }
 
     const REPORTS: &str = "json = ['{json}']\n";

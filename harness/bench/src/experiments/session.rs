@@ -5,6 +5,7 @@ use super::execute::{Failed, Runner};
 use super::plan::Study;
 use super::record::Record;
 use super::{machine, network, table};
+use check::promises::Independence;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
 use std::collections::HashMap;
@@ -57,8 +58,9 @@ pub(crate) fn temporary_directory() -> Result<tempfile::TempDir, BenchError> {
     place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))
 }
 
-/// Everything that a mesh, and so its digest, depends on.
-type Mesh = (String, String, u32);
+/// Everything that a mesh, and so its digest, depends on: case, spacing, n, and the partition unless the engine promises
+/// independence of it.
+type Mesh = (String, String, u32, String);
 
 /// A running session.
 pub(crate) struct Bench<'a> {
@@ -153,7 +155,7 @@ impl Bench<'_> {
         let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
             Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
             Err(Failed::Reason(why)) => why,
-            Ok(run) => match self.same_mesh(&run) {
+            Ok(run) => match self.right_mesh(point, &run).and_then(|()| self.same_mesh(&run)) {
                 Ok(()) => return self.append(Entry::Run(Box::new(run))),
                 Err(why) => why,
             },
@@ -181,10 +183,49 @@ impl Bench<'_> {
         }
     }
 
-    /// Requires all runs of a mesh to have the same digest: the time of a wrong mesh is not a result.
+    /// Requires the mesh of an engine that promises the definition to be that of the mesher, once for each mesh.
+    fn right_mesh(&self, point: &Point, run: &Run) -> Result<(), String> {
+        let engine = self.runner.programs.labelled(&self.options.engine);
+        if !run.warm_up || engine.name() == "mesher" || !engine.description().promises.definition {
+            return Ok(());
+        }
+        let setup = Setup {
+            engine: "mesher".to_owned(),
+            comm: Comm::Solo,
+            ranks: 1,
+            partitioner: String::new(),
+            weights: String::new(),
+            ..point.setup.clone()
+        };
+        let expected = match self.runner.run(&setup, &point.case, 0, true) {
+            Ok(run) => run.digest,
+            // Whether the mesher can be run is not a property of this engine.
+            Err(_) => return Ok(()),
+        };
+        match expected == run.digest {
+            true => Ok(()),
+            false => Err(format!(
+                "the mesh has digest {}, but that of the definition has {expected}",
+                run.digest
+            )),
+        }
+    }
+
+    /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result.
     fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
+        let promises = &self.runner.programs.labelled(&self.options.engine).description().promises;
+        if !promises.is_deterministic() {
+            return Ok(());
+        }
         let s = &run.setup;
-        let mesh = (s.case.clone(), format!("{:e}", s.spacing_min), s.layer_cells_min);
+        let mut partition = String::new();
+        if !promises.is_independent_of(Independence::Ranks) {
+            partition.push_str(&s.ranks.to_string());
+        }
+        if !promises.is_independent_of(Independence::Partitioner) {
+            partition.push_str(&s.partitioner);
+        }
+        let mesh = (s.case.clone(), format!("{:e}", s.spacing_min), s.layer_cells_min, partition);
         let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
         if *first == run.digest {
             return Ok(());

@@ -11,7 +11,7 @@ use run::engine::interrupt;
 use run::engine::layout::SERIAL;
 use run::engine::options::RunOptions;
 use run::engine::paths::on_path;
-use run::engine::process::{self, ErrorLine, Watch};
+use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use std::process::Command;
 
@@ -123,7 +123,6 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Profile, Str
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let watch = Watch::new(VALGRIND, bench.options.limit, &place);
-    let watch = Watch { error_line: ErrorLine::Last, ..watch };
     process::run(&mut command, &watch).map_err(|failure| failure.to_string())?;
     let text =
         std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;

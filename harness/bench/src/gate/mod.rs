@@ -18,7 +18,7 @@ pub mod subject;
 pub mod time;
 
 use measures::Measures;
-use report::{Layer, LayerName, Report};
+use report::{Finding, Layer, LayerName, Report, Verdict};
 use rules::{Rules, Selected};
 use run::engine::interrupt;
 use run::engine::programs::Programs;
@@ -124,6 +124,8 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
             }
             LayerName::Time => time::layer(bench, baseline),
         };
+        layer.findings.extend(bench.left_out_of(name));
+        layer.note_nothing_examined();
         layer.time_s = start.elapsed().as_secs_f64();
         report.layers.push(layer);
     }
@@ -131,9 +133,19 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
 }
 
 impl Bench<'_> {
-    /// Returns the cases of a layer.
+    /// Returns the cases of a layer that can be run.
     fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
-        self.cases.iter().filter(move |case| case.rule.layers.contains(&layer))
+        let of_layer = self.cases.iter().filter(move |case| case.rule.layers.contains(&layer));
+        of_layer.filter(|case| case.path.is_ok())
+    }
+
+    /// Returns the other cases of a layer as findings with their reasons.
+    fn left_out_of(&self, layer: LayerName) -> impl Iterator<Item = Finding> {
+        let of_layer = self.cases.iter().filter(move |case| case.rule.layers.contains(&layer));
+        of_layer.filter_map(|case| {
+            let why = case.path.as_ref().err()?;
+            Some(Finding::without_numbers(&case.rule.name, "runs", Verdict::LeftOut, why))
+        })
     }
 
     /// Creates an empty directory for one run.

@@ -37,10 +37,13 @@ impl fmt::Display for LayerName {
     }
 }
 
-/// The assessment of a finding, best first.
+/// The assessment of a finding, best first after those that were left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
+    /// Not examined, for the reason in the note.
+    #[serde(rename = "left_out")]
+    LeftOut,
     /// Better than the baseline.
     Improvement,
     /// Equal to the baseline.
@@ -56,6 +59,7 @@ pub enum Verdict {
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.pad(match self {
+            Self::LeftOut => "left out",
             Self::Improvement => "improvement",
             Self::Unchanged => "unchanged",
             Self::Changed => "changed",
@@ -153,7 +157,15 @@ impl Layer {
     /// Returns the worst verdict of the findings.
     pub fn verdict(&self) -> Verdict {
         let worst = self.findings.iter().map(|finding| finding.verdict).max();
-        worst.unwrap_or(Verdict::Unchanged)
+        worst.unwrap_or(Verdict::LeftOut)
+    }
+
+    /// Marks a layer that examined nothing as left out.
+    pub fn note_nothing_examined(&mut self) {
+        if self.left_out.is_none() && self.verdict() == Verdict::LeftOut {
+            let first = self.findings.first().map(|finding| finding.note.clone());
+            self.left_out = Some(first.unwrap_or_else(|| "nothing was compared".to_owned()));
+        }
     }
 }
 
@@ -219,11 +231,27 @@ mod tests {
     #[test]
     fn a_layer_has_the_worst_verdict_of_its_findings() {
         let mut layer = Layer::new(LayerName::Time);
-        assert_eq!(layer.verdict(), Verdict::Unchanged);
-        for verdict in [Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed] {
+        assert_eq!(layer.verdict(), Verdict::LeftOut);
+        for verdict in
+            [Verdict::LeftOut, Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed]
+        {
             layer.findings.push(Finding::without_numbers("c", "m", verdict, ""));
         }
         assert_eq!(layer.verdict(), Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_layer_without_an_examined_finding_is_left_out() {
+        let of = |verdicts: &[Verdict]| {
+            let mut layer = Layer::new(LayerName::Time);
+            let finding = |&verdict| Finding::without_numbers("c", "m", verdict, "too deep");
+            layer.findings = verdicts.iter().map(finding).collect();
+            layer.note_nothing_examined();
+            layer.left_out
+        };
+        assert_eq!(of(&[]).as_deref(), Some("nothing was compared"));
+        assert_eq!(of(&[Verdict::LeftOut; 2]).as_deref(), Some("too deep"));
+        assert_eq!(of(&[Verdict::LeftOut, Verdict::Unchanged]), None);
     }
 
     #[test]

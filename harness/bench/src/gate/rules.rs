@@ -3,6 +3,7 @@
 use super::GateError;
 use super::report::LayerName;
 use crate::statistics::comparison::rounds_min;
+use contract::case::Case;
 use run::engine::programs::Programs;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -95,7 +96,7 @@ pub struct CaseRule {
 pub struct Selected {
     /// Its rules.
     pub rule: CaseRule,
-    /// Its file, or the reason why it is missing.
+    /// Its file, or the reason why it cannot be run: it is missing, or the engine does not support it.
     pub path: Result<PathBuf, String>,
 }
 
@@ -155,6 +156,12 @@ impl Rules {
                 found.absent.clone().map_or_else(|| Ok(found.path.clone()), Err)
             }
         };
+        let engine = programs.engine.description();
+        let path = path.and_then(|path| match Case::read(&path) {
+            Ok(case) => engine.declines(&case).map_or(Ok(path), Err),
+            // What is wrong with the case is for the layers to report.
+            Err(_) => Ok(path),
+        });
         Ok(Selected { rule: rule.clone(), path })
     }
 }

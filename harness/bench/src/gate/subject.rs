@@ -7,7 +7,7 @@ use super::measures::{Measured, Measures};
 use super::{GateError, Options};
 use run::engine::description::{Build, Values, fill};
 use run::engine::failure::{End, Failure};
-use run::engine::process::{self, ErrorLine, Watch};
+use run::engine::process::{self, Watch};
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use std::fs;
@@ -215,7 +215,6 @@ fn make(
     let mut command = Command::new(program);
     command.args(arguments).current_dir(tree);
     let watch = Watch::new("build", BUILD_LIMIT, &place);
-    let watch = Watch { error_line: ErrorLine::Last, ..watch };
     process::run(&mut command, &watch).map_err(|failure| build_error(label, &failure, &place))?;
     // Copied under another name first, so that a program under its final name is complete.
     let (half, whole) = (place.join("program.new"), place.join("program"));

@@ -1,10 +1,11 @@
 //! Writes a shrunk case as a directory for a bug report.
 
 use super::Shrunk;
-use super::probe::{Kind, Probe};
+use super::probe::Probe;
 use super::reduce::size;
 use check::diff;
 use contract::case::Case;
+use contract::plain::StlForm;
 use run::engine::layout::Ranks;
 use std::fs;
 use std::io;
@@ -20,10 +21,11 @@ pub struct Repeat {
 }
 
 impl Repeat {
-    /// Returns a shell command that tests whether the case still fails.
-    pub fn line(&self, case: &Path, ranks: Ranks) -> String {
+    /// Returns a shell command that tests whether the case still fails the check.
+    pub fn line(&self, case: &Path, check: &str, ranks: Ranks) -> String {
         let mut words: Vec<String> =
-            vec!["harness".into(), "shrink".into(), case.display().to_string(), "--check".into()];
+            vec!["harness".into(), "shrink".into(), case.display().to_string()];
+        words.extend(["--test-only".into(), "--check".into(), check.to_owned()]);
         words.extend(["--engine".into(), self.engine.clone()]);
         if let Some(program) = &self.program {
             words.extend(["--mesher".into(), program.clone()]);
@@ -58,8 +60,8 @@ pub fn write(
     directory: &Path,
 ) -> io::Result<String> {
     fs::create_dir_all(directory)?;
-    let case = shrunk.trial.case.write(directory)?;
-    let line = repeat.line(&case, shrunk.trial.ranks);
+    let case = shrunk.trial.case.write(directory, StlForm::Any)?;
+    let line = repeat.line(&case, &shrunk.failure.check, shrunk.trial.ranks);
     let minimal =
         if shrunk.minimal { "nothing more can be removed" } else { "the budget is exhausted" };
     let text = format!(
@@ -76,9 +78,9 @@ pub fn write(
 
 /// Returns the first differing leaf and the rule that decides it, if there are two meshes.
 fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
-    if shrunk.failure.kind != Kind::Differs {
+    let Some(truth) = probe.truth_name().filter(|_| shrunk.failure.check != "runs") else {
         return String::new();
-    }
+    };
     let compared = probe.meshes(&shrunk.trial).and_then(|[engine, truth]| {
         let case = Case::read(case).ok();
         diff::diff(&engine, &truth, case.as_ref()).map_err(|error| error.to_string())
@@ -87,8 +89,7 @@ fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
         Ok(report) => {
             let indented = report.to_string().replace('\n', "\n    ");
             format!(
-                "\nThe difference between the meshes, where A is the engine's and B that of {}:\n\n    {indented}\n",
-                probe.truth_name()
+                "\nThe difference between the meshes, where A is the engine's and B that of {truth}:\n\n    {indented}\n"
             )
         }
         Err(why) => format!("\nThe meshes could not be compared: {why}\n"),

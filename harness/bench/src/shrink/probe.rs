@@ -1,10 +1,14 @@
-//! Whether a case fails, and how: the engine compared with the reference, or with its own serial run.
+//! Which checks a case fails: those of the definition or of the engine's promises on a serial run, and the comparison
+//! with the serial run on several ranks.
 
+use check::checks::{self, CheckResult, Subject, identical};
+use check::promises::Independence;
+use contract::case::Case;
+use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
 use run::engine::failure::{End, Failure as RunFailure};
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
-use run::engine::report::RunReport;
 use run::engine::runner::Engine;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -20,45 +24,55 @@ pub struct Trial {
     pub ranks: Ranks,
 }
 
-/// Kinds of failures. A smaller case must fail in the same way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The mesh differs from the expected one.
-    Differs,
-    /// The engine fails.
-    Fails,
-    /// The engine does not end.
-    Hangs,
-}
-
-/// How a case fails.
+/// A check that a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// The kind.
-    pub kind: Kind,
+    /// Its name, as in `harness verify`; `runs` for an engine that gives no mesh.
+    pub check: String,
+    /// How the engine ended, if the check is `runs`. Another end is another failure.
+    end: Option<String>,
     /// The failure in a sentence.
-    pub sentence: String,
+    sentence: String,
+}
+
+impl Failure {
+    /// Whether this is the same failure of, perhaps, another case.
+    pub fn is_same_as(&self, other: &Self) -> bool {
+        self.check == other.check && self.end == other.end
+    }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&self.sentence)
+        write!(f, "{}: {}", self.check, self.sentence)
     }
+}
+
+/// Why it is unknown whether a case fails.
+#[derive(Debug, thiserror::Error)]
+pub enum Unknown {
+    /// The engine does not support the case, or nothing was checked.
+    #[error("left out: {0}")]
+    LeftOut(String),
+    /// A program could not be run, or the case could not be read.
+    #[error("{0}")]
+    Error(String),
 }
 
 /// Runs trials.
 #[derive(Debug)]
 pub struct Probe {
     engine: Engine,
-    truth: Engine,
+    reference: Engine,
     ranks: Ranks,
     limit: Duration,
     place: TempDir,
 }
 
 impl Probe {
-    /// A serial engine is compared with the reference, one on several ranks with its own serial run: if both runs are
-    /// wrong in the same way, the serial case is the simpler one to shrink. Each run may take `limit`.
+    /// A serial engine is compared with the reference if it promises the definition, and its own promises are checked if
+    /// not. An engine on several ranks is compared with its own serial run: if both runs are wrong in the same way, the
+    /// serial case is the simpler one to shrink. Each run may take `limit`.
     ///
     /// # Errors
     /// If no directory for runs can be created.
@@ -68,9 +82,9 @@ impl Probe {
         ranks: Ranks,
         limit: Duration,
     ) -> Result<Self, String> {
-        let truth = if ranks == Ranks::Serial { reference } else { engine.clone() };
         let place = tempfile::Builder::new().prefix("harness-shrink-").tempdir();
-        Ok(Self { engine, truth, ranks, limit, place: place.map_err(|error| error.to_string())? })
+        let place = place.map_err(|error| error.to_string())?;
+        Ok(Self { engine, reference, ranks, limit, place })
     }
 
     /// The ranks of the first trial.
@@ -78,38 +92,88 @@ impl Probe {
         self.ranks
     }
 
-    /// How a trial fails; `None` if it does not. A case that both programs refuse does not fail.
+    /// The checks that a trial fails, the first one first. A case that both programs refuse fails none.
     ///
     /// # Errors
-    /// If the engine cannot be run, or no mesh exists to compare with.
-    pub fn failure(&self, trial: &Trial) -> Result<Option<Failure>, String> {
-        let case = self.write(&trial.case)?;
-        let expected = self.run(&self.truth, &case, Ranks::Serial, "truth", false);
-        let expected = expected.map_err(|why| {
-            format!("no mesh to compare with, because {} failed: {why}", self.truth_name())
-        })?;
-        let report = match self.run(&self.engine, &case, trial.ranks, "engine", false) {
-            Ok(report) if report.digest == expected.digest => return Ok(None),
-            Ok(report) => report,
-            Err(failure) => {
-                let kind = match failure.end {
-                    End::Missing(_) | End::Interrupted => return Err(failure.to_string()),
-                    End::TimedOut { .. } => Kind::Hangs,
-                    End::Exited { .. } | End::Signalled(_) | End::Unusable(_) => Kind::Fails,
-                };
-                let sentence = format!("{}: {failure}", trial.ranks);
-                return Ok(Some(Failure { kind, sentence }));
-            }
+    /// If the engine declines the case or cannot be run, or no mesh exists to compare with.
+    pub fn failures(&self, trial: &Trial) -> Result<Vec<Failure>, Unknown> {
+        let path = self.write(&trial.case)?;
+        let case = Case::read(&path).map_err(|error| Unknown::Error(error.to_string()))?;
+        if let Some(why) = self.engine.description().declines(&case) {
+            return Err(Unknown::LeftOut(why));
+        }
+        let truth = self.truth(&path)?;
+        let mesh = match self.run(&self.engine, &path, trial.ranks, "engine", false) {
+            Ok(mesh) => mesh,
+            Err(failure) => return Ok(vec![failed_run(failure, trial.ranks)?]),
         };
-        let mesh = |report: &RunReport| format!("{} cells, digest {}", report.cells, report.digest);
-        let sentence = format!(
-            "{}: {}; {}: {}",
-            trial.ranks,
-            mesh(&report),
-            self.truth_name(),
-            mesh(&expected)
-        );
-        Ok(Some(Failure { kind: Kind::Differs, sentence }))
+        let subject = Subject::new(&case, &mesh);
+        let results = match truth {
+            Some(truth) if self.ranks != Ranks::Serial => {
+                vec![identical::compare(&mesh.words, &truth.words, &case.root)]
+            }
+            Some(truth) if truth.words == mesh.words => {
+                vec![checks::manifest::check(&subject), checks::linear::check(&subject)]
+            }
+            Some(truth) => {
+                let base = self
+                    .run(&self.reference, &path, Ranks::Serial, "base", true)
+                    .map_err(|why| Unknown::Error(why.to_string()))?;
+                checks::all(&subject.with_base(&base).with_reference(&truth))
+            }
+            None => self.promised(&path, trial, &subject)?,
+        };
+        if results.iter().all(|result| !result.was_run()) {
+            return Err(Unknown::LeftOut("no check had anything to check".to_owned()));
+        }
+        let failed = results.iter().filter(|result| !result.holds());
+        Ok(failed.map(|result| failed_check(result, trial.ranks)).collect())
+    }
+
+    /// The checks of the engine's promises, and a second run if it is promised to be the same.
+    fn promised(
+        &self,
+        path: &Path,
+        trial: &Trial,
+        subject: &Subject,
+    ) -> Result<Vec<CheckResult>, Unknown> {
+        let promises = &self.engine.description().promises;
+        let mut results = vec![checks::manifest::check(subject), checks::linear::check(subject)];
+        let terms = &subject.terms;
+        results.extend(checks::promised(subject.tree(), terms, Some(subject.case), promises));
+        if promises.deterministic && trial.ranks == Ranks::Serial {
+            let again = self.run(&self.engine, path, trial.ranks, "again", false);
+            let again = again.map_err(|why| Unknown::Error(why.to_string()))?;
+            let compared = identical::compare(&again.words, &subject.mesh.words, &terms.root);
+            results.push(CheckResult { name: "deterministic", ..compared });
+        }
+        Ok(results)
+    }
+
+    /// The mesh that the engine must make, if there is one.
+    fn truth(&self, case: &Path) -> Result<Option<LeafSet>, Unknown> {
+        let Some((engine, name)) = self.truth_engine() else { return Ok(None) };
+        match self.run(engine, case, Ranks::Serial, "truth", false) {
+            Ok(mesh) => Ok(Some(mesh)),
+            Err(why) => Err(Unknown::Error(format!(
+                "no mesh to compare with, because {name} failed: {why}"
+            ))),
+        }
+    }
+
+    fn truth_engine(&self) -> Option<(&Engine, &'static str)> {
+        let promises = &self.engine.description().promises;
+        match self.ranks {
+            Ranks::Serial => promises.definition.then_some((&self.reference, "the reference")),
+            _ => promises
+                .is_independent_of(Independence::Ranks)
+                .then_some((&self.engine, "its serial run")),
+        }
+    }
+
+    /// What the engine is compared with; `None` if only its promises are checked.
+    pub fn truth_name(&self) -> Option<&'static str> {
+        self.truth_engine().map(|(_, name)| name)
     }
 
     /// Both meshes of a trial, for `harness diff`: that of the engine, and the expected one.
@@ -117,30 +181,29 @@ impl Probe {
     /// # Errors
     /// If one of them cannot be made.
     pub fn meshes(&self, trial: &Trial) -> Result<[PathBuf; 2], String> {
-        let case = self.write(&trial.case)?;
-        let why = |failure: RunFailure| failure.to_string();
-        self.run(&self.engine, &case, trial.ranks, "engine", true).map_err(why)?;
-        self.run(&self.truth, &case, Ranks::Serial, "truth", true).map_err(why)?;
-        Ok(["engine", "truth"].map(|name| self.place.path().join(name).join("mesh")))
+        let case = self.write(&trial.case).map_err(|error| error.to_string())?;
+        let run = |engine, ranks, name| {
+            let made = self.run(engine, &case, ranks, name, false);
+            made.map(|_| self.place.path().join(name).join("mesh")).map_err(|why| why.to_string())
+        };
+        let (truth, _) = self.truth_engine().ok_or("there is no mesh to compare with")?;
+        Ok([run(&self.engine, trial.ranks, "engine")?, run(truth, Ranks::Serial, "truth")?])
     }
 
-    /// What the engine is compared with.
-    pub fn truth_name(&self) -> &'static str {
-        if self.ranks == Ranks::Serial { "the reference" } else { "its serial run" }
+    fn write(&self, case: &PlainCase) -> Result<PathBuf, Unknown> {
+        let form = self.engine.description().takes.stl;
+        case.write(self.place.path(), form).map_err(|error| Unknown::Error(error.to_string()))
     }
 
-    fn write(&self, case: &PlainCase) -> Result<PathBuf, String> {
-        case.write(self.place.path()).map_err(|error| error.to_string())
-    }
-
+    /// Runs an engine and reads its mesh.
     fn run(
         &self,
         engine: &Engine,
         case: &Path,
         ranks: Ranks,
         name: &str,
-        write: bool,
-    ) -> Result<RunReport, RunFailure> {
+        ungraded: bool,
+    ) -> Result<LeafSet, RunFailure> {
         let place = self.place.path().join(name);
         let _ = std::fs::remove_dir_all(&place);
         std::fs::create_dir_all(&place).map_err(|error| {
@@ -149,7 +212,31 @@ impl Probe {
         })?;
         let mesh = place.join("mesh");
         let options =
-            RunOptions { mesh: write.then_some(&mesh), ..RunOptions::new(&place, self.limit) };
-        engine.run(case, &Layout::on(ranks), &options).map(|completed| completed.report)
+            RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
+        let completed = engine.run(case, &Layout::on(ranks), &options)?;
+        let read = completed.read_mesh().and_then(|mesh| mesh.ok_or("no mesh".to_owned()));
+        read.map_err(|why| engine.unusable(format!("wrote a mesh that cannot be read: {why}")))
     }
+}
+
+/// A run without a mesh as a failed check.
+fn failed_run(failure: RunFailure, ranks: Ranks) -> Result<Failure, Unknown> {
+    let end = match &failure.end {
+        End::Missing(_) | End::Interrupted => return Err(Unknown::Error(failure.to_string())),
+        End::TimedOut { .. } => "hangs".to_owned(),
+        End::Exited { code, .. } => format!("code {code}"),
+        End::Signalled(signal) => format!("signal {signal}"),
+        End::Unusable(_) => "unusable output".to_owned(),
+    };
+    let sentence = format!("{ranks}: {failure}");
+    Ok(Failure { check: "runs".to_owned(), end: Some(end), sentence })
+}
+
+fn failed_check(result: &CheckResult, ranks: Ranks) -> Failure {
+    let first = result.findings.first().map_or("", |finding| finding.detail.as_str());
+    let sentence = match result.findings_total {
+        1 => format!("{ranks}: {first}"),
+        count => format!("{ranks}: {count} findings, the first: {first}"),
+    };
+    Failure { check: result.name.to_owned(), end: None, sentence }
 }

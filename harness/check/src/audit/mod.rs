@@ -2,17 +2,20 @@
 //!
 //! One pass over the part files, which are merged while they are read, computes the tally, checks the order and
 //! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
-//! variety of a mesh and not with its size; an option limits it. The checks use the requirements in the
-//! manifest, without T0, facets or another mesh. The head of each check names what it cannot detect without
-//! them.
+//! variety of a mesh and not with its size; an option limits it. Without promises, the checks are those of the
+//! definition; they use the requirements in the manifest, without T0, facets or another mesh, and the head of each names
+//! what it cannot detect without them. With promises, exactly those are checked, against a case if there is one.
 
 use std::fmt;
 use std::path::Path;
 use std::time::Instant;
 
 use crate::checks::{self, CheckResult, Terms};
+use crate::promises::Promises;
+use contract::case::Case;
 use contract::leafset;
 use contract::manifest::{Keep, Manifest, Tree as Kind};
+use contract::tree::Tree;
 
 pub(crate) mod merge;
 mod pass;
@@ -49,9 +52,20 @@ pub struct AuditReport {
 }
 
 impl AuditReport {
-    /// Whether every check holds.
+    /// Whether no check has findings.
     pub fn holds(&self) -> bool {
         self.checks.iter().all(CheckResult::holds)
+    }
+
+    /// The checks that had nothing to check.
+    pub fn not_run(&self) -> impl Iterator<Item = &CheckResult> {
+        self.checks.iter().filter(|check| !check.was_run())
+    }
+
+    /// Whether any property of the leaves was checked, beyond their files and counts.
+    pub fn checked_anything(&self) -> bool {
+        let formal = [checks::FILES, "manifest", "linear"];
+        self.checks.iter().any(|c| !c.holds() || c.was_run() && !formal.contains(&c.name))
     }
 }
 
@@ -59,6 +73,9 @@ impl fmt::Display for AuditReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for check in &self.checks {
             writeln!(f, "{check}")?;
+        }
+        if !self.checked_anything() {
+            writeln!(f, "left out: the mesh gave no check of its leaves anything to check")?;
         }
         let Self { leaves, nodes, time_read_s, time_wall_s, .. } = self;
         let rate = *leaves as f64 / time_wall_s.max(1e-9) / 1e6;
@@ -73,8 +90,26 @@ impl fmt::Display for AuditReport {
 /// Name of the check that the tree does not exceed the memory limit.
 pub const CAPACITY: &str = "capacity";
 
-/// Audits a directory. If it cannot be read as a leaf set, that is a finding of `files`.
+/// What a mesh is required to be.
+#[derive(Clone, Copy, Debug)]
+pub enum Requirements<'a> {
+    /// A mesh of the definition, as far as its leaves show.
+    Definition,
+    /// These promises, on this case.
+    Promises(&'a Promises, Option<&'a Case>),
+}
+
+/// Audits a directory against the definition. If it cannot be read as a leaf set, that is a finding of `files`.
 pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
+    audit_against(dir, options, Requirements::Definition)
+}
+
+/// Audits a directory against the requirements. If it cannot be read as a leaf set, that is a finding of `files`.
+pub fn audit_against(
+    dir: &Path,
+    options: &AuditOptions,
+    requirements: Requirements,
+) -> AuditReport {
     let start = Instant::now();
     let mut report =
         AuditReport { checks: Vec::new(), leaves: 0, nodes: 0, time_read_s: 0.0, time_wall_s: 0.0 };
@@ -83,7 +118,7 @@ pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
     match pass {
         Ok((set, pass)) => {
             (report.leaves, report.nodes) = (pass.tally.leaves, pass.nodes() as u64);
-            report.checks = checks(&set.manifest, pass);
+            report.checks = checks(&set.manifest, pass, requirements);
         }
         Err(e) => report.checks.push(CheckResult::unreadable(&e)),
     }
@@ -91,41 +126,60 @@ pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
     report
 }
 
-fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
-    let (terms, leaves) = (Terms::of_manifest(manifest), pass.tally.leaves);
+fn checks(manifest: &Manifest, pass: Pass, requirements: Requirements) -> Vec<CheckResult> {
+    let leaves = pass.tally.leaves;
     let mut files = CheckResult::new(checks::FILES);
     files.examined = manifest.parts.len() as u64;
-    let mut checks =
-        vec![files, checks::manifest::check_leaves(manifest, &pass.tally, &pass.parts)];
-    checks.push(pass.linear);
+    let mut claims = checks::manifest::check_leaves(manifest, &pass.tally, &pass.parts);
+    if let Requirements::Promises(_, Some(case)) = requirements {
+        checks::manifest::check_terms(manifest, &Terms::of_case(case), &mut claims);
+    }
+    let mut checks = vec![files, claims, pass.linear];
     let Some(tree) = pass.tree else {
         checks.extend(pass.capacity);
         return checks;
     };
-    let mut of_tree = match manifest.tree {
-        Kind::Final => vec![
-            checks::complete::check_holes(&tree, &terms),
-            checks::spacing::check_tree(&tree, &terms),
-            checks::sides::check_tree(&tree, &terms),
-            checks::kept::check_tree(&tree, &terms, manifest),
-            checks::balance::check_tree(&tree, &terms.root),
-            checks::layer::check_tree(&tree, &terms),
-        ],
-        // T0 precedes deletion and gradation.
-        Kind::Base => {
-            let kept = checks::kept::check_tree(&tree, &terms, manifest);
-            let terms = Terms { keep: Keep::All, keep_crossing: true, ..terms };
-            vec![
-                checks::complete::check_holes(&tree, &terms),
-                checks::spacing::check_tree(&tree, &terms),
-                checks::sides::check_tree(&tree, &terms),
-                kept,
-            ]
+    let mut of_tree = match requirements {
+        Requirements::Promises(promises, case) if !promises.definition => {
+            let terms = case.map_or_else(|| Terms::of_manifest(manifest), Terms::of_case);
+            checks::promised(&tree, &terms, case, promises)
         }
+        _ => of_definition(manifest, &tree),
     };
-    of_tree.iter_mut().for_each(|c| c.examined = leaves);
+    of_tree.iter_mut().filter(|c| c.examined == 0 && c.was_run()).for_each(|c| c.examined = leaves);
     checks.extend(of_tree);
     checks
+}
+
+/// The checks of the definition that need the leaves only.
+fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
+    let terms = Terms::of_manifest(manifest);
+    let (results, terms) = match manifest.tree {
+        Kind::Final => {
+            let results = vec![
+                checks::complete::check_holes(tree, &terms),
+                checks::spacing::check_tree(tree, &terms),
+                checks::sides::check_tree(tree, &terms),
+                checks::kept::check_tree(tree, &terms, manifest),
+                checks::balance::check_tree(tree, &terms.root),
+                checks::layer::check_tree(tree, &terms),
+            ];
+            (results, terms)
+        }
+        // T0 precedes deletion and gradation.
+        Kind::Base => {
+            let kept = checks::kept::check_tree(tree, &terms, manifest);
+            let terms = Terms { keep: Keep::All, keep_crossing: true, ..terms };
+            let results = vec![
+                checks::complete::check_holes(tree, &terms),
+                checks::spacing::check_tree(tree, &terms),
+                checks::sides::check_tree(tree, &terms),
+                kept,
+            ];
+            (results, terms)
+        }
+    };
+    results.into_iter().map(|result| checks::with_premise(result, tree, None, &terms)).collect()
 }
 
 #[cfg(test)]

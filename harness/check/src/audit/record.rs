@@ -46,6 +46,9 @@ pub struct CheckRecord {
     pub examined: u64,
     /// Number of violations.
     pub findings: u64,
+    /// Why there was nothing to check.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nothing_to_check: Option<String>,
 }
 
 impl AuditRecord {
@@ -55,6 +58,7 @@ impl AuditRecord {
             name: c.name.to_owned(),
             examined: c.examined,
             findings: c.findings_total,
+            nothing_to_check: c.nothing_to_check.clone(),
         };
         Self {
             schema: SCHEMA.to_owned(),

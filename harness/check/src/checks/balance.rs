@@ -7,8 +7,9 @@
 
 use std::fmt::Write;
 
-use super::gap::Gap;
+use super::gap::{ALL_AXES, Gap};
 use super::{CheckResult, Subject, hanging};
+use crate::promises::Touching;
 use contract::lattice::Root;
 use contract::tree::Tree;
 
@@ -31,12 +32,22 @@ pub fn check(subject: &Subject) -> CheckResult {
     result
 }
 
-/// Checks the balance of a tree.
+/// Checks the 2:1 balance of a tree over faces, edges and corners.
 pub fn check_tree(tree: &Tree, root: &Root) -> CheckResult {
+    check_touching(tree, root, Touching::Corner, 1)
+}
+
+/// Checks that leaves that touch in this way differ by at most `levels` levels.
+pub fn check_touching(tree: &Tree, root: &Root, touching: Touching, levels: u8) -> CheckResult {
     let mut result = CheckResult::new(NAME);
+    let (how, directions): (_, &[[i64; 3]]) = match touching {
+        Touching::Corner => ("touch", &ALL_AXES),
+        Touching::Edge => ("share part of an edge or face", &[[1, 1, 0], [0, 1, 1], [1, 0, 1]]),
+        Touching::Face => ("share part of a face", &[[1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    };
+    let what = &format!("leaves that {how} differ by {} levels or more", levels + 1);
     // Distances are integers: octants less than one cell apart touch.
-    Gap { tree, root, margin: &|_| Some(1), what: "touching leaves differ by two levels or more" }
-        .check(&mut result);
+    Gap { tree, root, margin: &|_| Some(1), directions, levels, what }.check(&mut result);
     result
 }
 
@@ -52,9 +63,18 @@ mod tests {
 
     /// Whether any two leaves touch and differ by two levels, by comparison of all pairs.
     fn unbalanced(words: &[u64]) -> bool {
+        differs(words, 2, 1)
+    }
+
+    /// Whether two leaves differ by this many levels and touch in a set of at least `dimensions` - 1 dimensions.
+    fn differs(words: &[u64], levels: u8, dimensions: usize) -> bool {
         let leaves: Vec<_> = words.iter().map(|&w| word::octant(w)).collect();
-        let touch = |a: &Octant, b: &Octant| a.distance(b) == 0;
-        leaves.iter().any(|a| leaves.iter().any(|b| a.level + 2 <= b.level && touch(a, b)))
+        let touch = |a: &Octant, b: &Octant| {
+            let ((a_low, a_high), (b_low, b_high)) = (a.bounds(), b.bounds());
+            let overlap = |i: usize| a_low[i].max(b_low[i]) < a_high[i].min(b_high[i]);
+            a.distance(b) == 0 && (0..3).filter(|&i| overlap(i)).count() + 1 >= dimensions
+        };
+        leaves.iter().any(|a| leaves.iter().any(|b| a.level + levels <= b.level && touch(a, b)))
     }
 
     proptest! {
@@ -62,6 +82,17 @@ mod tests {
         fn the_check_agrees_with_a_comparison_of_all_pairs(words in prop_oneof![random_words(4), graded_words(5)]) {
             let tree = Tree::of_words(&words);
             prop_assert_eq!(check_tree(&tree, &ROOT).holds(), !unbalanced(&words));
+        }
+
+        #[test]
+        fn every_ratio_and_way_of_touching_agrees_with_a_comparison_of_all_pairs(
+            words in prop_oneof![random_words(4), graded_words(5)], levels in 1u8..=3,
+        ) {
+            let tree = Tree::of_words(&words);
+            for (touching, dimensions) in [(Touching::Corner, 1), (Touching::Edge, 2), (Touching::Face, 3)] {
+                let result = check_touching(&tree, &ROOT, touching, levels);
+                prop_assert_eq!(result.holds(), !differs(&words, levels + 1, dimensions), "{:?}: {}", touching, result);
+            }
         }
     }
 

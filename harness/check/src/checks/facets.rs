@@ -25,12 +25,25 @@ impl Facets {
         Self(facets.iter().map(Triangle::new).collect())
     }
 
+    /// The indices of all facets.
+    pub fn all(&self) -> Vec<u32> {
+        (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect()
+    }
+
+    /// Those of some facets that share a point with a closed box.
+    pub fn meeting(&self, candidates: &[u32], low: [i64; 3], high: [i64; 3]) -> Vec<u32> {
+        candidates.iter().copied().filter(|&i| self.0[i as usize].meets(low, high)).collect()
+    }
+
+    /// The first of some facets that shares a point with a closed box.
+    pub fn first_meeting(&self, candidates: &[u32], low: [i64; 3], high: [i64; 3]) -> Option<u32> {
+        candidates.iter().copied().find(|&i| self.0[i as usize].meets(low, high))
+    }
+
     /// Visits every octant that is a leaf or contains leaves, parents first, with whether a facet crosses it.
     /// The words must be sorted leaves without overlap.
     pub fn walk(&self, words: &[u64], visit: &mut dyn FnMut(Visit, &Octant, bool)) {
-        let all: Vec<u32> =
-            (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect();
-        self.descend(words, 0, Octant::ROOT, &all, visit);
+        self.descend(words, 0, Octant::ROOT, &self.all(), visit);
     }
 
     fn descend(
@@ -45,12 +58,12 @@ impl Facets {
             return;
         };
         let (low, high) = octant.bounds();
-        let crosses = |&&i: &&u32| self.0[i as usize].meets(low, high);
         if word::level(word) <= octant.level {
-            visit(Visit::Leaf(first), &octant, candidates.iter().any(|i| crosses(&i)));
+            let crossed = self.first_meeting(candidates, low, high).is_some();
+            visit(Visit::Leaf(first), &octant, crossed);
             return;
         }
-        let crossing: Vec<u32> = candidates.iter().filter(crosses).copied().collect();
+        let crossing = self.meeting(candidates, low, high);
         visit(Visit::Split, &octant, !crossing.is_empty());
         let mut from = 0;
         for digit in 0..8 {

@@ -1,5 +1,4 @@
-//! The common property of balance and layers: a minimum distance of split octants from leaves coarser than
-//! themselves.
+//! The common property of balance and layers: a minimum distance of split octants from coarse leaves.
 //!
 //! A leaf of level `l + 1` or finer lies in a split octant of level `l`. So leaves of levels `l + 1` and `l -
 //! 1` have a minimum distance iff no leaf of level `l - 1` is nearer than that to a split octant of level `l`.
@@ -21,6 +20,10 @@ pub struct Gap<'a> {
     /// Minimum distance from split octants of a level, in level-19 cells; `None` from the first level on that
     /// has none. It must not increase with the level.
     pub margin: &'a dyn Fn(u8) -> Option<i64>,
+    /// The axes along which the margin extends a split octant, for each region that coarse leaves must not meet.
+    pub directions: &'a [[i64; 3]],
+    /// Levels by which a leaf may be coarser than one within the margin: 1 for the ratio 2:1.
+    pub levels: u8,
     /// Name of a violation.
     pub what: &'a str,
 }
@@ -44,16 +47,18 @@ impl Gap<'_> {
             return;
         }
         let region = Region::around_children(&octant, split, margin);
-        let nearby = trail.coarsest_nearby(self.tree, margin, &region, level);
+        // A leaf of level l + 1 or finer lies in a split octant of level l.
+        let bound = (level + 1).saturating_sub(self.levels);
+        let nearby = trail.coarsest_nearby(self.tree, margin, &region, bound);
         for digit in (0..8).filter(|d| split >> d & 1 == 1) {
             let child = self.tree.child(handle, digit, octant.level);
             // The neighbourhood of the children contains that of each child, which contains those of the
             // grandchildren.
-            let deep = self.tree.finest_level(child, level) > nearby.max(level) + 1;
-            if nearby < level || deep {
+            let deep = self.tree.finest_level(child, level) > nearby.max(bound) + self.levels;
+            if nearby < bound || deep {
                 trail.descend(self.tree, digit);
-                if nearby < level {
-                    self.confirm(trail, child, margin, result);
+                if nearby < bound {
+                    self.confirm(trail, child, margin, bound, result);
                 }
                 if deep {
                     self.check_children(trail, result);
@@ -64,12 +69,21 @@ impl Gap<'_> {
     }
 
     /// Repeats the search for each part of the octant that has no holes, and reports the first coarse leaf.
-    fn confirm(&self, trail: &Trail, handle: Handle, margin: i64, result: &mut CheckResult) {
+    fn confirm(
+        &self,
+        trail: &Trail,
+        handle: Handle,
+        margin: i64,
+        bound: u8,
+        result: &mut CheckResult,
+    ) {
         let split = trail.current().octant;
         solid_parts(self.tree, handle, split, &mut |part| {
-            let region = Region::around(&part, margin);
-            let found = trail.search(self.tree, margin, &region, split.level);
-            if let Some(coarse) = found.leaf(self.tree) {
+            let mut found = self.directions.iter().filter_map(|axes| {
+                let region = Region::along(&part, axes.map(|axis| axis * margin));
+                trail.search(self.tree, margin, &region, bound).leaf(self.tree)
+            });
+            if let Some(coarse) = found.next() {
                 result.report_with(|| {
                     let (what, part) = (self.what, self.root.describe(&part));
                     format!(
@@ -84,6 +98,9 @@ impl Gap<'_> {
         });
     }
 }
+
+/// The margin along all axes at once: a Chebyshev distance.
+pub const ALL_AXES: [[i64; 3]; 1] = [[1, 1, 1]];
 
 /// Visits the largest octants without holes until `visit` returns false. Returns whether all visits returned true.
 fn solid_parts(

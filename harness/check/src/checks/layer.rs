@@ -5,9 +5,10 @@
 //! `keep` is `all`, for every l. Every leaf less than n - 1 cells of level D from a crossing leaf of level D has
 //! at least level D. If crossing leaves are deleted, leaves adjacent to one have at least level D: by the extra layer
 //! of section 6 for n < 3, and by the layers themselves for larger n. The check detects neither layers that are too
-//! thick nor, without T0, missing layers around deleted crossing leaves.
+//! thick nor, without T0, missing layers around deleted crossing leaves. With n = 1, the minimum distance is that of the
+//! 2:1 balance, which `balance` checks: an imbalance is one violation and is reported once.
 
-use super::gap::Gap;
+use super::gap::{ALL_AXES, Gap};
 use super::trail::Trail;
 use super::{CheckResult, Subject, Terms, contact};
 use contract::manifest::Keep;
@@ -32,8 +33,11 @@ pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
         let required = terms.keep == Keep::All || level < terms.level_surface;
         required.then(|| n * cell(level))
     };
-    let what = &format!("a layer is thinner than {n} cells");
-    Gap { tree, root: &terms.root, margin: &margin, what }.check(&mut result);
+    if n > 1 {
+        let what = &format!("a layer is thinner than {n} cells");
+        Gap { tree, root: &terms.root, margin: &margin, directions: &ALL_AXES, levels: 1, what }
+            .check(&mut result);
+    }
     SurfaceLayer { tree, terms }.check_children(&mut Trail::new(tree), &mut result);
     result
 }
@@ -147,7 +151,7 @@ mod tests {
             leaves.iter().any(|(coarse, _)| {
                 let distance = fine.distance(coarse);
                 let levels = coarse.level + 1..fine.level;
-                let required = |l: &u8| all || *l < terms.level_surface;
+                let required = |l: &u8| n > 1 && (all || *l < terms.level_surface);
                 let layer = levels.filter(required).any(|l| distance < n * cell(l));
                 let surface = terms.level_surface;
                 let at_surface = *side == Side::Crossing && fine.level == surface;

@@ -81,6 +81,11 @@ fn against_leaves(prefix: &str, set: &LeafSet, result: &mut CheckResult) {
     against_tally(prefix, &set.manifest, &Tally::of(&set.words), &parts, result);
 }
 
+/// Checks the inputs in the manifest only.
+pub fn check_terms(manifest: &Manifest, terms: &Terms, result: &mut CheckResult) {
+    against_terms("", manifest, terms, result);
+}
+
 /// Checks the counts and digests only. `parts` are the number of leaves and the digest of each part.
 pub fn check_leaves(manifest: &Manifest, tally: &Tally, parts: &[(u64, Digest)]) -> CheckResult {
     let mut result = CheckResult::new(NAME);

@@ -17,22 +17,28 @@ pub mod kept;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
+mod premise;
+mod promised;
+mod region;
 mod result;
 pub mod sides;
 pub mod spacing;
 mod subject;
+mod surface;
 mod terms;
 pub mod trail;
 
+pub use premise::with_premise;
+pub use promised::promised;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::Subject;
 pub(crate) use subject::valid_leaves;
 pub use terms::Terms;
 
-/// Runs all checks, in the order in which their findings are most helpful. `identical` is omitted without a
-/// reference.
+/// Runs all checks of the definition, in the order in which their findings are most helpful. `identical` is omitted
+/// without a reference.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
-    let mut results = vec![
+    let results = [
         manifest::check(subject),
         linear::check(subject),
         complete::check(subject),
@@ -43,6 +49,7 @@ pub fn all(subject: &Subject) -> Vec<CheckResult> {
         balance::check(subject),
         layer::check(subject),
     ];
-    results.extend(identical::check(subject));
-    results
+    let (tree, base) = (subject.tree_with_deleted(), subject.tree_base());
+    let noted = results.map(|result| with_premise(result, tree, base, &subject.terms));
+    noted.into_iter().chain(identical::check(subject)).collect()
 }

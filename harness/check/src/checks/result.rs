@@ -32,12 +32,26 @@ pub struct CheckResult {
     pub findings_total: u64,
     /// Numbers and limitations that are of interest even if the check passes.
     pub note: String,
+    /// Why the mesh gave the check nothing to examine; such a check neither holds nor fails.
+    pub nothing_to_check: Option<String>,
 }
 
 impl CheckResult {
     /// A result without findings.
     pub fn new(name: &'static str) -> Self {
-        Self { name, examined: 0, findings: Vec::new(), findings_total: 0, note: String::new() }
+        Self {
+            name,
+            examined: 0,
+            findings: Vec::new(),
+            findings_total: 0,
+            note: String::new(),
+            nothing_to_check: None,
+        }
+    }
+
+    /// The result of a check whose premise is missing.
+    pub fn nothing(name: &'static str, why: impl Into<String>) -> Self {
+        Self { nothing_to_check: Some(why.into()), ..Self::new(name) }
     }
 
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
@@ -47,9 +61,14 @@ impl CheckResult {
         result
     }
 
-    /// Whether there are no findings.
+    /// Whether there are no findings. A check that had nothing to check has none, but shows nothing about the mesh.
     pub fn holds(&self) -> bool {
         self.findings_total == 0
+    }
+
+    /// Whether the check examined something.
+    pub fn was_run(&self) -> bool {
+        self.nothing_to_check.is_none()
     }
 
     /// Adds a finding.
@@ -68,6 +87,9 @@ impl CheckResult {
 
 impl fmt::Display for CheckResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(why) = &self.nothing_to_check {
+            return write!(f, "{:<10} nothing to check: {why}", self.name);
+        }
         let verdict = match self.findings_total {
             0 => "holds".to_owned(),
             1 => "1 finding".to_owned(),

@@ -35,6 +35,16 @@ pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     result
 }
 
+/// Checks that every leaf that meets a box has at least the level of the box.
+pub fn check_boxes(tree: &Tree, terms: &Terms) -> CheckResult {
+    let mut result = CheckResult::new("boxes");
+    boxes_met(tree, terms, "", &mut result);
+    match terms.boxes.is_empty() {
+        true => CheckResult::nothing(result.name, "the case has no boxes"),
+        false => result,
+    }
+}
+
 /// Every leaf that meets a box has at least the level of the box.
 fn boxes_met(tree: &Tree, terms: &Terms, prefix: &str, result: &mut CheckResult) {
     for extent in &terms.boxes {

@@ -156,9 +156,9 @@ fn balance_merged(s: &SelftestCase) -> Option<Mutation> {
     merge_where(s, |level, near| near.touching > level)
 }
 
-/// Whether the definition requires a layer of cells of this level.
+/// Whether the definition requires a layer of cells of this level that is not implied by the balance.
 fn has_layer(s: &SelftestCase, level: u8) -> bool {
-    s.case.keep == Keep::All || level < s.case.level_surface
+    s.case.layer_cells_min > 1 && (s.case.keep == Keep::All || level < s.case.level_surface)
 }
 
 fn layer_merged(s: &SelftestCase) -> Option<Mutation> {

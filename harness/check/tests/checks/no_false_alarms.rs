@@ -3,6 +3,7 @@
 use crate::support;
 use check::audit::{self, AuditOptions};
 use check::checks::{self, Subject};
+use check::promises::{Promises, Sides, Surface, Touching};
 use geometries::Facet;
 use proptest::prelude::*;
 
@@ -92,6 +93,28 @@ proptest! {
             set.write(dir.path()).unwrap();
             let report = audit::audit(dir.path(), &AuditOptions::default());
             prop_assert!(report.holds(), "{text}{report}");
+        }
+    }
+
+    /// The definition includes every promise. Around a body that is not watertight, the rays of a single leaf may contradict
+    /// its component.
+    #[test]
+    fn meshes_of_the_reference_keep_every_promise(facets in hulls(), text in settings()) {
+        let promises = Promises {
+            complete: true,
+            surface: Some(Surface { tolerance_cells: 0.0 }),
+            boxes: true,
+            sides: Some(Sides { band_cells: 1.0 }),
+            balance: Some(Touching::Corner),
+            layers: true,
+            ..Promises::default()
+        };
+        let Ok(correct) = support::meshes_of_facets(&text, &facets) else { return Ok(()) };
+        let subject = Subject::new(&correct.case, &correct.mesh);
+        let results = checks::promised(subject.tree(), &subject.terms, Some(&correct.case), &promises);
+        prop_assert_eq!(results.len(), 6);
+        for result in results {
+            prop_assert!(result.holds(), "{text}{result}");
         }
     }
 }

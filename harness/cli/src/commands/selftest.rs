@@ -140,6 +140,9 @@ fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
     })?;
     println!("{report}");
     let (trials, found) = (report.kills.len(), report.found_by_audit());
+    if trials == 0 {
+        return Err((EXIT_MISSING, "left out: no corruption applies to these meshes".to_owned()));
+    }
     let killed = report.kills.iter().filter(|kill| kill.killed()).count();
     println!(
         "the audit found {found} of {trials}; {} only by comparison with the untouched mesh",

@@ -2,17 +2,17 @@
 
 use super::programs::ProgramArguments;
 use bench::shrink::bundle::{self, Repeat};
-use bench::shrink::probe::{Probe, Trial};
-use bench::shrink::{Budget, shrink};
+use bench::shrink::probe::{Probe, Trial, Unknown};
+use bench::shrink::{Budget, failure, shrink};
 use clap::Args;
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail.
+/// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail; 3 the engine does not support it.
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
@@ -29,9 +29,12 @@ pub struct Arguments {
     /// Seed of the schedule of simulated ranks
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// The check that must keep failing, by its name in `harness verify` [default: the one that fails first]
+    #[arg(long, value_name = "NAME")]
+    check: Option<String>,
     /// Only test whether the case fails
     #[arg(long)]
-    check: bool,
+    test_only: bool,
     /// Directory for the reduced case [default: shrunk-CASE]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -52,40 +55,50 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> u8 {
     try_run(arguments).unwrap_or_else(|why| {
         eprintln!("harness: {why}");
-        EXIT_INPUT
+        match why {
+            Unknown::LeftOut(_) => EXIT_MISSING,
+            Unknown::Error(_) => EXIT_INPUT,
+        }
     })
 }
 
-fn try_run(arguments: &Arguments) -> Result<u8, String> {
+fn try_run(arguments: &Arguments) -> Result<u8, Unknown> {
+    let wrong = Unknown::Error;
     let given = arguments.programs.given();
     let program = given.mesher.as_ref().map(|path| path.to_string_lossy().into_owned());
-    let programs = Programs::find_with_engine(&arguments.engine, given)?;
+    let programs = Programs::find_with_engine(&arguments.engine, given).map_err(wrong)?;
     let limit = Duration::from_secs(arguments.timeout);
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
         Some(ranks) => Ranks::Simulated { ranks: ranks as usize, seed: arguments.seed },
     };
-    let case = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
-    let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
-    if arguments.check {
-        let failure = probe.failure(&Trial { case: PlainCase::read(&case)?, ranks })?;
-        println!(
-            "{}",
-            failure.as_ref().map_or("the case does not fail".to_owned(), ToString::to_string)
-        );
+    let catalogue = &programs.paths.catalogue;
+    let path = catalogue.case_file(&arguments.case, Path::new("")).map_err(wrong)?;
+    let probe = Probe::new(programs.engine, programs.reference, ranks, limit).map_err(wrong)?;
+    let check = arguments.check.as_deref();
+    if arguments.test_only {
+        let case = PlainCase::read(&path).map_err(wrong)?;
+        let failure = failure(&Trial { case, ranks }, &probe, check)?;
+        let passed = || passed(check);
+        println!("{}", failure.as_ref().map_or_else(passed, ToString::to_string));
         return Ok(if failure.is_some() { EXIT_FAILED } else { EXIT_HOLDS });
     }
     let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
-    let Some(shrunk) = shrink(&case, &probe, &budget)? else {
-        println!("the case does not fail and was not shrunk");
+    let Some(shrunk) = shrink(&path, &probe, check, &budget)? else {
+        println!("{} and was not shrunk", passed(check));
         return Ok(EXIT_HOLDS);
     };
-    let name = case.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let repeat = Repeat { engine: arguments.engine.clone(), program };
     let readme = bundle::write(&shrunk, &probe, &repeat, &out)
-        .map_err(|error| format!("{}: {error}", out.display()))?;
+        .map_err(|error| wrong(format!("{}: {error}", out.display())))?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
+}
+
+fn passed(check: Option<&str>) -> String {
+    let what = check.map(|name| format!(" {name}")).unwrap_or_default();
+    format!("the case does not fail{what}")
 }

@@ -44,7 +44,7 @@ fn a_passing_case_is_not_shrunk() {
     let outcome = fixture.harness("shrink case.toml --engine engine.toml --ranks 2 --out tiny");
     assert_eq!(outcome.code, 0, "{}", outcome.printed);
     assert!(!fixture.path("tiny").exists());
-    assert_eq!(fixture.harness(&format!("{SHRINK} --check")).code, 1);
+    assert_eq!(fixture.harness(&format!("{SHRINK} --test-only")).code, 1);
 }
 
 #[test]

@@ -13,9 +13,14 @@ pub struct Region {
 impl Region {
     /// An octant enlarged by `margin` on every side.
     pub fn around(octant: &Octant, margin: i64) -> Self {
+        Self::along(octant, [margin; 3])
+    }
+
+    /// An octant enlarged on both sides of each axis by the margin for that axis.
+    pub fn along(octant: &Octant, margins: [i64; 3]) -> Self {
         let edge = i64::from(octant.edge());
-        let low = octant.corner.map(|c| i64::from(c) - margin);
-        Self { low, high: low.map(|c| c + edge + 2 * margin) }
+        let low = std::array::from_fn(|a| i64::from(octant.corner[a]) - margins[a]);
+        Self { low, high: std::array::from_fn(|a| low[a] + edge + 2 * margins[a]) }
     }
 
     /// The bounding box of some children of an octant, enlarged by `margin` on every side. Bit `d` of `digits`

@@ -1,10 +1,11 @@
 //! The command line of a run, assembled from the templates of an engine file.
 
-use super::description::{LAUNCHER, Templates, Values, fill};
+use super::description::{LAUNCHER, Values, fill};
 use super::failure::End;
 use super::launcher::Launcher;
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
+use super::templates::Templates;
 use std::path::Path;
 use std::process::Command;
 
@@ -42,6 +43,7 @@ fn add_values_of_run(values: &mut Values, case: &Path, layout: &Layout, options:
     values.extend([
         ("case", text(case)),
         ("ranks", layout.ranks.count().to_string()),
+        ("threads", layout.threads.unwrap_or(1).to_string()),
         ("json", text(&options.report_path())),
         ("status", text(&options.status_path())),
     ]);
@@ -92,9 +94,9 @@ fn appended<'a>(
     if options.ungraded && templates.ungraded.is_none() {
         return Err(cannot("stopped at the base tree", "`ungraded`"));
     }
-    let mesh = options.mesh.is_some() || templates.json.is_none();
+    let mesh = options.mesh.is_some() || templates.always_writes_mesh();
     let parts = [
-        (mesh, Some(&templates.out)),
+        (mesh, templates.out.as_ref()),
         (options.report, templates.json.as_ref()),
         (options.report && options.message_matrix, templates.message_matrix.as_ref()),
         (options.status, templates.status.as_ref()),
@@ -102,6 +104,7 @@ fn appended<'a>(
         (layout.partitioner.is_some(), templates.partitioner.as_ref()),
         (layout.level_base.is_some(), templates.level_base.as_ref()),
         (layout.weights.is_some(), templates.weights.as_ref()),
+        (layout.threads.is_some(), templates.threads.as_ref()),
     ];
     let requested = parts.into_iter().filter(|(needed, _)| *needed);
     Ok(requested.filter_map(|(_, template)| template).flatten().collect())

@@ -1,12 +1,13 @@
-//! The engine file: a TOML file with the command templates, capabilities and limits of a mesher.
+//! The engine file: a TOML file with the command templates, capabilities, limits and promises of a mesher.
 //! `harness/engines/README.md` explains how one is written.
 //!
 //! Invariants: an engine has a capability if and only if its file has the command template for it; unknown keys and
 //! unknown placeholders are errors when the file is read.
 
 use super::paths::Paths;
-use contract::case::Case;
-use contract::manifest::{Enclosed, Keep};
+use super::takes::{Limits, Takes};
+use super::templates::Templates;
+use check::promises::Promises;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -23,10 +24,14 @@ const OWN: [(&str, &str); 2] = [
 #[serde(deny_unknown_fields)]
 pub struct Description {
     /// A sentence about the engine.
+    #[serde(default)]
     pub about: String,
-    /// The program, `{program}` in templates. The command line may name another one.
+    /// The program, `{program}` in templates; by default the first word of `serial`. The command line may name another
+    /// one.
+    #[serde(default)]
     pub program: String,
-    /// Command templates.
+    /// Command templates. A file without them states promises only, and its engine cannot be run.
+    #[serde(default)]
     pub run: Templates,
     /// Features of a case that the engine supports.
     #[serde(default)]
@@ -34,6 +39,9 @@ pub struct Description {
     /// Limits on cases.
     #[serde(default)]
     pub limits: Limits,
+    /// What its meshes guarantee; by default the definition.
+    #[serde(default = "Promises::of_definition")]
+    pub promises: Promises,
     /// Whether the run report has the peak memory, so that the harness need not sample it.
     #[serde(default)]
     pub reports_memory: bool,
@@ -45,87 +53,6 @@ pub struct Description {
     /// The file's directory, `{here}` in templates.
     #[serde(skip)]
     pub here: PathBuf,
-}
-
-/// Command templates, as lists of words. A missing template is a capability that the engine does not have.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Templates {
-    /// A serial run.
-    pub serial: Vec<String>,
-    /// A run on `{ranks}` processes, started by `{launcher}`.
-    pub parallel: Option<Vec<String>>,
-    /// A run on `{ranks}` ranks within one process, scheduled by `{seed}`.
-    pub simulated: Option<Vec<String>>,
-    /// Appended to write the leaf-set directory `{out}`.
-    pub out: Vec<String>,
-    /// Appended to write the run report `{json}`.
-    pub json: Option<Vec<String>>,
-    /// Appended to include the message matrix in the run report.
-    pub message_matrix: Option<Vec<String>>,
-    /// Appended to keep the current activity of each rank in the directory `{status}`.
-    pub status: Option<Vec<String>>,
-    /// Appended to stop at the base tree.
-    pub ungraded: Option<Vec<String>>,
-    /// Appended to choose the `{partitioner}`.
-    pub partitioner: Option<Vec<String>>,
-    /// Appended to choose the level of the partition, `{level_base}`.
-    pub level_base: Option<Vec<String>>,
-    /// Appended to choose the `{weights}` of the partition.
-    pub weights: Option<Vec<String>>,
-    /// Variables to add to the environment.
-    #[serde(default)]
-    pub environment: BTreeMap<String, String>,
-}
-
-/// Features of a case file that an engine supports.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Takes {
-    /// `[generator]` and `root_scale`. If not, the engine is given an STL file and an explicit root.
-    pub generator: bool,
-    /// Extent boxes.
-    pub boxes: bool,
-    /// Values of `keep`.
-    pub keep: Vec<Keep>,
-    /// `keep_crossing = false`.
-    pub drop_crossing: bool,
-    /// `seeds`.
-    pub seeds: bool,
-    /// `enclosed = "keep"`. The default, `delete`, cannot be declined: whether anything is enclosed is known after
-    /// meshing only.
-    pub keep_enclosed: bool,
-}
-
-impl Default for Takes {
-    fn default() -> Self {
-        let keep = vec![Keep::Outside, Keep::Inside, Keep::All];
-        let generator = false;
-        Self {
-            generator,
-            boxes: true,
-            keep,
-            drop_crossing: true,
-            seeds: false,
-            keep_enclosed: false,
-        }
-    }
-}
-
-/// Limits: the engine is not run on a case beyond them.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Limits {
-    /// Deepest level.
-    pub level_max: u8,
-    /// Greatest number of facets.
-    pub facets_max: u64,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self { level_max: contract::octant::LEVEL_MAX, facets_max: u64::MAX }
-    }
 }
 
 /// How a revision is built.
@@ -166,10 +93,19 @@ impl Description {
         Ok(description)
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let description: Self =
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
+        let mut description: Self =
             toml::from_str(text).map_err(|error| error.message().replace('\n', " "))?;
-        description.run.check_placeholders()?;
+        description.promises.fault().map_or(Ok(()), Err)?;
+        let templates = &mut description.run;
+        if let Some(first) = templates.serial.first().cloned() {
+            templates.check_placeholders()?;
+            templates.check_promises(&description.promises)?;
+            if description.program.is_empty() {
+                templates.name_program(&first);
+                description.program = first;
+            }
+        }
         Ok(description)
     }
 
@@ -185,80 +121,13 @@ impl Description {
             ("mpirun", text(&paths.mpirun)),
         ])
     }
-
-    /// Why the engine is not run on a case; `None` if it is.
-    pub fn declines(&self, case: &Case) -> Option<String> {
-        let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
-        let name = &self.name;
-        if level > self.limits.level_max {
-            let limit = self.limits.level_max;
-            return Some(format!(
-                "{name} supports levels up to {limit}, and the case needs {level}"
-            ));
-        }
-        if facets > self.limits.facets_max {
-            let limit = self.limits.facets_max;
-            return Some(format!("{name} supports {limit} facets, and the case has {facets}"));
-        }
-        if !case.boxes.is_empty() && !self.takes.boxes {
-            return Some(format!("{name} does not support extent boxes"));
-        }
-        if !self.takes.keep.contains(&case.keep) {
-            return Some(format!("{name} does not support keep = {:?}", case.keep).to_lowercase());
-        }
-        if !case.keep_crossing && !self.takes.drop_crossing {
-            return Some(format!("{name} does not support keep_crossing = false"));
-        }
-        if !case.seeds.is_empty() && !self.takes.seeds {
-            return Some(format!("{name} does not support seeds"));
-        }
-        if case.enclosed == Enclosed::Keep && !self.takes.keep_enclosed {
-            return Some(format!("{name} does not support enclosed = keep"));
-        }
-        None
-    }
-}
-
-impl Templates {
-    /// Refuses placeholders that have no value in the template that contains them.
-    fn check_placeholders(&self) -> Result<(), String> {
-        let common = ["program", "case", "ranks", "here", "root", "python", "mpirun", "target"];
-        let environment: Vec<String> = self.environment.values().cloned().collect();
-        let templates = [
-            ("serial", Some(&self.serial), ""),
-            ("parallel", self.parallel.as_ref(), ""),
-            ("simulated", self.simulated.as_ref(), "seed"),
-            ("out", Some(&self.out), "out"),
-            ("json", self.json.as_ref(), "json"),
-            ("message_matrix", self.message_matrix.as_ref(), ""),
-            ("status", self.status.as_ref(), "status"),
-            ("ungraded", self.ungraded.as_ref(), ""),
-            ("partitioner", self.partitioner.as_ref(), "partitioner"),
-            ("level_base", self.level_base.as_ref(), "level_base"),
-            ("weights", self.weights.as_ref(), "weights"),
-            ("environment", Some(&environment), ""),
-        ];
-        for (key, template, own) in templates {
-            let words = template.into_iter().flatten();
-            let words = words.filter(|word| key != "parallel" || *word != LAUNCHER);
-            let unknown = |name: &&str| !common.contains(name) && *name != own;
-            if let Some(name) = words.flat_map(|word| placeholders(word)).find(unknown) {
-                let known = [&common[..], &[own]].concat().join(" ");
-                return Err(format!(
-                    "`{key}` has the unknown placeholder {{{name}}}; known there are {}",
-                    known.trim()
-                ));
-            }
-        }
-        Ok(())
-    }
 }
 
 /// The word in `parallel` that stands for the launcher's words.
 pub const LAUNCHER: &str = "{launcher}";
 
 /// Names between braces.
-fn placeholders(word: &str) -> impl Iterator<Item = &str> {
+pub(super) fn placeholders(word: &str) -> impl Iterator<Item = &str> {
     word.split('{').skip(1).filter_map(|rest| rest.split_once('}')).map(|(name, _)| name)
 }
 
@@ -283,15 +152,28 @@ mod tests {
     #[test]
     fn our_own_engine_files_are_valid() {
         for (name, text) in OWN {
-            assert!(Description::parse(text).unwrap().run.json.is_some(), "{name}");
+            let own = Description::parse(text).unwrap();
+            assert!(own.run.json.is_some() && own.promises.definition, "{name}");
         }
+    }
+
+    #[test]
+    fn an_engine_file_needs_nothing_but_a_command() {
+        let text = "[run]\nserial = ['meshit', '{case}', '{out}']\nparallel = ['{launcher}', 'meshit', '{case}', '{out}']";
+        let least = Description::parse(text).unwrap();
+        assert_eq!(least.program, "meshit");
+        assert_eq!(least.run.serial, ["{program}", "{case}", "{out}"]);
+        assert_eq!(least.run.parallel.as_ref().unwrap()[1], "{program}");
+        assert!(least.run.always_writes_mesh() && least.promises.definition);
+        let nowhere = Description::parse("[run]\nserial = ['meshit', '{case}']").unwrap_err();
+        assert!(nowhere.contains("`serial` has no {out}"), "{nowhere}");
     }
 
     #[test]
     fn a_missing_template_is_a_missing_capability() {
         let least = Description::parse(LEAST).unwrap();
         assert!(least.run.parallel.is_none() && least.run.json.is_none() && !least.takes.generator);
-        assert_eq!(least.limits.level_max, 19);
+        assert_eq!((least.limits.level_max, least.run.always_writes_mesh()), (19, true));
     }
 
     #[test]
@@ -302,30 +184,6 @@ mod tests {
         assert!(why(&LEAST.replace("'{case}'", "'{launcher}'")).contains("{launcher}"));
         assert!(why(&format!("{LEAST}status = ['{{out}}']\n")).contains("`status`"));
         assert!(why(&format!("{LEAST}outt = []\n")).contains("outt"));
-        assert!(why("about = 'x'").contains("program"));
-    }
-
-    #[test]
-    fn a_case_beyond_the_capabilities_is_declined_with_the_reason() {
-        let text =
-            format!("{LEAST}[takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 3\n");
-        let engine = Description::parse(&text).unwrap();
-        let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
-        let declines = |case: &str| {
-            engine.declines(&Case::from_parts(&case.replace("ROOT", root), vec![]).unwrap())
-        };
-        assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
-        let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
-        assert!(deep.contains("levels up to 3"), "{deep}");
-        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
-        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
-        assert!(seeds.ends_with("does not support seeds"), "{seeds}");
-        let enclosed =
-            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
-        assert!(enclosed.ends_with("enclosed = keep"), "{enclosed}");
-        let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
-                     max = [1.0, 1.0, 1.0]\nspacing = 1.0";
-        assert!(declines(boxed).unwrap().contains("boxes"));
     }
 
     #[test]

@@ -68,12 +68,20 @@ pub struct Layout {
     /// The weights of base leaves in the partition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
+    /// The number of threads of each rank.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threads: Option<usize>,
 }
 
 impl Layout {
     /// These ranks, with every choice left to the engine.
     pub const fn on(ranks: Ranks) -> Self {
-        Self { ranks, partitioner: None, level_base: None, weights: None }
+        Self { ranks, partitioner: None, level_base: None, weights: None, threads: None }
+    }
+
+    /// The number of ranks of a run on several; `None` for a serial run.
+    pub fn rank_count(&self) -> Option<usize> {
+        (self.ranks != Ranks::Serial).then(|| self.ranks.count())
     }
 }
 
@@ -90,7 +98,7 @@ impl fmt::Display for Layout {
                 write!(f, ", {label}{choice}")?;
             }
         }
-        Ok(())
+        self.threads.iter().try_for_each(|threads| write!(f, ", {threads} threads"))
     }
 }
 

@@ -16,3 +16,5 @@ pub mod programs;
 pub mod report;
 pub mod runner;
 mod session;
+pub mod takes;
+pub mod templates;

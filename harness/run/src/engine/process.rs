@@ -29,15 +29,6 @@ pub struct Finished {
     pub peak_rss_bytes: Option<u64>,
 }
 
-/// The line of the standard error that describes an error. Lines without alphabetic characters are ignored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ErrorLine {
-    /// The first: our own programs print one line, and `mpirun` adds many after it.
-    First,
-    /// The last: Python, compilers and valgrind print the error at the end.
-    Last,
-}
-
 /// A child's name and limits, and where its output goes.
 #[derive(Clone, Debug)]
 pub struct Watch<'a> {
@@ -49,17 +40,14 @@ pub struct Watch<'a> {
     pub logs: &'a Path,
     /// Directory in which rank N keeps its current activity in the file `rank-NNNNN.txt`.
     pub status: Option<&'a Path>,
-    /// Which line describes an error.
-    pub error_line: ErrorLine,
     /// Sample the memory of the child and its descendants.
     pub sample_memory: bool,
 }
 
 impl<'a> Watch<'a> {
-    /// A child without status files and memory samples, which describes an error in its first line.
+    /// A child without status files and memory samples.
     pub fn new(name: &'a str, limit: Duration, logs: &'a Path) -> Self {
-        let error_line = ErrorLine::First;
-        Self { name, limit, logs, status: None, error_line, sample_memory: false }
+        Self { name, limit, logs, status: None, sample_memory: false }
     }
 
     fn log(&self, stream: &str) -> PathBuf {
@@ -134,19 +122,31 @@ fn wait(
 fn judge(status: ExitStatus, watch: &Watch) -> Option<End> {
     match status.code() {
         Some(0) => None,
-        Some(code) => Some(End::Exited { code, error: error_line(watch) }),
+        Some(code) => {
+            let text = fs::read_to_string(watch.log("stderr")).unwrap_or_default();
+            Some(End::Exited { code, error: last_lines(&text) })
+        }
         None => Some(End::Signalled(status.signal().unwrap_or(0))),
     }
 }
 
-fn error_line(watch: &Watch) -> String {
-    let text = fs::read_to_string(watch.log("stderr")).unwrap_or_default();
-    let mut lines = text.lines().filter(|line| line.contains(char::is_alphabetic));
-    let line = match watch.error_line {
-        ErrorLine::First => lines.next(),
-        ErrorLine::Last => lines.next_back(),
+/// Lines of the standard error that a message shows.
+const LINES_SHOWN: usize = 3;
+
+/// The last lines of a standard error, in one line: programs print the error at the end. Lines without letters are
+/// ignored, and so are the paragraphs between rules of dashes that `mpirun` adds after the program's own error.
+fn last_lines(text: &str) -> String {
+    let mut of_mpirun = false;
+    let is_own = |line: &&str| {
+        let rule = line.len() >= 60 && line.chars().all(|c| c == '-');
+        of_mpirun ^= rule;
+        !of_mpirun && line.contains(char::is_alphabetic)
     };
-    line.map_or("it printed no error".to_owned(), |line| line.trim().to_owned())
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(is_own).collect();
+    match lines.len() {
+        0 => "it printed no error".to_owned(),
+        count => lines[count.saturating_sub(LINES_SHOWN)..].join(" | "),
+    }
 }
 
 /// Sends SIGTERM, on which `mpirun` ends its ranks, and kills the child if it does not end within a few seconds.
@@ -221,14 +221,21 @@ mod tests {
     }
 
     #[test]
-    fn an_exit_code_comes_with_the_line_that_describes_the_error() {
-        let logs = tempfile::tempdir().unwrap();
-        let script = "echo ---- >&2; echo first >&2; echo last >&2; echo >&2; exit 7";
-        for (error_line, error) in [(ErrorLine::First, "first"), (ErrorLine::Last, "last")] {
-            let watch = Watch::new("child", Duration::from_secs(60), logs.path());
-            let failure = shell(script, &Watch { error_line, ..watch }).unwrap_err();
-            assert_eq!(failure.end, End::Exited { code: 7, error: error.to_owned() });
-        }
+    fn an_exit_code_comes_with_the_last_lines() {
+        let script = "echo ---- >&2; for i in 1 2 3 4; do echo line $i >&2; done; echo >&2; exit 7";
+        let error = "line 2 | line 3 | line 4".to_owned();
+        assert_eq!(end_of(script, 60_000), End::Exited { code: 7, error });
+        let error = "it printed no error".to_owned();
+        assert_eq!(end_of("exit 7", 60_000), End::Exited { code: 7, error });
+    }
+
+    #[test]
+    fn what_mpirun_adds_to_an_error_is_not_shown() {
+        let rule = "-".repeat(74);
+        let text = format!(
+            "too deep\n{rule}\nPrimary job terminated\n{rule}\n{rule}\nmpirun detected\n{rule}\n"
+        );
+        assert_eq!(last_lines(&text), "too deep");
     }
 
     #[test]

@@ -6,11 +6,13 @@ use super::failure::{End, Failure};
 use super::launcher::{self, Launcher};
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
-use super::paths::Paths;
+use super::paths::{Paths, on_path};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
+use contract::case::Case;
 use contract::leafset::{self, LeafSet};
-use contract::plain::PlainCase;
+use contract::manifest::{self, Manifest, Tree};
+use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -45,11 +47,20 @@ impl Engine {
     /// One sentence, if the engine file is missing or wrong.
     pub fn find(name: &str, given: Option<&Path>, paths: &Paths) -> Result<Self, String> {
         let description = Description::find(name, paths)?;
+        if description.run.serial.is_empty() {
+            return Err(format!(
+                "{name} cannot be run: its engine file has no command `serial` in [run]"
+            ));
+        }
         let places = description.places(paths);
         let program = match given {
             // A name without a slash would be searched for on the PATH.
             Some(given) => fs::canonicalize(given).unwrap_or_else(|_| given.to_owned()),
-            None => PathBuf::from(fill(&description.program, &places)),
+            None => {
+                let program = fill(&description.program, &places);
+                let found = (!program.contains('/')).then(|| on_path(&program)).flatten();
+                found.unwrap_or_else(|| PathBuf::from(program))
+            }
         };
         Ok(Self { description, program, places, launcher: Launcher::mpirun(&paths.mpirun) })
     }
@@ -86,21 +97,23 @@ impl Engine {
 
     /// The directory to which a run writes its mesh, if it writes one.
     fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
-        let unreported = || (!self.writes_report()).then(|| options.place.join("mesh"));
-        options.mesh.map(Path::to_owned).or_else(unreported)
+        let always = self.description.run.always_writes_mesh();
+        let unrequested = || always.then(|| options.place.join("mesh"));
+        options.mesh.map(Path::to_owned).or_else(unrequested)
     }
 
     /// A case file equivalent to `case` that the engine can read: `case` itself, or one with an STL file
-    /// and an explicit root, written to `directory`.
+    /// in the engine's form and an explicit root, written to `directory`.
     ///
     /// # Errors
     /// If the case cannot be read or the other one cannot be written.
     pub fn prepare(&self, case: &Path, directory: &Path) -> Result<PathBuf, String> {
-        if self.description.takes.generator {
+        let takes = &self.description.takes;
+        if takes.generator && takes.stl == StlForm::Any {
             return Ok(case.to_owned());
         }
         fs::create_dir_all(directory).map_err(|error| error.to_string())?;
-        PlainCase::read(case)?.write(directory).map_err(|error| error.to_string())
+        PlainCase::read(case)?.write(directory, takes.stl).map_err(|error| error.to_string())
     }
 
     /// The command of a run.
@@ -136,6 +149,11 @@ impl Engine {
         let _ = fs::remove_file(options.report_path());
         let finished = self.execute(&mut command, layout.ranks, options)?;
         let mesh = self.mesh_path(options);
+        if let Some(mesh) = mesh.as_ref().filter(|mesh| !mesh.join(manifest::FILE).exists()) {
+            let tree = if options.ungraded { Tree::Base } else { Tree::Final };
+            self.describe(mesh, case, tree)
+                .map_err(|why| self.unusable(format!("wrote a mesh that cannot be read: {why}")))?;
+        }
         let report = match &mesh {
             Some(mesh) if !options.report || !self.writes_report() => {
                 leafset::read_manifest(mesh).map(|manifest| RunReport::of_mesh(&manifest)).map_err(
@@ -147,6 +165,18 @@ impl Engine {
         };
         let report = completed(report, &finished);
         Ok(Completed { report, time_process_s: finished.time_wall_s, command, mesh })
+    }
+
+    /// Writes the manifest of leaves that the engine wrote without one: the inputs of the case, the counts and digests
+    /// of the leaves.
+    fn describe(&self, mesh: &Path, case: &Path, tree: Tree) -> Result<(), String> {
+        let parts = leafset::read_parts(mesh).map_err(|error| error.to_string())?;
+        let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
+        let case = Case::read(case).map_err(|error| error.to_string())?;
+        let empty = Manifest::of_case(&case, tree, &self.label());
+        let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
+        set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
+        set.manifest.write(mesh).map_err(|error| format!("{}: {error}", mesh.display()))
     }
 
     fn execute(

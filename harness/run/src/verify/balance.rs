@@ -4,7 +4,7 @@
 use super::case::CaseRun;
 use super::report::{Check, Outcome};
 use super::run::{Program, Request};
-use super::serial::Meshes;
+use super::serial::Base;
 use crate::engine::failure::{End, Failure};
 use crate::engine::layout::SERIAL;
 use crate::engine::p4est::{self, EXIT_TOO_DEEP};
@@ -21,7 +21,7 @@ const NAME: &str = "balance";
 impl CaseRun<'_> {
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
-    pub fn verify_balance(&mut self, meshes: &Meshes) {
+    pub fn verify_balance(&mut self, base: &Base) {
         if let Some(why) = self.needs.p4est.clone() {
             return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
         }
@@ -30,9 +30,9 @@ impl CaseRun<'_> {
             Ok(words) => words,
             Err(failure) => return self.add_failure("p4est: n = 1, all kept", None, &failure),
         };
-        let failure = match self.balance_by_p4est(&meshes.base_place) {
+        let failure = match self.balance_by_p4est(&base.place) {
             Ok(words) => {
-                let root = &meshes.mesh.manifest.root;
+                let root = &base.tree.manifest.root;
                 let compared = identical::compare(&sideless(&plain), &words, root);
                 let result = CheckResult { name: NAME, ..compared };
                 return self.add_results(SUBJECT, None, vec![result]);

@@ -75,7 +75,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
         schema: report::SCHEMA.to_owned(),
         program: format!("harness {}", env!("CARGO_PKG_VERSION")),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
-        missing: needs.missing(options),
+        missing: needs.missing(options, cases.len()),
         cases,
         interrupted,
         time_s: start.elapsed().as_secs_f64(),
@@ -94,6 +94,7 @@ fn verify_case(
     progress.case(&selected.name);
     if let Some(why) = &selected.absent {
         needs.note_absent_geometry(why);
+        needs.note_unchecked(&selected.name);
         let check = Check::new("case", "geometry", Outcome::LeftOut(why.clone()));
         return Ok(CaseReport {
             name: selected.name.clone(),
@@ -106,6 +107,9 @@ fn verify_case(
     let mut run = CaseRun::new(selected, options, programs, needs, &place, progress);
     run.verify();
     let mut report = run.into_report();
+    if report.tally().run() == 0 && report.input_error.is_none() {
+        needs.note_unchecked(&selected.name);
+    }
     report.time_s = start.elapsed().as_secs_f64();
     let keep = options.keep || (report.failed() && !interrupt::requested());
     report.kept = workplace.leave(&place, keep).map(|kept| kept.display().to_string());

@@ -8,6 +8,7 @@ use crate::engine::options::RunOptions;
 use crate::engine::paths::Paths;
 use crate::engine::programs::Programs;
 use crate::oracle::{ORACLES, Question};
+use contract::case::Case;
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -17,6 +18,8 @@ use std::time::Duration;
 pub struct Needs {
     /// Why MPI is unavailable.
     pub mpi: Option<String>,
+    /// Why it is unknown whether the engine's ranks on MPI communicate.
+    pub mpi_doubt: Option<String>,
     /// Why no oracle can be used.
     pub oracles: Option<String>,
     /// Oracles that can be used.
@@ -27,22 +30,27 @@ pub struct Needs {
     pub p4est: Option<String>,
     /// Why geometries are missing, one reason each.
     geometries: Vec<String>,
+    /// Cases without any check.
+    unchecked: Vec<String>,
 }
 
 /// A case for trying programs out: eight cells around a cube.
-const PROBE: &str =
-    "spacing_min = 1.0\nroot_scale = 2.0\n[generator]\nshape = \"cube\"\nfacets = 12\n";
+const PROBE: &str = "spacing_min = 1.0\nroot_scale = 2.0\nkeep = KEEP\n[generator]\n\
+                     shape = \"cube\"\nfacets = 12\n";
 const PROBE_RANKS: usize = 2;
 const PROBE_LIMIT: Duration = Duration::from_secs(60);
 
 impl Needs {
     /// Tries the prerequisites of these options.
     pub fn probe(options: &Options, programs: &Programs, place: &Path) -> Self {
-        let mpi = match options.mpi {
-            true => probe_mpi(programs, place).err(),
-            false => Some("--no-mpi was given".to_owned()),
+        let probed = match options.mpi {
+            true => probe_mpi(programs, place),
+            false => Err("--no-mpi was given".to_owned()),
         };
-        let mut needs = Self { mpi, ..Self::default() };
+        let mut needs = match probed {
+            Ok(mpi_doubt) => Self { mpi_doubt, ..Self::default() },
+            Err(why) => Self { mpi: Some(why), ..Self::default() },
+        };
         let p4est = &programs.paths.p4est;
         needs.p4est = match (options.p4est, p4est.is_file()) {
             (false, _) => Some("--no-p4est was given".to_owned()),
@@ -77,13 +85,18 @@ impl Needs {
         }
     }
 
+    /// Records that no check of a case was run.
+    pub fn note_unchecked(&mut self, case: &str) {
+        self.unchecked.push(case.to_owned());
+    }
+
     /// Records that the geometry of a case is missing.
     pub fn note_absent_geometry(&mut self, why: &str) {
         self.geometries.push(why.to_owned());
     }
 
-    /// Everything that is missing, once each.
-    pub fn missing(&self, options: &Options) -> Vec<Missing> {
+    /// Everything that is missing, once each. If no case was checked, that counts as required with any requirement.
+    pub fn missing(&self, options: &Options, cases: usize) -> Vec<Missing> {
         // The vote needs all oracles, so one that is missing counts as all.
         let one = || self.oracles_missing.first().map(Failure::to_string);
         let oracles = self.oracles.clone().or_else(one);
@@ -93,29 +106,41 @@ impl Needs {
                 "{count} geometries are missing (ci/setup --geometries fetches those that can be fetched)"
             )),
         };
+        let unchecked = (!self.unchecked.is_empty())
+            .then(|| format!("no check was run on {}", self.unchecked.join(", ")));
         let all = [
             (Need::Mpi, self.mpi.clone()),
             (Need::Oracles, oracles),
             (Need::P4est, self.p4est.clone()),
             (Need::Geometries, geometries),
+            (Need::Checks, unchecked),
         ];
+        let nothing = self.unchecked.len() == cases && !options.require.is_empty();
         let missing = all.into_iter().filter_map(|(need, why)| {
-            let required = options.require.contains(&need);
+            let required = options.require.contains(&need) || need == Need::Checks && nothing;
             Some(Missing { what: need.to_string(), why: why?, required })
         });
         missing.collect()
     }
 }
 
-/// Checks that `mpirun` starts ranks that communicate, which the ranks of a mesher without MPI do not.
-fn probe_mpi(programs: &Programs, place: &Path) -> Result<(), String> {
+/// Checks that `mpirun` starts the engine and, if the engine reports the number of its ranks, that they communicate,
+/// which the ranks of a mesher without MPI do not. Returns what remains unknown.
+fn probe_mpi(programs: &Programs, place: &Path) -> Result<Option<String>, String> {
     if !programs.paths.mpirun.is_file() {
         return Err("mpirun is not on the PATH (ci/setup installs it)".to_owned());
     }
+    let engine = &programs.engine;
     let probe = tempfile::tempdir_in(place).map_err(|error| error.to_string())?;
     let case = probe.path().join("probe.toml");
-    fs::write(&case, PROBE).map_err(|error| error.to_string())?;
-    let engine = &programs.engine;
+    let keep = engine.description().takes.keep.first();
+    let keep = format!("{:?}", keep.copied().unwrap_or_default()).to_lowercase();
+    fs::write(&case, PROBE.replace("KEEP", &format!("{keep:?}")))
+        .map_err(|error| error.to_string())?;
+    let read = Case::read(&case).map_err(|error| error.to_string())?;
+    if let Some(why) = engine.description().declines(&read) {
+        return Err(format!("no case tries it out: {why}"));
+    }
     let case = engine.prepare(&case, &probe.path().join("plain"))?;
     let layout = Layout {
         partitioner: Some("morton".into()),
@@ -125,11 +150,12 @@ fn probe_mpi(programs: &Programs, place: &Path) -> Result<(), String> {
     let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), PROBE_LIMIT));
     let ranks = completed.map_err(|failure| format!("on MPI, {failure}"))?.report.ranks;
     match (engine.writes_report(), ranks) {
-        (false, _) => Err(format!(
-            "{} has no run report, which would show that its ranks communicate",
-            engine.name()
-        )),
-        (true, PROBE_RANKS) => Ok(()),
+        (false, _) => {
+            let why =
+                "it is unknown whether the ranks communicate: the engine writes no run report";
+            Ok(Some(why.to_owned()))
+        }
+        (true, PROBE_RANKS) => Ok(None),
         (true, ranks) => Err(format!(
             "the mesher runs on {ranks} of {PROBE_RANKS} ranks: it was built without MPI"
         )),

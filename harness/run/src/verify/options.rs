@@ -1,6 +1,8 @@
 //! The options of a verification.
 
+use crate::engine::description::Description;
 use crate::engine::layout::{Layout, Ranks};
+use check::promises::Independence;
 use contract::catalogue::Size;
 use std::fmt;
 use std::path::PathBuf;
@@ -17,6 +19,8 @@ pub enum Need {
     P4est,
     /// The geometries that are downloaded and not kept in the repository.
     Geometries,
+    /// At least one check of every case.
+    Checks,
 }
 
 impl fmt::Display for Need {
@@ -26,6 +30,7 @@ impl fmt::Display for Need {
             Self::Oracles => "oracles",
             Self::P4est => "p4est",
             Self::Geometries => "geometries",
+            Self::Checks => "checks",
         })
     }
 }
@@ -90,15 +95,24 @@ impl Options {
         }
     }
 
-    /// Every layout of a run on MPI, in the order of rank counts.
-    pub fn layouts(&self) -> Vec<Layout> {
+    /// Every layout of a run on MPI, in the order of rank counts. The partition is varied as far as the engine offers a choice
+    /// and promises that its mesh does not depend on it.
+    pub fn layouts(&self, engine: &Description) -> Vec<Layout> {
+        let templates = &engine.run;
+        let independent = engine.promises.is_independent_of(Independence::Partitioner);
+        let varied = |offered: bool, values: &[String]| match offered && independent {
+            true => values.iter().cloned().map(Some).collect(),
+            false => vec![None],
+        };
+        let partitioners = varied(templates.partitioner.is_some(), &self.partitioners);
+        let level_bases = varied(templates.level_base.is_some(), &self.level_bases);
         let mut layouts = Vec::new();
         for &ranks in &self.ranks {
-            for partitioner in &self.partitioners {
-                for level_base in &self.level_bases {
+            for partitioner in &partitioners {
+                for level_base in &level_bases {
                     layouts.push(Layout {
-                        partitioner: Some(partitioner.clone()),
-                        level_base: Some(level_base.clone()),
+                        partitioner: partitioner.clone(),
+                        level_base: level_base.clone(),
                         ..Layout::on(Ranks::Mpi(ranks))
                     });
                 }

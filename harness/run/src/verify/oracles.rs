@@ -2,7 +2,7 @@
 
 use super::case::CaseRun;
 use super::report::{Check, Outcome};
-use super::serial::Meshes;
+use super::serial::Base;
 use crate::engine::failure::{End, Failure};
 use crate::oracle::Question;
 use check::oracle::sample::{self, Sample};
@@ -28,7 +28,7 @@ const POINTS_OF_SMALL: usize = 400_000;
 
 impl CaseRun<'_> {
     /// Chooses points, has the oracles classify them, and counts the votes.
-    pub fn verify_oracles(&mut self, case: &Case, meshes: &Meshes) {
+    pub fn verify_oracles(&mut self, case: &Case, base: &Base) {
         if let Some(why) = &self.needs.oracles {
             let why = why.clone();
             return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
@@ -38,7 +38,7 @@ impl CaseRun<'_> {
             Some(Size::Small) => POINTS_OF_SMALL,
             _ => self.options.oracle_points,
         };
-        let sample = sample::choose(case, &meshes.base.words, most, self.options.seed);
+        let sample = sample::choose(case, &base.tree.words, most, self.options.seed);
         let (answers, failures) = match self.ask(case, &sample) {
             Ok(answered) => answered,
             Err(failure) if failure.is_interrupt() => return,

@@ -54,9 +54,9 @@ impl Check {
         }
     }
 
-    /// A check of one run on MPI.
+    /// A check of one run.
     pub fn of_layout(layout: &Layout, name: impl Into<String>, outcome: Outcome) -> Self {
-        Self { ranks: Some(layout.ranks.count()), ..Self::new(layout.to_string(), name, outcome) }
+        Self { ranks: layout.rank_count(), ..Self::new(layout.to_string(), name, outcome) }
     }
 
     /// Whether it failed.
@@ -74,6 +74,13 @@ pub struct Tally {
     pub fail: usize,
     /// Left out.
     pub left_out: usize,
+}
+
+impl Tally {
+    /// Number of checks that were run.
+    pub fn run(&self) -> usize {
+        self.pass + self.fail
+    }
 }
 
 impl<'a> FromIterator<&'a Check> for Tally {

@@ -1,41 +1,60 @@
-//! Independence of the partition: every layout gives the mesh of the serial run, leaf by leaf.
+//! Ranks, partitions and threads: every layout gives the mesh of the serial run, leaf by leaf, if the engine promises
+//! that, and else a mesh that keeps the engine's other promises.
 
 use super::case::{CaseRun, RUNS};
 use super::report::{Check, Outcome};
 use super::run::{Program, Request};
-use super::serial::Meshes;
 use crate::engine::failure::{End, Failure};
-use crate::engine::layout::Layout;
+use crate::engine::layout::{Layout, SERIAL};
 use check::checks::{self, CheckResult, Subject};
+use check::promises::Independence;
 use contract::case::Case;
+use contract::leafset::LeafSet;
 use std::fs;
+
+/// Numbers of threads that are compared with one.
+const THREADS: [usize; 2] = [2, 4];
 
 /// Hangs after which the remaining layouts of a case are left out: each hang costs the whole time limit.
 const HANGS_MAX: usize = 3;
 
 impl CaseRun<'_> {
-    /// Runs every layout and compares its mesh with the serial one.
-    pub fn verify_ranks(&mut self, case: &Case, meshes: &Meshes) {
+    /// Runs the engine on several numbers of threads, if it promises that its mesh does not depend on them.
+    pub fn verify_threads(&mut self, case: &Case, serial: &LeafSet) {
+        if !self.promises().independent_of.contains(&Independence::Threads) {
+            return;
+        }
+        let layouts = THREADS.map(|threads| Layout { threads: Some(threads), ..SERIAL.clone() });
+        self.verify_layouts(case, serial, &layouts);
+    }
+
+    /// Runs every layout on MPI and checks its mesh.
+    pub fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
         if let Some(why) = &self.needs.mpi {
             let ranks: Vec<String> = self.options.ranks.iter().map(usize::to_string).collect();
             let subject = format!("ranks {}", ranks.join(", "));
             let check = Check::new(subject, RUNS, Outcome::LeftOut(why.clone()));
             return self.add(check, None);
         }
+        let layouts = self.options.layouts(self.programs.engine.description());
+        self.verify_layouts(case, serial, &layouts);
+    }
+
+    fn verify_layouts(&mut self, case: &Case, serial: &LeafSet, layouts: &[Layout]) {
         let mut hangs = 0;
-        for layout in self.options.layouts() {
+        for layout in layouts {
             if hangs >= HANGS_MAX {
                 let why = format!("{HANGS_MAX} runs of this case have hung");
-                let check = Check::of_layout(&layout, RUNS, Outcome::LeftOut(why));
-                self.add(check, Some(&layout));
+                let check = Check::of_layout(layout, RUNS, Outcome::LeftOut(why));
+                self.add(check, Some(layout));
                 continue;
             }
-            match self.verify_layout(case, meshes, &layout) {
+            match self.verify_layout(case, serial, layout) {
                 Ok(()) => {}
                 Err(failure) if failure.is_interrupt() => return,
                 Err(failure) => {
                     hangs += usize::from(matches!(failure.end, End::TimedOut { .. }));
-                    self.add_failure(&layout.to_string(), Some(&layout), &failure);
+                    self.add_failure(&layout.to_string(), Some(layout), &failure);
                 }
             }
         }
@@ -44,7 +63,7 @@ impl CaseRun<'_> {
     fn verify_layout(
         &mut self,
         case: &Case,
-        meshes: &Meshes,
+        serial: &LeafSet,
         layout: &Layout,
     ) -> Result<(), Failure> {
         self.progress.step(layout.to_string());
@@ -57,23 +76,40 @@ impl CaseRun<'_> {
             write: true,
         })?;
         self.report().runs.push(meshed.run);
-        self.add(Check::of_layout(layout, RUNS, Outcome::Pass), Some(layout));
+        let mut check = Check::of_layout(layout, RUNS, Outcome::Pass);
+        let is_first = self.report().checks.iter().all(|check| check.ranks.is_none());
+        check
+            .notes
+            .extend(self.needs.mpi_doubt.clone().filter(|_| is_first && check.ranks.is_some()));
+        self.add(check, Some(layout));
         let Some(mesh) = meshed.mesh else { return Ok(()) };
-        let subject = Subject::new(case, &mesh).with_reference(&meshes.mesh);
-        let mut results = vec![checks::manifest::check(&subject), checks::linear::check(&subject)];
-        results.extend(checks::identical::check(&subject));
+        let results = match self.must_equal_serial(layout) {
+            false => self.promised(case, &mesh),
+            true => {
+                let subject = Subject::new(case, &mesh).with_reference(serial);
+                let files = [checks::manifest::check(&subject), checks::linear::check(&subject)];
+                files.into_iter().chain(checks::identical::check(&subject)).collect()
+            }
+        };
         let holds = results.iter().all(CheckResult::holds);
         self.add_results(&layout.to_string(), Some(layout), results);
         if holds && !self.options.keep {
-            // A correct mesh equals the serial one, and one copy of it suffices.
+            // The mesh of the serial run remains.
             let _ = fs::remove_dir_all(meshed.place);
         }
         Ok(())
     }
+
+    /// Whether the engine promises the serial mesh on a layout. Only what it promises to be independent of is varied, besides
+    /// the ranks.
+    fn must_equal_serial(&self, layout: &Layout) -> bool {
+        layout.rank_count().is_none() || self.promises().is_independent_of(Independence::Ranks)
+    }
 }
 
 fn directory_name(layout: &Layout) -> String {
-    let choices = [&layout.partitioner, &layout.level_base].map(|choice| choice.as_deref());
-    let words = choices.into_iter().flatten();
+    let choices = [&layout.partitioner, &layout.level_base].map(|choice| choice.clone());
+    let threads = layout.threads.map(|threads| format!("threads-{threads}"));
+    let words = choices.into_iter().flatten().chain(threads);
     words.fold(format!("ranks-{}", layout.ranks.count()), |name, word| format!("{name}-{word}"))
 }

@@ -153,6 +153,7 @@ impl Report {
         let cases = self.cases.len();
         let counts = format!("{cases} cases: {pass} checks hold, {fail} fail, {left_out} left out");
         let end = match self.exit_code() {
+            EXIT_HOLDS if pass == 0 => "nothing was checked",
             EXIT_HOLDS => "all hold",
             EXIT_FAILED => "FAILED",
             EXIT_INPUT => "invalid input",

@@ -3,7 +3,7 @@
 use super::case::CaseRun;
 use super::report::Run;
 use crate::engine::failure::Failure;
-use crate::engine::layout::{Layout, Ranks};
+use crate::engine::layout::Layout;
 use crate::engine::options::RunOptions;
 use crate::engine::report::RunReport;
 use crate::engine::runner::{Completed, Engine};
@@ -42,6 +42,8 @@ pub struct Request<'a> {
 pub struct Meshed {
     /// Its measurements.
     pub run: Run,
+    /// Its report.
+    pub report: RunReport,
     /// The mesh, if it was requested.
     pub mesh: Option<LeafSet>,
     /// Directory of the run.
@@ -64,6 +66,7 @@ impl CaseRun<'_> {
             mesh: request.write.then_some(&mesh),
             status: true,
             ungraded: request.ungraded,
+            sample_memory: true,
             ..RunOptions::new(&place, self.options.limit)
         };
         let completed = engine.run(request.case, request.layout, &options)?;
@@ -76,7 +79,7 @@ impl CaseRun<'_> {
         if let Some(mesh) = &mesh {
             compare(&completed.report, mesh).map_err(|why| engine.unusable(why))?;
         }
-        Ok(Meshed { run: measurements(request, &completed), mesh, place })
+        Ok(Meshed { run: measurements(request, &completed), report: completed.report, mesh, place })
     }
 
     fn engine(&self, program: Program) -> &Engine {
@@ -107,7 +110,7 @@ fn measurements(request: &Request, completed: &Completed) -> Run {
     let report = &completed.report;
     Run {
         program: program.to_owned(),
-        layout: (request.layout.ranks != Ranks::Serial).then(|| request.layout.clone()),
+        layout: request.layout.rank_count().map(|_| request.layout.clone()),
         cells: report.cells,
         time_wall_s: report.time_wall_s.unwrap_or(completed.time_process_s),
         time_process_s: completed.time_process_s,

@@ -5,7 +5,8 @@ use super::report::{Check, Outcome};
 use super::run::{Meshed, Program, Request};
 use crate::engine::failure::{CODE_INPUT, End};
 use crate::engine::layout::SERIAL;
-use check::checks::{self, Subject, identical, kept};
+use crate::engine::report::RunReport;
+use check::checks::{self, CheckResult, Subject, identical, kept};
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::manifest::{Ambiguous, Components, Manifest};
@@ -16,10 +17,17 @@ use std::path::{Path, PathBuf};
 pub struct Meshes {
     /// The mesher's final mesh.
     pub mesh: LeafSet,
-    /// The mesher's base tree.
-    pub base: LeafSet,
-    /// Directory of the base tree.
-    pub base_place: PathBuf,
+    /// The mesher's base tree; `None` for an engine that does not promise the definition.
+    pub base: Option<Base>,
+}
+
+/// A base tree and its directory.
+#[derive(Debug)]
+pub struct Base {
+    /// The leaves.
+    pub tree: LeafSet,
+    /// The leaf-set directory.
+    pub place: PathBuf,
 }
 
 /// A serial run that writes the final mesh.
@@ -30,30 +38,73 @@ fn serial<'a>(program: Program, case: &'a Path, name: &'a str) -> Request<'a> {
 impl CaseRun<'_> {
     /// Makes the serial meshes and checks them. `None` if the mesher made none, or they are too large to check.
     pub fn verify_serial(&mut self, case: &Case) -> Option<Meshes> {
-        let (cells, limit) = (self.measure()?, self.options.cells_max);
+        let timed = self.measure()?;
+        let (cells, limit) = (timed.cells, self.options.cells_max);
         if cells > limit {
             let why = format!("{cells} cells exceed the {limit} that are checked in memory");
             self.add(Check::new("serial", "checks", Outcome::LeftOut(why)), None);
             return None;
         }
-        let mesh = self.make("serial", Program::Mesher, "serial", false)?;
+        let mesh = self.make("serial", Program::Mesher, "serial", false)?.mesh?;
+        self.verify_repetition(&timed, &mesh);
+        if self.promises().definition {
+            return self.verify_definition(case, mesh);
+        }
+        self.progress.step("checks");
+        let results = self.promised(case, &mesh);
+        self.add_results("serial", None, results);
+        Some(Meshes { mesh, base: None })
+    }
+
+    /// Compares a mesh with the base tree and with the reference.
+    fn verify_definition(&mut self, case: &Case, mesh: LeafSet) -> Option<Meshes> {
         // The mesh of an engine that cannot stop at the base tree is checked against the reference's base tree.
         let stops = self.programs.engine.description().run.ungraded.is_some();
         let program = if stops { Program::Mesher } else { Program::Reference };
         let base = self.make("base tree", program, "base", true)?;
-        let base_place = base.place.join("mesh");
-        let meshes = Meshes { mesh: mesh.mesh?, base: base.mesh?, base_place };
-        self.report().leaves_base = meshes.base.words.len() as u64;
-        let reference = self.reference(case, &meshes);
+        let base = Base { place: base.place.join("mesh"), tree: base.mesh? };
+        self.report().leaves_base = base.tree.words.len() as u64;
+        let reference = self.reference(case, &mesh, &base);
         self.progress.step("checks");
-        let subject = Subject::new(case, &meshes.mesh).with_base(&meshes.base);
+        let subject = Subject::new(case, &mesh).with_base(&base.tree);
         let subject = match &reference {
             Some(reference) => subject.with_reference(reference),
             None => subject,
         };
-        self.add_results("serial", None, checks::all(&subject));
-        self.note_components(&meshes.mesh.manifest);
-        Some(meshes)
+        let results = checks::all(&subject);
+        self.add_results("serial", None, results);
+        self.note_components(&mesh.manifest);
+        Some(Meshes { mesh, base: Some(base) })
+    }
+
+    /// The checks of what the engine promises about any of its meshes, and of the files.
+    pub fn promised(&self, case: &Case, mesh: &LeafSet) -> Vec<CheckResult> {
+        let subject = Subject::new(case, mesh);
+        let mut results = vec![checks::manifest::check(&subject), checks::linear::check(&subject)];
+        results.extend(checks::promised(
+            subject.tree(),
+            &subject.terms,
+            Some(case),
+            self.promises(),
+        ));
+        results
+    }
+
+    /// Compares the digest of the timed run with that of the mesh that was written, if the engine is deterministic.
+    fn verify_repetition(&mut self, timed: &RunReport, mesh: &LeafSet) {
+        if !self.promises().is_deterministic() {
+            return;
+        }
+        let (first, second) = (&timed.digest, mesh.manifest.digest.to_string());
+        let outcome = match *first == second {
+            true => Outcome::Pass,
+            false => Outcome::Fail(format!(
+                "two serial runs differ: {} cells, digest {first}; {} cells, digest {second}",
+                timed.cells,
+                mesh.words.len()
+            )),
+        };
+        self.add(Check::new("serial", "deterministic", outcome), None);
     }
 
     /// Adds the numbers of components to the check that has compared them, with remarks about what a user may not expect.
@@ -112,17 +163,16 @@ impl CaseRun<'_> {
         }
     }
 
-    /// A run that writes no mesh, for time and memory; returns the number of cells.
-    fn measure(&mut self) -> Option<u64> {
+    /// A run for time and memory, which writes no mesh if the engine can do without; returns its report.
+    fn measure(&mut self) -> Option<RunReport> {
         self.progress.step("serial, timed");
         let request =
             Request { write: false, ..serial(Program::Mesher, &self.selected.path, "timed") };
         match self.run(&request) {
             Ok(meshed) => {
-                let cells = meshed.run.cells;
-                self.report().cells = cells;
+                self.report().cells = meshed.run.cells;
                 self.report().runs.push(meshed.run);
-                Some(cells)
+                Some(meshed.report)
             }
             Err(failure) => {
                 self.add_failure("serial", None, &failure);
@@ -132,8 +182,8 @@ impl CaseRun<'_> {
     }
 
     /// The reference's final mesh; its base tree is compared with the mesher's.
-    fn reference(&mut self, case: &Case, meshes: &Meshes) -> Option<LeafSet> {
-        let (cells, limit) = (meshes.mesh.words.len() as u64, self.options.reference_cells_max);
+    fn reference(&mut self, case: &Case, mesh: &LeafSet, own: &Base) -> Option<LeafSet> {
+        let (cells, limit) = (mesh.words.len() as u64, self.options.reference_cells_max);
         if cells > limit {
             let why = format!("{cells} cells exceed the {limit} up to which the reference is run");
             self.add(Check::new("reference", "identical", Outcome::LeftOut(why)), None);
@@ -142,7 +192,7 @@ impl CaseRun<'_> {
         let meshed = self.make("reference", Program::Reference, "reference", false)?;
         self.report().runs.push(meshed.run);
         let base = self.make("reference base tree", Program::Reference, "reference-base", true)?;
-        let compared = identical::compare(&meshes.base.words, &base.mesh?.words, &case.root);
+        let compared = identical::compare(&own.tree.words, &base.mesh?.words, &case.root);
         self.add_results("base tree", None, vec![compared]);
         meshed.mesh
     }

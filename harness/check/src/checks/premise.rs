@@ -1,0 +1,105 @@
+//! What each check needs in a mesh to have anything to check. A check without its premise cannot fail, so it must not
+//! count as one that holds.
+
+use super::{CheckResult, Terms};
+use contract::tree::{DELETED, HOLES, Handle, Tree};
+use contract::word::Side;
+
+const CROSSING: u8 = 1 << Side::Crossing as u8;
+
+/// The result of a check, marked if it has no findings because its premise is missing. `tree` is the mesh, with the deleted
+/// crossing leaves where they are known; `base` is T0.
+pub fn with_premise(
+    result: CheckResult,
+    tree: &Tree,
+    base: Option<&Tree>,
+    terms: &Terms,
+) -> CheckResult {
+    match result.holds() && result.was_run() {
+        true => CheckResult { nothing_to_check: missing(result.name, tree, base, terms), ..result },
+        false => result,
+    }
+}
+
+/// Why a check had nothing to check; `None` if it had something, or if it has no premise.
+fn missing(name: &str, tree: &Tree, base: Option<&Tree>, terms: &Terms) -> Option<String> {
+    let kinds = tree.kinds(tree.root()) & !HOLES;
+    let known = base.is_some();
+    match name {
+        "manifest" | "identical" => None,
+        "complete" | "spacing" | "crossing" | "kept" if known => None,
+        "sides" if known => {
+            let all = base.map_or(0, |base| base.kinds(base.root()) & !HOLES);
+            (all == CROSSING).then(|| "all leaves of T0 are crossing".to_owned())
+        }
+        _ if tree.root() == Handle::HOLE => Some("the mesh has no leaves".to_owned()),
+        "spacing" if kinds & CROSSING == 0 && terms.boxes.is_empty() => {
+            Some("no leaf is crossing, and there are no boxes".to_owned())
+        }
+        "sides" if kinds.count_ones() == 1 => Some("all leaves have the same side".to_owned()),
+        "balance" => one_level(tree),
+        "layer" if terms.layer_cells_min == 1 && !has_extra_layer(kinds, terms) => {
+            Some("with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned())
+        }
+        "layer" => one_level(tree),
+        _ => None,
+    }
+}
+
+/// Whether the mesh shows deleted crossing leaves, which have a layer of their own for n = 1.
+fn has_extra_layer(kinds: u8, terms: &Terms) -> bool {
+    !terms.keep_crossing && kinds & (CROSSING | 1 << DELETED) != 0
+}
+
+fn one_level(tree: &Tree) -> Option<String> {
+    let level = tree.finest_level(tree.root(), 0);
+    let uniform = tree.coarsest_level(tree.root(), 0) >= level;
+    uniform.then(|| format!("all leaves have level {level}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::lattice::Root;
+    use contract::manifest::{Enclosed, Keep};
+    use contract::testing::words_of;
+
+    fn terms(layer_cells_min: u32) -> Terms {
+        let root = Root { origin: [0.0; 3], edge: 1.0 };
+        Terms {
+            root,
+            level_surface: 8,
+            layer_cells_min,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: Vec::new(),
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
+        }
+    }
+
+    #[test]
+    fn a_mesh_of_one_cell_that_claims_level_8_gives_hardly_any_check_something_to_check() {
+        let tree = Tree::of_words(&[0]);
+        let names = ["spacing", "sides", "balance", "layer"];
+        for result in names.into_iter().map(CheckResult::new) {
+            let result = with_premise(result, &tree, None, &terms(4));
+            assert!(!result.was_run(), "{result}");
+        }
+    }
+
+    #[test]
+    fn a_finding_is_never_hidden() {
+        let mut result = CheckResult::new("sides");
+        result.report("wrong".to_owned());
+        let result = with_premise(result, &Tree::of_words(&[0]), None, &terms(4));
+        assert!(result.was_run() && !result.holds());
+    }
+
+    #[test]
+    fn layers_of_one_cell_are_left_to_the_balance() {
+        let tree = Tree::of_words(&words_of(|o| o.level < 3 && o.corner == [0; 3]));
+        let run = |n| missing("layer", &tree, None, &terms(n)).is_none();
+        assert!(run(2) && !run(1) && missing("balance", &tree, None, &terms(1)).is_none());
+    }
+}
