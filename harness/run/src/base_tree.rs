@@ -5,7 +5,7 @@ use crate::engine::layout::SERIAL;
 use crate::engine::options::RunOptions;
 use crate::engine::runner::Engine;
 use contract::lattice::Root;
-use contract::plain::PlainCase;
+use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -51,7 +51,7 @@ impl<'a> BaseTrees<'a> {
         let spacing = self.root.edge / f64::from(1u32 << level);
         self.case.table.insert("spacing_min".into(), Value::Float(spacing));
         let place = self.place.path();
-        let case = self.case.write(place).map_err(|error| {
+        let case = self.case.write(place, StlForm::Any).map_err(|error| {
             Failure::new("the harness", End::Unusable(format!("cannot write a case: {error}")))
         })?;
         let mesh = place.join("mesh");
