@@ -40,6 +40,23 @@ pub enum Tree {
     Final,
 }
 
+/// Whether the sides in the leaf words were found by the program that made the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// Every word holds the side of its leaf.
+    #[default]
+    Known,
+    /// The mesh has no sides, as one from a format that stores cells only. Every word holds `outside`, which means nothing.
+    Unknown,
+}
+
+impl Sides {
+    fn are_known(&self) -> bool {
+        *self == Self::Known
+    }
+}
+
 /// An extent box on the lattice, clamped to the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -108,6 +125,9 @@ pub struct Manifest {
     pub keep_crossing: bool,
     /// Extent boxes.
     pub boxes: Vec<ExtentBox>,
+    /// Whether the words hold sides. Written only if they do not.
+    #[serde(default, skip_serializing_if = "Sides::are_known")]
+    pub sides: Sides,
     /// Leaves in all parts.
     pub leaves: u64,
     /// Leaves by level.

@@ -83,6 +83,7 @@ pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
         keep: Keep::All,
         keep_crossing: true,
         boxes: Vec::new(),
+        sides: manifest::Sides::Known,
         leaves: 0,
         leaves_by_level: [0; 20],
         leaves_by_side: BySide::default(),
