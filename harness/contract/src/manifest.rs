@@ -159,8 +159,12 @@ impl Manifest {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, directory: &Path) -> io::Result<()> {
-        let text = serde_json::to_string(self).expect("a manifest is representable in JSON");
-        fs::write(directory.join(FILE), text)
+        fs::write(directory.join(FILE), self.text())
+    }
+
+    /// The manifest as JSON.
+    pub fn text(&self) -> String {
+        serde_json::to_string(self).expect("a manifest is representable in JSON")
     }
 }
 

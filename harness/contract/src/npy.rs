@@ -1,7 +1,7 @@
 //! Part files: one-dimensional NumPy arrays of type `<u8`.
 
 use std::fs::File;
-use std::io::{Cursor, Read, Write};
+use std::io::{BufWriter, Cursor, Read, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -135,10 +135,18 @@ impl PartFile {
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
-    let shape = format!("({},)", words.len());
-    let mut bytes = header("<u8", &shape);
-    words.iter().for_each(|w| bytes.extend(w.to_le_bytes()));
-    File::create(path)?.write_all(&bytes)
+    let mut out = BufWriter::new(File::create(path)?);
+    write_to(&mut out, words)?;
+    out.flush()
+}
+
+/// Writes words in the format of a part file.
+///
+/// # Errors
+/// Whatever the writer returns.
+pub fn write_to(out: &mut dyn Write, words: &[u64]) -> std::io::Result<()> {
+    out.write_all(&header("<u8", &format!("({},)", words.len())))?;
+    words.iter().try_for_each(|w| out.write_all(&w.to_le_bytes()))
 }
 
 /// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does. It is not written by `npyz`,

@@ -1,11 +1,11 @@
 //! Cells as a foreign file states them, and their leaf words.
 //!
 //! Every cell becomes the leaf of one octant or an error that names the cell: its edge is the root's edge halved a whole
-//! number of times, its minimum corner is a multiple of its edge from the root's, both within a tolerance in units of
-//! its edge, and no two cells overlap. Cells may leave parts of the root empty, and neighbours may differ by any
+//! number of times, its minimum corner is a multiple of its edge from the root's, both within [`TOLERANCE`] of its
+//! edge, and no two cells overlap. Cells may leave parts of the root empty, and neighbours may differ by any
 //! number of levels.
 
-use super::ImportError;
+use super::{ImportError, TOLERANCE};
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word::{self, Leaf, Side};
@@ -46,20 +46,20 @@ impl Cells {
     ///
     /// # Errors
     /// If a cell is not a leaf of an oct-tree with this root, or overlaps another.
-    pub fn words(&self, root: &Root, tolerance: f64) -> Result<Vec<u64>, ImportError> {
-        let mut words = self.words_in_order(root, tolerance)?;
+    pub fn words(&self, root: &Root) -> Result<Vec<u64>, ImportError> {
+        let mut words = self.words_in_order(root)?;
         self.agree_with_levels(&words)?;
         words.sort_unstable();
         let overlaps = |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
         match words.windows(2).find(overlaps) {
             None => Ok(words),
-            Some(pair) => Err(self.overlap(&self.words_in_order(root, tolerance)?, pair)),
+            Some(pair) => Err(self.overlap(&self.words_in_order(root)?, pair)),
         }
     }
 
-    fn words_in_order(&self, root: &Root, tolerance: f64) -> Result<Vec<u64>, ImportError> {
+    fn words_in_order(&self, root: &Root) -> Result<Vec<u64>, ImportError> {
         let word = |i: usize| {
-            let octant = octant(self.corners[i], self.edges[i], root, tolerance)
+            let octant = octant(self.corners[i], self.edges[i], root)
                 .map_err(|why| self.misfit(i, root, &why))?;
             let side = self.sides.as_ref().map_or(Side::Outside, |sides| sides[i]);
             Ok(word::encode(&Leaf { octant, side }))
@@ -98,7 +98,7 @@ impl Cells {
 }
 
 /// The octant of a cell.
-fn octant(corner: [f64; 3], edge: f64, root: &Root, tolerance: f64) -> Result<Octant, String> {
+fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
     if !(edge > 0.0 && edge.is_finite() && corner.iter().all(|c| c.is_finite())) {
         return Err("has an edge that is not positive, or coordinates that are not finite".to_owned());
     }
@@ -107,14 +107,14 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root, tolerance: f64) -> Result<Oc
         return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist"));
     };
     let edge_of_level = root.edge / f64::from(1u32 << level);
-    if (edge / edge_of_level - 1.0).abs() > tolerance {
+    if (edge / edge_of_level - 1.0).abs() > TOLERANCE {
         return Err("has an edge that is not the root's edge halved a whole number of times".to_owned());
     }
     let mut cell = [0; 3];
     for axis in 0..3 {
         let position = (corner[axis] - root.origin[axis]) / edge_of_level;
         let index = position.round();
-        if (position - index).abs() > tolerance {
+        if (position - index).abs() > TOLERANCE {
             return Err(format!("is not aligned: it is {position} of its edges from the root along axis {}", axis + 1));
         }
         if !(0.0..f64::from(1u32 << level)).contains(&index) {
@@ -141,14 +141,14 @@ mod tests {
             if !turned.is_empty() {
                 turned.rotate_left(turn % words.len());
             }
-            prop_assert_eq!(cells_of(&turned, &ROOT).words(&ROOT, 0.01).unwrap(), words);
+            prop_assert_eq!(cells_of(&turned, &ROOT).words(&ROOT).unwrap(), words);
         }
     }
 
     fn refused(cells: &[([f64; 3], f64)]) -> String {
         let mut all = Cells::default();
         cells.iter().for_each(|&(corner, edge)| all.push(corner, edge));
-        all.words(&Root { origin: [0.0; 3], edge: 1.0 }, 0.01).unwrap_err().to_string()
+        all.words(&Root { origin: [0.0; 3], edge: 1.0 }).unwrap_err().to_string()
     }
 
     #[test]
@@ -176,8 +176,9 @@ mod tests {
         let mut cells = Cells::default();
         cells.push([0.5004, 0.2497, 0.0], 0.2496);
         let root = Root { origin: [0.0; 3], edge: 1.0 };
-        assert_eq!(word::octant(cells.words(&root, 0.01).unwrap()[0]).path(), "1.2");
-        assert!(cells.words(&root, 0.001).is_err());
+        assert_eq!(word::octant(cells.words(&root).unwrap()[0]).path(), "1.2");
+        cells.corners[0][0] = 0.503;
+        assert!(cells.words(&root).is_err());
     }
 
     #[test]
@@ -187,9 +188,9 @@ mod tests {
         cells.push([0.5, 0.0, 0.0], 0.25);
         let root = Root { origin: [0.0; 3], edge: 1.0 };
         cells.levels = Some(vec![3, 4]);
-        assert!(cells.words(&root, 0.01).is_ok());
+        assert!(cells.words(&root).is_ok());
         cells.levels = Some(vec![3, 5]);
-        let message = cells.words(&root, 0.01).unwrap_err().to_string();
+        let message = cells.words(&root).unwrap_err().to_string();
         assert!(message.contains("cell 1 has level 5"), "{message}");
     }
 }

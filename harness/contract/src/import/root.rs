@@ -76,7 +76,7 @@ mod tests {
             let cells = cells_of(part, &ROOT);
             let root = derive(&cells).unwrap();
             assert!(root.edge <= ROOT.edge * 2.0);
-            assert_eq!(cells.words(&root, 1e-9).unwrap().len(), part.len());
+            assert_eq!(cells.words(&root).unwrap().len(), part.len());
         }
     }
 
@@ -90,7 +90,7 @@ mod tests {
             cells.edges[i] = far[0] - cells.corners[i][0];
         }
         let root = derive(&cells).unwrap();
-        assert_eq!(cells.words(&root, 0.01).unwrap(), words);
+        assert_eq!(cells.words(&root).unwrap(), words);
     }
 
     #[test]

@@ -102,7 +102,7 @@ mod tests {
             let cells = read(place.path(), &request(sides)).unwrap();
             let side_bits = if sides { 3 } else { 0 };
             let expected: Vec<u64> = words.iter().map(|w| w & (!3 | side_bits)).collect();
-            assert_eq!(cells.words(&request(sides).root.unwrap(), 1e-3).unwrap(), expected);
+            assert_eq!(cells.words(&request(sides).root.unwrap()).unwrap(), expected);
         }
         fs::write(place.path().join(manifest::FILE), "{}").unwrap();
         assert!(read(place.path(), &request(true)).unwrap_err().to_string().contains("a leaf set already"));
