@@ -2,13 +2,10 @@
 
 use super::cells::Cells;
 use super::{ImportError, Request, table, text};
+use crate::npy::read_header;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs;
-use std::io::Cursor;
 use std::path::Path;
-
-/// Longer than the header of any table of cells. A header is read from no more bytes than these.
-const HEADER_BYTES_MAX: usize = 1 << 16;
 
 /// The numbers of a column: the one of row r is at the byte `first + r * stride`.
 struct Column {
@@ -32,10 +29,9 @@ struct Number {
 /// If the file cannot be read, is not an array of numbers, or is shorter or longer than its header states.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     let bytes = fs::read(path)?;
-    let mut cursor = Cursor::new(&bytes[..bytes.len().min(HEADER_BYTES_MAX)]);
-    let header = NpyHeader::from_reader(&mut cursor)
-        .map_err(|error| ImportError::content(format!("has no npy header: {error}")))?;
-    let data = &bytes[cursor.position() as usize..];
+    let (header, offset) =
+        read_header(&bytes).map_err(|error| ImportError::content(format!("has no npy header: {error}")))?;
+    let data = &bytes[offset as usize..];
     let (rows, columns) = layout(&header, data.len())?;
     let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
     let value = |row: usize, column: usize| {
@@ -221,7 +217,8 @@ mod tests {
         let refused = |bytes: &[u8]| read_bytes(bytes, None).unwrap_err().to_string();
         assert!(refused(&good[..good.len() - 1]).contains("has 63 bytes of data, but its header implies 64"));
         assert!(refused(&good[..20]).contains("has no npy header"));
-        assert!(refused(&header("<f8", "(4611686018427387904, 4)")).contains("incomplete or damaged"));
+        assert!(refused(&header("<f8", "(4611686018427387904, 4)")).contains("can be counted"));
+        assert!(refused(&header("<f8", "(1152921504606846976, 4)")).contains("incomplete or damaged"));
         assert!(refused(&header("<f8", "(2, 9223372036854775807)")).contains("columns"));
         assert!(refused(&header("<f8", "(8,)")).contains("at least four columns"));
         assert!(refused(&header("<c16", "(0, 4)")).contains("has type <c16"));
