@@ -2,7 +2,7 @@
 
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "verify",
     "selftest",
     "gate",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 13] = [
     "shrink",
     "audit",
     "export",
+    "import",
     "diff",
     "completions",
     "man",

@@ -173,7 +173,10 @@ impl LeafSet {
             let fill = |out: &mut dyn std::io::Write| npy::write_to(out, words);
             write_atomically(&dir.join(&part.file), fill).map_err(named)?;
         }
-        write_atomically(&dir.join(manifest::FILE), |out| out.write_all(self.manifest.text().as_bytes())).map_err(named)
+        write_atomically(&dir.join(manifest::FILE), |out| {
+            out.write_all(self.manifest.text().as_bytes())
+        })
+        .map_err(named)
     }
 
     /// Writes the mesh into an existing directory, whether or not its manifest is correct.

@@ -137,7 +137,10 @@ pub(crate) fn read_header(head: &[u8]) -> std::io::Result<(NpyHeader, u64)> {
     let head = &head[..head.len().min(HEADER_BYTES_MAX as usize)];
     let text = String::from_utf8_lossy(head);
     let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once(')'));
-    let mut items = shape.map_or("", |(shape, _)| shape).split([',', '(']).filter_map(|n| n.trim().parse().ok());
+    let mut items = shape
+        .map_or("", |(shape, _)| shape)
+        .split([',', '('])
+        .filter_map(|n| n.trim().parse().ok());
     if items.try_fold(1u64, u64::checked_mul).is_none() {
         return Err(std::io::Error::other("its shape has more items than can be counted"));
     }

@@ -1,10 +1,12 @@
 //! Runs engines and oracles as processes, and verifies the meshes that engines make.
 //!
 //! - [`engine`]: finds, starts, watches and judges programs, and reads their run reports;
+//! - [`import`]: reads meshes in the formats of other programs, VTK's in Python;
 //! - [`oracle`]: classifies points with trimesh, open3d and pyvista, in Python;
 //! - [`verify`](mod@verify): runs engines on cases and checks the meshes.
 
 pub mod engine;
+pub mod import;
 pub mod oracle;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -50,7 +50,8 @@ impl Cells {
         let mut words = self.words_in_order(root)?;
         self.agree_with_levels(&words)?;
         words.sort_unstable();
-        let overlaps = |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
+        let overlaps =
+            |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
         match words.windows(2).find(overlaps) {
             None => Ok(words),
             Some(pair) => Err(self.overlap(&self.words_in_order(root)?, pair)),
@@ -91,7 +92,8 @@ impl Cells {
 
     /// The error for two words that overlap; `words` are those of the cells in the order of the file.
     fn overlap(&self, words: &[u64], pair: &[u64]) -> ImportError {
-        let at = |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
+        let at =
+            |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
         let both: Vec<_> = (0..words.len()).filter(|&i| pair.contains(&words[i])).map(at).collect();
         ImportError::content(format!("{} overlaps {}: remove one of them", both[1], both[0]))
     }
@@ -100,22 +102,31 @@ impl Cells {
 /// The octant of a cell.
 fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
     if !(edge > 0.0 && edge.is_finite() && corner.iter().all(|c| c.is_finite())) {
-        return Err("has an edge that is not positive, or coordinates that are not finite".to_owned());
+        return Err(
+            "has an edge that is not positive, or coordinates that are not finite".to_owned()
+        );
     }
     let depth = (root.edge / edge).log2().round();
-    let level = if (0.0..=f64::from(LEVEL_MAX)).contains(&depth) { depth as u8 } else {
+    let level = if (0.0..=f64::from(LEVEL_MAX)).contains(&depth) {
+        depth as u8
+    } else {
         return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist"));
     };
     let edge_of_level = root.edge / f64::from(1u32 << level);
     if (edge / edge_of_level - 1.0).abs() > TOLERANCE {
-        return Err("has an edge that is not the root's edge halved a whole number of times".to_owned());
+        return Err(
+            "has an edge that is not the root's edge halved a whole number of times".to_owned()
+        );
     }
     let mut cell = [0; 3];
     for axis in 0..3 {
         let position = (corner[axis] - root.origin[axis]) / edge_of_level;
         let index = position.round();
         if (position - index).abs() > TOLERANCE {
-            return Err(format!("is not aligned: it is {position} of its edges from the root along axis {}", axis + 1));
+            return Err(format!(
+                "is not aligned: it is {position} of its edges from the root along axis {}",
+                axis + 1
+            ));
         }
         if !(0.0..f64::from(1u32 << level)).contains(&index) {
             return Err("lies outside the root".to_owned());
@@ -155,15 +166,24 @@ mod tests {
     fn each_misfit_names_its_cell() {
         let good = ([0.5, 0.0, 0.0], 0.5);
         let cases = [
-            (([0.0; 3], 0.3), "cell 1 (corner [0.0, 0.0, 0.0], edge 0.3) has an edge that is not the root's"),
+            (
+                ([0.0; 3], 0.3),
+                "cell 1 (corner [0.0, 0.0, 0.0], edge 0.3) has an edge that is not the root's",
+            ),
             (([0.1, 0.0, 0.0], 0.25), "cell 1 (corner [0.1, 0.0, 0.0], edge 0.25) is not aligned"),
-            (([0.0, 1.0, 0.0], 0.25), "cell 1 (corner [0.0, 1.0, 0.0], edge 0.25) lies outside the root"),
+            (
+                ([0.0, 1.0, 0.0], 0.25),
+                "cell 1 (corner [0.0, 1.0, 0.0], edge 0.25) lies outside the root",
+            ),
             (([0.0; 3], 2.0), "cell 1 (corner [0.0, 0.0, 0.0], edge 2) needs level -1"),
             (([0.0; 3], 1e-9), "needs level 30"),
             (([0.0; 3], f64::NAN), "has an edge that is not positive"),
             (([0.0, f64::INFINITY, 0.0], 0.5), "not finite"),
             (good, "cell 1 (corner [0.5, 0.0, 0.0], edge 0.5) overlaps cell 0"),
-            (([0.75, 0.0, 0.0], 0.25), "cell 1 (corner [0.75, 0.0, 0.0], edge 0.25) overlaps cell 0"),
+            (
+                ([0.75, 0.0, 0.0], 0.25),
+                "cell 1 (corner [0.75, 0.0, 0.0], edge 0.25) overlaps cell 0",
+            ),
         ];
         for (cell, expected) in cases {
             let message = refused(&[good, cell]);

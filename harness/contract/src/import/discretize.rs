@@ -60,7 +60,8 @@ impl Grid {
     /// A grid whose cells are cubes, and not too many.
     fn new(shape: [u64; 3], origin: [f64; 3], edges: [f64; 3]) -> Result<Self, ImportError> {
         let edge = edges[0];
-        if edges.iter().any(|e| (e - edge).abs() > 1e-6 * edge) || edge <= 0.0 || !edge.is_finite() {
+        if edges.iter().any(|e| (e - edge).abs() > 1e-6 * edge) || edge <= 0.0 || !edge.is_finite()
+        {
             return Err(ImportError::content(format!(
                 "has smallest cells with the edges {edges:?}: only cubes can be leaves of an oct-tree"
             )));
@@ -90,14 +91,21 @@ impl Grid {
 }
 
 fn from_json(text: &str) -> Result<Cells, ImportError> {
-    let mesh: TreeMesh = serde_json::from_str(text)
-        .map_err(|error| ImportError::content(format!("is not a three-dimensional TreeMesh in JSON: {error}")))?;
-    let (Ok(h), Ok(origin)) = (<[Vec<f64>; 3]>::try_from(mesh.h), <[f64; 3]>::try_from(mesh.origin)) else {
+    let mesh: TreeMesh = serde_json::from_str(text).map_err(|error| {
+        ImportError::content(format!("is not a three-dimensional TreeMesh in JSON: {error}"))
+    })?;
+    let (Ok(h), Ok(origin)) =
+        (<[Vec<f64>; 3]>::try_from(mesh.h), <[f64; 3]>::try_from(mesh.origin))
+    else {
         return Err(ImportError::content("has a number of dimensions other than three"));
     };
     let CellState { indexes, levels } = mesh.cell_state;
     if indexes.len() != levels.len() {
-        return Err(ImportError::content(format!("has {} indexes of cells and {} levels", indexes.len(), levels.len())));
+        return Err(ImportError::content(format!(
+            "has {} indexes of cells and {} levels",
+            indexes.len(),
+            levels.len()
+        )));
     }
     for (axis, widths) in h.iter().enumerate() {
         let Some(&first) = widths.first() else { continue };
@@ -126,23 +134,41 @@ fn from_ubc(text: &str, requested: Option<Root>) -> Result<Cells, ImportError> {
         (!content.is_empty()).then_some((number, content))
     });
     let mut next = |what: &str| {
-        lines.next().ok_or_else(|| ImportError::content(format!("ends before {what}: it is not a UBC oct-tree mesh")))
+        lines.next().ok_or_else(|| {
+            ImportError::content(format!("ends before {what}: it is not a UBC oct-tree mesh"))
+        })
     };
     // The first line may continue with the extent of a core region.
     let shape = numbers::<u64>(next("the numbers of cells")?)?;
     let top = fixed(numbers::<f64>(next("the top corner")?)?, "the top corner")?;
-    let edges = fixed(numbers::<f64>(next("the edges of the smallest cell")?)?, "the edges of the smallest cell")?;
+    let edges = fixed(
+        numbers::<f64>(next("the edges of the smallest cell")?)?,
+        "the edges of the smallest cell",
+    )?;
     let [count] = fixed(numbers::<u64>(next("the number of cells")?)?, "the number of cells")?;
-    let shape = shape.first_chunk().copied().ok_or_else(|| ImportError::content("has fewer than three numbers of cells"))?;
+    let shape = shape
+        .first_chunk()
+        .copied()
+        .ok_or_else(|| ImportError::content("has fewer than three numbers of cells"))?;
     let mut grid = Grid::new(shape, top, edges)?;
     grid.origin[2] -= shape[2] as f64 * grid.edge;
     let mut rows: Vec<([i64; 3], i64)> = Vec::new();
     for line in lines {
         let [i, j, k, edge] = fixed(numbers::<i64>(line)?, "a cell")?;
-        rows.push(([i.wrapping_sub(1), j.wrapping_sub(1), (shape[2] as i64 + 1).wrapping_sub(k).wrapping_sub(edge)], edge));
+        rows.push((
+            [
+                i.wrapping_sub(1),
+                j.wrapping_sub(1),
+                (shape[2] as i64 + 1).wrapping_sub(k).wrapping_sub(edge),
+            ],
+            edge,
+        ));
     }
     if rows.len() as u64 != count {
-        return Err(ImportError::content(format!("states {count} cells and has {}: it is incomplete", rows.len())));
+        return Err(ImportError::content(format!(
+            "states {count} cells and has {}: it is incomplete",
+            rows.len()
+        )));
     }
     if let Some(root) = requested.filter(|root| agrees(root, &grid)) {
         let along = grid.root().edge / grid.edge;
@@ -164,12 +190,16 @@ fn agrees(root: &Root, grid: &Grid) -> bool {
 /// The numbers of a line.
 fn numbers<T: std::str::FromStr>((line, text): (usize, &str)) -> Result<Vec<T>, ImportError> {
     let parse = |field: &str| {
-        field.parse().map_err(|_| ImportError::content(format!("line {line} has {field:?}, which is not such a number")))
+        field.parse().map_err(|_| {
+            ImportError::content(format!("line {line} has {field:?}, which is not such a number"))
+        })
     };
     text.split_whitespace().map(parse).collect()
 }
 
 fn fixed<T, const N: usize>(numbers: Vec<T>, what: &str) -> Result<[T; N], ImportError> {
     let found = numbers.len();
-    numbers.try_into().map_err(|_| ImportError::content(format!("has {found} numbers for {what}, which has {N}")))
+    numbers
+        .try_into()
+        .map_err(|_| ImportError::content(format!("has {found} numbers for {what}, which has {N}")))
 }

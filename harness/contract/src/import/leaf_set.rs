@@ -63,7 +63,10 @@ mod tests {
         let mut cells = cells_of(&words, &ROOT);
         let set = leaf_set(&cells, Some(ROOT), None, "test".to_owned()).unwrap();
         assert_eq!(set.manifest.digest, Digest::of(&words));
-        assert_eq!((set.manifest.leaves, set.manifest.level_surface, set.manifest.sides), (22, 3, Sides::Known));
+        assert_eq!(
+            (set.manifest.leaves, set.manifest.level_surface, set.manifest.sides),
+            (22, 3, Sides::Known)
+        );
         cells.sides = None;
         let set = leaf_set(&cells, None, None, "test".to_owned()).unwrap();
         assert_eq!((&set.words, set.manifest.sides), (&words, Sides::Unknown));
@@ -71,6 +74,8 @@ mod tests {
         set.create(&place.path().join("mesh")).unwrap();
         let again = crate::leafset::read(&place.path().join("mesh")).unwrap();
         assert_eq!((again.manifest, again.words), (set.manifest.clone(), words));
-        assert!(set.create(&place.path().join("mesh")).unwrap_err().to_string().contains("not empty"));
+        assert!(
+            set.create(&place.path().join("mesh")).unwrap_err().to_string().contains("not empty")
+        );
     }
 }

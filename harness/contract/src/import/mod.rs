@@ -105,7 +105,8 @@ impl From<io::Error> for ImportError {
 /// # Errors
 /// If it cannot be read, or has none of the formats.
 pub fn guess(path: &Path) -> Result<Format, ImportError> {
-    let format = if fs::metadata(path)?.is_dir() { of_directory(path) } else { of_content(&head(path)?) };
+    let format =
+        if fs::metadata(path)?.is_dir() { of_directory(path) } else { of_content(&head(path)?) };
     format.ok_or_else(|| {
         ImportError::content("its format was not recognised: choose one with --format (see --help)")
     })
@@ -191,7 +192,9 @@ fn side(code: f64, cell: usize) -> Result<Side, ImportError> {
 fn refuse_sides(request: &Request, format: &str) -> Result<(), ImportError> {
     match &request.sides {
         None => Ok(()),
-        Some(_) => Err(ImportError::content(format!("{format} has no named cell arrays: omit --sides"))),
+        Some(_) => {
+            Err(ImportError::content(format!("{format} has no named cell arrays: omit --sides")))
+        }
     }
 }
 
@@ -228,6 +231,8 @@ mod tests {
     fn a_path_that_is_no_mesh_is_an_error() {
         let empty = tempfile::tempdir().unwrap();
         assert!(guess(empty.path()).unwrap_err().to_string().contains("--format"));
-        assert!(guess(&empty.path().join("absent")).unwrap_err().to_string().contains("cannot be read"));
+        assert!(
+            guess(&empty.path().join("absent")).unwrap_err().to_string().contains("cannot be read")
+        );
     }
 }

@@ -29,8 +29,8 @@ struct Number {
 /// If the file cannot be read, is not an array of numbers, or is shorter or longer than its header states.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     let bytes = fs::read(path)?;
-    let (header, offset) =
-        read_header(&bytes).map_err(|error| ImportError::content(format!("has no npy header: {error}")))?;
+    let (header, offset) = read_header(&bytes)
+        .map_err(|error| ImportError::content(format!("has no npy header: {error}")))?;
     let data = &bytes[offset as usize..];
     let (rows, columns) = layout(&header, data.len())?;
     let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
@@ -49,7 +49,10 @@ fn layout(header: &NpyHeader, bytes: usize) -> Result<(usize, Vec<Column>), Impo
             let (mut columns, mut first) = (Vec::new(), 0);
             for field in fields {
                 let DType::Plain(kind) = &field.dtype else {
-                    return Err(ImportError::content(format!("its field {} is not a number", field.name)));
+                    return Err(ImportError::content(format!(
+                        "its field {} is not a number",
+                        field.name
+                    )));
                 };
                 let number = Number::of(kind)?;
                 columns.push(Column { name: field.name, first, stride: 0, number });
@@ -155,21 +158,28 @@ mod tests {
     const ROWS: [[i8; 5]; 2] = [[0, 2, -1, 1, 2], [2, 0, 0, 2, 1]];
 
     fn expected() -> Cells {
-        let mut cells = Cells { root: Some(Root { origin: [0.0; 3], edge: 4.0 }), ..Cells::default() };
+        let mut cells =
+            Cells { root: Some(Root { origin: [0.0; 3], edge: 4.0 }), ..Cells::default() };
         cells.push([0.0, 2.0, -1.0], 2.0);
         cells.push([2.0, 0.0, 0.0], 1.0);
         cells
     }
 
     /// An array of these rows in one of NumPy's types and orders.
-    fn array(descr: &str, columns: usize, fortran: bool, encode: impl Fn(i8) -> Vec<u8>) -> Vec<u8> {
+    fn array(
+        descr: &str,
+        columns: usize,
+        fortran: bool,
+        encode: impl Fn(i8) -> Vec<u8>,
+    ) -> Vec<u8> {
         let mut bytes = header(descr, &format!("(2, {columns})"));
         if fortran {
             let text = String::from_utf8_lossy(&bytes[10..]).replace("False", "True ");
             bytes.splice(10.., text.bytes());
             (0..columns).for_each(|c| ROWS.iter().for_each(|row| bytes.extend(encode(row[c]))));
         } else {
-            ROWS.iter().for_each(|row| row[..columns].iter().for_each(|&v| bytes.extend(encode(v))));
+            ROWS.iter()
+                .for_each(|row| row[..columns].iter().for_each(|&v| bytes.extend(encode(v))));
         }
         bytes
     }
@@ -215,10 +225,15 @@ mod tests {
     fn damaged_arrays_are_one_sentence_each() {
         let good = array("<f8", 4, false, |v| f64::from(v).to_le_bytes().to_vec());
         let refused = |bytes: &[u8]| read_bytes(bytes, None).unwrap_err().to_string();
-        assert!(refused(&good[..good.len() - 1]).contains("has 63 bytes of data, but its header implies 64"));
+        assert!(
+            refused(&good[..good.len() - 1])
+                .contains("has 63 bytes of data, but its header implies 64")
+        );
         assert!(refused(&good[..20]).contains("has no npy header"));
         assert!(refused(&header("<f8", "(4611686018427387904, 4)")).contains("can be counted"));
-        assert!(refused(&header("<f8", "(1152921504606846976, 4)")).contains("incomplete or damaged"));
+        assert!(
+            refused(&header("<f8", "(1152921504606846976, 4)")).contains("incomplete or damaged")
+        );
         assert!(refused(&header("<f8", "(2, 9223372036854775807)")).contains("columns"));
         assert!(refused(&header("<f8", "(8,)")).contains("at least four columns"));
         assert!(refused(&header("<c16", "(0, 4)")).contains("has type <c16"));

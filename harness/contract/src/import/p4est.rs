@@ -39,9 +39,12 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     let mut cells = Cells { root: Some(placed), ..Cells::default() };
     let mut begin = 0;
     for (tree, end) in ends.into_iter().enumerate() {
-        let count = end.checked_sub(begin).ok_or_else(|| damaged("the trees' numbers of quadrants decrease"))?;
+        let count = end
+            .checked_sub(begin)
+            .ok_or_else(|| damaged("the trees' numbers of quadrants decrease"))?;
         let quadrants = input.items(count, QUADRANT_BYTES + data_bytes)?;
-        let corner = [0, 1, 2].map(|a| placed.origin[a] + (trees.corners[tree][a] - stated.origin[a]) * scale);
+        let corner = [0, 1, 2]
+            .map(|a| placed.origin[a] + (trees.corners[tree][a] - stated.origin[a]) * scale);
         let tree = Root { origin: corner, edge: trees.edges[tree] * scale };
         add_tree(quadrants, (QUADRANT_BYTES + data_bytes) as usize, &tree, &mut cells)?;
         begin = end;
@@ -63,18 +66,28 @@ impl<'a> Input<'a> {
     /// The next `count` items of `size` bytes each.
     fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], ImportError> {
         let left = &self.bytes[self.at..];
-        match count.checked_mul(size).and_then(|n| usize::try_from(n).ok()).filter(|&n| n <= left.len()) {
+        match count
+            .checked_mul(size)
+            .and_then(|n| usize::try_from(n).ok())
+            .filter(|&n| n <= left.len())
+        {
             Some(n) => {
                 self.at += n;
                 Ok(&left[..n])
             }
-            None => Err(damaged(&format!("it ends at byte {} within {count} items of {size} bytes", self.bytes.len()))),
+            None => Err(damaged(&format!(
+                "it ends at byte {} within {count} items of {size} bytes",
+                self.bytes.len()
+            ))),
         }
     }
 
     fn numbers(&mut self, count: u64) -> Result<Vec<u64>, ImportError> {
         let bytes = self.items(count, 8)?;
-        Ok(bytes.chunks_exact(8).map(|b| u64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
+        Ok(bytes
+            .chunks_exact(8)
+            .map(|b| u64::from_le_bytes(b.try_into().expect("eight bytes")))
+            .collect())
     }
 
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
@@ -91,7 +104,19 @@ fn connectivity(input: &mut Input) -> Result<Cells, ImportError> {
     }
     input.items(24, 1)?;
     let head = input.numbers(10)?;
-    let [format, index_bytes, vertices, trees, edges, edge_trees, corners, corner_trees, attribute_bytes, _] = head[..] else {
+    let [
+        format,
+        index_bytes,
+        vertices,
+        trees,
+        edges,
+        edge_trees,
+        corners,
+        corner_trees,
+        attribute_bytes,
+        _,
+    ] = head[..]
+    else {
         unreachable!("ten numbers were read");
     };
     if format != FORMAT || index_bytes != 4 {
@@ -122,12 +147,16 @@ fn cubes(coordinates: &[u8], tree_to_vertex: &[u8]) -> Result<Cells, ImportError
     let vertex = |index: &[u8]| {
         let index = u32::from_le_bytes(index.try_into().expect("four bytes")) as usize;
         let place = coordinates.chunks_exact(24).nth(index)?;
-        Some([0, 1, 2].map(|a| f64::from_le_bytes(place[8 * a..][..8].try_into().expect("eight bytes"))))
+        Some(
+            [0, 1, 2]
+                .map(|a| f64::from_le_bytes(place[8 * a..][..8].try_into().expect("eight bytes"))),
+        )
     };
     let mut trees = Cells::default();
     for (tree, indices) in tree_to_vertex.chunks_exact(32).enumerate() {
         let corners: Option<Vec<_>> = indices.chunks_exact(4).map(vertex).collect();
-        let corners = corners.ok_or_else(|| damaged(&format!("tree {tree} has a vertex that does not exist")))?;
+        let corners = corners
+            .ok_or_else(|| damaged(&format!("tree {tree} has a vertex that does not exist")))?;
         let (origin, edge) = (corners[0], corners[1][0] - corners[0][0]);
         let in_place = |(digit, corner): (usize, &[f64; 3])| {
             (0..3).all(|a| {
@@ -166,23 +195,36 @@ fn forest_header(input: &mut Input, trees: usize) -> Result<(Vec<u64>, u64), Imp
 }
 
 /// Adds the quadrants of a tree, which has `stride` bytes per quadrant.
-fn add_tree(quadrants: &[u8], stride: usize, tree: &Root, cells: &mut Cells) -> Result<(), ImportError> {
+fn add_tree(
+    quadrants: &[u8],
+    stride: usize,
+    tree: &Root,
+    cells: &mut Cells,
+) -> Result<(), ImportError> {
     let decode = |quadrant: &[u8]| -> [i32; 4] {
-        [0, 1, 2, 3].map(|i| i32::from_le_bytes(quadrant[4 * i..][..4].try_into().expect("four bytes")))
+        [0, 1, 2, 3]
+            .map(|i| i32::from_le_bytes(quadrant[4 * i..][..4].try_into().expect("four bytes")))
     };
     let Some(last) = quadrants.chunks_exact(stride).next_back().map(decode) else {
         return Err(damaged("a tree has no quadrants"));
     };
     let length = tree_length(last).ok_or_else(|| {
-        damaged(&format!("the last quadrant of a tree, {last:?}, does not end in the tree's last corner"))
+        damaged(&format!(
+            "the last quadrant of a tree, {last:?}, does not end in the tree's last corner"
+        ))
     })?;
     for [x, y, z, level] in quadrants.chunks_exact(stride).map(decode) {
         if !(0..=30).contains(&level) || [x, y, z].iter().any(|&c| c < 0) {
             let cell = cells.len();
-            return Err(damaged(&format!("cell {cell} has the corner [{x}, {y}, {z}] and the level {level}")));
+            return Err(damaged(&format!(
+                "cell {cell} has the corner [{x}, {y}, {z}] and the level {level}"
+            )));
         }
         let along = [x, y, z].map(|c| f64::from(c) / f64::from(length) * tree.edge);
-        cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), tree.edge / f64::from(1u32 << level));
+        cells.push(
+            [0, 1, 2].map(|a| tree.origin[a] + along[a]),
+            tree.edge / f64::from(1u32 << level),
+        );
     }
     Ok(())
 }

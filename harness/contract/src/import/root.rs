@@ -13,9 +13,13 @@ use crate::octant::LEVEL_MAX;
 /// If there are no cells, if a number is not finite, or if the cells need more levels than exist.
 pub fn derive(cells: &Cells) -> Result<Root, ImportError> {
     let unusable = |why: &str| {
-        ImportError::content(format!("the root cannot be derived from the cells, because {why}: give it with --root X,Y,Z,EDGE"))
+        ImportError::content(format!(
+            "the root cannot be derived from the cells, because {why}: give it with --root X,Y,Z,EDGE"
+        ))
     };
-    let Some(coarsest) = (0..cells.len()).max_by(|&a, &b| cells.edges[a].total_cmp(&cells.edges[b])) else {
+    let Some(coarsest) =
+        (0..cells.len()).max_by(|&a, &b| cells.edges[a].total_cmp(&cells.edges[b]))
+    else {
         return Err(unusable("there are none"));
     };
     let finest = cells.edges.iter().copied().fold(f64::INFINITY, f64::min);
@@ -23,7 +27,9 @@ pub fn derive(cells: &Cells) -> Result<Root, ImportError> {
     let depth = (cells.edges[coarsest] / finest).log2().round();
     let finite = low.iter().chain(&high).all(|c| c.is_finite()) && finest > 0.0;
     if !finite || !(0.0..=f64::from(LEVEL_MAX)).contains(&depth) {
-        return Err(unusable("a coordinate is not finite, or an edge is not positive or too small"));
+        return Err(unusable(
+            "a coordinate is not finite, or an edge is not positive or too small",
+        ));
     }
     // The extent of all cells is known more precisely than the edge of one, and is a whole number of finest cells.
     let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
@@ -63,7 +69,8 @@ mod tests {
     #[test]
     fn cells_that_fill_their_root_give_it_back() {
         for depth in 0..5 {
-            let words = words_of(|o| o.level == 0 && depth > 0 || o.level < depth && o.corner == [0; 3]);
+            let words =
+                words_of(|o| o.level == 0 && depth > 0 || o.level < depth && o.corner == [0; 3]);
             assert_eq!(derive(&cells_of(&words, &ROOT)).unwrap(), ROOT);
         }
     }

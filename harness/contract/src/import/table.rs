@@ -28,7 +28,10 @@ pub(super) fn cells(
     let column = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
     let required = |name: &str| {
         column(name).ok_or_else(|| {
-            ImportError::content(format!("has no column {name}: its columns are {}", names.join(", ")))
+            ImportError::content(format!(
+                "has no column {name}: its columns are {}",
+                names.join(", ")
+            ))
         })
     };
     let xyz = [required("x")?, required("y")?, required("z")?];
@@ -46,7 +49,9 @@ pub(super) fn cells(
         let edge = edge(&size, row, value)?;
         let at = xyz.map(|column| value(row, column));
         let corner = match (request.position, &size) {
-            (Position::Index, Size::Level(_, root)) => [0, 1, 2].map(|a| root.origin[a] + at[a] * edge),
+            (Position::Index, Size::Level(_, root)) => {
+                [0, 1, 2].map(|a| root.origin[a] + at[a] * edge)
+            }
             (Position::Centre, _) => at.map(|c| c - edge / 2.0),
             _ => at,
         };

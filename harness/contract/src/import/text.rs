@@ -44,7 +44,8 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
 
 /// Names of the columns of a table without names.
 pub(super) fn names(columns: usize) -> Vec<String> {
-    let name = |i: usize| ["x", "y", "z", "level"].get(i).map_or(i.to_string(), |&name| name.to_owned());
+    let name =
+        |i: usize| ["x", "y", "z", "level"].get(i).map_or(i.to_string(), |&name| name.to_owned());
     (0..columns).map(name).collect()
 }
 

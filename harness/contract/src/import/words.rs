@@ -32,15 +32,18 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
         }
     };
     let root = request.root.unwrap_or(UNIT);
-    let mut cells = Cells { root: Some(root), sides: with_sides.then(Vec::new), ..Cells::default() };
+    let mut cells =
+        Cells { root: Some(root), sides: with_sides.then(Vec::new), ..Cells::default() };
     for part in parts(path)? {
         let of_part = |why: String| ImportError::content(why).of_file(&part);
         let file = PartFile::open(&part).map_err(|error| of_part(format!("the part {error}")))?;
         for word in file.read_all()? {
             let cell = cells.len();
-            let octant = octant(word, with_sides)
-                .map_err(|why| of_part(format!("cell {cell} is the word {word:#018x}, in which {why}")))?;
-            cells.push(root.to_user(octant.bounds().0), root.edge / f64::from(1u32 << octant.level));
+            let octant = octant(word, with_sides).map_err(|why| {
+                of_part(format!("cell {cell} is the word {word:#018x}, in which {why}"))
+            })?;
+            cells
+                .push(root.to_user(octant.bounds().0), root.edge / f64::from(1u32 << octant.level));
             cells.sides.iter_mut().for_each(|sides| sides.push(Side::ALL[(word & 3) as usize]));
         }
     }
@@ -80,8 +83,8 @@ fn parts(path: &Path) -> Result<Vec<PathBuf>, ImportError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::words_with_sides;
     use crate::npy;
+    use crate::testing::words_with_sides;
 
     fn words() -> Vec<u64> {
         words_with_sides(|o| o.level < 2, |o| Some(Side::ALL[o.digit() as usize % 3]))
@@ -105,7 +108,12 @@ mod tests {
             assert_eq!(cells.words(&request(sides).root.unwrap()).unwrap(), expected);
         }
         fs::write(place.path().join(manifest::FILE), "{}").unwrap();
-        assert!(read(place.path(), &request(true)).unwrap_err().to_string().contains("a leaf set already"));
+        assert!(
+            read(place.path(), &request(true))
+                .unwrap_err()
+                .to_string()
+                .contains("a leaf set already")
+        );
     }
 
     #[test]
@@ -118,7 +126,9 @@ mod tests {
             npy::write(&path, &words).unwrap();
             read(&path, &request(sides)).map(|cells| cells.len()).map_err(|error| error.to_string())
         };
-        assert!(refused(1 << 7, true).unwrap_err().contains("cell 7 is the word 0x0000000000000080"));
+        assert!(
+            refused(1 << 7, true).unwrap_err().contains("cell 7 is the word 0x0000000000000080")
+        );
         assert!(refused(20 << 2, false).unwrap_err().contains("level 20"));
         assert!(refused(words()[7] | 3, true).unwrap_err().contains("side 3"));
         assert_eq!(refused(words()[7] | 3, false), Ok(64));

@@ -27,7 +27,8 @@ impl FoamFile {
     /// If it cannot be read, is compressed, or has no usable dictionary.
     pub fn open(path: &Path) -> Result<Self, ImportError> {
         if !path.exists() && path.with_extension("gz").exists() {
-            return Err(ImportError::content("is compressed: decompress it with gunzip").of_file(&path.with_extension("gz")));
+            return Err(ImportError::content("is compressed: decompress it with gunzip")
+                .of_file(&path.with_extension("gz")));
         }
         let bytes = fs::read(path).map_err(|error| ImportError::from(error).of_file(path))?;
         let mut file = Self {
@@ -74,7 +75,11 @@ impl FoamFile {
                 "LSB" | "label=32" | "scalar=64" | "" => {}
                 "label=64" => self.label_bytes = 8,
                 "scalar=32" => self.scalar_bytes = 4,
-                other => return Err(self.error(format!("has the architecture {other}, which is not supported"))),
+                other => {
+                    return Err(
+                        self.error(format!("has the architecture {other}, which is not supported"))
+                    );
+                }
             }
         }
         Ok(())
@@ -144,7 +149,9 @@ impl FoamFile {
         let length = match rest.first() {
             None => return Err(self.ended("a list or dictionary")),
             Some(b) if delimiter(b) => 1,
-            Some(_) => rest.iter().take_while(|b| !delimiter(b) && !b.is_ascii_whitespace()).count(),
+            Some(_) => {
+                rest.iter().take_while(|b| !delimiter(b) && !b.is_ascii_whitespace()).count()
+            }
         };
         self.at += length;
         Ok(&self.bytes[self.at - length..self.at])
@@ -154,7 +161,9 @@ impl FoamFile {
         let token = self.token()?;
         let parsed = std::str::from_utf8(token).ok().and_then(|text| text.parse().ok());
         let shown = String::from_utf8_lossy(&token[..token.len().min(20)]).into_owned();
-        parsed.ok_or_else(|| self.error(format!("has {shown:?} before byte {}, where a number belongs", self.at)))
+        parsed.ok_or_else(|| {
+            self.error(format!("has {shown:?} before byte {}, where a number belongs", self.at))
+        })
     }
 
     /// The number of items of a list. Each needs at least `bytes_min` bytes of the file.
@@ -162,7 +171,9 @@ impl FoamFile {
         let count: usize = self.number()?;
         let left = self.bytes.len() - self.at;
         if count > left / bytes_min {
-            return Err(self.error(format!("states {count} items, but has only {left} bytes for them: it is incomplete")));
+            return Err(self.error(format!(
+                "states {count} items, but has only {left} bytes for them: it is incomplete"
+            )));
         }
         Ok(count)
     }
@@ -175,7 +186,9 @@ impl FoamFile {
         self.expect(b'(')?;
         let (begin, end) = (self.at, self.at + count * size);
         if self.bytes.get(end) != Some(&b')') {
-            return Err(self.error(format!("has no \")\" after {count} items of {size} bytes: it is incomplete or damaged")));
+            return Err(self.error(format!(
+                "has no \")\" after {count} items of {size} bytes: it is incomplete or damaged"
+            )));
         }
         self.at = end + 1;
         Ok(&self.bytes[begin..end])
@@ -197,7 +210,9 @@ impl FoamFile {
             self.expect(b'}')?;
             return match count <= count_uniform {
                 true => Ok(vec![value; count]),
-                false => Err(self.error(format!("states {count} equal items, and at most {count_uniform} are possible"))),
+                false => Err(self.error(format!(
+                    "states {count} equal items, and at most {count_uniform} are possible"
+                ))),
             };
         }
         self.at -= 1;
@@ -247,7 +262,11 @@ impl FoamFile {
     ///
     /// # Errors
     /// If the file has no such list.
-    pub fn indices(&mut self, count_uniform: usize, length: usize) -> Result<Vec<usize>, ImportError> {
+    pub fn indices(
+        &mut self,
+        count_uniform: usize,
+        length: usize,
+    ) -> Result<Vec<usize>, ImportError> {
         let labels = self.labels(count_uniform)?;
         self.as_indices(labels, length)
     }
@@ -255,7 +274,9 @@ impl FoamFile {
     fn as_indices(&self, labels: Vec<i64>, length: usize) -> Result<Vec<usize>, ImportError> {
         let index = |(i, label): (usize, i64)| {
             let index = usize::try_from(label).ok().filter(|&index| index < length);
-            index.ok_or_else(|| self.error(format!("has {label} as item {i}, where {length} objects are possible")))
+            index.ok_or_else(|| {
+                self.error(format!("has {label} as item {i}, where {length} objects are possible"))
+            })
         };
         labels.into_iter().enumerate().map(index).collect()
     }
@@ -268,7 +289,12 @@ impl FoamFile {
         let (ends, labels) = match (self.class.as_str(), self.binary) {
             ("faceCompactList", _) => self.faces_compact()?,
             (_, false) => self.faces_listed()?,
-            _ => return Err(self.error(format!("is a binary {}, and faceCompactList is supported", self.class))),
+            _ => {
+                return Err(self.error(format!(
+                    "is a binary {}, and faceCompactList is supported",
+                    self.class
+                )));
+            }
         };
         Ok((ends, self.as_indices(labels, points)?))
     }
@@ -280,7 +306,8 @@ impl FoamFile {
             && begins.last().is_some_and(|&last| last == labels.len() as i64);
         match sound {
             true => Ok((begins[1..].iter().map(|&end| end as usize).collect(), labels)),
-            false => Err(self.error("has positions of faces that do not ascend from 0 to the number of labels")),
+            false => Err(self
+                .error("has positions of faces that do not ascend from 0 to the number of labels")),
         }
     }
 

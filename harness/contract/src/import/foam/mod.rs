@@ -14,7 +14,9 @@ use std::path::{Path, PathBuf};
 /// The directory with the mesh: the given one, or the one below it in a case or in `constant`.
 pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
     let below = ["", "polyMesh", "constant/polyMesh"].map(|place| path.join(place));
-    below.into_iter().find(|place| ["points", "points.gz"].iter().any(|name| place.join(name).is_file()))
+    below
+        .into_iter()
+        .find(|place| ["points", "points.gz"].iter().any(|name| place.join(name).is_file()))
 }
 
 /// Reads a mesh. Sides come from a list of labels in the same directory, named by the request.
@@ -40,7 +42,13 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
             "has {faces} faces with {owners} owners and {neighbours} neighbours: its files belong to different meshes"
         )));
     }
-    let faces = Faces { points: &points, ends: &ends, vertices: &vertices, owners: &owners, neighbours: &neighbours };
+    let faces = Faces {
+        points: &points,
+        ends: &ends,
+        vertices: &vertices,
+        owners: &owners,
+        neighbours: &neighbours,
+    };
     let mut cells = faces.cubes(count)?;
     let per_cell = |name: &str| -> Result<Vec<i64>, ImportError> {
         let mut file = open(name)?;
@@ -50,7 +58,8 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
             false => Err(file.error(format!("has {} labels for {count} cells", labels.len()))),
         }
     };
-    cells.levels = directory.join("cellLevel").is_file().then(|| per_cell("cellLevel")).transpose()?;
+    cells.levels =
+        directory.join("cellLevel").is_file().then(|| per_cell("cellLevel")).transpose()?;
     if let Some(name) = &request.sides {
         let codes = per_cell(name)?;
         let sides = codes.iter().enumerate().map(|(i, &code)| side(code as f64, i));
@@ -102,7 +111,8 @@ impl Faces<'_> {
             for &vertex in vertices {
                 for axis in 0..3 {
                     shapes[cell].low[axis] = shapes[cell].low[axis].min(self.points[vertex][axis]);
-                    shapes[cell].high[axis] = shapes[cell].high[axis].max(self.points[vertex][axis]);
+                    shapes[cell].high[axis] =
+                        shapes[cell].high[axis].max(self.points[vertex][axis]);
                 }
             }
         });
@@ -116,9 +126,15 @@ impl Faces<'_> {
         });
         let mut cells = Cells::default();
         for (i, shape) in shapes.iter().enumerate() {
-            cells.push(shape.low, shape.edge().map_err(|why| {
-                ImportError::content(format!("cell {i} (corner {:?}) is not a cube: {why}", shape.low))
-            })?);
+            cells.push(
+                shape.low,
+                shape.edge().map_err(|why| {
+                    ImportError::content(format!(
+                        "cell {i} (corner {:?}) is not a cube: {why}",
+                        shape.low
+                    ))
+                })?,
+            );
         }
         Ok(cells)
     }
@@ -143,5 +159,7 @@ impl Shape {
 
 /// The determinant of three vectors: six times the signed volume of the tetrahedron that they span.
 fn determinant(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
