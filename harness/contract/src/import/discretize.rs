@@ -79,12 +79,12 @@ impl Grid {
         Root { origin: self.origin, edge: self.edge * along as f64 }
     }
 
-    /// The cells with these first indices and edges, in smallest cells.
-    fn cells(&self, of: impl Iterator<Item = ([i64; 3], i64)>) -> Cells {
+    /// The cells with these minimum corners and edges, in smallest cells from the origin.
+    fn cells(&self, of: impl Iterator<Item = ([f64; 3], f64)>) -> Cells {
         let mut cells = Cells { root: Some(self.root()), ..Cells::default() };
         for (first, edge) in of {
-            let corner = [0, 1, 2].map(|a| self.origin[a] + first[a] as f64 * self.edge);
-            cells.push(corner, edge as f64 * self.edge);
+            let corner = [0, 1, 2].map(|a| self.origin[a] + first[a] * self.edge);
+            cells.push(corner, edge * self.edge);
         }
         cells
     }
@@ -120,8 +120,8 @@ fn from_json(text: &str) -> Result<Cells, ImportError> {
     let grid = Grid::new(shape, origin, [0, 1, 2].map(|a| h[a].first().copied().unwrap_or(0.0)))?;
     // A centre is an odd number of half edges from the origin, so its lowest bit gives the edge.
     let cell = |centre: &[i64; 3]| {
-        let edge = centre[0] & centre[0].wrapping_neg();
-        (centre.map(|c| c.wrapping_sub(edge).div_euclid(2)), edge)
+        let edge = (centre[0] & centre[0].wrapping_neg()) as f64;
+        (centre.map(|c| (c as f64 - edge) / 2.0), edge)
     };
     let mut cells = grid.cells(indexes.iter().map(cell));
     cells.levels = Some(levels);
@@ -152,17 +152,12 @@ fn from_ubc(text: &str, requested: Option<Root>) -> Result<Cells, ImportError> {
         .ok_or_else(|| ImportError::content("has fewer than three numbers of cells"))?;
     let mut grid = Grid::new(shape, top, edges)?;
     grid.origin[2] -= shape[2] as f64 * grid.edge;
-    let mut rows: Vec<([i64; 3], i64)> = Vec::new();
+    // Indices begin at 1; those along z count from the top downward.
+    let above = shape[2] as f64 + 1.0;
+    let mut rows = Vec::new();
     for line in lines {
-        let [i, j, k, edge] = fixed(numbers::<i64>(line)?, "a cell")?;
-        rows.push((
-            [
-                i.wrapping_sub(1),
-                j.wrapping_sub(1),
-                (shape[2] as i64 + 1).wrapping_sub(k).wrapping_sub(edge),
-            ],
-            edge,
-        ));
+        let [i, j, k, edge] = fixed(numbers::<f64>(line)?, "a cell")?;
+        rows.push(([i - 1.0, j - 1.0, above - k - edge], edge));
     }
     if rows.len() as u64 != count {
         return Err(ImportError::content(format!(

@@ -103,20 +103,24 @@ impl From<io::Error> for ImportError {
 /// The format of a file or directory, from its content.
 ///
 /// # Errors
-/// If it cannot be read, or has none of the formats.
+/// If it cannot be read, or has none of the formats. Parts of a leaf set without a manifest must be requested by their
+/// format: a program that writes manifests did not finish such a directory.
 pub fn guess(path: &Path) -> Result<Format, ImportError> {
-    let format =
-        if fs::metadata(path)?.is_dir() { of_directory(path) } else { of_content(&head(path)?) };
+    let is_directory = fs::metadata(path)?.is_dir();
+    if is_directory && path.join(manifest::part_name(0)).is_file() {
+        return Err(ImportError::content(format!(
+            "has parts and no {}, so the program that wrote them may not have finished: if it writes none, choose \
+             --format leaf-words",
+            manifest::FILE
+        )));
+    }
+    let format = match is_directory {
+        true => foam::poly_mesh(path).map(|_| Format::Openfoam),
+        false => of_content(&head(path)?),
+    };
     format.ok_or_else(|| {
         ImportError::content("its format was not recognised: choose one with --format (see --help)")
     })
-}
-
-fn of_directory(path: &Path) -> Option<Format> {
-    if foam::poly_mesh(path).is_some() {
-        return Some(Format::Openfoam);
-    }
-    path.join(manifest::part_name(0)).is_file().then_some(Format::LeafWords)
 }
 
 /// The first bytes of a file.
