@@ -225,11 +225,11 @@ fn each_error_of_a_mesh_names_its_cell() {
         "{level}"
     );
     let face = refusal("foam-ascii", "faces", |bytes| {
-        let at = String::from_utf8_lossy(bytes).find("\n(\n4(").unwrap();
+        let at = String::from_utf8_lossy(bytes).find("\n4(").unwrap();
         let end = bytes[at..].iter().position(|&b| b == b')').unwrap() + at;
-        let text = String::from_utf8_lossy(&bytes[at + 5..end]).into_owned();
+        let text = String::from_utf8_lossy(&bytes[at + 3..end]).into_owned();
         let first = text.split(' ').next().unwrap();
-        bytes.splice(at + 5..end, [first; 4].join(" ").bytes());
+        bytes.splice(at + 3..end, [first; 4].join(" ").bytes());
     });
     assert!(face.contains("is not a cube: its faces enclose"), "{face}");
     let quadrant = refusal("unitcube.p8est", "", |bytes| {
