@@ -143,10 +143,11 @@ fn of_content(head: &[u8]) -> Option<Format> {
     if starts(b"p8est\0\0\0") {
         return Some(Format::P4est);
     }
-    let text = std::str::from_utf8(&head[..head.len() - incomplete(head)]).ok()?;
-    if text.contains("<VTKFile") {
+    // Binary data may follow in the same file.
+    if head.windows(8).any(|bytes| bytes == b"<VTKFile") {
         return Some(Format::Vtk);
     }
+    let text = std::str::from_utf8(&head[..head.len() - incomplete(head)]).ok()?;
     if text.trim_start().starts_with('{') {
         return Some(Format::Discretize);
     }
@@ -210,7 +211,8 @@ mod tests {
     fn formats_are_recognised_by_content() {
         let words = crate::npy::header("<u8", "(5,)");
         let rows = crate::npy::header("<f8", "(5, 4)");
-        let cases: [(&[u8], Option<Format>); 14] = [
+        let cases: [(&[u8], Option<Format>); 15] = [
+            (b"<VTKFile type=\"UnstructuredGrid\">\n<AppendedData>_\xff\xfe", Some(Format::Vtk)),
             (&words, Some(Format::LeafWords)),
             (&rows, Some(Format::Npy)),
             (&crate::npy::header("<u8", "(5, 4)"), Some(Format::Npy)),
