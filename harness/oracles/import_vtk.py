@@ -109,23 +109,32 @@ def of_unstructured(grid):
     if connectivity.min() < 0 or connectivity.max() >= len(points):
         raise Refused(f"has a cell with a point beyond the {len(points)} that exist")
     corners, edges = np.empty((count, 3)), np.empty(count)
+    axes = [np.ascontiguousarray(points[:, axis], np.float64) for axis in range(3)]
     for first in range(0, count, CHUNK):
         part = slice(first, min(first + CHUNK, count))
-        vertices = points[connectivity[8 * part.start : 8 * part.stop]].astype(np.float64).reshape(-1, 8, 3)
-        low = vertices.min(axis=1)
-        edge = (vertices.max(axis=1) - low).mean(axis=1)
-        # Each vertex, in edges from the minimum corner, is one of the eight corners of the unit cube.
-        with np.errstate(all="ignore"):
-            place = (vertices - low[:, None]) / edge[:, None, None]
-            corner = np.rint(place)
-            digits = np.where(np.isfinite(corner), corner, 0).astype(np.int64) @ np.array([1, 2, 4])
-            is_cube = (np.abs(place - corner) <= TOLERANCE).all(axis=(1, 2)) & (edge > 0)
-            is_cube &= (np.left_shift(1, np.clip(digits, 0, 8)).sum(axis=1) == 255) & (corner <= 1).all(axis=(1, 2))
+        vertices = np.ascontiguousarray(connectivity[8 * part.start : 8 * part.stop].reshape(-1, 8).T)
+        corners[part], edges[part], is_cube = cubes([axis[vertices] for axis in axes])
         if not is_cube.all():
             cell = first + int(np.flatnonzero(~is_cube)[0])
-            raise Refused(f"has cell {cell}, which is not an axis-aligned cube (minimum corner {low[cell - first].tolist()})")
-        corners[part], edges[part] = low, edge
+            raise Refused(f"has cell {cell}, which is not an axis-aligned cube (minimum corner {corners[cell].tolist()})")
     return corners, edges
+
+
+def cubes(vertices):
+    """Minimum corners, mean edges, and whether each cell is a cube, from the coordinates of vertices: [axis][vertex, cell]."""
+    lows, highs = ([bound(axis, axis=0) for axis in vertices] for bound in (np.min, np.max))
+    # Which corner of the cell a vertex is, as one bit: a cube has all eight.
+    digits = np.zeros(vertices[0].shape, np.uint8)
+    with np.errstate(all="ignore"):
+        edge = sum(high - low for low, high in zip(lows, highs)) / 3
+        is_cube = edge > 0
+        for axis, (along, low, high) in enumerate(zip(vertices, lows, highs)):
+            from_corner = np.minimum(along - low, high - along).max(axis=0)
+            # Written so that NaN is no cube.
+            is_cube &= (from_corner <= TOLERANCE * edge) & (np.abs(high - low - edge) <= TOLERANCE * edge)
+            digits |= (along - low > high - along).astype(np.uint8) << axis
+    is_cube &= np.bitwise_or.reduce(np.left_shift(np.uint8(1), digits), axis=0) == 255
+    return np.column_stack(lows), edge, is_cube
 
 
 def of_hyper_trees(grid):

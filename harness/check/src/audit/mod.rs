@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use crate::checks::{self, CheckResult, Terms};
 use contract::leafset;
-use contract::manifest::{Keep, Manifest, Tree as Kind};
+use contract::manifest::{Keep, Manifest, Sides, Tree as Kind};
 
 pub(crate) mod merge;
 mod pass;
@@ -120,9 +120,20 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
             ]
         }
     };
+    if manifest.sides == Sides::Unknown {
+        checks[0].note = without_sides(&mut of_tree, &terms);
+    }
     of_tree.iter_mut().for_each(|c| c.examined = leaves);
     checks.extend(of_tree);
     checks
+}
+
+/// Removes the checks that need sides, which would pass or fail by the meaningless codes in the words; returns a note.
+fn without_sides(checks: &mut Vec<CheckResult>, terms: &Terms) -> String {
+    let deletes = terms.keep != Keep::All || !terms.keep_crossing;
+    checks.retain(|c| c.name != "sides" && !(deletes && c.name == "complete"));
+    let holes = if deletes { " and holes" } else { "" };
+    format!("the sides of the leaves are unknown, so sides{holes} were not checked")
 }
 
 #[cfg(test)]
@@ -170,6 +181,31 @@ mod tests {
         unsorted.swap(3, 4);
         let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
         assert!(found(&report).contains(&"linear"));
+    }
+
+    /// The codes of unknown sides are all `outside`, which must neither pass for sides nor fail for holes.
+    #[test]
+    fn what_needs_unknown_sides_is_not_checked() {
+        let mut words = correct();
+        words.pop();
+        let mut set = leaf_set(vec![words]);
+        let names = |set: &LeafSet| -> Vec<_> {
+            audited(set, &AuditOptions::default())
+                .checks
+                .iter()
+                .map(|c| (c.name, c.holds()))
+                .collect()
+        };
+        assert!(names(&set).contains(&("sides", true)));
+        set.manifest.sides = Sides::Unknown;
+        assert!(
+            names(&set).contains(&("complete", false)) && !names(&set).contains(&("sides", true))
+        );
+        set.manifest.keep = Keep::Outside;
+        assert!(
+            names(&set).iter().all(|&(name, holds)| holds && name != "complete" && name != "sides")
+        );
+        assert!(audited(&set, &AuditOptions::default()).checks[0].note.contains("sides and holes"));
     }
 
     /// The audit must not pass if memory does not suffice, but it still checks counts and digests.

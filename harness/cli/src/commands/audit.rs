@@ -4,6 +4,7 @@ use super::import::{Failure, Source};
 use check::audit::record::AuditRecord;
 use check::audit::{self, AuditOptions};
 use clap::Args;
+use contract::case::Case;
 use contract::manifest;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
 use std::path::{Path, PathBuf};
@@ -35,7 +36,8 @@ pub fn run(arguments: &Arguments) -> u8 {
 
 fn audited(Arguments { mesh, nodes_max, json, source }: &Arguments) -> Result<u8, Failure> {
     // The temporary directory of an imported mesh lives as long as this value.
-    let imported = imported(mesh, source)?;
+    let case = source.read_case()?;
+    let imported = imported(mesh, source, case.as_ref())?;
     let directory = imported.as_ref().map_or(mesh.as_path(), TempDir::path);
     let default = AuditOptions::default();
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
@@ -49,7 +51,7 @@ fn audited(Arguments { mesh, nodes_max, json, source }: &Arguments) -> Result<u8
 }
 
 /// The leaf set of a mesh without a manifest, in a temporary directory; `None` for a leaf-set directory.
-fn imported(mesh: &Path, source: &Source) -> Result<Option<TempDir>, Failure> {
+fn imported(mesh: &Path, source: &Source, case: Option<&Case>) -> Result<Option<TempDir>, Failure> {
     if mesh.join(manifest::FILE).exists() {
         return match source.is_given() {
             false => Ok(None),
@@ -63,7 +65,7 @@ fn imported(mesh: &Path, source: &Source) -> Result<Option<TempDir>, Failure> {
         };
     }
     let io = |error: std::io::Error| (EXIT_INPUT, error.to_string());
-    let set = source.read(mesh)?;
+    let set = source.read(mesh, case)?;
     let place = tempfile::tempdir().map_err(io)?;
     set.create(place.path()).map_err(io)?;
     Ok(Some(place))

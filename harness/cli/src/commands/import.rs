@@ -46,9 +46,9 @@ pub struct Source {
     /// Minimum corner and edge length of the root [default: that of the case, of the file, or derived from the cells]
     #[arg(long, value_name = "X,Y,Z,EDGE", value_parser = root, allow_hyphen_values = true)]
     root: Option<Root>,
-    /// The case that was meshed: its root and requirements
+    /// The case that was meshed, for its root and requirements: name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]
-    case: Option<PathBuf>,
+    case: Option<String>,
     /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: the sides are unknown]
     #[arg(long, value_name = "NAME")]
     sides: Option<String>,
@@ -74,36 +74,36 @@ impl Source {
             || *position != Position::default()
     }
 
+    /// Reads the case, if one is given.
+    ///
+    /// # Errors
+    /// If it is not in the catalogue, or is invalid.
+    pub fn read_case(&self) -> Result<Option<Case>, Failure> {
+        let read = |name: &String| {
+            let path = Paths::find().catalogue.case_file(name, Path::new(""))?;
+            Case::read(&path).map_err(|error| error.to_string())
+        };
+        self.case.as_ref().map(read).transpose().map_err(|why| (EXIT_INPUT, why))
+    }
+
     /// Reads the mesh.
     ///
     /// # Errors
     /// If it is not a usable mesh, or if Python or VTK is missing.
-    pub fn read(&self, mesh: &Path) -> Result<LeafSet, Failure> {
+    pub fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<LeafSet, Failure> {
         let input = |error: import::ImportError| (EXIT_INPUT, error.of_file(mesh).to_string());
-        let case = self.case.as_deref().map(Case::read).transpose();
-        let case = case.map_err(|error| (EXIT_INPUT, error.to_string()))?;
-        let root = self.root.or(case.as_ref().map(|case| case.root));
-        if let Some(root) = root.filter(|root| !is_cube(root)) {
-            return Err((
-                EXIT_INPUT,
-                format!("the root {root:?} is not finite, or its edge is not positive"),
-            ));
-        }
+        let root = self.root.or(case.map(|case| case.root));
         let format = self.format.map_or_else(|| import::guess(mesh), Ok).map_err(input)?;
         let request = Request { sides: self.sides.clone(), root, position: self.position };
         let limit = Duration::from_secs(self.timeout);
-        let cells =
-            run::import::read(mesh, format, &request, &Paths::find(), limit).map_err(|why| {
-                match why {
-                    Refusal::Input(error) => input(error),
-                    Refusal::Missing(why) => (EXIT_MISSING, why),
-                    Refusal::Interrupted => {
-                        (EXIT_INTERRUPTED, "interrupted by the user".to_owned())
-                    }
-                }
-            })?;
+        let cells = run::import::read(mesh, format, &request, &Paths::find(), limit);
+        let cells = cells.map_err(|why| match why {
+            Refusal::Input(error) => input(error),
+            Refusal::Missing(why) => (EXIT_MISSING, why),
+            Refusal::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+        })?;
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let set = import::leaf_set(&cells, root, case.as_ref(), program).map_err(input)?;
+        let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
         if root.is_none() && cells.root.is_none() {
             let Root { origin: [x, y, z], edge } = set.manifest.root;
             eprintln!(
@@ -114,13 +114,10 @@ impl Source {
     }
 }
 
-fn is_cube(root: &Root) -> bool {
-    root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())
-}
-
 /// Reads and writes; returns the exit code.
 pub fn run(Arguments { mesh, out, source }: &Arguments) -> u8 {
-    let imported = source.read(mesh).and_then(|set| {
+    let read = source.read_case().and_then(|case| source.read(mesh, case.as_ref()));
+    let imported = read.and_then(|set| {
         set.create(out).map_err(|error| (EXIT_INPUT, error.to_string()))?;
         Ok(set)
     });

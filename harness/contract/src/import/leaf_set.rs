@@ -25,6 +25,12 @@ pub fn leaf_set(
 ) -> Result<LeafSet, ImportError> {
     let stated = given.or(case.map(|case| case.root)).or(cells.root);
     let root = stated.map_or_else(|| root::derive(cells), Ok)?;
+    if !(root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())) {
+        return Err(ImportError::content(format!(
+            "has a root that is not a cube: corner {:?}, edge {}",
+            root.origin, root.edge
+        )));
+    }
     let words = cells.words(&root)?;
     let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
     let manifest = Manifest {
