@@ -85,7 +85,7 @@ fn foreign_meshes_are_audited_without_a_manifest() {
 fn a_case_gives_root_and_requirements() {
     let place = tempfile::tempdir().unwrap();
     let case = place.path().join("case.toml");
-    let text = "generator = { shape = \"cube\" }\nspacing_min = 0.25\nlayer_cells_min = 3\nkeep = \"all\"\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
+    let text = "generator = { shape = \"cube\", facets = 48 }\nspacing_min = 0.25\nlayer_cells_min = 3\nkeep = \"all\"\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
     fs::write(&case, text).unwrap();
     let case = case.to_str().unwrap();
     let (code, output, error) = result(&["audit", &sample("unitcube.p8est"), "--case", case]);

@@ -121,7 +121,7 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
         }
     };
     if manifest.sides == Sides::Unknown {
-        checks[0].note = without_sides(&mut of_tree, &terms);
+        checks[0].note = without_sides(&mut of_tree, manifest);
     }
     of_tree.iter_mut().for_each(|c| c.examined = leaves);
     checks.extend(of_tree);
@@ -129,8 +129,8 @@ fn checks(manifest: &Manifest, pass: Pass) -> Vec<CheckResult> {
 }
 
 /// Removes the checks that need sides, which would pass or fail by the meaningless codes in the words; returns a note.
-fn without_sides(checks: &mut Vec<CheckResult>, terms: &Terms) -> String {
-    let deletes = terms.keep != Keep::All || !terms.keep_crossing;
+fn without_sides(checks: &mut Vec<CheckResult>, manifest: &Manifest) -> String {
+    let deletes = manifest.keep != Keep::All || !manifest.keep_crossing;
     checks.retain(|c| c.name != "sides" && !(deletes && c.name == "complete"));
     let holes = if deletes { " and holes" } else { "" };
     format!("the sides of the leaves are unknown, so sides{holes} were not checked")
