@@ -176,7 +176,7 @@ fn no_damage_is_fatal() {
         .map(|&(name, _, _)| (name, ""));
     let mut refused = 0;
     for (name, file) in foam.chain(single) {
-        for round in 0..60 {
+        for round in 0..30 {
             let (_place, copy) = edited(name, file, |bytes| {
                 let begin = random(bytes.len() - 8);
                 match round % 3 {
@@ -188,7 +188,7 @@ fn no_damage_is_fatal() {
             refused += usize::from(imported(&copy, &Request::default()).is_err());
         }
     }
-    assert!(refused > 500, "{refused}");
+    assert!(refused > 250, "{refused}");
 }
 
 #[test]
@@ -234,7 +234,7 @@ fn each_error_of_a_mesh_names_its_cell() {
     assert!(face.contains("is not a cube: its faces enclose"), "{face}");
     let quadrant = refusal("unitcube.p8est", "", |bytes| {
         let second = bytes.len() - 16 * 105;
-        bytes[second..second + 4].copy_from_slice(&3i32.to_le_bytes());
+        bytes[second..second + 4].copy_from_slice(&8192i32.to_le_bytes());
     });
     assert!(
         quadrant.contains("cell 1 (corner") && quadrant.contains("is not aligned"),
