@@ -3,7 +3,7 @@
 //! - one module per format, which returns the cells of a file as cubes: [`words`](mod@words), [`npy`], [`text`], [`p4est`],
 //!   [`discretize`], [`foam`]. VTK's formats are read by VTK itself, which the crate `run` starts;
 //! - [`cells`]: cubes as leaf words, verified cell by cell; [`root`]: the root, if the file states none;
-//! - [`leaf_set`]: the mesh with its manifest.
+//! - [`leaf_set()`]: the mesh with its manifest.
 //!
 //! No reader allocates memory for a count before the file has been seen to be long enough for it.
 

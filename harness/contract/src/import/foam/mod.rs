@@ -5,6 +5,7 @@
 //! directory has it, must agree with the edges. The format states no root: see [`super::root`].
 
 mod file;
+mod lists;
 
 use super::cells::Cells;
 use super::{ImportError, Request, TOLERANCE, side};
