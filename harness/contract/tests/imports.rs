@@ -192,6 +192,18 @@ fn no_damage_is_fatal() {
 }
 
 #[test]
+fn a_compressed_or_missing_file_of_openfoam_is_named() {
+    let (_place, copy) = edited("foam-binary", "points", |_| {});
+    fs::rename(copy.join("points"), copy.join("points.gz")).unwrap();
+    let why = imported(&copy, &Request::default()).unwrap_err().to_string();
+    assert!(why.contains("points.gz: is compressed: decompress it with gunzip"), "{why}");
+    let (_place, copy) = edited("foam-binary", "points", |_| {});
+    fs::remove_file(copy.join("owner")).unwrap();
+    let why = imported(&copy, &Request::default()).unwrap_err().to_string();
+    assert!(why.contains("owner: cannot be read"), "{why}");
+}
+
+#[test]
 fn counts_beyond_the_file_are_errors() {
     // Vertices, trees, edges, and corners of the connectivity.
     for number in [2, 3, 4, 6] {

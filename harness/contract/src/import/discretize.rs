@@ -186,7 +186,9 @@ fn agrees(root: &Root, grid: &Grid) -> bool {
 fn numbers<T: std::str::FromStr>((line, text): (usize, &str)) -> Result<Vec<T>, ImportError> {
     let parse = |field: &str| {
         field.parse().map_err(|_| {
-            ImportError::content(format!("line {line} has {field:?}, which is not such a number"))
+            ImportError::content(format!(
+                "line {line} has {field:?}, which is not a valid number there"
+            ))
         })
     };
     text.split_whitespace().map(parse).collect()
