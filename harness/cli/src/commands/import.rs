@@ -47,7 +47,7 @@ pub struct Source {
     #[arg(long, value_name = "X,Y,Z,EDGE", value_parser = root, allow_hyphen_values = true)]
     root: Option<Root>,
     /// The case that was meshed, for its root and requirements: name in geometries/catalogue.toml or path of a case file
-    #[arg(long, value_name = "CASE")]
+    #[arg(long, value_name = "CASE", conflicts_with = "root")]
     case: Option<String>,
     /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: the sides are unknown]
     #[arg(long, value_name = "NAME")]
