@@ -125,12 +125,8 @@ impl Case {
             return Err(Error::input("the root's origin is not finite: give three numbers"));
         }
         let level_surface = root.level_of(self.spacing_min, "spacing_min")?;
-        let boxes = self
-            .boxes
-            .iter()
-            .enumerate()
-            .map(|(i, b)| b.on(&root, i))
-            .collect::<Result<_, _>>()?;
+        let boxes =
+            self.boxes.iter().enumerate().map(|(i, b)| b.on(&root, i)).collect::<Result<_, _>>()?;
         let seeds = (0..)
             .zip(&self.seeds)
             .map(|(number, &given)| on_lattice(given, &root, number))

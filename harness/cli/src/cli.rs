@@ -34,7 +34,7 @@ pub enum Command {
     Track(Box<commands::track::Arguments>),
     /// Reduce a failing case to the smallest one that fails in the same way
     Shrink(Box<commands::shrink::Arguments>),
-    /// Check a leaf-set directory of any size by itself
+    /// Check a mesh of any size and format by itself
     Audit(commands::audit::Arguments),
     /// Diagnose a geometry before meshing: its defects, and what each means for the mesh
     Geometry(commands::geometry::Arguments),
@@ -42,6 +42,8 @@ pub enum Command {
     Leak(Box<commands::leak::Arguments>),
     /// Write a leaf-set directory as a VTK unstructured grid for ParaView or pyvista
     Export(commands::export::Arguments),
+    /// Make a leaf-set directory from a mesh in another program's format
+    Import(commands::import::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides
     Diff(commands::diff::Arguments),
     /// Explain the size and the side of the leaf at a point, or find splits that nothing requires

@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Leak(arguments) => commands::leak::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Import(arguments) => commands::import::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Why(arguments) => commands::why::run(&arguments),
         Command::Completions(arguments) => {

@@ -5,7 +5,7 @@ use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 16] = [
     "verify",
     "selftest",
     "gate",
@@ -17,6 +17,7 @@ const COMMANDS: [&str; 15] = [
     "audit",
     "leak",
     "export",
+    "import",
     "diff",
     "why",
     "completions",

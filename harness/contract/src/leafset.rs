@@ -8,6 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::digest::Digest;
+use crate::files::write_atomically;
 use crate::manifest::{self, Manifest, Part, Tally};
 use crate::npy::{self, NpyError, PartFile};
 
@@ -176,6 +177,29 @@ impl LeafSet {
         };
         set.manifest.parts = set.parts.iter().enumerate().map(part).collect();
         set
+    }
+
+    /// Writes the mesh as a new directory, or into one that is empty. No partial file ever has its final name, and the
+    /// manifest is written last.
+    ///
+    /// # Errors
+    /// If the directory is not empty or a file cannot be written; the message names it.
+    pub fn create(&self, dir: &Path) -> std::io::Result<()> {
+        let named = |error: std::io::Error| {
+            std::io::Error::new(error.kind(), format!("{}: {error}", dir.display()))
+        };
+        fs::create_dir_all(dir).map_err(named)?;
+        if fs::read_dir(dir).map_err(named)?.next().is_some() {
+            return Err(named(std::io::Error::other("the directory is not empty: choose another")));
+        }
+        for (part, words) in self.manifest.parts.iter().zip(&self.parts) {
+            let fill = |out: &mut dyn std::io::Write| npy::write_to(out, words);
+            write_atomically(&dir.join(&part.file), fill).map_err(named)?;
+        }
+        write_atomically(&dir.join(manifest::FILE), |out| {
+            out.write_all(self.manifest.text().as_bytes())
+        })
+        .map_err(named)
     }
 
     /// Writes the mesh into an existing directory, whether or not its manifest is correct.

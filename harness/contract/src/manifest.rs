@@ -52,6 +52,23 @@ pub enum Tree {
     Final,
 }
 
+/// Whether the sides in the leaf words were found by the program that made the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// Every word holds the side of its leaf.
+    #[default]
+    Known,
+    /// The mesh has no sides, as one from a format that stores cells only. Every word holds `outside`, which means nothing.
+    Unknown,
+}
+
+impl Sides {
+    fn are_known(&self) -> bool {
+        *self == Self::Known
+    }
+}
+
 /// An extent box on the lattice, clamped to the root.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -159,6 +176,9 @@ pub struct Manifest {
     /// The treatment of enclosed components. A manifest without this key means [`Enclosed::Delete`].
     #[serde(default)]
     pub enclosed: Enclosed,
+    /// Whether the words hold sides. Written only if they do not.
+    #[serde(default, skip_serializing_if = "Sides::are_known")]
+    pub sides: Sides,
     /// Leaves in all parts.
     pub leaves: u64,
     /// Leaves by level.
@@ -194,6 +214,7 @@ impl Manifest {
             boxes: case.boxes.clone(),
             seeds: case.seeds_lattice.clone(),
             enclosed: case.enclosed,
+            sides: Sides::Known,
             leaves,
             leaves_by_level: by_level,
             leaves_by_side: by_side,
@@ -219,8 +240,12 @@ impl Manifest {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, directory: &Path) -> io::Result<()> {
-        let text = serde_json::to_string(self).expect("a manifest is representable in JSON");
-        fs::write(directory.join(FILE), text)
+        fs::write(directory.join(FILE), self.text())
+    }
+
+    /// The manifest as JSON.
+    pub fn text(&self) -> String {
+        serde_json::to_string(self).expect("a manifest is representable in JSON")
     }
 }
 

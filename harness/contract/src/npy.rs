@@ -1,7 +1,7 @@
 //! Part files: one-dimensional NumPy arrays of type `<u8`.
 
 use std::fs::File;
-use std::io::{Cursor, Read, Write};
+use std::io::{BufWriter, Cursor, Read, Write};
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -57,8 +57,7 @@ impl PartFile {
         let file = File::open(path)?;
         let mut head = Vec::new();
         (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head)?;
-        let mut cursor = Cursor::new(head);
-        let header = NpyHeader::from_reader(&mut cursor).map_err(NpyError::Header)?;
+        let (header, offset) = read_header(&head).map_err(NpyError::Header)?;
         match header.dtype() {
             DType::Plain(t) if t.to_string() == "<u8" => {}
             other => return Err(NpyError::Type(other.descr())),
@@ -66,7 +65,7 @@ impl PartFile {
         let &[len] = header.shape() else {
             return Err(NpyError::Shape(header.shape().to_vec()));
         };
-        let (offset, found) = (cursor.position(), file.metadata()?.len());
+        let found = file.metadata()?.len();
         let expected = u128::from(offset) + 8 * u128::from(len);
         if u128::from(found) != expected {
             return Err(NpyError::Length { found, expected, leaves: len });
@@ -192,15 +191,43 @@ impl MappedPart {
     }
 }
 
+/// The npy header at the beginning of a file, and its length.
+///
+/// # Errors
+/// If the bytes begin with no header, or with one of more items than can be counted, which npyz multiplies unchecked.
+pub(crate) fn read_header(head: &[u8]) -> std::io::Result<(NpyHeader, u64)> {
+    let head = &head[..head.len().min(HEADER_BYTES_MAX as usize)];
+    let text = String::from_utf8_lossy(head);
+    let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once(')'));
+    let mut items = shape
+        .map_or("", |(shape, _)| shape)
+        .split([',', '('])
+        .filter_map(|n| n.trim().parse().ok());
+    if items.try_fold(1u64, u64::checked_mul).is_none() {
+        return Err(std::io::Error::other("its shape has more items than can be counted"));
+    }
+    let mut cursor = Cursor::new(head);
+    let header = NpyHeader::from_reader(&mut cursor)?;
+    Ok((header, cursor.position()))
+}
+
 /// Writes words as a part file.
 ///
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
-    let shape = format!("({},)", words.len());
-    let mut bytes = header("<u8", &shape);
-    words.iter().for_each(|w| bytes.extend(w.to_le_bytes()));
-    File::create(path)?.write_all(&bytes)
+    let mut out = BufWriter::new(File::create(path)?);
+    write_to(&mut out, words)?;
+    out.flush()
+}
+
+/// Writes words in the format of a part file.
+///
+/// # Errors
+/// Whatever the writer returns.
+pub fn write_to(out: &mut dyn Write, words: &[u64]) -> std::io::Result<()> {
+    out.write_all(&header("<u8", &format!("({},)", words.len())))?;
+    words.iter().try_for_each(|w| out.write_all(&w.to_le_bytes()))
 }
 
 /// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does. It is not written by `npyz`,
@@ -258,6 +285,7 @@ mod tests {
         assert!(matches!(refused("<u8", "()", 8), NpyError::Shape(_)));
         assert!(matches!(refused("<u8", "(2,)", 15), NpyError::Length { .. }));
         assert!(matches!(refused("<u8", "(1,)", 16), NpyError::Length { .. }));
+        assert!(matches!(refused("<u8", "(4294967296, 4294967296)", 16), NpyError::Header(_)));
         let headless = file_of(b"not an array");
         assert!(matches!(PartFile::open(headless.path()), Err(NpyError::Header(_))));
     }

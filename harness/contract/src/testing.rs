@@ -104,6 +104,7 @@ pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
         boxes: Vec::new(),
         seeds: Vec::new(),
         enclosed: Enclosed::Delete,
+        sides: manifest::Sides::Known,
         leaves: 0,
         leaves_by_level: [0; 20],
         leaves_by_side: BySide::default(),

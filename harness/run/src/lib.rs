@@ -2,11 +2,13 @@
 //!
 //! - [`base_tree`]: base trees of a case at any level;
 //! - [`engine`]: finds, starts, watches and judges programs, and reads their run reports;
+//! - [`import`]: reads meshes in the formats of other programs, VTK's in Python;
 //! - [`oracle`]: classifies points with trimesh, open3d and pyvista, in Python;
 //! - [`verify`](mod@verify): runs engines on cases and checks the meshes.
 
 pub mod base_tree;
 pub mod engine;
+pub mod import;
 pub mod oracle;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -14,7 +14,7 @@ use crate::checks::{self, CheckResult, Terms};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset;
-use contract::manifest::{Keep, Manifest, Tree as Kind};
+use contract::manifest::{Keep, Manifest, Sides, Tree as Kind};
 use contract::tree::Tree;
 
 pub(crate) mod merge;
@@ -146,6 +146,10 @@ fn checks(manifest: &Manifest, pass: Pass, requirements: Requirements) -> Vec<Ch
         }
         _ => of_definition(manifest, &tree),
     };
+    if manifest.sides == Sides::Unknown {
+        let by_definition = matches!(requirements, Requirements::Definition);
+        of_tree.iter_mut().for_each(|check| without_sides(check, manifest, by_definition));
+    }
     of_tree.iter_mut().filter(|c| c.examined == 0 && c.was_run()).for_each(|c| c.examined = leaves);
     checks.extend(of_tree);
     checks
@@ -180,6 +184,16 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
         }
     };
     results.into_iter().map(|result| checks::with_premise(result, tree, None, &terms)).collect()
+}
+
+/// Withdraws the result of a check that needs the sides, which it took from meaningless codes in the words.
+fn without_sides(check: &mut CheckResult, manifest: &Manifest, by_definition: bool) {
+    let deletes = manifest.keep != Keep::All || !manifest.keep_crossing;
+    if ["sides", checks::kept::NAME].contains(&check.name)
+        || check.name == "complete" && deletes && by_definition
+    {
+        *check = CheckResult::nothing(check.name, "the sides of the leaves are unknown");
+    }
 }
 
 #[cfg(test)]
@@ -227,6 +241,31 @@ mod tests {
         unsorted.swap(3, 4);
         let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
         assert!(found(&report).contains(&"linear"));
+    }
+
+    /// The codes of unknown sides are all `outside`, which must neither pass for sides nor fail for holes.
+    #[test]
+    fn what_needs_unknown_sides_is_not_checked() {
+        let mut words = correct();
+        words.pop();
+        let mut set = leaf_set(vec![words]);
+        let names = |set: &LeafSet| -> Vec<_> {
+            audited(set, &AuditOptions::default())
+                .checks
+                .iter()
+                .map(|c| (c.name, c.holds()))
+                .collect()
+        };
+        assert!(names(&set).contains(&("sides", true)));
+        set.manifest.sides = Sides::Unknown;
+        assert!(
+            names(&set).contains(&("complete", false)) && !names(&set).contains(&("sides", true))
+        );
+        set.manifest.keep = Keep::Outside;
+        assert!(
+            names(&set).iter().all(|&(name, holds)| holds && name != "complete" && name != "sides")
+        );
+        assert!(audited(&set, &AuditOptions::default()).checks[0].note.contains("sides and holes"));
     }
 
     /// The audit must not pass if memory does not suffice, but it still checks counts and digests.

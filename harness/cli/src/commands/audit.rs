@@ -1,25 +1,26 @@
-//! `harness audit`: checks a leaf-set directory by itself, or against promises on a case.
+//! `harness audit`: checks a mesh by itself, or against promises on a case.
 
+use super::import::{Failure, Source};
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, Requirements, audit_against};
 use clap::Args;
 use contract::case::Case;
+use contract::manifest;
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// `harness audit`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// The leaf-set directory
+    /// A leaf-set directory, or a mesh in any format of harness import
     mesh: PathBuf,
-    /// Check these promises instead of the definition: name in harness/engines or path of a file with [promises]
+    /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines or path of a file
+    /// with [promises]
     #[arg(long, value_name = "ENGINE")]
     promises: Option<String>,
-    /// The case of the mesh, for promises about its geometry: name in geometries/catalogue.toml or path of a case file
-    #[arg(long, value_name = "CASE", requires = "promises")]
-    case: Option<String>,
     /// Exit code 3 if a check had nothing to check
     #[arg(long)]
     require_checks: bool,
@@ -29,51 +30,66 @@ pub struct Arguments {
     /// Write verdict, times and memory as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// How to read a mesh without a manifest.
+    #[command(flatten)]
+    source: Source,
 }
 
 /// Audits, prints and writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
-    try_run(arguments).unwrap_or_else(|why| {
+    audited(arguments).unwrap_or_else(|(code, why)| {
         eprintln!("harness: {why}");
-        EXIT_INPUT
+        code
     })
 }
 
-fn try_run(arguments: &Arguments) -> Result<u8, String> {
-    let mesh = &arguments.mesh;
-    if !mesh.is_dir() {
-        return Err(format!("{} is not a directory", mesh.display()));
-    }
-    let paths = Paths::find();
-    let engine =
-        arguments.promises.as_ref().map(|name| Description::find(name, &paths)).transpose()?;
-    let case = arguments.case.as_ref().map(|name| read_case(name, &paths)).transpose()?;
+fn audited(arguments: &Arguments) -> Result<u8, Failure> {
+    let Arguments { mesh, promises, require_checks, nodes_max, json, source } = arguments;
+    let input = |why| (EXIT_INPUT, why);
+    let find = |name: &String| Description::find(name, &Paths::find());
+    let engine = promises.as_ref().map(find).transpose().map_err(input)?;
+    let case = source.read_case()?;
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
         println!("left out: {why}");
-        return Ok(if arguments.require_checks { EXIT_MISSING } else { EXIT_HOLDS });
+        return Ok(if *require_checks { EXIT_MISSING } else { EXIT_HOLDS });
     }
+    // The temporary directory of an imported mesh lives as long as this value.
+    let imported = match mesh.join(manifest::FILE).exists() {
+        true if source.is_given(engine.is_some()) => {
+            let why =
+                "has a manifest, which states root, case and sides: omit the options for them";
+            return Err(input(format!("{} {why}", mesh.display())));
+        }
+        true => None,
+        false => Some(imported(mesh, source, case.as_ref())?),
+    };
+    let directory = imported.as_ref().map_or(mesh.as_path(), TempDir::path);
     let default = AuditOptions::default();
-    let options = AuditOptions { nodes_max: arguments.nodes_max.unwrap_or(default.nodes_max) };
+    let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let requirements = match &engine {
         Some(engine) => Requirements::Promises(&engine.promises, case.as_ref()),
         None => Requirements::Definition,
     };
-    let report = audit_against(mesh, &options, requirements);
+    let report = audit_against(directory, &options, requirements);
     println!("{report}");
-    if let Some(path) = &arguments.json {
+    if let Some(path) = json {
         let written = AuditRecord::of(&report).write(path);
-        written.map_err(|error| format!("{}: {error}", path.display()))?;
+        written.map_err(|error| input(format!("{}: {error}", path.display())))?;
     }
     Ok(match report.holds() {
         false => EXIT_FAILED,
-        true if arguments.require_checks && report.not_run().next().is_some() => EXIT_MISSING,
+        true if *require_checks && report.not_run().next().is_some() => EXIT_MISSING,
         true => EXIT_HOLDS,
     })
 }
 
-fn read_case(name: &str, paths: &Paths) -> Result<Case, String> {
-    let path = paths.catalogue.case_file(name, Path::new(""))?;
-    Case::read(&path).map_err(|error| error.to_string())
+/// The leaf set of a mesh without a manifest, in a temporary directory.
+fn imported(mesh: &Path, source: &Source, case: Option<&Case>) -> Result<TempDir, Failure> {
+    let io = |error: std::io::Error| (EXIT_INPUT, error.to_string());
+    let set = source.read(mesh, case)?;
+    let place = tempfile::tempdir().map_err(io)?;
+    set.create(place.path()).map_err(io)?;
+    Ok(place)
 }

@@ -4,6 +4,7 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use super::files::put;
+use super::values::root;
 use check::geometry::input::{Input, Requested};
 use check::geometry::{Options, diagnose};
 use clap::Args;
@@ -66,13 +67,4 @@ fn diagnosed(arguments: &Arguments) -> Result<u8, String> {
 fn write(path: &Path, diagnosis: &check::geometry::report::Diagnosis) -> Result<(), String> {
     let json = serde_json::to_string_pretty(diagnosis).map_err(|error| error.to_string())?;
     put(path, &(json + "\n")).map_err(|error| error.to_string())
-}
-
-/// Parses a root from four numbers.
-fn root(text: &str) -> Result<Root, String> {
-    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y, z, edge] if text.split(',').count() == 4 => Ok(Root { origin: [x, y, z], edge }),
-        _ => Err("give four numbers: X,Y,Z,EDGE".to_owned()),
-    }
 }

@@ -8,6 +8,7 @@ pub mod export;
 mod files;
 pub mod gate;
 pub mod geometry;
+pub mod import;
 pub mod leak;
 pub mod man;
 mod programs;

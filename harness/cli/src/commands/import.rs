@@ -1,0 +1,152 @@
+//! `harness import`: makes a leaf-set directory from a mesh in another program's format.
+
+use super::values::root;
+use clap::Args;
+use contract::case::Case;
+use contract::import::{self, Format, Position, Request};
+use contract::lattice::Root;
+use contract::leafset::LeafSet;
+use contract::manifest::Sides;
+use contract::word::{self, KEY_END};
+use run::engine::paths::Paths;
+use run::import::Refusal;
+use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// `harness import`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  harness import forest.p8est --root -4,-4,-4,8 --out mesh     the unit cube of the forest becomes this root
+  harness import cells.csv --case body.toml --out mesh         columns x, y, z, level; the root of the case
+  harness import mesh.vtu --sides side --out mesh              sides from a cell array: 0 outside, 1 inside, 2 crossing
+  harness import foam/constant/polyMesh --out mesh             the root is derived from the cells
+
+Every cell must be a cube of the oct-tree, within 0.01 of its edge, and no two may overlap. Exit codes: 0 success; 2 the
+file is not such a mesh, which is explained in one sentence, or cannot be written; 3 Python or VTK is missing (VTK's \
+formats only).")]
+pub struct Arguments {
+    /// The mesh: a file, or an OpenFOAM case or polyMesh
+    mesh: PathBuf,
+    /// The directory to make
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// How to read the mesh.
+    #[command(flatten)]
+    source: Source,
+}
+
+/// How to read a mesh in another program's format.
+#[derive(Args, Debug)]
+pub struct Source {
+    /// The format [default: recognised by content]
+    #[arg(long)]
+    format: Option<Format>,
+    /// Minimum corner and edge length of the root [default: that of the case, of the file, or derived from the cells]
+    #[arg(long, value_name = "X,Y,Z,EDGE", value_parser = root, allow_hyphen_values = true)]
+    root: Option<Root>,
+    /// The case that was meshed, for its root and requirements: name in geometries/catalogue.toml or path of a case file
+    #[arg(long, value_name = "CASE", conflicts_with = "root")]
+    case: Option<String>,
+    /// Cell array or column with the sides: 0 outside, 1 inside, 2 crossing [default: the sides are unknown]
+    #[arg(long, value_name = "NAME")]
+    sides: Option<String>,
+    /// What x, y and z are in a table
+    #[arg(long, value_enum, default_value_t)]
+    position: Position,
+    /// Time limit of VTK's reader
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = clap::value_parser!(u64).range(1..))]
+    timeout: u64,
+}
+
+/// Why there is no mesh: exit code and sentence.
+pub type Failure = (u8, String);
+
+impl Source {
+    /// Whether any option is given that has no effect on a leaf-set directory. A case has one if `with_promises`.
+    pub fn is_given(&self, with_promises: bool) -> bool {
+        let Self { format, root, case, sides, position, timeout: _ } = self;
+        format.is_some()
+            || root.is_some()
+            || case.is_some() && !with_promises
+            || sides.is_some()
+            || *position != Position::default()
+    }
+
+    /// Reads the case, if one is given.
+    ///
+    /// # Errors
+    /// If it is not in the catalogue, or is invalid.
+    pub fn read_case(&self) -> Result<Option<Case>, Failure> {
+        let read = |name: &String| {
+            let path = Paths::find().catalogue.case_file(name, Path::new(""))?;
+            Case::read(&path).map_err(|error| error.to_string())
+        };
+        self.case.as_ref().map(read).transpose().map_err(|why| (EXIT_INPUT, why))
+    }
+
+    /// Reads the mesh.
+    ///
+    /// # Errors
+    /// If it is not a usable mesh, or if Python or VTK is missing.
+    pub fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<LeafSet, Failure> {
+        let input = |error: import::ImportError| (EXIT_INPUT, error.of_file(mesh).to_string());
+        let root = self.root.or(case.map(|case| case.root));
+        let format = self.format.map_or_else(|| import::guess(mesh), Ok).map_err(input)?;
+        let request = Request { sides: self.sides.clone(), root, position: self.position };
+        let limit = Duration::from_secs(self.timeout);
+        let cells = run::import::read(mesh, format, &request, &Paths::find(), limit);
+        let cells = cells.map_err(|why| match why {
+            Refusal::Input(error) => input(error),
+            Refusal::Missing(why) => (EXIT_MISSING, why),
+            Refusal::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+        })?;
+        let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
+        let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
+        if root.is_none() && cells.root.is_none() {
+            let Root { origin: [x, y, z], edge } = set.manifest.root;
+            eprintln!(
+                "harness: the root {x},{y},{z},{edge} is the least that holds the cells; --root gives another"
+            );
+        }
+        Ok(set)
+    }
+}
+
+/// Reads and writes; returns the exit code.
+pub fn run(Arguments { mesh, out, source }: &Arguments) -> u8 {
+    let read = source.read_case().and_then(|case| source.read(mesh, case.as_ref()));
+    let imported = read.and_then(|set| {
+        set.create(out).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+        Ok(set)
+    });
+    match imported {
+        Ok(set) => {
+            println!("{}: {}", out.display(), summary(&set));
+            EXIT_HOLDS
+        }
+        Err((code, why)) => {
+            eprintln!("harness: {why}");
+            code
+        }
+    }
+}
+
+/// Number of cells, levels, sides, and the part of the root that they fill.
+fn summary(set: &LeafSet) -> String {
+    let levels: Vec<usize> =
+        (0..).zip(set.manifest.leaves_by_level).filter(|&(_, n)| n > 0).map(|(l, _)| l).collect();
+    let filled: u128 = set.words.iter().map(|&w| u128::from(word::span(word::level(w)))).sum();
+    let sides = match set.manifest.sides {
+        Sides::Known => "sides known",
+        Sides::Unknown => "sides unknown",
+    };
+    format!(
+        "{} cells of levels {} to {}, {sides}; they fill {:.6} % of the root",
+        set.words.len(),
+        levels.first().unwrap_or(&0),
+        levels.last().unwrap_or(&0),
+        100.0 * filled as f64 / KEY_END as f64
+    )
+}

@@ -1,0 +1,148 @@
+//! `harness import` and `harness audit` on meshes of other programs, as commands.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn harness(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.args(arguments).env("HARNESS_PYTHON", "/nowhere/python").output().unwrap()
+}
+
+fn sample(name: &str) -> String {
+    format!("{}/../contract/tests/samples/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Exit code, standard output and standard error.
+fn result(arguments: &[&str]) -> (i32, String, String) {
+    let output = harness(arguments);
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+fn digest(mesh: &Path) -> String {
+    let text = fs::read_to_string(mesh.join("mesh.json")).unwrap();
+    serde_json::from_str::<serde_json::Value>(&text).unwrap()["digest"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_mesh_is_imported_again_from_its_own_leaf_words() {
+    let place = tempfile::tempdir().unwrap();
+    let [first, second] = ["a", "b"].map(|name| place.path().join(name));
+    let (code, output, error) =
+        result(&["import", &sample("cube.json"), "--out", first.to_str().unwrap()]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    assert!(
+        output.contains(
+            "162 cells of levels 2 to 4, sides unknown; they fill 100.000000 % of the root"
+        ),
+        "{output}"
+    );
+    let words = first.join("leaves-00000.npy");
+    let arguments = [
+        "import",
+        words.to_str().unwrap(),
+        "--root",
+        "-1,2,0.5,2",
+        "--out",
+        second.to_str().unwrap(),
+    ];
+    assert_eq!(result(&arguments).0, 0);
+    assert_eq!(digest(&first), digest(&second));
+    // An existing mesh is not overwritten.
+    let (code, _, error) = result(&arguments);
+    assert!(code == 2 && error.contains("not empty"), "{error}");
+}
+
+#[test]
+fn a_derived_root_is_printed() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("mesh");
+    let (code, output, error) =
+        result(&["import", &sample("foam-binary"), "--out", out.to_str().unwrap()]);
+    assert_eq!((code, error.matches('\n').count()), (0, 1));
+    assert!(error.contains("the root -1,-1,-1,4 is the least that holds the cells"), "{error}");
+    assert!(output.contains("256 cells"), "{output}");
+}
+
+#[test]
+fn foreign_meshes_are_audited_without_a_manifest() {
+    for (name, leaves) in [("cube.json", 162), ("unitcube.p8est", 106)] {
+        let (code, output, error) = result(&["audit", &sample(name)]);
+        assert_eq!((code, error.as_str()), (0, ""), "{output}");
+        assert!(
+            output.contains(&format!("{leaves} leaves"))
+                && output.contains("sides were not checked"),
+            "{output}"
+        );
+    }
+    // This mesh fills half of its root, of which nothing states that a part is deleted.
+    let (code, output, _) = result(&["audit", &sample("flat.msh")]);
+    assert!(code == 1 && output.contains("has a hole across a face"), "{output}");
+}
+
+#[test]
+fn a_case_gives_root_and_requirements() {
+    let place = tempfile::tempdir().unwrap();
+    let case = place.path().join("case.toml");
+    let text = "generator = { shape = \"cube\", facets = 48 }\nspacing_min = 0.25\nlayer_cells_min = 3\nkeep = \"all\"\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
+    fs::write(&case, text).unwrap();
+    let case = case.to_str().unwrap();
+    let (code, output, error) = result(&["audit", &sample("unitcube.p8est"), "--case", case]);
+    assert_eq!((code, error.as_str()), (1, ""), "{output}");
+    assert!(
+        output.lines().any(|line| line.starts_with("layer") && line.contains("finding")),
+        "{output}"
+    );
+    assert!(
+        output.lines().any(|line| line.starts_with("balance") && line.contains("holds")),
+        "{output}"
+    );
+    let (code, _, error) = result(&["audit", &sample("unitcube.p8est"), "--case", "no-such-case"]);
+    assert!(code == 2 && error.contains("no-such-case"), "{error}");
+}
+
+#[test]
+fn unusable_input_is_one_sentence_with_the_file() {
+    let place = tempfile::tempdir().unwrap();
+    let (out, empty) = (place.path().join("out"), place.path().join("empty"));
+    fs::create_dir(&empty).unwrap();
+    let bare = place.path().join("bare");
+    fs::create_dir(&bare).unwrap();
+    fs::write(bare.join("leaves-00000.npy"), "").unwrap();
+    let refused = |arguments: &[&str]| {
+        let all: Vec<&str> =
+            ["import", "--out", out.to_str().unwrap()].iter().chain(arguments).copied().collect();
+        let (code, output, error) = result(&all);
+        assert_eq!((code, output.as_str(), error.matches('\n').count()), (2, "", 1), "{error}");
+        assert!(!out.exists());
+        error
+    };
+    assert!(refused(&["/nowhere/mesh"]).contains("/nowhere/mesh: cannot be read"));
+    assert!(refused(&[empty.to_str().unwrap()]).contains("--format"));
+    assert!(refused(&[bare.to_str().unwrap()]).contains("--format leaf-words"));
+    assert!(
+        refused(&[&sample("cube.csv"), "--root", "0,0,0,1"]).contains("cube.csv: cell 0 (corner")
+    );
+    assert!(refused(&[&sample("cube.csv"), "--root", "0,0,0,-1"]).contains("is not a cube"));
+    assert!(refused(&[&sample("cube.json"), "--format", "p4est"]).contains("p8est"));
+}
+
+#[test]
+fn vtk_files_need_python() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("mesh.vtu");
+    fs::write(&file, "<VTKFile type=\"UnstructuredGrid\">").unwrap();
+    let (code, _, error) = result(&["audit", file.to_str().unwrap()]);
+    assert!(code == 3 && error.contains("/nowhere/python"), "{error}");
+}
+
+#[test]
+fn options_that_contradict_a_manifest_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let mesh = place.path().join("mesh");
+    assert_eq!(result(&["import", &sample("cube.json"), "--out", mesh.to_str().unwrap()]).0, 0);
+    assert_eq!(result(&["audit", mesh.to_str().unwrap()]).0, 0);
+    let (code, _, error) = result(&["audit", mesh.to_str().unwrap(), "--root", "0,0,0,1"]);
+    assert!(code == 2 && error.contains("has a manifest"), "{error}");
+}

@@ -1,0 +1,90 @@
+//! Imported cells as a leaf set with its manifest.
+
+use super::cells::Cells;
+use super::{ImportError, root};
+use crate::case::Case;
+use crate::digest::Digest;
+use crate::lattice::Root;
+use crate::leafset::LeafSet;
+use crate::manifest::{self, Ambiguous, BySide, Keep, Manifest, Sides};
+use crate::octant::LEVEL_MAX;
+use crate::word;
+
+/// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
+///
+/// The manifest states the requirements of the case. Without one it requires nothing beyond 2:1 balance: n is 1, no box
+/// exists, and the surface has the level of the finest cell. All of the root is then expected to be filled.
+///
+/// # Errors
+/// If the cells are not leaves of an oct-tree with this root.
+pub fn leaf_set(
+    cells: &Cells,
+    given: Option<Root>,
+    case: Option<&Case>,
+    program: String,
+) -> Result<LeafSet, ImportError> {
+    let stated = given.or(case.map(|case| case.root)).or(cells.root);
+    let root = stated.map_or_else(|| root::derive(cells), Ok)?;
+    if !(root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())) {
+        return Err(ImportError::content(format!(
+            "has a root that is not a cube: corner {:?}, edge {}",
+            root.origin, root.edge
+        )));
+    }
+    let words = cells.words(&root)?;
+    let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
+    let manifest = Manifest {
+        schema: manifest::SCHEMA.to_owned(),
+        program,
+        tree: manifest::Tree::Final,
+        root,
+        level_surface: case.map_or(finest, |case| case.level_surface),
+        layer_cells_min: case.map_or(1, |case| case.layer_cells_min),
+        keep: case.map_or(Keep::All, |case| case.keep),
+        keep_crossing: case.is_none_or(|case| case.keep_crossing),
+        boxes: case.map(|case| case.boxes.clone()).unwrap_or_default(),
+        seeds: case.map(|case| case.seeds_lattice.clone()).unwrap_or_default(),
+        enclosed: case.map(|case| case.enclosed).unwrap_or_default(),
+        sides: if cells.sides.is_some() { Sides::Known } else { Sides::Unknown },
+        leaves: 0,
+        leaves_by_level: [0; LEVEL_MAX as usize + 1],
+        leaves_by_side: BySide::default(),
+        components: None,
+        components_ambiguous: Ambiguous::default(),
+        digest: Digest::default(),
+        octant_digests: Vec::new(),
+        parts: Vec::new(),
+    };
+    Ok(LeafSet::new(manifest, Vec::new()).with_parts(vec![words]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::testing::cells_of;
+    use crate::testing::words_of;
+
+    const ROOT: Root = Root { origin: [1.0; 3], edge: 0.3 };
+
+    #[test]
+    fn an_imported_mesh_has_a_complete_manifest() {
+        let words = words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3]);
+        let mut cells = cells_of(&words, &ROOT);
+        let set = leaf_set(&cells, Some(ROOT), None, "test".to_owned()).unwrap();
+        assert_eq!(set.manifest.digest, Digest::of(&words));
+        assert_eq!(
+            (set.manifest.leaves, set.manifest.level_surface, set.manifest.sides),
+            (22, 3, Sides::Known)
+        );
+        cells.sides = None;
+        let set = leaf_set(&cells, None, None, "test".to_owned()).unwrap();
+        assert_eq!((&set.words, set.manifest.sides), (&words, Sides::Unknown));
+        let place = tempfile::tempdir().unwrap();
+        set.create(&place.path().join("mesh")).unwrap();
+        let again = crate::leafset::read(&place.path().join("mesh")).unwrap();
+        assert_eq!((again.manifest, again.words), (set.manifest.clone(), words));
+        assert!(
+            set.create(&place.path().join("mesh")).unwrap_err().to_string().contains("not empty")
+        );
+    }
+}

@@ -1,0 +1,244 @@
+//! Meshes in the formats of other programs, as leaf sets.
+//!
+//! - one module per format, which returns the cells of a file as cubes: [`words`](mod@words), [`npy`], [`text`], [`p4est`],
+//!   [`discretize`], [`foam`]. VTK's formats are read by VTK itself, which the crate `run` starts;
+//! - [`cells`]: cubes as leaf words, verified cell by cell; [`root`]: the root, if the file states none;
+//! - [`leaf_set()`]: the mesh with its manifest.
+//!
+//! No reader allocates memory for a count before the file has been seen to be long enough for it.
+
+pub mod cells;
+pub mod discretize;
+pub mod foam;
+mod leaf_set;
+pub mod npy;
+pub mod p4est;
+pub mod root;
+mod table;
+#[cfg(test)]
+mod testing;
+pub mod text;
+pub mod words;
+
+use crate::lattice::Root;
+use crate::manifest;
+use crate::word::Side;
+use cells::Cells;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+pub use leaf_set::leaf_set;
+
+/// Greatest distance of a corner from its place in the oct-tree, and greatest difference of an edge, in edges of the
+/// cell. Coordinates in single precision need more than rounding errors of double precision.
+pub const TOLERANCE: f64 = 0.01;
+
+/// A format of mesh files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Leaf words in one .npy file, or in the parts of a directory without a manifest
+    LeafWords,
+    /// A NumPy array of x, y, z and level or edge
+    Npy,
+    /// Lines of x, y, z and level or edge, with or without a header
+    Csv,
+    /// VTK: legacy .vtk, .vtu, .pvtu, .htg, and VTKHDF with a hyper-tree grid or unstructured grid
+    Vtk,
+    /// A forest that p4est wrote with p8est_save
+    P4est,
+    /// A discretize TreeMesh: UBC text, or JSON
+    Discretize,
+    /// An OpenFOAM polyMesh, ASCII or binary
+    Openfoam,
+}
+
+/// The place of a cell that x, y and z give in a table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Position {
+    /// The minimum corner, in the units of the geometry
+    #[default]
+    Corner,
+    /// The centre, in the units of the geometry
+    Centre,
+    /// The number of cells of its own level from the minimum corner of the root
+    Index,
+}
+
+/// What a reader needs besides the file.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// Name of the cell array that holds the sides.
+    pub sides: Option<String>,
+    /// The root, if it is not that of the file.
+    pub root: Option<Root>,
+    /// The meaning of x, y and z in a table.
+    pub position: Position,
+}
+
+/// Why a file was not imported, in one sentence.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ImportError(String);
+
+impl ImportError {
+    /// The file has content that is not a mesh, or not one that fits.
+    pub fn content(why: impl Into<String>) -> Self {
+        Self(why.into())
+    }
+
+    /// The error with the path of the file before it.
+    #[must_use]
+    pub fn of_file(self, path: &Path) -> Self {
+        Self(format!("{}: {}", path.display(), self.0))
+    }
+}
+
+impl From<io::Error> for ImportError {
+    fn from(error: io::Error) -> Self {
+        Self(format!("cannot be read: {error}"))
+    }
+}
+
+/// The format of a file or directory, from its content.
+///
+/// # Errors
+/// If it cannot be read, or has none of the formats. Parts of a leaf set without a manifest must be requested by their
+/// format: a program that writes manifests did not finish such a directory.
+pub fn guess(path: &Path) -> Result<Format, ImportError> {
+    let is_directory = fs::metadata(path)?.is_dir();
+    if is_directory && path.join(manifest::part_name(0)).is_file() {
+        return Err(ImportError::content(format!(
+            "has parts and no {}, so the program that wrote them may not have finished: if it writes none, choose \
+             --format leaf-words",
+            manifest::FILE
+        )));
+    }
+    let format = match is_directory {
+        true => foam::poly_mesh(path).map(|_| Format::Openfoam),
+        false => of_content(&head(path)?),
+    };
+    format.ok_or_else(|| {
+        ImportError::content("its format was not recognised: choose one with --format (see --help)")
+    })
+}
+
+/// The first bytes of a file.
+fn head(path: &Path) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    File::open(path)?.take(4096).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+fn of_content(head: &[u8]) -> Option<Format> {
+    let starts = |with: &[u8]| head.starts_with(with);
+    if starts(b"\x93NUMPY") {
+        let text = String::from_utf8_lossy(head);
+        let is_words = text.contains("'descr': '<u8'") && text.contains(",), ");
+        return Some(if is_words { Format::LeafWords } else { Format::Npy });
+    }
+    if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") {
+        return Some(Format::Vtk);
+    }
+    if starts(b"p8est\0\0\0") {
+        return Some(Format::P4est);
+    }
+    // Binary data may follow in the same file.
+    if head.windows(8).any(|bytes| bytes == b"<VTKFile") {
+        return Some(Format::Vtk);
+    }
+    let text = std::str::from_utf8(&head[..head.len() - incomplete(head)]).ok()?;
+    if text.trim_start().starts_with('{') {
+        return Some(Format::Discretize);
+    }
+    let first = text.lines().find(|line| !text::is_comment(line) && !line.starts_with('!'))?;
+    match text::fields(first).count() {
+        3 => Some(Format::Discretize),
+        n if n > 3 => Some(Format::Csv),
+        _ => None,
+    }
+}
+
+/// Number of bytes of an incomplete UTF-8 character at the end.
+fn incomplete(head: &[u8]) -> usize {
+    match std::str::from_utf8(head) {
+        Err(error) if error.error_len().is_none() => head.len() - error.valid_up_to(),
+        _ => 0,
+    }
+}
+
+/// Reads the cells of a file in any format but VTK's.
+///
+/// # Errors
+/// If the file cannot be read, or is not of this format.
+pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, ImportError> {
+    match format {
+        Format::LeafWords => words::read(path, request),
+        Format::Npy => npy::read(path, request),
+        Format::Csv => text::read(path, request),
+        Format::P4est => p4est::read(path, request),
+        Format::Discretize => discretize::read(path, request),
+        Format::Openfoam => foam::read(path, request),
+        Format::Vtk => Err(ImportError::content("VTK's formats are read by VTK itself")),
+    }
+}
+
+/// The side with this code in a cell array.
+fn side(code: f64, cell: usize) -> Result<Side, ImportError> {
+    let known = Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code);
+    known.ok_or_else(|| {
+        ImportError::content(format!(
+            "cell {cell} has the side {code}, and the sides are 0 (outside), 1 (inside) and 2 (crossing)"
+        ))
+    })
+}
+
+/// The error for a format without named cell arrays, if sides are requested.
+fn refuse_sides(request: &Request, format: &str) -> Result<(), ImportError> {
+    match &request.sides {
+        None => Ok(()),
+        Some(_) => {
+            Err(ImportError::content(format!("{format} has no named cell arrays: omit --sides")))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_recognised_by_content() {
+        let words = crate::npy::header("<u8", "(5,)");
+        let rows = crate::npy::header("<f8", "(5, 4)");
+        let cases: [(&[u8], Option<Format>); 15] = [
+            (b"<VTKFile type=\"UnstructuredGrid\">\n<AppendedData>_\xff\xfe", Some(Format::Vtk)),
+            (&words, Some(Format::LeafWords)),
+            (&rows, Some(Format::Npy)),
+            (&crate::npy::header("<u8", "(5, 4)"), Some(Format::Npy)),
+            (b"# vtk DataFile Version 3.0\n", Some(Format::Vtk)),
+            (b"<?xml version=\"1.0\"?>\n<VTKFile type=\"HyperTreeGrid\">", Some(Format::Vtk)),
+            (b"\x89HDF\r\n\x1a\n\0\0", Some(Format::Vtk)),
+            (b"p8est\0\0\x002.2", Some(Format::P4est)),
+            (b"{\"h\": [[1.0", Some(Format::Discretize)),
+            (b"! octree\n16 16 16\n0 0 8\n", Some(Format::Discretize)),
+            (b"# made by hand\nx,y,z,level\n0,0,0,1\n", Some(Format::Csv)),
+            (b"0 0 0 1\n", Some(Format::Csv)),
+            (b"p4est\0\0\0", None),
+            (b"", None),
+            (b"solid body\n", None),
+        ];
+        for (content, expected) in cases {
+            assert_eq!(of_content(content), expected, "{}", String::from_utf8_lossy(content));
+        }
+    }
+
+    #[test]
+    fn a_path_that_is_no_mesh_is_an_error() {
+        let empty = tempfile::tempdir().unwrap();
+        assert!(guess(empty.path()).unwrap_err().to_string().contains("--format"));
+        assert!(
+            guess(&empty.path().join("absent")).unwrap_err().to_string().contains("cannot be read")
+        );
+    }
+}

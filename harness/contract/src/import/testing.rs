@@ -1,0 +1,23 @@
+//! Foreign files for tests.
+
+use super::cells::Cells;
+use crate::lattice::Root;
+use crate::word;
+use std::io::Write;
+
+/// The cells of leaf words.
+pub(crate) fn cells_of(words: &[u64], root: &Root) -> Cells {
+    let mut cells = Cells::default();
+    for octant in words.iter().map(|&w| word::octant(w)) {
+        cells.push(root.to_user(octant.bounds().0), root.edge / f64::from(1u32 << octant.level));
+    }
+    cells.sides = Some(words.iter().map(|&w| word::side(w)).collect());
+    cells
+}
+
+/// A temporary file with this content.
+pub(crate) fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    file.write_all(bytes).unwrap();
+    file
+}

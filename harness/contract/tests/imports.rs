@@ -1,0 +1,279 @@
+//! Meshes that other programs wrote are imported as the cells that those programs state; damaged ones are refused.
+
+use contract::import::{self, Format, ImportError, Request, leaf_set};
+use contract::lattice::Root;
+use contract::leafset::LeafSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Every sample, the cells that its program states, and its root as origin and edge.
+const SAMPLES: [(&str, &str, [f64; 4]); 10] = [
+    ("unitcube.p8est", "unitcube.csv", [0.0, 0.0, 0.0, 1.0]),
+    ("brick.p8est", "brick.csv", [0.0, 0.0, 0.0, 4.0]),
+    ("cube.json", "cube.csv", [-1.0, 2.0, 0.5, 2.0]),
+    ("cube.msh", "cube.csv", [-1.0, 2.0, 0.5, 2.0]),
+    ("flat.json", "flat.csv", [0.0, 0.0, -1.0, 8.0]),
+    ("flat.msh", "flat.csv", [0.0, 0.0, -1.0, 8.0]),
+    ("rounded.json", "rounded.csv", [0.0, 0.0, 0.0, 0.25]),
+    ("foam-ascii", "foam.csv", [-1.0, -1.0, -1.0, 4.0]),
+    ("foam-binary", "foam.csv", [-1.0, -1.0, -1.0, 4.0]),
+    ("unitcube.csv", "unitcube.csv", [0.0, 0.0, 0.0, 1.0]),
+];
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples").join(name)
+}
+
+fn root([x, y, z, edge]: [f64; 4]) -> Root {
+    Root { origin: [x, y, z], edge }
+}
+
+fn imported(path: &Path, request: &Request) -> Result<LeafSet, ImportError> {
+    let cells = import::read(path, import::guess(path)?, request)?;
+    leaf_set(&cells, request.root, None, "test".to_owned())
+}
+
+/// The leaves of a table of corners and edges.
+fn leaves(table: &str, root: Root) -> Vec<u64> {
+    let request = Request { root: Some(root), ..Request::default() };
+    imported(&sample(table), &request).unwrap().words
+}
+
+#[test]
+fn every_sample_is_imported_as_its_program_states_its_cells() {
+    for (name, table, expected) in SAMPLES {
+        let set = imported(&sample(name), &Request::default()).unwrap();
+        let Root { origin, edge } = set.manifest.root;
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(
+            (0..3).all(|a| near(origin[a], expected[a])) && near(edge, expected[3]),
+            "{name}: {:?}",
+            set.manifest.root
+        );
+        assert_eq!(set.words, leaves(table, root(expected)), "{name}");
+        assert!(set.words.len() > 90, "{name}");
+    }
+}
+
+#[test]
+fn a_given_root_moves_a_forest() {
+    let given = root([-4.0, -4.0, -4.0, 8.0]);
+    let request = Request { root: Some(given), ..Request::default() };
+    for (name, table, own) in &SAMPLES[..2] {
+        let set = imported(&sample(name), &request).unwrap();
+        assert_eq!((set.manifest.root, set.words), (given, leaves(table, root(*own))));
+    }
+}
+
+#[test]
+fn a_given_root_replaces_one_that_the_file_rounded() {
+    let exact = root([0.0, 0.0, 0.0, 0.25]);
+    let set =
+        imported(&sample("rounded.msh"), &Request { root: Some(exact), ..Request::default() })
+            .unwrap();
+    assert_eq!((set.manifest.root, set.words), (exact, leaves("rounded.csv", exact)));
+    // This root is not the file's: cells stay where they are, and do not fit.
+    let other = Request { root: Some(root([0.0, 0.0, 0.0, 0.3])), ..Request::default() };
+    assert!(imported(&sample("rounded.msh"), &other).unwrap_err().to_string().contains("cell 0"));
+}
+
+#[test]
+fn a_larger_root_holds_the_same_cells() {
+    let request = Request { root: Some(root([-9.0, -6.0, -7.5, 16.0])), ..Request::default() };
+    let set = imported(&sample("cube.json"), &request).unwrap();
+    assert_eq!(set.words.len(), leaves("cube.csv", root([-1.0, 2.0, 0.5, 2.0])).len());
+}
+
+#[test]
+fn formats_without_cell_arrays_refuse_sides() {
+    let request = Request { sides: Some("body".into()), ..Request::default() };
+    for name in ["unitcube.p8est", "cube.json", "cube.msh"] {
+        assert!(
+            imported(&sample(name), &request).unwrap_err().to_string().contains("omit --sides")
+        );
+    }
+    assert!(imported(&sample("foam-ascii"), &request).unwrap_err().to_string().contains("body"));
+}
+
+/// A copy of a sample in which `change` has edited one file.
+fn edited(
+    name: &str,
+    file: &str,
+    change: impl FnOnce(&mut Vec<u8>),
+) -> (tempfile::TempDir, PathBuf) {
+    let place = tempfile::tempdir().unwrap();
+    let copy = place.path().join("mesh");
+    match sample(name).is_dir() {
+        false => fs::copy(sample(name), &copy).map(drop).unwrap(),
+        true => {
+            fs::create_dir(&copy).unwrap();
+            for entry in fs::read_dir(sample(name)).unwrap() {
+                let entry = entry.unwrap();
+                fs::copy(entry.path(), copy.join(entry.file_name())).unwrap();
+            }
+        }
+    }
+    let path = if file.is_empty() { copy.clone() } else { copy.join(file) };
+    let mut bytes = fs::read(&path).unwrap();
+    change(&mut bytes);
+    fs::write(&path, bytes).unwrap();
+    (place, copy)
+}
+
+/// The sentence with which an edited sample is refused.
+fn refusal(name: &str, file: &str, change: impl FnOnce(&mut Vec<u8>)) -> String {
+    let (_place, copy) = edited(name, file, change);
+    let why = imported(&copy, &Request::default()).unwrap_err().to_string();
+    assert!(why.len() > 10 && !why.contains('\n'), "{why}");
+    why
+}
+
+fn replace(bytes: &mut Vec<u8>, from: &str, to: &str) {
+    let at = bytes
+        .windows(from.len())
+        .position(|w| w == from.as_bytes())
+        .expect("the text is in the sample");
+    bytes.splice(at..at + from.len(), to.bytes());
+}
+
+#[test]
+fn sides_of_an_openfoam_mesh_are_a_list_of_labels() {
+    let (_place, copy) = edited("foam-ascii", "cellLevel", |_| {});
+    let list = fs::read_to_string(copy.join("cellLevel")).unwrap();
+    fs::write(copy.join("body"), list).unwrap();
+    let set =
+        imported(&copy, &Request { sides: Some("body".into()), ..Request::default() }).unwrap();
+    let inside = set.manifest.leaves_by_side.inside;
+    assert!(inside > 0 && inside < set.manifest.leaves);
+    assert_eq!(set.manifest.sides, contract::manifest::Sides::Known);
+}
+
+#[test]
+fn an_incomplete_file_is_an_error() {
+    let files = ["points", "faces", "owner", "neighbour", "cellLevel"];
+    let foam = files.into_iter().flat_map(|file| [("foam-ascii", file), ("foam-binary", file)]);
+    let single = SAMPLES[..7].iter().map(|&(name, _, _)| (name, ""));
+    for (name, file) in foam.chain(single) {
+        for part in [0.0, 0.1, 0.5, 0.9] {
+            refusal(name, file, |bytes| bytes.truncate((bytes.len() as f64 * part) as usize));
+        }
+    }
+}
+
+/// No change of bytes causes a panic, a hang, or an allocation that a count alone determines.
+#[test]
+fn no_damage_is_fatal() {
+    let mut state = 1u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize % below
+    };
+    let files = ["points", "faces", "owner", "neighbour", "cellLevel"];
+    let foam = files.into_iter().flat_map(|file| [("foam-ascii", file), ("foam-binary", file)]);
+    let single = SAMPLES
+        .iter()
+        .filter(|(name, _, _)| !name.starts_with("foam"))
+        .map(|&(name, _, _)| (name, ""));
+    let mut refused = 0;
+    for (name, file) in foam.chain(single) {
+        for round in 0..30 {
+            let (_place, copy) = edited(name, file, |bytes| {
+                let begin = random(bytes.len() - 8);
+                match round % 3 {
+                    0 => bytes[begin] = random(256) as u8,
+                    1 => bytes[begin..begin + 8].fill([0, 0x7f, 0xff, b'9'][random(4)]),
+                    _ => drop(bytes.drain(begin..begin + 1 + random(7))),
+                }
+            });
+            refused += usize::from(imported(&copy, &Request::default()).is_err());
+        }
+    }
+    assert!(refused > 250, "{refused}");
+}
+
+#[test]
+fn a_compressed_or_missing_file_of_openfoam_is_named() {
+    let (_place, copy) = edited("foam-binary", "points", |_| {});
+    fs::rename(copy.join("points"), copy.join("points.gz")).unwrap();
+    let why = imported(&copy, &Request::default()).unwrap_err().to_string();
+    assert!(why.contains("points.gz: is compressed: decompress it with gunzip"), "{why}");
+    let (_place, copy) = edited("foam-binary", "points", |_| {});
+    fs::remove_file(copy.join("owner")).unwrap();
+    let why = imported(&copy, &Request::default()).unwrap_err().to_string();
+    assert!(why.contains("owner: cannot be read"), "{why}");
+}
+
+#[test]
+fn counts_beyond_the_file_are_errors() {
+    // Vertices, trees, edges, and corners of the connectivity.
+    for number in [2, 3, 4, 6] {
+        for count in [1 << 20, 1 << 40, u64::MAX / 24 + 1, u64::MAX] {
+            refusal("brick.p8est", "", |bytes| {
+                bytes[32 + 8 * number..][..8].copy_from_slice(&count.to_le_bytes())
+            });
+        }
+    }
+    for count in ["999999999999", "18446744073709551615", "99999999999999999999999999"] {
+        refusal("foam-binary", "points", |bytes| {
+            replace(bytes, "\n462\n", &format!("\n{count}\n"))
+        });
+        refusal("foam-ascii", "owner", |bytes| {
+            replace(bytes, "\n960\n(", &format!("\n{count}\n("))
+        });
+        refusal("foam-ascii", "cellLevel", |bytes| {
+            replace(bytes, "\n256\n(", &format!("\n{count}{{0}}\n("))
+        });
+    }
+}
+
+#[test]
+fn each_error_of_a_mesh_names_its_cell() {
+    let moved = refusal("foam-ascii", "points", |bytes| replace(bytes, "(0 -1 -1)", "(0.2 -1 -1)"));
+    assert!(moved.contains("cell 0 (corner [-1.0, -1.0, -1.0]) is not a cube"), "{moved}");
+    let level =
+        refusal("foam-ascii", "cellLevel", |bytes| replace(bytes, "(\n0\n0\n0\n", "(\n0\n0\n1\n"));
+    assert!(
+        level.contains("cell 2 has level 1 and edge 1, but cell 0 has level 0 and edge 1"),
+        "{level}"
+    );
+    let face = refusal("foam-ascii", "faces", |bytes| {
+        let at = String::from_utf8_lossy(bytes).find("\n4(").unwrap();
+        let end = bytes[at..].iter().position(|&b| b == b')').unwrap() + at;
+        let text = String::from_utf8_lossy(&bytes[at + 3..end]).into_owned();
+        let first = text.split(' ').next().unwrap();
+        bytes.splice(at + 3..end, [first; 4].join(" ").bytes());
+    });
+    assert!(face.contains("is not a cube: its faces enclose"), "{face}");
+    let quadrant = refusal("unitcube.p8est", "", |bytes| {
+        let second = bytes.len() - 16 * 105;
+        bytes[second..second + 4].copy_from_slice(&8192i32.to_le_bytes());
+    });
+    assert!(
+        quadrant.contains("cell 1 (corner") && quadrant.contains("is not aligned"),
+        "{quadrant}"
+    );
+    let overlap = refusal("cube.msh", "", |bytes| replace(bytes, "\n5 1 1 4\n", "\n1 1 1 4\n"));
+    assert!(overlap.contains("cell 1 ") && overlap.contains("overlaps cell 0 "), "{overlap}");
+    let index = refusal("cube.json", "", |bytes| replace(bytes, "[[2, 2, 2], ", "[[2, 2, 1], "));
+    assert!(index.contains("cell 0 (corner"), "{index}");
+}
+
+#[test]
+fn widths_that_vary_are_an_error() {
+    let json = refusal("cube.json", "", |bytes| replace(bytes, "[[0.125, 0.125", "[[0.125, 0.25"));
+    assert!(json.contains("widths 0.125 and 0.25 along axis 1"), "{json}");
+    let text =
+        refusal("cube.msh", "", |bytes| replace(bytes, "0.125 0.125 0.125", "0.125 0.250 0.125"));
+    assert!(text.contains("only cubes"), "{text}");
+}
+
+#[test]
+fn the_format_can_be_given() {
+    let read = |format| import::read(&sample("cube.csv"), format, &Request::default());
+    assert!(read(Format::Csv).is_ok());
+    for format in
+        [Format::P4est, Format::Discretize, Format::Openfoam, Format::Npy, Format::LeafWords]
+    {
+        assert!(read(format).is_err(), "{format:?}");
+    }
+}

@@ -1,0 +1,228 @@
+"""Reads a mesh of cubes in one of VTK's formats, for `harness import`.
+
+    python import_vtk.py FILE CELLS.npy [NAME]
+
+FILE is a legacy .vtk file, .vtu, .pvtu, .htg, or VTKHDF with an unstructured grid or a hyper-tree grid; its first bytes
+decide. CELLS.npy becomes a structured array with one row per cell, x, y, z and edge: the minimum corner and the edge, in
+float64. With NAME, the field `side` holds the cell array of that name. Standard output is one line of JSON: the root
+cube, {"origin": [x, y, z], "edge": e}, if the file states one, otherwise null. A hyper-tree grid of 2^k trees along
+each axis states it; masked leaves are left out.
+
+Exit codes: 0 success; 2 the file cannot be read or has cells that are not axis-aligned cubes, which the last line on standard
+error explains; 3 VTK cannot be imported.
+"""
+
+import json
+import os
+import resource
+import sys
+
+import numpy as np
+import protocol
+
+try:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkBitArray, vtkIdList, vtkOutputWindow, vtkStringOutputWindow, vtkTypeInt64Array
+    from vtkmodules.vtkCommonDataModel import VTK_HEXAHEDRON, VTK_VOXEL
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridReader
+    from vtkmodules.vtkIOXML import (
+        vtkXMLHyperTreeGridReader,
+        vtkXMLPUnstructuredGridReader,
+        vtkXMLUnstructuredGridReader,
+    )
+except (ImportError, OSError) as error:
+    protocol.missing(error)
+
+# Greatest difference between the corners of a cell and those of a cube, in edges of the cell, as in the harness.
+TOLERANCE = 0.01
+# Cells that are converted at a time. Larger arrays cost a page fault per page, five times the computation.
+CHUNK = 1 << 12
+READERS = {
+    "UnstructuredGrid": vtkXMLUnstructuredGridReader,
+    "PUnstructuredGrid": vtkXMLPUnstructuredGridReader,
+    "HyperTreeGrid": vtkXMLHyperTreeGridReader,
+}
+
+
+class Refused(Exception):
+    """Why the file is not imported, in one sentence."""
+
+
+def reader_for(path):
+    """A reader for the format of the file."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    if head.startswith(b"\x89HDF\r\n\x1a\n"):
+        return vtkHDFReader()
+    if head.startswith(b"# vtk DataFile"):
+        return vtkUnstructuredGridReader()
+    for name, reader in READERS.items():
+        if f'type="{name}"'.encode() in head or f"type='{name}'".encode() in head:
+            return reader()
+    raise Refused("is not a VTK file of an unstructured grid or hyper-tree grid")
+
+
+def read(path):
+    """The data set in the file. VTK reports errors in a window and returns what it has read until then."""
+    window = vtkStringOutputWindow()
+    vtkOutputWindow.SetInstance(window)
+    reader = reader_for(path)
+    reader.SetFileName(path)
+    if isinstance(reader, vtkUnstructuredGridReader):
+        reader.ReadAllScalarsOn()
+        reader.ReadAllFieldsOn()
+    reader.Update()
+    # A message is a line with its place in VTK's source, then the text after the name and address of an object.
+    text = window.GetOutput()
+    text = text.decode(errors="replace") if isinstance(text, bytes) else text
+    lines = [line.strip() for line in text.splitlines()]
+    errors = [line.split("): ", 1)[-1] for line in lines if line and ": In vtk" not in line]
+    if text or reader.GetErrorCode():
+        why = errors[0] if errors else f"error {reader.GetErrorCode()}"
+        raise Refused(f"cannot be read by VTK: {why.encode('ascii', 'replace').decode()}")
+    return reader.GetOutput()
+
+
+def cell_array(data, name):
+    """The cell array with this name."""
+    array = data.GetCellData().GetArray(name)
+    if array is None or array.GetNumberOfComponents() != 1:
+        names = [data.GetCellData().GetArrayName(i) for i in range(data.GetCellData().GetNumberOfArrays())]
+        raise Refused(f"has no cell array {name} of single numbers; its cell arrays are: {', '.join(map(str, names)) or 'none'}")
+    return vtk_to_numpy(array)
+
+
+def of_unstructured(grid):
+    """Corners and edges of hexahedra."""
+    count = grid.GetNumberOfCells()
+    if count == 0:
+        raise Refused("has no cells")
+    kinds = vtk_to_numpy(grid.GetCellTypes())
+    wrong = np.flatnonzero((kinds != VTK_HEXAHEDRON) & (kinds != VTK_VOXEL))
+    if len(wrong):
+        raise Refused(f"has cell {wrong[0]} of VTK's type {kinds[wrong[0]]}: hexahedra (12) and voxels (11) are supported")
+    points = vtk_to_numpy(grid.GetPoints().GetData())
+    connectivity = vtk_to_numpy(grid.GetCells().GetConnectivityArray())
+    if len(connectivity) != 8 * count or grid.GetCells().GetMaxCellSize() != 8:
+        raise Refused(f"has {len(connectivity)} vertices for {count} cells of eight")
+    if connectivity.min() < 0 or connectivity.max() >= len(points):
+        raise Refused(f"has a cell with a point beyond the {len(points)} that exist")
+    corners, edges = np.empty((count, 3)), np.empty(count)
+    axes = [np.ascontiguousarray(points[:, axis], np.float64) for axis in range(3)]
+    for first in range(0, count, CHUNK):
+        part = slice(first, min(first + CHUNK, count))
+        vertices = np.ascontiguousarray(connectivity[8 * part.start : 8 * part.stop].reshape(-1, 8).T)
+        corners[part], edges[part], is_cube = cubes([axis[vertices] for axis in axes])
+        if not is_cube.all():
+            cell = first + int(np.flatnonzero(~is_cube)[0])
+            raise Refused(f"has cell {cell}, which is not an axis-aligned cube (minimum corner {corners[cell].tolist()})")
+    return corners, edges
+
+
+def cubes(vertices):
+    """Minimum corners, mean edges, and whether each cell is a cube, from the coordinates of vertices: [axis][vertex, cell]."""
+    lows, highs = ([bound(axis, axis=0) for axis in vertices] for bound in (np.min, np.max))
+    # Which corner of the cell a vertex is, as one bit: a cube has all eight.
+    digits = np.zeros(vertices[0].shape, np.uint8)
+    with np.errstate(all="ignore"):
+        edge = sum(high - low for low, high in zip(lows, highs)) / 3
+        is_cube = edge > 0
+        for axis, (along, low, high) in enumerate(zip(vertices, lows, highs)):
+            from_corner = np.minimum(along - low, high - along).max(axis=0)
+            # Written so that NaN is no cube.
+            is_cube &= (from_corner <= TOLERANCE * edge) & (np.abs(high - low - edge) <= TOLERANCE * edge)
+            digits |= (along - low > high - along).astype(np.uint8) << axis
+    is_cube &= np.bitwise_or.reduce(np.left_shift(np.uint8(1), digits), axis=0) == 255
+    return np.column_stack(lows), edge, is_cube
+
+
+def of_hyper_trees(grid):
+    """Corners and edges of the leaves of a hyper-tree grid, their indices in cell arrays, and the root."""
+    if grid.GetDimension() != 3 or grid.GetBranchFactor() != 2:
+        raise Refused(
+            f"has {grid.GetDimension()} dimensions and branch factor {grid.GetBranchFactor()}: an oct-tree has 3 and 2"
+        )
+    axes = [vtk_to_numpy(axis) for axis in (grid.GetXCoordinates(), grid.GetYCoordinates(), grid.GetZCoordinates())]
+    steps = [np.diff(np.asarray(axis, np.float64)) for axis in axes]
+    edge = steps[0][0]
+    if any((np.abs(step - edge) > 1e-6 * edge).any() for step in steps):
+        raise Refused("has trees that are not equal cubes")
+    mask = vtk_to_numpy(grid.GetMask()).astype(bool) if grid.HasMask() else None
+    shape = [len(step) for step in steps]
+    parts = []
+    for index in range(shape[0] * shape[1] * shape[2]):
+        tree = grid.GetTree(index)
+        if tree is None:
+            continue
+        origin = [0.0] * 3
+        grid.GetLevelZeroOriginFromIndex(index, origin)
+        corners, edges, nodes = leaves_of_tree(tree)
+        if mask is not None:
+            kept = ~mask[nodes]
+            corners, edges, nodes = corners[kept], edges[kept], nodes[kept]
+        parts.append((np.array(origin) + corners * edge, edges * edge, nodes))
+    if not parts:
+        raise Refused("has no trees")
+    corners, edges, nodes = (np.concatenate(columns) for columns in zip(*parts))
+    is_root = shape[0] == shape[1] == shape[2] and shape[0] & (shape[0] - 1) == 0
+    root = {"origin": [float(axis[0]) for axis in axes], "edge": float(edge * shape[0])} if is_root else None
+    return corners, edges, nodes, root
+
+
+def leaves_of_tree(tree):
+    """Corners and edges of the leaves in the unit cube, and their global indices."""
+    depths, split, order = vtkTypeInt64Array(), vtkBitArray(), vtkIdList()
+    tree.ComputeBreadthFirstOrderDescriptor(2**31 - 1, None, depths, split, order)
+    counts = vtk_to_numpy(depths)
+    bits = vtk_to_numpy(split).astype(bool)
+    local = np.fromiter((order.GetId(i) for i in range(order.GetNumberOfIds())), np.int64, order.GetNumberOfIds())
+    digits = np.array([[d & 1, d >> 1 & 1, d >> 2 & 1] for d in range(8)])
+    octants, begin, parts = np.zeros((1, 3), np.int64), 0, []
+    for level, count in enumerate(counts):
+        is_split = np.zeros(count, bool)
+        known = bits[begin : begin + count]
+        is_split[: len(known)] = known
+        leaves = ~is_split
+        scale = 0.5**level
+        parts.append((octants[leaves] * scale, np.full(leaves.sum(), scale), local[begin : begin + count][leaves]))
+        octants = (2 * octants[is_split, None] + digits).reshape(-1, 3)
+        begin += count
+    return tuple(np.concatenate(columns) for columns in zip(*parts))
+
+
+def main():
+    if len(sys.argv) not in (3, 4):
+        print(f"usage: {sys.argv[0]} FILE CELLS.npy [NAME]", file=sys.stderr)
+        raise SystemExit(2)
+    path, out, name = sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) == 4 else None
+    # A damaged file may state any size: an allocation beyond the memory of the machine fails and is reported.
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (memory, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    try:
+        data = read(path)
+        if data is not None and data.IsA("vtkHyperTreeGrid"):
+            corners, edges, nodes, root = of_hyper_trees(data)
+        elif data is not None and data.IsA("vtkUnstructuredGrid"):
+            (corners, edges), nodes, root = of_unstructured(data), slice(None), None
+        else:
+            raise Refused(f"holds {data.GetClassName() if data else 'nothing'}: unstructured and hyper-tree grids are supported")
+        sides = cell_array(data, name)[nodes] if name else None
+    except Refused as why:
+        print(why, file=sys.stderr)
+        raise SystemExit(2) from None
+    except MemoryError:
+        print("needs more memory than the machine has: it is damaged or too large", file=sys.stderr)
+        raise SystemExit(2) from None
+    fields = [(field, "<f8") for field in ("x", "y", "z", "edge")] + ([("side", "<f8")] if name else [])
+    cells = np.empty(len(edges), fields)
+    cells["x"], cells["y"], cells["z"] = corners.T
+    cells["edge"] = edges
+    if name:
+        cells["side"] = sides
+    np.save(out, cells)
+    print(json.dumps(root))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,249 @@
+"""VTK writes meshes in its formats, and `harness import` reads them. Run with: python -m unittest discover harness/oracles
+
+Needs target/debug/{harness,reference}, which `cargo test --workspace` builds."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+import pyvista
+import vtk
+
+ROOT = pathlib.Path(__file__).parent.parent.parent
+PROGRAMS = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug"
+ORIGIN, EDGE, DEPTH = np.array([-1.0, 2.0, 0.5]), 4.0, 4
+
+
+def run(program, *arguments):
+    """Exit code, standard output and standard error of one of the programs."""
+    environment = os.environ | {"HARNESS_PYTHON": sys.executable}
+    run = subprocess.run([PROGRAMS / program, *arguments], capture_output=True, text=True, env=environment)
+    return run.returncode, run.stdout, run.stderr
+
+
+def leaves():
+    """Indices and levels of the leaves of a small oct-tree, level by level."""
+    octants, rows = np.zeros((1, 3), np.int64), []
+    for level in range(DEPTH + 1):
+        split = (octants[:, 0] == 0) & (level < DEPTH)
+        rows.append(np.column_stack([octants[~split], np.full((~split).sum(), level)]))
+        digits = np.array([[d & 1, d >> 1 & 1, d >> 2 & 1] for d in range(8)])
+        octants = (2 * octants[split, None] + digits).reshape(-1, 3)
+    return np.concatenate(rows)
+
+
+def words_of(rows, sides):
+    """Sorted leaf words (morton57 << 7 | level << 2 | side)."""
+    morton = np.zeros(len(rows), np.uint64)
+    for bit in range(19):
+        for axis in range(3):
+            cell = rows[:, axis] << (19 - rows[:, 3])
+            morton |= (cell >> bit & 1).astype(np.uint64) << np.uint64(3 * bit + axis)
+    return np.sort(morton << np.uint64(7) | rows[:, 3].astype(np.uint64) << np.uint64(2) | sides.astype(np.uint64))
+
+
+def hexahedra(rows, sides, dtype=np.float64, cell_type=pyvista.CellType.HEXAHEDRON):
+    """The leaves as an unstructured grid without duplicate points."""
+    order = [0, 1, 3, 2, 4, 5, 7, 6] if cell_type == pyvista.CellType.HEXAHEDRON else range(8)
+    steps = np.array([[d & 1, d >> 1 & 1, d >> 2 & 1] for d in order])
+    size = (1 << DEPTH) >> rows[:, 3]
+    corners = ((rows[:, None, :3] + steps) * size[:, None, None]).reshape(-1, 3)
+    lattice, vertices = np.unique(corners, axis=0, return_inverse=True)
+    cells = np.column_stack([np.full(len(rows), 8), vertices.reshape(-1, 8)])
+    points = (ORIGIN + lattice * (EDGE / (1 << DEPTH))).astype(dtype)
+    grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(rows), cell_type), points)
+    grid.cell_data["body"] = sides.astype(np.int32)
+    return grid
+
+
+def hyper_trees(rows, sides, trees, masked):
+    """The leaves as a hyper-tree grid of `trees` trees along each axis, with the leaves of side 1 masked or not."""
+    side_of = {tuple(row): side for row, side in zip(rows.tolist(), sides.tolist())}
+    base = trees.bit_length() - 1
+    grid = vtk.vtkHyperTreeGrid()
+    grid.Initialize()
+    grid.SetDimensions([trees + 1] * 3)
+    grid.SetBranchFactor(2)
+    for axis, put in enumerate((grid.SetXCoordinates, grid.SetYCoordinates, grid.SetZCoordinates)):
+        values = vtk.vtkDoubleArray()
+        for i in range(trees + 1):
+            values.InsertNextValue(ORIGIN[axis] + i * EDGE / trees)
+        put(values)
+    array, mask = vtk.vtkDoubleArray(), vtk.vtkBitArray()
+    array.SetName("body")
+    cursor = vtk.vtkHyperTreeGridNonOrientedCursor()
+
+    def visit(at, level):
+        index, side = cursor.GetGlobalNodeIndex(), side_of.get((*at, level))
+        array.InsertValue(index, -1 if side is None else side)
+        mask.InsertValue(index, side == 1)
+        if side is None:
+            cursor.SubdivideLeaf()
+            for digit in range(8):
+                cursor.ToChild(digit)
+                visit([2 * at[axis] + (digit >> axis & 1) for axis in range(3)], level + 1)
+                cursor.ToParent()
+
+    begin = 0
+    for tree in range(trees**3):
+        grid.InitializeNonOrientedCursor(cursor, tree, True)
+        cursor.SetGlobalIndexStart(begin)
+        visit([tree % trees, tree // trees % trees, tree // trees**2], base)
+        begin += cursor.GetTree().GetNumberOfVertices()
+    grid.GetCellData().AddArray(array)
+    if masked:
+        grid.SetMask(mask)
+    return grid
+
+
+def write(data, writer, path, **settings):
+    """Writes a file with one of VTK's writers."""
+    writer = getattr(vtk, writer)()
+    writer.SetFileName(str(path))
+    writer.SetInputData(data)
+    for name, values in settings.items():
+        getattr(writer, name)(*values)
+    writer.Write()
+
+
+def unstructured_files(at, grid):
+    """Files of an unstructured grid in every format and encoding."""
+    grid.save(at / "ascii.vtk", binary=False)
+    grid.save(at / "binary.vtk", binary=True)
+    grid.save(at / "ascii.vtu", binary=False)
+    settings = {
+        "raw": {"SetCompressorTypeToNone": (), "EncodeAppendedDataOff": ()},
+        "base64": {"SetCompressorTypeToNone": (), "SetDataModeToBinary": ()},
+        "zlib": {"SetCompressorTypeToZLib": (), "SetHeaderTypeToUInt32": ()},
+        "lz4": {"SetCompressorTypeToLZ4": (), "SetDataModeToBinary": ()},
+        "lzma": {"SetCompressorTypeToLZMA": ()},
+    }
+    for name, setting in settings.items():
+        write(grid, "vtkXMLUnstructuredGridWriter", at / f"{name}.vtu", **setting)
+    write(grid, "vtkXMLPUnstructuredGridWriter", at / "parallel.pvtu", SetNumberOfPieces=(1,))
+    write(grid, "vtkHDFWriter", at / "grid.vtkhdf")
+    return sorted(path for path in at.iterdir() if path.suffix != ".json" and not path.name.startswith("parallel_"))
+
+
+@unittest.skipUnless(
+    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
+    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
+)
+class ImportTest(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.TemporaryDirectory()
+        self.addCleanup(self.directory.cleanup)
+        self.at = pathlib.Path(self.directory.name)
+        self.rows = leaves()
+        self.sides = np.arange(len(self.rows)) % 3
+
+    def imported(self, path, *options):
+        """Words and manifest of an imported mesh."""
+        with tempfile.TemporaryDirectory() as out:
+            code, _, error = run("harness", "import", path, "--out", pathlib.Path(out) / "mesh", *options)
+            self.assertEqual((code, "Traceback" in error), (0, False), f"{path}: {error}")
+            mesh = pathlib.Path(out) / "mesh"
+            return np.load(mesh / "leaves-00000.npy"), json.loads((mesh / "mesh.json").read_text())
+
+    def check(self, path, rows, sides):
+        """The mesh in the file has these leaves, with the sides and without."""
+        words, manifest = self.imported(path, "--sides", "body")
+        np.testing.assert_array_equal(words, words_of(rows, sides), str(path))
+        self.assertNotIn("sides", manifest)
+        np.testing.assert_allclose(manifest["root"]["origin"], ORIGIN, atol=1e-6)
+        self.assertAlmostEqual(manifest["root"]["edge"], EDGE, places=6)
+        words, manifest = self.imported(path)
+        np.testing.assert_array_equal(words, words_of(rows, 0 * sides))
+        self.assertEqual(manifest["sides"], "unknown")
+
+    def refused(self, path, *options):
+        """The sentence with which a file is refused."""
+        out = self.at / "refused"
+        code, output, error = run("harness", "import", path, "--out", out, *options)
+        self.assertEqual((code, output, error.count("\n")), (2, "", 1), f"{path}: {error}")
+        self.assertFalse(out.exists())
+        return error
+
+    def test_unstructured_grids_in_every_encoding(self):
+        files = unstructured_files(self.at, hexahedra(self.rows, self.sides))
+        self.assertEqual(len(files), 10)
+        for path in files:
+            self.check(path, self.rows, self.sides)
+
+    def test_voxels_and_single_precision(self):
+        hexahedra(self.rows, self.sides, np.float32).save(self.at / "single.vtu")
+        hexahedra(self.rows, self.sides, cell_type=pyvista.CellType.VOXEL).save(self.at / "voxel.vtu")
+        for name in ("single", "voxel"):
+            self.check(self.at / f"{name}.vtu", self.rows, self.sides)
+
+    def test_hyper_tree_grids(self):
+        kept = self.sides != 1
+        for trees in (1, 2):
+            for masked in (False, True):
+                grid = hyper_trees(self.rows, self.sides, trees, masked)
+                which = kept if masked else slice(None)
+                for writer, suffix in (("vtkXMLHyperTreeGridWriter", "htg"), ("vtkHDFWriter", "vtkhdf")):
+                    path = self.at / f"{trees}-{masked}.{suffix}"
+                    write(grid, writer, path)
+                    self.check(path, self.rows[which], self.sides[which])
+
+    def test_an_exported_mesh_is_imported_with_its_digest(self):
+        case = (ROOT / "geometries/cube-small.toml").read_text()
+        for keep in ("outside", "inside", "all"):
+            case_file, mesh, file = self.at / f"{keep}.toml", self.at / keep, self.at / f"{keep}.vtu"
+            case_file.write_text(f'keep = "{keep}"\n' + case)
+            self.assertEqual(run("reference", case_file, "--out", mesh)[0], 0)
+            self.assertEqual(run("harness", "export", mesh, file)[0], 0)
+            expected = json.loads((mesh / "mesh.json").read_text())
+            _, manifest = self.imported(file, "--sides", "side", "--case", case_file)
+            for key in ("digest", "root", "leaves_by_level", "leaves_by_side", "level_surface", "keep"):
+                self.assertEqual(manifest[key], expected[key], key)
+
+    def test_an_audit_of_a_file_needs_no_manifest(self):
+        path = self.at / "mesh.vtu"
+        hexahedra(self.rows, self.sides).save(path)
+        code, output, error = run("harness", "audit", path)
+        self.assertEqual(code, 0, output + error)
+        self.assertIn(f"{len(self.rows)} leaves", output)
+        # A cell without its neighbours leaves a hole, and a level between is missing.
+        hexahedra(self.rows[1:], self.sides[1:]).save(path)
+        code, output, _ = run("harness", "audit", path, "--root", "-1,2,0.5,4")
+        self.assertEqual(code, 1, output)
+
+    def test_damaged_files_are_refused_in_one_sentence(self):
+        files = unstructured_files(self.at, hexahedra(self.rows, self.sides))
+        htg = self.at / "tree.htg"
+        write(hyper_trees(self.rows, self.sides, 1, True), "vtkXMLHyperTreeGridWriter", htg)
+        for path in [*files, htg]:
+            content = path.read_bytes()
+            for part in (0.1, 0.5):
+                damaged = self.at / f"damaged{path.suffix}"
+                damaged.write_bytes(content[: int(len(content) * part)])
+                self.refused(damaged, "--format", "vtk")
+
+    def test_cells_that_are_not_cubes_are_named(self):
+        grid = hexahedra(self.rows, self.sides)
+        grid.points[5] += [0.03, 0, 0]
+        grid.save(self.at / "moved.vtu")
+        self.assertRegex(self.refused(self.at / "moved.vtu"), r"has cell \d+, which is not an axis-aligned cube")
+        tetrahedron = pyvista.UnstructuredGrid([4, 0, 1, 2, 3], [pyvista.CellType.TETRA], np.eye(4, 3))
+        tetrahedron.save(self.at / "tetrahedron.vtu")
+        self.assertIn("has cell 0 of VTK's type 10", self.refused(self.at / "tetrahedron.vtu"))
+        message = self.refused(self.at / "moved.vtu", "--sides", "absent")
+        self.assertIn("not an axis-aligned cube", message)
+
+    def test_an_absent_cell_array_is_named(self):
+        path = self.at / "mesh.vtu"
+        hexahedra(self.rows, self.sides).save(path)
+        self.assertIn("has no cell array absent of single numbers; its cell arrays are: body", self.refused(path, "--sides", "absent"))
+        hexahedra(self.rows, self.sides + 1).save(path)
+        self.assertIn("has the side 3", self.refused(path, "--sides", "body"))
+
+
+if __name__ == "__main__":
+    unittest.main()
