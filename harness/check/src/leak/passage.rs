@@ -17,7 +17,7 @@ use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
 
 /// Openings that are measured at most.
-const OPENINGS_MAX: usize = 8;
+const OPENINGS_MAX: usize = 4;
 /// Another opening is of interest if it is wider by this factor.
 const WIDER: f64 = 1.005;
 

@@ -22,10 +22,10 @@ pub struct Spot {
 }
 
 /// Step of the finest grid, in parts of the clearance.
-const PRECISION: f64 = 2e-3;
+const PRECISION: f64 = 1e-3;
 
 /// Half of a grid's edge, in steps.
-const STEPS: i32 = 8;
+const STEPS: i32 = 16;
 
 /// Grids that are searched at most.
 const GRIDS_MAX: usize = 150;
