@@ -3,6 +3,7 @@
 mod agreement;
 mod kept;
 mod no_false_alarms;
+mod promises;
 mod selftest;
 mod selftest_at_scale;
 mod support;

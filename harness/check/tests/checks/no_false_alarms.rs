@@ -33,7 +33,7 @@ pub fn hulls() -> impl Strategy<Value = Vec<Facet>> {
 }
 
 /// The box with this minimum corner and size.
-fn hull((low, size): ([f32; 3], [f32; 3])) -> Vec<Facet> {
+pub fn hull((low, size): ([f32; 3], [f32; 3])) -> Vec<Facet> {
     let corner = |i: usize| -> [f32; 3] {
         std::array::from_fn(|a| low[a] + if i >> a & 1 == 1 { size[a] } else { 0.0 })
     };
