@@ -56,6 +56,13 @@ pub struct Fit {
     pub slope: f64,
 }
 
+impl Fit {
+    /// Returns the mean at an index of the series, which may lie between two values.
+    pub fn at(&self, index: f64) -> f64 {
+        self.level + self.slope * index
+    }
+}
+
 impl Series {
     /// Prepares a series for noise with autocorrelation `phi`, from 0 to below 1.
     pub fn new(values: &[f64], phi: f64) -> Self {
@@ -96,7 +103,7 @@ impl Series {
     /// Returns the whitened residuals of the values `from..until`.
     pub fn residuals(&self, from: usize, until: usize, mean: Mean) -> Vec<f64> {
         let fit = self.fit(from, until, mean);
-        let plain = |i: usize| self.values[i] - fit.level - fit.slope * i as f64;
+        let plain = |i: usize| self.values[i] - fit.at(i as f64);
         let first = (1.0 - self.phi * self.phi).sqrt() * plain(from);
         let rest = (from + 1..until).map(|i| plain(i) - self.phi * plain(i - 1));
         std::iter::once(first).chain(rest).collect()
@@ -159,12 +166,11 @@ impl Series {
         found
     }
 
-    /// Returns the best division of the whole series into two segments: the first index of the second one, and the cost.
-    pub fn halves(&self, mean: Mean) -> Option<(usize, f64)> {
+    /// Returns the least cost of two segments; `None` if the series is too short for two.
+    pub fn halves(&self, mean: Mean) -> Option<f64> {
         let (n, least) = (self.values.len(), mean.length_min());
         let cost = |at: usize| self.fit(0, at, mean).cost + self.fit(at, n, mean).cost;
-        let all = (least..(n + 1).saturating_sub(least)).map(|at| (at, cost(at)));
-        all.min_by(|a, b| a.1.total_cmp(&b.1))
+        (least..(n + 1).saturating_sub(least)).map(cost).min_by(f64::total_cmp)
     }
 }
 
