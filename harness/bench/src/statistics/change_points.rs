@@ -73,6 +73,9 @@ const WORK_MAX: usize = 20_000_000;
 /// Least number of permutations.
 const PERMUTATIONS_MIN: usize = 199;
 
+/// Factor on the p-value of a model, because it was chosen among several to fit the data: by simulation.
+const MODELS_TRIED: f64 = 4.0;
+
 /// Least step between two segments with slopes, in standard deviations of the noise.
 const STEP_MIN: f64 = 1.5;
 
@@ -123,8 +126,8 @@ struct Search<'a> {
 impl Search<'_> {
     /// Returns the confirmed steps and removes all other boundaries from the model.
     fn steps(&mut self) -> Vec<Step> {
-        // The test does not know that the number of segments was chosen to fit the data.
-        let p = if self.model.boundaries.is_empty() { 1.0 } else { 2.0 * self.p_of_model() };
+        let none = self.model.boundaries.is_empty();
+        let p = if none { 1.0 } else { (MODELS_TRIED * self.p_of_model()).min(1.0) };
         if p > self.rules.alpha {
             self.model.boundaries.clear();
             return Vec::new();

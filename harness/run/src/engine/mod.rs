@@ -8,6 +8,7 @@ pub mod interrupt;
 pub mod launcher;
 pub mod layout;
 mod memory;
+mod reap;
 pub mod options;
 pub mod p4est;
 pub mod paths;
