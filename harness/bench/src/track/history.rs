@@ -9,6 +9,7 @@
 
 use crate::gate::measures::Measures;
 use crate::gate::report::{LayerName, Report};
+use crate::gate::time::{CPU, WALL};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
@@ -86,8 +87,13 @@ impl Record {
         if let Ok(report) = serde_json::from_slice::<Report>(text) {
             let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
             for finding in times.flat_map(|layer| &layer.findings) {
+                let name = match finding.metric.as_str() {
+                    CPU => "seconds",
+                    WALL => "wall_seconds",
+                    _ => continue,
+                };
                 if let Some(seconds) = finding.candidate {
-                    self.metrics.insert(format!("{}/seconds", finding.case), seconds);
+                    self.metrics.insert(format!("{}/{name}", finding.case), seconds);
                 }
             }
         }

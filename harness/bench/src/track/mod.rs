@@ -102,7 +102,7 @@ fn plain(name: &str) -> &str {
 /// Returns the unit of a metric.
 pub fn unit(name: &str) -> &'static str {
     match plain(name) {
-        name if name == "seconds" || name.ends_with("_s") => "s",
+        name if name.ends_with("seconds") || name.ends_with("_s") => "s",
         name if name.ends_with("bytes") => "bytes",
         "instructions" => "instructions",
         "cells" | "leaves" => "cells",
