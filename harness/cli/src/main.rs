@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Shrink(arguments) => commands::shrink::run(&arguments),
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
+        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Completions(arguments) => {

@@ -6,6 +6,7 @@
 //! Invariant: the same history and options give the same result on every machine.
 
 pub mod history;
+pub mod link;
 pub mod summary;
 
 pub use summary::summary;

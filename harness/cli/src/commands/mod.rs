@@ -9,6 +9,7 @@ mod files;
 pub mod gate;
 pub mod geometry;
 pub mod man;
+pub mod planted;
 mod programs;
 pub mod report;
 pub mod selftest;
