@@ -165,7 +165,10 @@ fn every_figure_has_its_values_and_its_tikz_picture() {
     let speedup =
         std::fs::read_to_string(place.path().join("figures/speedup-uav-50M.csv")).unwrap();
     assert!(speedup.contains("\"mesher, oversubscribed\",oversubscribed,4,"), "{speedup}");
-    assert!(speedup.contains("\"mesher, projected\",projected,64,") && speedup.contains("cited,32,11.28"));
+    assert!(
+        speedup.contains("\"mesher, projected\",projected,64,")
+            && speedup.contains("cited,32,11.28")
+    );
     assert!(
         place.path().join("figures.tex").is_file() && place.path().join("artifact.md").is_file()
     );

@@ -63,7 +63,13 @@ fn experiment_table(out: &mut String, groups: &Groups, experiment: &str) {
     for group in last {
         let (run, reference) = (&group.typical, groups.reference(group));
         let cause = sentence(run, &reference.typical, &groups.network);
-        let _ = writeln!(out, "  {}, {}, {}: {cause}", group.setup.engine, group.setup.case, group.how());
+        let _ = writeln!(
+            out,
+            "  {}, {}, {}: {cause}",
+            group.setup.engine,
+            group.setup.case,
+            group.how()
+        );
     }
 }
 

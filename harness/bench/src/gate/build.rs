@@ -105,7 +105,9 @@ fn make(build: &Build, places: &Places, options: &Options) -> Result<PathBuf, Ga
         true => Ok(program),
         false => {
             let program = program.display();
-            let why = format!("{label}: the build succeeded, but {program} is missing: check [build] program");
+            let why = format!(
+                "{label}: the build succeeded, but {program} is missing: check [build] program"
+            );
             Err(GateError::Input(why))
         }
     }

@@ -66,7 +66,8 @@ pub fn power(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Vec<Row>, GateError> {
     let place = tempfile::Builder::new().prefix("harness-power-").tempdir();
-    let place = place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
+    let place =
+        place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
     let test = Test { place: place.path(), harness, options };
     test.write_files().map_err(|error| GateError::Input(error.to_string()))?;
     let mut rows = Vec::new();
@@ -146,7 +147,8 @@ impl Test<'_> {
     fn gate(&self, layers: Vec<LayerName>, trial: usize) -> Result<Report, GateError> {
         let text = |name: &str| self.place.join(name).to_string_lossy().into_owned();
         let rules = self.place.join("gate.toml");
-        let case = "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\", \"instructions\", \"time\"]\n";
+        let case =
+            "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\", \"instructions\", \"time\"]\n";
         let tolerance = "[tolerance]\ninstructions = 0.2\n";
         fs::write(&rules, format!("{tolerance}{case}"))
             .map_err(|error| GateError::Input(error.to_string()))?;
@@ -169,7 +171,8 @@ impl Test<'_> {
 /// Whether the regressions of a layer name this phase and no other.
 fn names(layer: &Layer, guilty: &str) -> bool {
     let bad = layer.findings.iter().filter(|finding| finding.verdict == Verdict::Regression);
-    let text: String = bad.map(|finding| format!("{} {}\n", finding.metric, finding.note)).collect();
+    let text: String =
+        bad.map(|finding| format!("{} {}\n", finding.metric, finding.note)).collect();
     PHASES.iter().all(|phase| text.contains(phase) == (*phase == guilty))
 }
 
@@ -225,10 +228,14 @@ mod tests {
     #[test]
     fn a_table_has_a_row_per_slow_down() {
         let rate = Rate { tried: 10, found: 9, named: 8 };
-        let row = Row { kind: Some(Kind::Counted), percent: 0.3, rates: [rate, Rate::default(), rate] };
+        let row =
+            Row { kind: Some(Kind::Counted), percent: 0.3, rates: [rate, Rate::default(), rate] };
         let none = Row { kind: None, percent: 0.0, ..row.clone() };
         let text = table(&[none, row]);
         assert!(text.contains("no slow-down") && text.contains("left out"), "{text}");
-        assert!(text.contains("0.3 % more operations, counted") && text.contains("9 of 10, 8 named"), "{text}");
+        assert!(
+            text.contains("0.3 % more operations, counted") && text.contains("9 of 10, 8 named"),
+            "{text}"
+        );
     }
 }

@@ -114,8 +114,14 @@ impl Rules {
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let time = &rules.time;
-        if !(time.alpha > 0.0 && time.alpha < 0.5 && time.effect_min >= 0.0 && time.phase_min >= 0.0) {
-            return Err(wrong("alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into()));
+        if !(time.alpha > 0.0
+            && time.alpha < 0.5
+            && time.effect_min >= 0.0
+            && time.phase_min >= 0.0)
+        {
+            return Err(wrong(
+                "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into(),
+            ));
         }
         let least = rounds_min(time.alpha);
         if time.rounds_min < least || time.rounds_max < time.rounds_min {

@@ -32,10 +32,7 @@ impl Baseline {
     ///
     /// # Errors
     /// If it is neither, or does not build.
-    pub fn find(
-        options: &Options,
-        engine: &Engine,
-    ) -> Result<Self, GateError> {
+    pub fn find(options: &Options, engine: &Engine) -> Result<Self, GateError> {
         let Some(named) = &options.baseline else { return Ok(Self::None) };
         let path = Path::new(named);
         if path.is_file() {

@@ -148,7 +148,8 @@ impl Search<'_> {
     /// the series is that line with its residuals in random order. Outliers are moved in each permutation anew.
     fn p_of_model(&mut self) -> f64 {
         let (n, phi, mean) = (self.values.len(), self.model.phi, self.model.mean);
-        let (segments, floor) = (self.model.boundaries.len() + 1, self.floor * self.values.len() as f64);
+        let (segments, floor) =
+            (self.model.boundaries.len() + 1, self.floor * self.values.len() as f64);
         let gain = |values: &[f64]| {
             let series = Series::new(&without_outliers(values), phi);
             let divided = series.divisions(mean, segments).pop().map_or(f64::INFINITY, |d| d.0);

@@ -82,7 +82,8 @@ fn criterion(model: &Model, cost: f64, n: f64, floor: f64) -> f64 {
     if freedom < 1.0 || !cost.is_finite() {
         return f64::INFINITY;
     }
-    let penalty = PENALTY_BOUNDARY * boundaries + PENALTY_SLOPE * slopes + PENALTY_PHI * autocorrelated;
+    let penalty =
+        PENALTY_BOUNDARY * boundaries + PENALTY_SLOPE * slopes + PENALTY_PHI * autocorrelated;
     n * (cost / n + floor).ln() - segments * (1.0 - model.phi.powi(2)).ln()
         + penalty * n.ln() * n / freedom
 }

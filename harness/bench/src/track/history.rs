@@ -145,7 +145,9 @@ pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
         records.iter().filter(|record| record.commit.starts_with(commit)).collect();
     let [record] = matching[..] else {
         let why = match matching.len() {
-            0 => format!("has no values of commit {commit}: accept the first commit with the new values"),
+            0 => format!(
+                "has no values of commit {commit}: accept the first commit with the new values"
+            ),
             _ => format!("has several commits that begin with {commit}: give more of the hash"),
         };
         return Err(wrong(&why));

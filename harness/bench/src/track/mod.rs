@@ -132,8 +132,10 @@ fn control(found: &mut [Changes], alpha: f64) {
     let least = |p_values: &mut dyn Iterator<Item = f64>| p_values.fold(1.0, f64::min);
     let steps: Vec<f64> =
         found.iter().map(|changes| least(&mut changes.steps.iter().map(|step| step.p))).collect();
-    let drifts: Vec<f64> =
-        found.iter().map(|changes| least(&mut changes.drifts.iter().map(|drift| drift.p))).collect();
+    let drifts: Vec<f64> = found
+        .iter()
+        .map(|changes| least(&mut changes.drifts.iter().map(|drift| drift.p)))
+        .collect();
     for (i, (steps, drifts)) in adjusted(&steps).into_iter().zip(adjusted(&drifts)).enumerate() {
         if steps > alpha {
             found[i].steps.clear();

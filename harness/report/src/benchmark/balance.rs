@@ -66,7 +66,10 @@ fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
         y: Axis::linear("useful time / s"),
         body: Body::Bars(Bars {
             categories: (0..ranks).map(|r| r.to_string()).collect(),
-            segments: vec![(format!("{}: useful time", subject.engine), run.useful_s.by_rank.clone())],
+            segments: vec![(
+                format!("{}: useful time", subject.engine),
+                run.useful_s.by_rank.clone(),
+            )],
             references: vec![(format!("mean; λ = {lambda:.2}"), mean)],
             provenance: Provenance::Projected,
         }),
@@ -102,7 +105,10 @@ fn imbalance(subject: Subject, (cells, ranks): (u64, usize), of: &[&Group]) -> F
         y: Axis::linear("λ = max/mean of cells per rank"),
         body: Body::Bars(Bars {
             categories: of.iter().map(|g| division(&g.setup)).collect(),
-            segments: vec![(format!("{}: by cells", subject.engine), of.iter().map(lambda).collect())],
+            segments: vec![(
+                format!("{}: by cells", subject.engine),
+                of.iter().map(lambda).collect(),
+            )],
             references,
             provenance: Provenance::Measured,
         }),

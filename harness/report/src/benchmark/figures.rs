@@ -36,7 +36,10 @@ fn by_line<'a>(all: &[&'a Group]) -> Vec<(Line<'a>, Vec<&'a Group>)> {
         }
     }
     // Programs and cases stay in the order of the record.
-    let first = |line: &Line| all.iter().position(|g| (g.setup.case.as_str(), g.setup.engine.as_str()) == (line.0, line.1));
+    let first = |line: &Line| {
+        all.iter()
+            .position(|g| (g.setup.case.as_str(), g.setup.engine.as_str()) == (line.0, line.1))
+    };
     out.sort_by_key(|(line, _)| (first(line), line.2, line.3));
     for (_, groups) in &mut out {
         groups.sort_by_key(|g| g.cells());

@@ -44,10 +44,7 @@ pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(&'a str, Vec<&'
 }
 
 /// The groups of an experiment by engine and case, in the order of the record.
-pub fn by_subject<'a>(
-    groups: &'a Groups,
-    experiment: &str,
-) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
+pub fn by_subject<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
     partition(groups, experiment, |group| Subject::of(&group.setup))
 }
 

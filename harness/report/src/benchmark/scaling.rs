@@ -75,7 +75,12 @@ fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
         };
         let points: Vec<Point> = with_provenance(mesh, kind).iter().map(speedup).collect();
         if !points.is_empty() {
-            series.push(Series::new(&format!("{}, {}", subject.engine, kind.word()), kind, style, points));
+            series.push(Series::new(
+                &format!("{}, {}", subject.engine, kind.word()),
+                kind,
+                style,
+                points,
+            ));
         }
     }
     let cells = mesh[0].cells();
@@ -139,7 +144,12 @@ fn base_cases(groups: &Groups, mesh: &[&Group]) -> String {
 type Factor = fn(&Efficiency) -> f64;
 
 /// Global efficiency and its factors on simulated ranks.
-fn efficiency(groups: &Groups, subject: Subject, all: &[&Group], experiment: &str) -> Option<Figure> {
+fn efficiency(
+    groups: &Groups,
+    subject: Subject,
+    all: &[&Group],
+    experiment: &str,
+) -> Option<Figure> {
     let simulated = with_provenance(all, Provenance::Projected);
     if simulated.len() < 2 {
         return None;
@@ -158,7 +168,12 @@ fn efficiency(groups: &Groups, subject: Subject, all: &[&Group], experiment: &st
             Point { count: g.time_s.count, ..Point::exact(g.setup.ranks as f64, value(&e)) }
         };
         let points = simulated.iter().map(factor).collect();
-        series.push(Series::new(&format!("{}: {name}", subject.engine), Provenance::Projected, style, points));
+        series.push(Series::new(
+            &format!("{}: {name}", subject.engine),
+            Provenance::Projected,
+            style,
+            points,
+        ));
     }
     // In weak scaling, computation scaling exceeds 1: the fixed costs per cell fall as the mesh grows.
     let efficiency_max = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);

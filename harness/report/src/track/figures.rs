@@ -91,7 +91,8 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
     };
     let mark = |change: &Change| {
         let position = |at: usize| series.points[at].0 as f64;
-        let (name, style) = match (series.is_cost(), change.accepted, change.after > change.before) {
+        let (name, style) = match (series.is_cost(), change.accepted, change.after > change.before)
+        {
             (false, _, _) => ("change", 3),
             (true, true, _) => ("accepted", 3),
             (true, false, true) => ("increase", 1),
@@ -105,9 +106,8 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
     let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
     let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
     let plotted = |name: &str, how: Provenance, style: usize, shown: &[&(usize, f64)]| {
-        let point = |&&(commit, value): &&(usize, f64)| {
-            Point::exact(commit as f64, value.clamp(low, high))
-        };
+        let point =
+            |&&(commit, value): &&(usize, f64)| Point::exact(commit as f64, value.clamp(low, high));
         let notes = shown.iter().map(|point| note(point)).collect();
         let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
         Plotted { notes, ..plotted.not_joined() }

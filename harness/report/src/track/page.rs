@@ -14,8 +14,7 @@ use std::cmp::Reverse;
 pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
     let (changed, constant): (Vec<&Series>, Vec<&Series>) =
         all.iter().partition(|series| !series.changes.is_empty() || !series.drifts.is_empty());
-    let sections =
-        [("Metrics with changes", changed), ("Metrics without changes", constant)];
+    let sections = [("Metrics with changes", changed), ("Metrics without changes", constant)];
     let content = html! {
         p { (span(records, link)) }
         (changes(records, all, link))
