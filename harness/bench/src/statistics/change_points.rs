@@ -152,7 +152,7 @@ impl Search<'_> {
             (self.model.boundaries.len() + 1, self.floor * self.values.len() as f64);
         let gain = |values: &[f64]| {
             let series = Series::new(&without_outliers(values), phi);
-            let divided = series.divisions(mean, segments).pop().map_or(f64::INFINITY, |d| d.0);
+            let divided = series.divisions(mean).nth(segments - 1).map_or(f64::INFINITY, |d| d.0);
             (series.fit(0, n, Mean::Linear).cost + floor) / (divided + floor)
         };
         let series = Series::new(&self.values, phi);

@@ -13,6 +13,9 @@ const PHIS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.75, 0.9];
 /// Greatest number of segments.
 const SEGMENTS_MAX: usize = 16;
 
+/// Numbers of segments in sequence that are no improvement, after which larger ones are not tried.
+const PATIENCE: usize = 4;
+
 /// Penalty of a boundary, in units of the logarithm of the number of values.
 const PENALTY_BOUNDARY: f64 = 2.5;
 
@@ -57,12 +60,18 @@ pub fn select(values: &[f64], floor: f64) -> Model {
     for phi in PHIS {
         let series = Series::new(values, phi);
         for mean in [Mean::Constant, Mean::Linear] {
-            for (cost, boundaries) in series.divisions(mean, count_max) {
+            let (mut least, mut worse) = (f64::INFINITY, 0);
+            for (cost, boundaries) in series.divisions(mean).take(count_max) {
                 let best = if boundaries.is_empty() { &mut whole } else { &mut divided };
                 let model = Model { phi, mean, boundaries };
                 let criterion = criterion(&model, cost, values.len() as f64, floor);
+                worse = if criterion < least { 0 } else { worse + 1 };
+                least = least.min(criterion);
                 if criterion < best.0 {
                     *best = (criterion, model);
+                }
+                if worse == PATIENCE {
+                    break;
                 }
             }
         }

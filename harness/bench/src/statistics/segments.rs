@@ -121,27 +121,28 @@ impl Series {
         values
     }
 
-    /// Returns for 1, 2, ..., `count_max` segments, as far as they fit: the least total cost and the first indices of
-    /// all segments but the first.
-    pub fn divisions(&self, mean: Mean, count_max: usize) -> Vec<(f64, Vec<usize>)> {
+    /// Returns for 1, 2, ... segments, as far as they fit: the least total cost, and the first indices of all segments but
+    /// the first. Each takes a time quadratic in the number of values when it is requested.
+    pub fn divisions(&self, mean: Mean) -> impl Iterator<Item = (f64, Vec<usize>)> {
         let (n, least) = (self.values.len(), mean.length_min());
-        // costs[until] is that of the best division of the values before `until`; origins[k][until] is the first index
-        // of its last segment.
-        let mut costs: Vec<f64> = (0..=n)
-            .map(|until| match until >= least {
-                true => self.fit(0, until, mean).cost,
-                false => f64::INFINITY,
-            })
-            .collect();
-        let mut origins: Vec<Vec<usize>> = vec![vec![0; n + 1]];
-        let mut found = vec![(costs[n], Vec::new())];
-        while origins.len() < count_max && (origins.len() + 1) * least <= n {
+        // costs[until] is that of the best division of the values before `until`; origins[k][until] is the first index of
+        // the last of k + 1 segments.
+        let mut costs: Vec<f64> = Vec::new();
+        let mut origins: Vec<Vec<usize>> = Vec::new();
+        std::iter::from_fn(move || {
+            let segments = origins.len() + 1;
+            if segments * least > n.max(least) {
+                return None;
+            }
             let mut next = vec![f64::INFINITY; n + 1];
             let mut origin = vec![0; n + 1];
-            for until in least * (origins.len() + 1)..=n {
-                for from in least * origins.len()..=until - least {
+            for until in least * segments..=n {
+                if segments == 1 {
+                    next[until] = self.fit(0, until, mean).cost;
+                }
+                for from in least * (segments - 1)..=until - least {
                     // A cost is never negative.
-                    if costs[from] < next[until] {
+                    if segments > 1 && costs[from] < next[until] {
                         let cost = costs[from] + self.fit(from, until, mean).cost;
                         if cost < next[until] {
                             (next[until], origin[until]) = (cost, from);
@@ -151,19 +152,8 @@ impl Series {
             }
             costs = next;
             origins.push(origin);
-            let mut until = n;
-            let mut places: Vec<usize> = origins[1..]
-                .iter()
-                .rev()
-                .map(|origin| {
-                    until = origin[until];
-                    until
-                })
-                .collect();
-            places.reverse();
-            found.push((costs[n], places));
-        }
-        found
+            Some((costs[n], boundaries(&origins, n)))
+        })
     }
 
     /// Returns the least cost of two segments; `None` if the series is too short for two.
@@ -174,7 +164,83 @@ impl Series {
     }
 }
 
+/// Follows the origins of the last segments from the end of the series.
+fn boundaries(origins: &[Vec<usize>], n: usize) -> Vec<usize> {
+    let mut until = n;
+    let mut places: Vec<usize> = Vec::with_capacity(origins.len() - 1);
+    for origin in origins[1..].iter().rev() {
+        until = origin[until];
+        places.push(until);
+    }
+    places.reverse();
+    places
+}
+
 /// The regressor of a slope in the whitened value at index `i`.
 fn whitened_time(i: usize, phi: f64) -> f64 {
     i as f64 - phi * (i as f64 - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::statistics::random::Random;
+
+    fn values(count: usize) -> Vec<f64> {
+        let mut random = Random(count as u64);
+        (0..count).map(|_| random.below(1000) as f64 / 100.0).collect()
+    }
+
+    /// The sum of squares, by the residuals of the fit.
+    fn squares(series: &Series, from: usize, until: usize, mean: Mean) -> f64 {
+        series.residuals(from, until, mean).iter().map(|r| r * r).sum()
+    }
+
+    #[test]
+    fn the_cost_is_the_sum_of_squares_and_no_other_line_has_less() {
+        let values = values(40);
+        for phi in [0.0, 0.5, 0.9] {
+            let series = Series::new(&values, phi);
+            for mean in [Mean::Constant, Mean::Linear] {
+                let fit = series.fit(7, 33, mean);
+                assert!((fit.cost - squares(&series, 7, 33, mean)).abs() < 1e-6 * fit.cost);
+                let shifted: Vec<f64> = (0..40)
+                    .map(|i| values[i] - fit.at(i as f64) + if i < 20 { 0.1 } else { -0.1 })
+                    .collect();
+                let other = Series::new(&shifted, phi).fit(7, 33, mean).cost;
+                assert!((other - fit.cost).abs() > 1e-6, "{mean:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn coloured_residuals_give_the_values_back() {
+        let values = values(30);
+        let series = Series::new(&values, 0.6);
+        let fit = series.fit(0, 30, Mean::Linear);
+        let coloured = Series::coloured(&series.residuals(0, 30, Mean::Linear), 0.6);
+        for (i, value) in coloured.iter().enumerate() {
+            assert!((value + fit.at(i as f64) - values[i]).abs() < 1e-9);
+        }
+    }
+
+    /// Compares with all divisions into three segments.
+    #[test]
+    fn the_best_division_is_found() {
+        let values = values(16);
+        let series = Series::new(&values, 0.3);
+        let (cost, places) = series.divisions(Mean::Constant).nth(2).unwrap();
+        let of = |a: usize, b: usize| {
+            [(0, a), (a, b), (b, 16)]
+                .iter()
+                .map(|(from, until)| series.fit(*from, *until, Mean::Constant).cost)
+                .sum::<f64>()
+        };
+        let all = (2..=12).flat_map(|a| (a + 2..=14).map(move |b| (a, b)));
+        let least = all.map(|(a, b)| of(a, b)).fold(f64::INFINITY, f64::min);
+        assert!((cost - least).abs() < 1e-9 && (of(places[0], places[1]) - least).abs() < 1e-9);
+        let halves = series.halves(Mean::Constant).unwrap();
+        assert_eq!(series.divisions(Mean::Constant).nth(1).unwrap().0, halves);
+        assert_eq!(series.divisions(Mean::Linear).count(), 3);
+    }
 }
