@@ -25,7 +25,7 @@ const ROUNDS_MIN_LIMIT: usize = 40;
 const SAMPLES: usize = 20_000;
 
 /// Greatest number of random permutations for `p`: many tests at once need small p-values.
-const PERMUTATIONS_MAX: usize = 200_000;
+const PERMUTATIONS_MAX: usize = 50_000;
 
 /// Number of permutations with a larger effect after which `p` is known well enough (Besag and Clifford, 1991).
 const EXCEEDANCES_MAX: usize = 100;
