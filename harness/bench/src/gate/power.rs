@@ -53,8 +53,8 @@ pub struct Row {
     pub rates: [Rate; 3],
 }
 
-/// Runs the gate on slow-downs of every kind and of these sizes, in percent; 0 is none. Exact layers are run once for every
-/// phase, and the layer of time `trials` times. `options` has seed, limits, and the layers to test.
+/// Runs the gate `trials` times on slow-downs of every kind and of these sizes, in percent; 0 is none. Trials take turns
+/// with the phases, and exact layers are run at most once for every phase. `options` has seed, limits, and the layers to test.
 ///
 /// # Errors
 /// If the gate cannot run.
@@ -79,12 +79,12 @@ pub fn power(
     });
     for (kind, percent) in all {
         let mut row = Row { kind, percent, rates: Default::default() };
-        for trial in 0..trials.max(PHASES.len()) {
+        for trial in 0..trials {
             if interrupt::requested() {
                 return Ok(rows);
             }
             progress(&format!("{}, trial {}", described(kind, percent), trial + 1));
-            test.trial(&mut row, trial, trial < trials)?;
+            test.trial(&mut row, trial)?;
         }
         rows.push(row);
     }
@@ -114,8 +114,8 @@ impl Test<'_> {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755))
     }
 
-    /// Runs the gate once and adds the outcome to the row. Trials take turns with the phases.
-    fn trial(&self, row: &mut Row, trial: usize, timed: bool) -> Result<(), GateError> {
+    /// Runs the gate once and adds the outcome to the row.
+    fn trial(&self, row: &mut Row, trial: usize) -> Result<(), GateError> {
         let phase = trial % PHASES.len();
         let arguments = row.kind.map_or(String::new(), |kind| {
             let kind = kind.to_possible_value().map(|v| v.get_name().to_owned());
@@ -127,7 +127,7 @@ impl Test<'_> {
         let layers: Vec<LayerName> = LAYERS
             .into_iter()
             .filter(|layer| requested.is_empty() || requested.contains(layer))
-            .filter(|layer| if *layer == LayerName::Time { timed } else { trial < PHASES.len() })
+            .filter(|layer| *layer == LayerName::Time || trial < PHASES.len())
             .collect();
         if layers.is_empty() {
             return Ok(());

@@ -70,8 +70,8 @@ pub struct Arguments {
           default_missing_value = "0,0.1,0.3,1,3,10", conflicts_with_all = ["baseline", "candidate", "record"])]
     selftest: Option<Vec<f64>>,
     /// Gates per slow-down in --selftest
-    #[arg(long, default_value_t = 10, requires = "selftest")]
-    trials: usize,
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
+    trials: u16,
     /// Where revisions are built and kept [default: target/gate in the repository]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
@@ -103,7 +103,7 @@ pub fn run(arguments: Arguments) -> u8 {
         repository,
     };
     if let Some(sizes) = &arguments.selftest {
-        return selftest(sizes, arguments.trials, &options, &programs);
+        return selftest(sizes, usize::from(arguments.trials), &options, &programs);
     }
     let report = match gate(&options, &programs) {
         Ok(report) => report,
