@@ -23,6 +23,7 @@ fn main() -> ExitCode {
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Leak(arguments) => commands::leak::run(&arguments),
+        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Import(arguments) => commands::import::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),

@@ -164,15 +164,58 @@ fn every_figure_has_its_values_and_its_tikz_picture() {
     }
     let speedup =
         std::fs::read_to_string(place.path().join("figures/speedup-uav-50M.csv")).unwrap();
-    assert!(speedup.contains("oversubscribed,oversubscribed,4,"), "{speedup}");
-    assert!(speedup.contains("projected,projected,64,") && speedup.contains("cited,32,11.28"));
+    assert!(speedup.contains("\"mesher, oversubscribed\",oversubscribed,4,"), "{speedup}");
+    assert!(
+        speedup.contains("\"mesher, projected\",projected,64,")
+            && speedup.contains("cited,32,11.28")
+    );
     assert!(
         place.path().join("figures.tex").is_file() && place.path().join("artifact.md").is_file()
     );
     assert!(written.broken.is_empty(), "{:?}", written.broken);
     let balance =
         std::fs::read_to_string(place.path().join("figures/balance-uav-4M-64.csv")).unwrap();
-    assert!(balance.contains("\nmorton rehearsal,by cells,measured,"), "{balance}");
+    assert!(balance.contains("\nmorton rehearsal,mesher: by cells,measured,"), "{balance}");
+}
+
+#[test]
+fn two_programs_are_never_in_one_series() {
+    let mut lines = record();
+    let other = |line: &Line| {
+        let mut line = line.clone();
+        if let Entry::Run(run) = &mut line.entry {
+            run.setup.engine = "other".into();
+            run.time_wall_s *= 3.0;
+        }
+        line
+    };
+    lines.extend(record().iter().map(other));
+    let place = tempfile::tempdir().unwrap();
+    let written = report(place.path(), &lines, &[]).unwrap();
+    // Figures over cells show both programs, and all others one.
+    assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4);
+    let read = |name: &str| {
+        std::fs::read_to_string(place.path().join("figures").join(format!("{name}.csv"))).unwrap()
+    };
+    for name in ["time-over-cells-uav", "time-over-layers-uav", "rate", "memory"] {
+        let text = read(name);
+        for engine in ["mesher", "other"] {
+            for ranks in ["1 rank", "2 ranks"] {
+                let series = format!("\"{engine}, {ranks}, measured\"");
+                assert_eq!(text.matches(&series).count(), 4, "{series} in {name}:\n{text}");
+            }
+        }
+    }
+    assert!(read("speedup-other-uav-50M").contains("\"other, projected\",projected,64,"));
+    assert!(read("phases-weak-other-uav").contains("64,other: grade,"));
+    let page = std::fs::read_to_string(&written.page).unwrap();
+    assert!(page.contains("Speedup: uav by other") && page.contains("uav by mesher"), "{page}");
+    assert!(page.matches("<td>other</td>").count() == page.matches("<td>mesher</td>").count());
+}
+
+/// Number of figures of the record of one program.
+fn files_of_one() -> usize {
+    report(tempfile::tempdir().unwrap().path(), &record(), &[]).unwrap().figures
 }
 
 #[test]

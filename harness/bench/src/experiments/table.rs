@@ -35,7 +35,8 @@ fn experiment_table(out: &mut String, groups: &Groups, experiment: &str) {
     let _ = writeln!(out, "\n{experiment}");
     let _ = writeln!(
         out,
-        "  {:<14} {:>13} {:>3} {:<19} {:>5} {:<14} {:>10} {:>22} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>8} {:>7}",
+        "  {:<10} {:<14} {:>13} {:>3} {:<19} {:>5} {:<14} {:>10} {:>22} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>8} {:>7}",
+        "engine",
         "case",
         "cells",
         "n",
@@ -62,7 +63,13 @@ fn experiment_table(out: &mut String, groups: &Groups, experiment: &str) {
     for group in last {
         let (run, reference) = (&group.typical, groups.reference(group));
         let cause = sentence(run, &reference.typical, &groups.network);
-        let _ = writeln!(out, "  {}, {}: {cause}", group.setup.case, group.how());
+        let _ = writeln!(
+            out,
+            "  {}, {}, {}: {cause}",
+            group.setup.engine,
+            group.setup.case,
+            group.how()
+        );
     }
 }
 
@@ -72,7 +79,8 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
     let interval = format!("[{:.3}, {:.3}] {:.0} %", t.low, t.high, t.coverage * 100.0);
     let _ = writeln!(
         out,
-        "  {:<14} {:>13} {:>3} {:<19} {:>5} {:<14} {:>10.3} {:>22} {:>6.3} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>8.2} {:>7.2}",
+        "  {:<10} {:<14} {:>13} {:>3} {:<19} {:>5} {:<14} {:>10.3} {:>22} {:>6.3} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>8.2} {:>7.2}",
+        s.engine,
         s.case,
         grouped(group.cells()),
         s.layer_cells_min,
@@ -138,7 +146,8 @@ fn projections(out: &mut String, groups: &Groups) {
     for p in pairs {
         let _ = writeln!(
             out,
-            "  {:<14} {:>13} cells, {} ranks: projected {:.3} s, measured {:.3} s, error {:+.1} %; of CPU times alone {:+.1} %",
+            "  {:<10} {:<14} {:>13} cells, {} ranks: projected {:.3} s, measured {:.3} s, error {:+.1} %; of CPU times alone {:+.1} %",
+            p.sim.setup.engine,
             p.sim.setup.case,
             grouped(p.sim.cells()),
             p.sim.setup.ranks,
@@ -153,8 +162,8 @@ fn projections(out: &mut String, groups: &Groups) {
     if let Some(group) = largest {
         let _ = writeln!(
             out,
-            "\nphases on {} simulated ranks, {}",
-            group.setup.ranks, group.setup.case
+            "\nphases of {} on {} simulated ranks, {}",
+            group.setup.engine, group.setup.ranks, group.setup.case
         );
         out.push_str(&phases(group, groups.reference(group), &groups.network));
     }

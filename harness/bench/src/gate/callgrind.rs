@@ -26,11 +26,18 @@ impl Profile {
         ALLOCATORS.iter().filter_map(|name| self.calls.get(*name)).sum()
     }
 
-    /// Parses a callgrind file.
-    ///
-    /// # Errors
-    /// If the file contains no costs.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    /// Adds the profile of another process.
+    pub fn add(&mut self, other: &Self) {
+        self.instructions += other.instructions;
+        for (of, more) in [(&mut self.own, &other.own), (&mut self.calls, &other.calls)] {
+            for (name, count) in more {
+                *of.entry(name.clone()).or_default() += count;
+            }
+        }
+    }
+
+    /// Parses a callgrind file. A process that was replaced by another program has no costs.
+    pub fn parse(text: &str) -> Self {
         let mut profile = Self::default();
         let mut names: HashMap<&str, &str> = HashMap::new();
         let (mut function, mut callee) = ("", "");
@@ -53,10 +60,7 @@ impl Profile {
                 profile.instructions += cost;
             }
         }
-        match profile.instructions {
-            0 => Err("the callgrind file contains no costs".into()),
-            _ => Ok(profile),
-        }
+        profile
     }
 
     /// Returns the differences of instructions by function relative to an older profile, largest first.
@@ -104,20 +108,26 @@ mod tests {
 
     #[test]
     fn own_costs_add_up_to_the_reported_total() {
-        let profile = Profile::parse(FILE).unwrap();
+        let profile = Profile::parse(FILE);
         assert_eq!(profile.instructions, 116);
         assert_eq!((profile.own["main"], profile.own["malloc@GLIBC"]), (9, 100));
         assert_eq!((profile.calls["malloc"], profile.allocations()), (5, 5));
-        assert!(Profile::parse("events: Ir\n").is_err());
+        assert_eq!(Profile::parse("events: Ir\n"), Profile::default());
+    }
+
+    #[test]
+    fn profiles_of_several_processes_add_up() {
+        let mut sum = Profile::parse(FILE);
+        sum.add(&Profile::parse(FILE));
+        assert_eq!((sum.instructions, sum.own["main"], sum.allocations()), (232, 18, 10));
     }
 
     #[test]
     fn differences_are_sorted_by_size() {
-        let old = Profile::parse(FILE).unwrap();
+        let old = Profile::parse(FILE);
         let new = Profile::parse(
             &FILE.replace("12 3", "12 30").replace("\n0 7\ntotals", "\n0 5\ntotals"),
-        )
-        .unwrap();
+        );
         assert_eq!(
             new.grown_since(&old),
             [("main".to_owned(), 27), ("_int_malloc".to_owned(), -2)]

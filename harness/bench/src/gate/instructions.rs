@@ -1,4 +1,4 @@
-//! The layer of instructions: instructions and allocations of a serial run under valgrind. They do not depend on the load of the
+//! The layer of instructions: instructions and allocations of a serial run under valgrind, of all its processes. They do not depend on the load of the
 //! machine, so a difference of a percent is significant.
 
 use super::callgrind::Profile;
@@ -13,6 +13,7 @@ use run::engine::options::RunOptions;
 use run::engine::paths::on_path;
 use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
+use std::path::Path;
 use std::process::Command;
 
 const VALGRIND: &str = "valgrind";
@@ -116,15 +117,32 @@ fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Profile, Str
     // Without output files, the count is that of meshing alone.
     let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit) };
     let plain = engine.command(&path, &SERIAL, &options).map_err(|why| why.to_string())?;
-    let file = place.join("callgrind.out");
     let mut command = Command::new(VALGRIND);
-    command.args(["--tool=callgrind", "--compress-pos=no"]);
-    command.arg(format!("--callgrind-out-file={}", file.display()));
+    // The program may be started by a script, and may start others.
+    command.args(["--tool=callgrind", "--compress-pos=no", "--trace-children=yes"]);
+    command.arg(format!("--callgrind-out-file={}.%p", place.join(PROFILE).display()));
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let watch = Watch::new(VALGRIND, bench.options.limit, &place);
     process::run(&mut command, &watch).map_err(|failure| failure.to_string())?;
-    let text =
-        std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
-    Profile::parse(&text)
+    profile_of_all(&place)
+}
+
+/// Beginning of the names of the profiles.
+const PROFILE: &str = "callgrind.out";
+
+/// The sum of the profiles of all processes.
+fn profile_of_all(place: &Path) -> Result<Profile, String> {
+    let wrong = |error: std::io::Error| format!("{}: {error}", place.display());
+    let mut sum = Profile::default();
+    for entry in std::fs::read_dir(place).map_err(wrong)? {
+        let entry = entry.map_err(wrong)?;
+        if entry.file_name().to_string_lossy().starts_with(PROFILE) {
+            sum.add(&Profile::parse(&std::fs::read_to_string(entry.path()).map_err(wrong)?));
+        }
+    }
+    match sum.instructions {
+        0 => Err("valgrind wrote no profile with costs".into()),
+        _ => Ok(sum),
+    }
 }

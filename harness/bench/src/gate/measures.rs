@@ -48,6 +48,9 @@ pub struct CaseMeasures {
     pub exact: BTreeMap<String, u64>,
     /// Counts by valgrind; deterministic except for hash seeds and addresses.
     pub counted: BTreeMap<String, u64>,
+    /// Number of findings by failed check.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub findings: BTreeMap<String, u64>,
 }
 
 impl Measures {

@@ -3,15 +3,20 @@
 //!
 //! [`rules`] defines cases and tolerances; [`subject`] finds or builds the two programs; [`measures`] holds the exact measures
 //! of one; [`counters`], [`instructions`] and [`time`] compare, the last with [`crate::statistics::comparison`]; [`report`] is
-//! the result.
+//! the result. [`power`] measures which slow-downs the gate finds, with the program [`planted`].
 //!
 //! Invariant: times of different sessions are never compared.
 
+pub mod build;
 pub mod callgrind;
 pub mod correctness;
 pub mod counters;
 pub mod instructions;
+pub mod known;
 pub mod measures;
+pub mod phases;
+pub mod planted;
+pub mod power;
 pub mod report;
 pub mod rules;
 pub mod subject;
@@ -46,6 +51,8 @@ pub struct Options {
     pub limit: Duration,
     /// Seconds for timing one case, instead of the rules'.
     pub budget_s: Option<f64>,
+    /// The root directory of the repository with the revisions and the working tree.
+    pub repository: PathBuf,
     /// Where revisions are built and kept.
     pub cache: PathBuf,
 }
@@ -87,8 +94,8 @@ pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError>
     let rules =
         Rules::read(options.rules.as_deref().unwrap_or(&programs.paths.engines.join("gate.toml")))?;
     let cases = rules.select(&options.cases, programs)?;
-    let baseline = Baseline::find(options, &programs.engine, programs)?;
-    let candidate = Subject::candidate(options, &programs.engine, &baseline, programs)?;
+    let baseline = Baseline::find(options, &programs.engine)?;
+    let candidate = Subject::candidate(options, &programs.engine, &baseline)?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();
     let place =
         place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
@@ -117,7 +124,9 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
         let start = Instant::now();
         eprintln!("harness gate: {name}");
         let mut layer = match name {
-            LayerName::Correctness => correctness::layer(bench)?,
+            LayerName::Correctness => {
+                correctness::layer(bench, baseline, &mut report.candidate_measures)?
+            }
             LayerName::Counters => counters::layer(bench, baseline, &mut report.candidate_measures),
             LayerName::Instructions => {
                 instructions::layer(bench, baseline, &mut report.candidate_measures)

@@ -54,10 +54,12 @@ pub struct TimeRules {
     pub rounds_max: usize,
     /// Time for one case, in seconds.
     pub budget_s: f64,
-    /// Significance level: the probability of a false alarm per case.
+    /// Greatest rate of false discoveries among all quantities of all cases; the probability of a false alarm per run.
     pub alpha: f64,
     /// Smaller effects are ignored; percent.
     pub effect_min: f64,
+    /// Changes of a phase that are a smaller part of the whole CPU time are ignored; percent.
+    pub phase_min: f64,
     /// "Unchanged" requires that an effect of this size would have been detected; percent.
     pub effect_wanted: f64,
 }
@@ -70,6 +72,7 @@ impl Default for TimeRules {
             budget_s: 20.0,
             alpha: 0.001,
             effect_min: 3.0,
+            phase_min: 0.5,
             effect_wanted: 10.0,
         }
     }
@@ -112,8 +115,14 @@ impl Rules {
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let time = &rules.time;
-        if !(time.alpha > 0.0 && time.alpha < 0.5 && time.effect_min >= 0.0) {
-            return Err(wrong("alpha must be between 0 and 0.5 and effect_min at least 0".into()));
+        if !(time.alpha > 0.0
+            && time.alpha < 0.5
+            && time.effect_min >= 0.0
+            && time.phase_min >= 0.0)
+        {
+            return Err(wrong(
+                "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into(),
+            ));
         }
         let least = rounds_min(time.alpha);
         if time.rounds_min < least || time.rounds_max < time.rounds_min {

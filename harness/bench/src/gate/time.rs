@@ -1,10 +1,16 @@
 //! The layer of time: baseline and candidate run interleaved, so that the load of the machine affects both equally.
+//!
+//! Three kinds of quantities are compared: the CPU time and the wall time of the whole process, seen from outside, and the
+//! CPU time of every phase that the program reports, with what lies outside all phases. All of them are tested together:
+//! [`adjusted`] controls the rate of false discoveries.
 
+use super::phases::{self, OUTSIDE};
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
 use super::{Bench, left_out};
 use crate::statistics::comparison::{Comparison, Round, compare};
+use crate::statistics::false_discovery::adjusted;
 use crate::statistics::random::Random;
 use crate::statistics::trimmed_mean;
 use run::engine::failure::Failure;
@@ -14,6 +20,11 @@ use run::engine::options::RunOptions;
 use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine};
 use std::path::Path;
+
+/// CPU time of the whole process.
+pub const CPU: &str = "CPU time";
+/// Wall time of the whole process.
+pub const WALL: &str = "wall time";
 
 /// Compares the times of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
@@ -28,32 +39,48 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
         Baseline::None => return left_out(LayerName::Time, "no baseline was given"),
     };
     let mut layer = Layer::new(LayerName::Time);
+    let mut measured = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
         if interrupt::requested() {
             break;
         }
-        let found = match rounds(bench, &subject.engine, case) {
-            Ok(timed) => judge(bench, case, &timed),
+        match rounds(bench, &subject.engine, case) {
+            Ok(quantities) => measured.push((case.rule.name.clone(), quantities)),
             Err(failure) if failure.is_interrupt() => break,
-            Err(why) => Finding::without_numbers(
+            Err(why) => layer.findings.push(Finding::without_numbers(
                 &case.rule.name,
                 "time",
                 Verdict::Inconclusive,
                 why.to_string(),
-            ),
-        };
-        layer.findings.push(found);
+            )),
+        }
     }
+    layer.findings.extend(judged(bench, &mut measured));
     layer
 }
 
-/// All rounds of a case.
-struct Timed {
-    rounds: Vec<Round>,
-    /// The kind of time.
-    what: &'static str,
-    /// Logarithms of the ratio of candidate to baseline, by phase.
-    phases: Vec<(String, Vec<f64>)>,
+/// A quantity of all rounds of a case.
+#[derive(Debug)]
+pub(super) struct Quantity {
+    /// [`CPU`], [`WALL`], or the name of a phase.
+    pub name: String,
+    pub rounds: Vec<Round>,
+    /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
+    pub found: Option<Comparison>,
+}
+
+impl Quantity {
+    fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), rounds: Vec::new(), found: None }
+    }
+
+    /// Mean times of baseline and candidate, in seconds.
+    pub fn means(&self) -> (f64, f64) {
+        let mean = |of: &dyn Fn(&Round) -> f64| {
+            trimmed_mean(&self.rounds.iter().map(of).collect::<Vec<f64>>()).exp()
+        };
+        (mean(&|round| (round.a + round.a_again) / 2.0), mean(&|round| round.b))
+    }
 }
 
 /// The three runs of a round.
@@ -61,7 +88,8 @@ const BASELINE: usize = 0;
 const AGAIN: usize = 1;
 const CANDIDATE: usize = 2;
 
-fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, Failure> {
+/// Runs all rounds of a case: the two times of the process, then the phases that both programs report.
+fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Vec<Quantity>, Failure> {
     let unusable = |why: String| baseline.unusable(why);
     let path = case.path.clone().map_err(unusable)?;
     let place = bench.enter("time").map_err(unusable)?;
@@ -70,40 +98,33 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Timed, Fa
     // The first run reads program and geometry from disk and is not counted.
     let first = run(bench, baseline, &path)?;
     let also = run(bench, &bench.candidate, &path)?;
-    let cpu = first.report.time_cpu_s().is_some() && also.report.time_cpu_s().is_some();
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget_s.unwrap_or(rules.budget_s);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let mut random = Random(bench.options.seed);
-    let mut timed = Timed {
-        rounds: Vec::with_capacity(count),
-        what: if cpu { "CPU seconds" } else { "wall seconds" },
-        phases: first.report.phases.iter().map(|phase| (phase.name.clone(), Vec::new())).collect(),
-    };
+    let mut quantities = vec![Quantity::new(CPU), Quantity::new(WALL)];
+    if first.report.time_cpu_s().is_some() && also.report.time_cpu_s().is_some() {
+        let of_candidate = |p: &&PhaseReport| also.report.phases.iter().any(|o| o.name == p.name);
+        let both = first.report.phases.iter().filter(of_candidate);
+        quantities.extend(both.map(|phase| Quantity::new(&phase.name)));
+        quantities.push(Quantity::new(OUTSIDE));
+    }
     for _ in 0..count {
         let mut order = [BASELINE, AGAIN, CANDIDATE];
         random.shuffle(&mut order);
-        let mut reports = [const { None }; 3];
+        let mut runs = [const { None }; 3];
         for index in order {
-            reports[index] = Some(run(bench, engines[index], &path)?);
+            runs[index] = Some(run(bench, engines[index], &path)?);
         }
-        let [Some(a), Some(a_again), Some(b)] = reports else { unreachable!("each was run") };
-        let time = |run: &Completed| {
-            run.report.time_cpu_s().filter(|_| cpu).unwrap_or(run.time_process_s).max(1e-9).ln()
-        };
-        timed.rounds.push(Round { a: time(&a), a_again: time(&a_again), b: time(&b) });
-        for (name, ratios) in &mut timed.phases {
-            let of = |run: &Completed| {
-                let phase = run.report.phases.iter().find(|phase| phase.name == *name);
-                phase.map(PhaseReport::time_cpu_total_s)
-            };
-            if let (Some(a), Some(a_again), Some(b)) = (of(&a), of(&a_again), of(&b)) {
-                ratios.push((2.0 * b.max(1e-9) / (a + a_again).max(1e-9)).ln());
-            }
+        let [Some(a), Some(a_again), Some(b)] = runs else { unreachable!("each was run") };
+        for quantity in &mut quantities {
+            // A microsecond is the resolution of the clocks.
+            let of = |run: &Completed| seconds(run, &quantity.name).max(1e-6).ln();
+            quantity.rounds.push(Round { a: of(&a), a_again: of(&a_again), b: of(&b) });
         }
     }
-    Ok(timed)
+    Ok(quantities)
 }
 
 fn run(bench: &Bench, engine: &Engine, case: &Path) -> Result<Completed, Failure> {
@@ -111,46 +132,84 @@ fn run(bench: &Bench, engine: &Engine, case: &Path) -> Result<Completed, Failure
     engine.run(case, &SERIAL, &RunOptions::new(&place, bench.options.limit))
 }
 
-fn judge(bench: &Bench, case: &Selected, timed: &Timed) -> Finding {
+/// A quantity of one run, in seconds.
+fn seconds(run: &Completed, name: &str) -> f64 {
+    match name {
+        CPU => run.time_process_cpu_s,
+        WALL => run.time_process_s,
+        OUTSIDE => run.time_process_cpu_s - run.report.time_cpu_s().unwrap_or(0.0),
+        _ => {
+            let of_phase = run.report.phases.iter().filter(|phase| phase.name == name);
+            of_phase.map(PhaseReport::time_cpu_total_s).sum()
+        }
+    }
+}
+
+/// Tests all quantities of all cases together.
+fn judged(bench: &Bench, measured: &mut [(String, Vec<Quantity>)]) -> Vec<Finding> {
     let rules = &bench.rules.time;
-    let found = compare(&timed.rounds, rules.alpha, bench.options.seed);
-    let verdict = verdict(&found, rules);
-    let mean = |of: &dyn Fn(&Round) -> f64| {
-        let times: Vec<f64> = timed.rounds.iter().map(of).collect();
-        trimmed_mean(&times).exp()
+    let quantities = || measured.iter().flat_map(|(_, quantities)| quantities);
+    let compared: Vec<Comparison> = quantities()
+        .map(|quantity| compare(&quantity.rounds, rules.alpha, bench.options.seed))
+        .collect();
+    let p_values: Vec<f64> = compared.iter().map(|found| found.p).collect();
+    let all = measured.iter_mut().flat_map(|(_, quantities)| quantities);
+    for ((quantity, found), p) in all.zip(compared).zip(adjusted(&p_values)) {
+        quantity.found = Some(Comparison { p, ..found });
+    }
+    let of_case = |(case, quantities): &(String, Vec<Quantity>)| {
+        let (whole, phases) = quantities.split_at(2);
+        let mut findings: Vec<Finding> =
+            whole.iter().filter_map(|quantity| whole_finding(case, quantity, rules)).collect();
+        findings.extend(phases::findings(case, &whole[0], phases, rules));
+        findings
     };
+    measured.iter().flat_map(of_case).collect()
+}
+
+/// The finding for a time of the whole process.
+fn whole_finding(case: &str, quantity: &Quantity, rules: &TimeRules) -> Option<Finding> {
+    let found = quantity.found?;
+    let (baseline, candidate) = quantity.means();
+    let note = format!(
+        "{} rounds; {}, minimum detectable effect {:.1} %",
+        quantity.rounds.len(),
+        certainty(&found),
+        100.0 * found.visible.max(rules.effect_min / 100.0)
+    );
+    Some(Finding {
+        baseline: Some(baseline),
+        candidate: Some(candidate),
+        change_percent: Some(100.0 * found.effect),
+        ..Finding::without_numbers(case, &quantity.name, verdict(&found, rules), note)
+    })
+}
+
+/// The certainty of an effect, as text.
+pub(super) fn certainty(found: &Comparison) -> String {
     let percent = |ratio: f64| ratio * 100.0;
-    let mut note = format!(
-        "{} rounds, {}; 99 % interval {:+.1} to {:+.1} %, p = {:.5}; noise floor {:.1} %, minimum detectable effect {:.1} %",
-        timed.rounds.len(),
-        timed.what,
+    format!(
+        "99 % interval {:+.1} to {:+.1} %, p = {:.5} among all times; noise floor {:.1} %",
         percent(found.low),
         percent(found.high),
         found.p,
-        percent(found.floor),
-        percent(found.visible.max(rules.effect_min / 100.0)),
-    );
-    if matches!(verdict, Verdict::Regression | Verdict::Improvement) {
-        note.push_str(&format!("; by phase: {}", phases(timed)));
-    }
-    Finding {
-        baseline: Some(mean(&|round| (round.a + round.a_again) / 2.0)),
-        candidate: Some(mean(&|round| round.b)),
-        change_percent: Some(percent(found.effect)),
-        ..Finding::without_numbers(&case.rule.name, "time", verdict, note)
-    }
+        percent(found.floor)
+    )
 }
 
 /// An effect with a p-value below this is not reported as unchanged.
 const SUSPICIOUS: f64 = 0.01;
+
+/// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
+pub(super) fn size(effect: f64) -> f64 {
+    if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect }
+}
 
 /// A change must be significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
 /// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was
 /// seen.
 fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
     let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
-    // As a ratio, 1/3 less time equals 1/2 more time.
-    let size = |effect: f64| if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect };
     if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
         return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
     }
@@ -160,15 +219,6 @@ fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
         true => Verdict::Unchanged,
         false => Verdict::Inconclusive,
     }
-}
-
-/// Returns the change of each phase as text.
-fn phases(timed: &Timed) -> String {
-    let changes =
-        timed.phases.iter().filter(|(_, ratios)| !ratios.is_empty()).map(|(name, ratios)| {
-            format!("{name} {:+.0} %", trimmed_mean(ratios).exp_m1() * 100.0)
-        });
-    changes.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -1,21 +1,25 @@
-//! Change points by E-divisive (Matteson and James, "A Nonparametric Approach for Multiple Change Point Analysis of
-//! Multivariate Data", 2014). The series is split where the energy distance between the two sides is greatest, as long as
-//! a permutation test finds the split significant.
+//! Steps and drifts of a series that may have trends, autocorrelated noise and outliers.
 //!
-//! The method assumes no distribution, so it treats exact counters and noisy times alike. Permutations are drawn from a
-//! seed: the result is reproducible.
+//! [`select`] finds the model: segments with constant or linear means and autoregressive noise. Two permutation tests
+//! then confirm its boundaries. The first decides whether there are any steps at all: the model must fit better than it
+//! fits a straight line with the same residuals in random order. The second tests each boundary between its neighbours.
+//! A boundary at which the slope changes but the value does not is no step.
+//!
+//! Permutations are drawn from a seed: the result is reproducible.
 
 use super::median::median_of;
+use super::model::{Model, select, without_outliers};
 use super::random::Random;
+use super::segments::{Fit, Mean, Series};
 
-/// Criteria for a change point.
+/// Criteria for a change.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
-    /// Significance level: the probability of a false change point.
+    /// Significance level: the greatest probability of a step in a series without one.
     pub alpha: f64,
-    /// Number of permutations; the p-value has a resolution of one over this number.
+    /// Greatest number of permutations; a p-value has a resolution of one over the number.
     pub permutations: usize,
-    /// Smaller changes of the median are ignored; a fraction.
+    /// Smaller changes are ignored; a fraction of the value.
     pub effect_min: f64,
     /// Seed of the permutations.
     pub seed: u64,
@@ -27,140 +31,252 @@ impl Default for Rules {
     }
 }
 
-/// Minimum number of values on either side of a change: a single value may be an outlier.
-const SEGMENT_MIN: usize = 2;
-
-/// Returns the index of the first value after each change and its p-value, in ascending order.
-pub fn change_points(values: &[f64], rules: &Rules) -> Vec<(usize, f64)> {
-    let mut random = Random(rules.seed);
-    let mut found = Vec::new();
-    // A stack of segments, so that the order of the random draws depends on the values alone.
-    let mut segments = Vec::from([(0, values.len())]);
-    while let Some((from, until)) = segments.pop() {
-        let part = &values[from..until];
-        let Some((at, energy)) = best_split(part) else { continue };
-        if !large(&part[..at], &part[at..], rules.effect_min) {
-            continue;
-        }
-        let p = p_value(part, energy, rules, &mut random);
-        if p <= rules.alpha {
-            let at = from + at;
-            found.push((at, p));
-            segments.extend([(from, at), (at, until)]);
-        }
-    }
-    found.sort_by_key(|(at, _)| *at);
-    found
+/// A step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Index of the first value after it.
+    pub at: usize,
+    /// The p-value.
+    pub p: f64,
 }
 
-/// Whether the medians differ by more than a fraction of the first.
-fn large(before: &[f64], after: &[f64], fraction: f64) -> bool {
-    let (before, after) = (median_of(before), median_of(after));
-    (after - before).abs() > fraction * before.abs()
+/// A linear change of the mean between two steps or ends of the series.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// First index.
+    pub from: usize,
+    /// Index after the last one.
+    pub until: usize,
+    /// Mean at the first index.
+    pub before: f64,
+    /// Mean at the last index.
+    pub after: f64,
+    /// The p-value.
+    pub p: f64,
 }
 
-/// Returns the split with the greatest energy distance, and that distance; `None` if the series is too short or
-/// constant.
-fn best_split(values: &[f64]) -> Option<(usize, f64)> {
-    let n = values.len();
-    let distances =
-        |from: &[f64], to: f64| from.iter().map(|value| (value - to).abs()).sum::<f64>();
-    // Moving one value from after to before changes the three sums by its distances alone.
-    let (mut within_before, mut between) = (0.0, 0.0);
-    let mut within_after: f64 = (0..n).map(|i| distances(&values[i + 1..], values[i])).sum();
-    let mut best: Option<(usize, f64)> = None;
-    for i in 0..n {
-        let (to_before, to_after) =
-            (distances(&values[..i], values[i]), distances(&values[i + 1..], values[i]));
-        within_before += to_before;
-        within_after -= to_after;
-        between += to_after - to_before;
-        let (b, a) = ((i + 1) as f64, (n - i - 1) as f64);
-        if i + 1 < SEGMENT_MIN || n - i - 1 < SEGMENT_MIN {
-            continue;
+/// The changes of a series, in ascending order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Changes {
+    /// Steps.
+    pub steps: Vec<Step>,
+    /// Drifts.
+    pub drifts: Vec<Drift>,
+}
+
+/// Minimum number of values: two on either side of a step.
+const VALUES_MIN: usize = 4;
+
+/// Number of operations on segments for one test; the number of permutations is reduced to fit.
+const WORK_MAX: usize = 20_000_000;
+
+/// Least number of permutations.
+const PERMUTATIONS_MIN: usize = 199;
+
+/// Factor on the p-value of a model, because it was chosen among several to fit the data: by simulation.
+const MODELS_TRIED: f64 = 4.0;
+
+/// Least step between two segments with slopes, in standard deviations of the noise.
+const STEP_MIN: f64 = 1.5;
+
+/// Returns the steps and drifts of a series.
+pub fn change_points(values: &[f64], rules: &Rules) -> Changes {
+    let size = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    if values.len() < VALUES_MIN || size == 0.0 || !size.is_finite() {
+        return Changes::default();
+    }
+    let middle = median_of(values);
+    let scaled: Vec<f64> = values.iter().map(|value| (value - middle) / size).collect();
+    let least = rules.effect_min * middle.abs() / size;
+    let mut search = Search {
+        clean: without_outliers(&scaled),
+        model: select(&without_outliers(&scaled), variance_min(least)),
+        values: scaled,
+        floor: variance_min(least),
+        least,
+        rules,
+        random: Random(rules.seed),
+    };
+    let steps = search.steps();
+    let mut drifts = search.drifts();
+    for drift in &mut drifts {
+        (drift.before, drift.after) = (drift.before * size + middle, drift.after * size + middle);
+    }
+    Changes { steps, drifts }
+}
+
+/// The variance below which noise is not distinguished from none, for changes of at least `least`.
+fn variance_min(least: f64) -> f64 {
+    (least / 4.0).max(1e-9).powi(2)
+}
+
+/// The tests of a model.
+struct Search<'a> {
+    values: Vec<f64>,
+    /// The values without outliers.
+    clean: Vec<f64>,
+    model: Model,
+    floor: f64,
+    /// Smallest change that counts.
+    least: f64,
+    rules: &'a Rules,
+    random: Random,
+}
+
+impl Search<'_> {
+    /// Returns the confirmed steps and removes all other boundaries from the model.
+    fn steps(&mut self) -> Vec<Step> {
+        let none = self.model.boundaries.is_empty();
+        let p = if none { 1.0 } else { (MODELS_TRIED * self.p_of_model()).min(1.0) };
+        if p > self.rules.alpha {
+            self.model.boundaries.clear();
+            return Vec::new();
         }
-        let pairs = |count: f64| count * (count - 1.0) / 2.0;
-        let distance = 2.0 * between / (a * b) - within_before / pairs(b) - within_after / pairs(a);
-        let energy = a * b / (a + b) * distance;
-        if energy > best.map_or(0.0, |(_, energy)| energy) {
-            best = Some((i + 1, energy));
-        }
-    }
-    best
-}
-
-/// Returns the p-value: the fraction of permutations whose best split has at least this energy distance.
-fn p_value(values: &[f64], energy: f64, rules: &Rules, random: &mut Random) -> f64 {
-    let mut shuffled = values.to_vec();
-    // Sums in a different order differ in their last bits.
-    let enough = energy * (1.0 - 1e-9);
-    let as_clear = (0..rules.permutations).filter(|_| {
-        random.shuffle(&mut shuffled);
-        best_split(&shuffled).is_some_and(|(_, other)| other >= enough)
-    });
-    (1 + as_clear.count()) as f64 / (1 + rules.permutations) as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn noise(count: usize, seed: u64) -> Vec<f64> {
-        let mut random = Random(seed);
-        (0..count).map(|_| 100.0 + random.below(1000) as f64 / 200.0).collect()
-    }
-
-    fn places(values: &[f64]) -> Vec<usize> {
-        change_points(values, &Rules::default()).into_iter().map(|(at, _)| at).collect()
-    }
-
-    #[test]
-    fn steps_are_located_exactly() {
-        let mut values = noise(60, 1);
-        values[20..].iter_mut().for_each(|value| *value *= 1.1);
-        values[45..].iter_mut().for_each(|value| *value *= 0.8);
-        assert_eq!(places(&values), [20, 45]);
-    }
-
-    #[test]
-    fn an_exact_counter_needs_two_values_after_the_change() {
-        let mut values = vec![7.0; 30];
-        values.push(8.0);
-        assert_eq!(places(&values), [0usize; 0]);
-        values.push(8.0);
-        assert_eq!(places(&values), [30]);
-    }
-
-    #[test]
-    fn noise_rarely_gives_a_change_point() {
-        let false_alarms = (0..100).filter(|&seed| !places(&noise(30, seed)).is_empty()).count();
-        assert!(false_alarms <= 4, "{false_alarms}");
-        assert_eq!(places(&[]), [0usize; 0]);
-        assert_eq!(places(&[5.0; 50]), [0usize; 0]);
-    }
-
-    /// Compares with the definition, summed naively.
-    #[test]
-    fn the_split_is_the_one_with_the_greatest_energy_distance() {
-        for seed in 0..20 {
-            let values = noise(12, seed);
-            let mean = |x: &[f64], y: &[f64], pairs: f64| {
-                x.iter().flat_map(|a| y.iter().map(move |b| (a - b).abs())).sum::<f64>() / pairs
-            };
-            let energy = |at: usize| {
-                let (x, y) = values.split_at(at);
-                let (m, n) = (x.len() as f64, y.len() as f64);
-                let distance =
-                    2.0 * mean(x, y, m * n) - mean(x, x, m * (m - 1.0)) - mean(y, y, n * (n - 1.0));
-                m * n / (m + n) * distance
-            };
-            let greatest = (2..=10).map(energy).fold(0.0, f64::max);
-            match best_split(&values) {
-                Some((at, found)) => {
-                    assert!((found - energy(at)).abs() < 1e-9 && (found - greatest).abs() < 1e-9)
+        while self.remove_smallest() {}
+        loop {
+            let tested = self.tested();
+            match tested.iter().max_by(|a, b| a.p.total_cmp(&b.p)) {
+                Some(worst) if worst.p > self.rules.alpha => {
+                    self.model.boundaries.retain(|at| *at != worst.at);
                 }
-                None => assert!(greatest <= 0.0),
+                _ => return tested.into_iter().map(|s| Step { p: s.p.max(p), ..s }).collect(),
             }
         }
     }
+
+    /// Returns the p-value of all boundaries together: how often the model fits as much better than a straight line if
+    /// the series is that line with its residuals in random order. Outliers are moved in each permutation anew.
+    fn p_of_model(&mut self) -> f64 {
+        let (n, phi, mean) = (self.values.len(), self.model.phi, self.model.mean);
+        let (segments, floor) =
+            (self.model.boundaries.len() + 1, self.floor * self.values.len() as f64);
+        let gain = |values: &[f64]| {
+            let series = Series::new(&without_outliers(values), phi);
+            let divided = series.divisions(mean).nth(segments - 1).map_or(f64::INFINITY, |d| d.0);
+            (series.fit(0, n, Mean::Linear).cost + floor) / (divided + floor)
+        };
+        let series = Series::new(&self.values, phi);
+        let line = series.fit(0, n, Mean::Linear);
+        let residuals = series.residuals(0, n, Mean::Linear);
+        let draw = |residuals: &[f64]| {
+            let mut values = Series::coloured(residuals, phi);
+            values.iter_mut().enumerate().for_each(|(i, value)| *value += line.at(i as f64));
+            gain(&values)
+        };
+        self.p_value(gain(&self.values), residuals, segments * n * n / 2, draw)
+    }
+
+    /// Returns every boundary with its p-value: how often two segments fit as much better than one if the residuals
+    /// between the neighbouring boundaries are in random order.
+    fn tested(&mut self) -> Vec<Step> {
+        let edges = self.model.edges(self.values.len());
+        let (phi, mean) = (self.model.phi, self.model.mean);
+        let test = |w: &[usize]| {
+            let values = self.clean[w[0]..w[2]].to_vec();
+            let (n, floor) = (values.len(), self.floor * (w[2] - w[0]) as f64);
+            let gain = |values: &[f64]| {
+                let series = Series::new(values, phi);
+                let one = series.fit(0, n, mean).cost + floor;
+                series.halves(mean).map_or(1.0, |two| one / (two + floor))
+            };
+            let residuals = Series::new(&values, phi).residuals(0, n, mean);
+            let draw = |residuals: &[f64]| gain(&Series::coloured(residuals, phi));
+            Step { at: w[1], p: self.p_value(gain(&values), residuals, n, draw) }
+        };
+        edges.windows(3).map(test).collect()
+    }
+
+    /// Returns the drifts between the boundaries that are left.
+    fn drifts(&mut self) -> Vec<Drift> {
+        let edges = self.model.edges(self.values.len());
+        if self.model.mean == Mean::Constant {
+            return Vec::new();
+        }
+        let phi = self.model.phi;
+        let test = |w: &[usize]| {
+            let values = self.clean[w[0]..w[1]].to_vec();
+            let n = values.len();
+            let floor = self.floor * n as f64;
+            let gain = |values: &[f64]| {
+                let series = Series::new(values, phi);
+                let cost = |mean| series.fit(0, n, mean).cost + floor;
+                cost(Mean::Constant) / cost(Mean::Linear)
+            };
+            let series = Series::new(&values, phi);
+            let line = series.fit(0, n, Mean::Linear);
+            let (before, after) = (line.at(0.0), line.at((n - 1) as f64));
+            let draw = |residuals: &[f64]| gain(&Series::coloured(residuals, phi));
+            let residuals = series.residuals(0, n, Mean::Constant);
+            let p = self.p_value(gain(&values), residuals, n, draw);
+            let counts = p <= self.rules.alpha && (after - before).abs() > self.least;
+            counts.then_some(Drift { from: w[0], until: w[1], before, after, p })
+        };
+        edges.windows(2).filter_map(test).collect()
+    }
+
+    /// Removes the boundary with the smallest step if that is too small. Returns whether one was removed.
+    fn remove_smallest(&mut self) -> bool {
+        let (series, mean) = (Series::new(&self.clean, self.model.phi), self.model.mean);
+        let edges = self.model.edges(self.values.len());
+        let fits: Vec<Fit> = edges.windows(2).map(|w| series.fit(w[0], w[1], mean)).collect();
+        let cost: f64 = fits.iter().map(|fit| fit.cost).sum();
+        let deviation = (cost / self.values.len() as f64 + self.floor).sqrt();
+        let least = match mean {
+            Mean::Constant => self.least,
+            Mean::Linear => self.least.max(STEP_MIN * deviation),
+        };
+        let step = |i: usize| {
+            let middle = edges[i + 1] as f64 - 0.5;
+            (fits[i + 1].at(middle) - fits[i].at(middle)).abs()
+        };
+        let smallest = (0..fits.len() - 1).min_by(|a, b| step(*a).total_cmp(&step(*b)));
+        let small = smallest.filter(|i| step(*i) <= least);
+        small.map(|i| self.model.boundaries.remove(i)).is_some()
+    }
+
+    /// Returns the fraction of random orders of the residuals for which `draw` is at least `observed`, counting the
+    /// observed order. Sampling ends early when that fraction is clearly large (Besag and Clifford, 1991). If no order
+    /// reaches the observed one, the fraction is extrapolated: the logarithm of a gain, like that of a likelihood ratio, has
+    /// an exponential tail.
+    fn p_value(
+        &mut self,
+        observed: f64,
+        mut residuals: Vec<f64>,
+        work: usize,
+        draw: impl Fn(&[f64]) -> f64,
+    ) -> f64 {
+        let permutations =
+            (WORK_MAX / work.max(1)).max(PERMUTATIONS_MIN).min(self.rules.permutations);
+        // Sums in a different order differ in their last bits.
+        let enough = observed * (1.0 - 1e-9);
+        let mut gains = Vec::with_capacity(permutations);
+        let mut as_clear = 1;
+        for drawn in 1..=permutations {
+            self.random.shuffle(&mut residuals);
+            gains.push(draw(&residuals));
+            as_clear += usize::from(gains[drawn - 1] >= enough);
+            if as_clear > EXCEEDANCES_MAX {
+                return as_clear as f64 / (drawn + 1) as f64;
+            }
+        }
+        let counted = as_clear as f64 / (permutations + 1) as f64;
+        if as_clear > 1 { counted } else { counted.min(tail(&mut gains, observed)) }
+    }
+}
+
+/// Number of exceedances after which a p-value is known well enough.
+const EXCEEDANCES_MAX: usize = 50;
+
+/// Fraction of the gains to which the tail is fitted.
+const TAIL: f64 = 0.1;
+
+/// Returns the probability of a gain of at least `observed`, from an exponential distribution fitted to the logarithms of
+/// the largest gains.
+fn tail(gains: &mut [f64], observed: f64) -> f64 {
+    gains.sort_by(f64::total_cmp);
+    let largest = &gains[gains.len() - ((gains.len() as f64 * TAIL) as usize).max(1)..];
+    let start = largest[0].max(1.0).ln();
+    let excess = largest.iter().map(|gain| gain.max(1.0).ln() - start).sum::<f64>();
+    let mean = (excess / largest.len() as f64).max(1e-9);
+    TAIL * (-(observed.ln() - start) / mean).exp()
 }

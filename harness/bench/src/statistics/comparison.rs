@@ -20,9 +20,15 @@ pub fn rounds_min(alpha: f64) -> usize {
 /// Largest value of [`rounds_min`], for levels that no number of samples here resolves.
 const ROUNDS_MIN_LIMIT: usize = 40;
 
-/// Random permutations for `p` and sign patterns for the noise floor: enough to resolve probabilities of 0.001. The
-/// interval takes a quarter as many bootstrap samples.
+/// Sign patterns for the noise floor: enough to resolve probabilities of 0.001. The interval takes a quarter as many
+/// bootstrap samples.
 const SAMPLES: usize = 20_000;
+
+/// Greatest number of random permutations for `p`: many tests at once need small p-values.
+const PERMUTATIONS_MAX: usize = 50_000;
+
+/// Number of permutations with a larger effect after which `p` is known well enough (Besag and Clifford, 1991).
+const EXCEEDANCES_MAX: usize = 100;
 
 /// Factor that gives the difference of two baseline runs the variance of the candidate minus the mean of two baselines:
 /// sqrt((1 + 1/2) / 2).
@@ -73,7 +79,11 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
         });
         trimmed_mean(&relabelled.collect::<Vec<_>>()).abs()
     };
-    let as_large = (0..SAMPLES).filter(|_| permuted_effect(&mut random) >= effect.abs()).count();
+    let (mut as_large, mut drawn) = (0, 0);
+    while drawn < PERMUTATIONS_MAX && as_large < EXCEEDANCES_MAX {
+        as_large += usize::from(permuted_effect(&mut random) >= effect.abs());
+        drawn += 1;
+    }
     let baseline_differences: Vec<f64> =
         rounds.iter().map(|r| (r.a_again - r.a) * SCALE_BASELINE_DIFFERENCE).collect();
     let mut null_effects = collect_draws(SAMPLES, || {
@@ -92,7 +102,7 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let relative = |logarithm: f64| logarithm.exp_m1();
     Comparison {
         effect: relative(effect),
-        p: (1 + as_large) as f64 / (1 + SAMPLES) as f64,
+        p: (1 + as_large) as f64 / (1 + drawn) as f64,
         floor: relative(floor),
         visible: relative(floor + NORMAL_QUANTILE_90 * deviation(&bootstrap_effects)),
         low: relative(quantile(&bootstrap_effects, 0.005)),

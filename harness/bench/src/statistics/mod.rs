@@ -2,7 +2,8 @@
 //!
 //! - [`mod@median`]: medians with intervals between order statistics;
 //! - [`comparison`]: candidate against baseline by a permutation test, for the gate;
-//! - [`mod@change_points`]: changes in a history by E-divisive, for `harness track`;
+//! - [`mod@change_points`]: steps and drifts in a history, for `harness track`, from a [`model`] of [`segments`];
+//! - [`false_discovery`]: the rate of false alarms among many tests;
 //! - [`mod@trimmed_mean`]: the location estimate of the comparison;
 //! - [`random`]: the generator from which permutations are drawn.
 //!
@@ -10,8 +11,11 @@
 
 pub mod change_points;
 pub mod comparison;
+pub mod false_discovery;
 pub mod median;
+pub mod model;
 pub mod random;
+pub mod segments;
 pub mod trimmed_mean;
 
 pub use median::{Median, median, median_of};

@@ -2,11 +2,14 @@
 //!
 //! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts.
 //!
+//! A record with `accepted` states that the user has accepted the values from that commit on.
+//!
 //! A record: `{"schema": "octree-track/1", "commit": "full name", "time": "2026-01-31T12:00:00Z" (of the commit),
-//! "subject": "first line of its message", "metrics": {"CASE/METRIC": number}}`.
+//! "subject": "first line of its message", "metrics": {"CASE/METRIC": number}, "accepted": true (absent if false)}`.
 
 use crate::gate::measures::Measures;
 use crate::gate::report::{LayerName, Report};
+use crate::gate::time::{CPU, WALL};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
@@ -33,13 +36,17 @@ pub struct Record {
     pub subject: String,
     /// Numbers by `CASE/METRIC`.
     pub metrics: BTreeMap<String, f64>,
+    /// Whether the changes at this commit are accepted.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accepted: bool,
 }
 
 impl Record {
     /// Returns a record without metrics.
     pub fn new(commit: String) -> Self {
         let (time, subject) = (String::new(), String::new());
-        Self { schema: SCHEMA.to_owned(), commit, time, subject, metrics: BTreeMap::new() }
+        let metrics = BTreeMap::new();
+        Self { schema: SCHEMA.to_owned(), commit, time, subject, metrics, accepted: false }
     }
 
     /// Returns a record with the time and subject of a commit.
@@ -80,8 +87,13 @@ impl Record {
         if let Ok(report) = serde_json::from_slice::<Report>(text) {
             let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
             for finding in times.flat_map(|layer| &layer.findings) {
+                let name = match finding.metric.as_str() {
+                    CPU => "seconds",
+                    WALL => "wall_seconds",
+                    _ => continue,
+                };
                 if let Some(seconds) = finding.candidate {
-                    self.metrics.insert(format!("{}/seconds", finding.case), seconds);
+                    self.metrics.insert(format!("{}/{name}", finding.case), seconds);
                 }
             }
         }
@@ -112,11 +124,36 @@ fn parse(text: &str) -> Result<Vec<Record>, String> {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
         match records.iter_mut().find(|other| other.commit == record.commit) {
-            Some(same) => same.metrics.extend(record.metrics),
+            Some(same) => {
+                same.metrics.extend(record.metrics);
+                same.accepted |= record.accepted;
+            }
             None => records.push(record),
         }
     }
     Ok(records)
+}
+
+/// Accepts the changes of all metrics at a commit of the history, given by its hash or the beginning of it.
+///
+/// # Errors
+/// One sentence, if the history does not have exactly one such commit, or cannot be written.
+pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
+    let wrong = |why: &str| format!("{}: {why}", path.display());
+    let records = read(path)?;
+    let matching: Vec<&Record> =
+        records.iter().filter(|record| record.commit.starts_with(commit)).collect();
+    let [record] = matching[..] else {
+        let why = match matching.len() {
+            0 => format!(
+                "has no values of commit {commit}: accept the first commit with the new values"
+            ),
+            _ => format!("has several commits that begin with {commit}: give more of the hash"),
+        };
+        return Err(wrong(&why));
+    };
+    let record = Record { metrics: BTreeMap::new(), accepted: true, ..record.clone() };
+    append(path, &record).map_err(|error| wrong(&error.to_string()))
 }
 
 /// Appends a record in a single write, so that no partial line remains.
@@ -157,6 +194,21 @@ mod tests {
         }
         let expected = [record("a", &[("x", 3.0), ("y", 4.0)]), record("b", &[("x", 2.5)])];
         assert_eq!(read(&path).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_commit_is_accepted_by_the_beginning_of_its_hash() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        for commit in ["abc1", "abc2", "abd3"] {
+            append(&path, &record(commit, &[("x", 1.0)])).unwrap();
+        }
+        accept(&path, "abc2").unwrap();
+        let accepted: Vec<bool> = read(&path).unwrap().iter().map(|r| r.accepted).collect();
+        assert_eq!(accepted, [false, true, false]);
+        assert_eq!(read(&path).unwrap()[1].metrics["x"], 1.0);
+        assert!(accept(&path, "abc").unwrap_err().contains("several"));
+        assert!(accept(&path, "f00").unwrap_err().contains("no values of commit f00"));
     }
 
     #[test]

@@ -1,12 +1,18 @@
 //! `harness track`: a history of metrics by commit, and the commits at which they changed.
 //!
-//! [`history`] is the file; [`crate::statistics::change_points`] finds the changes.
+//! [`history`] is the file; [`crate::statistics::change_points`] finds steps and drifts in one metric, and
+//! [`crate::statistics::false_discovery`] controls how many of all of them are false.
 //!
 //! Invariant: the same history and options give the same result on every machine.
 
 pub mod history;
+pub mod link;
+pub mod summary;
 
-use crate::statistics::change_points::{Rules, change_points};
+pub use summary::summary;
+
+use crate::statistics::change_points::{Changes, Rules, Step, change_points};
+use crate::statistics::false_discovery::adjusted;
 use crate::statistics::median_of;
 use history::Record;
 use serde::Serialize;
@@ -14,18 +20,25 @@ use serde::Serialize;
 /// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];
 
+/// Number of values by which a step may be located too early or too late, and still is the change that the user accepted.
+const ACCEPTED_WITHIN: usize = 2;
+
 /// One metric over the history.
 #[derive(Clone, Debug, Serialize)]
 pub struct Series {
     /// `CASE/METRIC`.
     pub name: String,
+    /// Unit of the values.
+    pub unit: &'static str,
     /// Index of the record and value.
     pub points: Vec<(usize, f64)>,
-    /// The change points.
+    /// The steps.
     pub changes: Vec<Change>,
+    /// The slow changes.
+    pub drifts: Vec<Drift>,
 }
 
-/// A change point.
+/// A step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// Index of the first new value in `points`.
@@ -42,71 +55,142 @@ pub struct Change {
     pub percent: Option<f64>,
     /// The p-value of the permutation test.
     pub p: f64,
+    /// Whether the user has accepted the new values.
+    pub accepted: bool,
+}
+
+/// A slow change over many commits.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Drift {
+    /// Index of its first value in `points`.
+    pub from: usize,
+    /// Index after its last value.
+    pub until: usize,
+    /// Its first commit.
+    pub first: String,
+    /// Its last commit.
+    pub last: String,
+    /// Mean at the first commit.
+    pub before: f64,
+    /// Mean at the last commit.
+    pub after: f64,
+    /// Relative change in percent; `None` if it was 0.
+    pub percent: Option<f64>,
+    /// The p-value of the permutation test.
+    pub p: f64,
 }
 
 impl Series {
     /// Whether an increase is worse.
     pub fn is_cost(&self) -> bool {
-        let plain = self.name.rsplit('/').next().unwrap_or(&self.name);
-        !NEUTRAL.contains(&plain)
+        !NEUTRAL.contains(&plain(&self.name))
     }
 
-    /// Returns the last change if it is for the worse and its first new value is among the last `recent`.
+    /// Returns the last change if it is for the worse, was not accepted, and its first new value is among the last
+    /// `recent`.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
         let last = self.changes.last()?;
         let new = self.points.len() - last.at <= recent;
-        (self.is_cost() && new && last.after > last.before).then_some(last)
+        (self.is_cost() && new && !last.accepted && last.after > last.before).then_some(last)
     }
 }
 
-/// Returns every metric of the history with its change points.
+/// A metric's name without its case and ranks.
+fn plain(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// Returns the unit of a metric.
+pub fn unit(name: &str) -> &'static str {
+    match plain(name) {
+        name if name.ends_with("seconds") || name.ends_with("_s") => "s",
+        name if name.ends_with("bytes") => "bytes",
+        "instructions" => "instructions",
+        "cells" | "leaves" => "cells",
+        _ => "count",
+    }
+}
+
+/// Returns every metric of the history with its changes. Of all metrics with a change, at most the fraction `rules.alpha`
+/// is expected to have none in truth.
 pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
     let mut names: Vec<&String> = records.iter().flat_map(|record| record.metrics.keys()).collect();
     names.sort();
     names.dedup();
-    names.into_iter().map(|name| series(name, records, rules)).collect()
+    let all: Vec<Vec<(usize, f64)>> = names.iter().map(|name| points(name, records)).collect();
+    let values = |points: &[(usize, f64)]| points.iter().map(|p| p.1).collect::<Vec<f64>>();
+    let mut found: Vec<Changes> =
+        all.iter().map(|points| change_points(&values(points), rules)).collect();
+    control(&mut found, rules.alpha);
+    let both = names.into_iter().zip(all).zip(found);
+    both.map(|((name, points), found)| series(name, points, &found, records)).collect()
 }
 
-fn series(name: &str, records: &[Record], rules: &Rules) -> Series {
-    let value = |record: &Record| record.metrics.get(name).copied();
-    let points: Vec<(usize, f64)> =
-        records.iter().enumerate().filter_map(|(i, record)| Some((i, value(record)?))).collect();
-    let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
-    let found = change_points(&values, rules);
-    let commit = |at: usize| records[points[at].0].commit.clone();
-    let changes = (0..found.len()).map(|i| {
-        let (at, p) = found[i];
-        let from = if i == 0 { 0 } else { found[i - 1].0 };
-        let until = found.get(i + 1).map_or(values.len(), |next| next.0);
-        let (before, after) = (median_of(&values[from..at]), median_of(&values[at..until]));
-        let percent = (before != 0.0).then(|| (after / before - 1.0) * 100.0);
-        Change { at, last_old: commit(at - 1), first_new: commit(at), before, after, percent, p }
-    });
-    Series { name: name.to_owned(), changes: changes.collect(), points }
-}
-
-/// Returns a text with one change point per line.
-pub fn summary(all: &[Series]) -> String {
-    let short = |commit: &str| commit.chars().take(12).collect::<String>();
-    let mut text = String::new();
-    for series in all {
-        for change in &series.changes {
-            let percent = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
-            text.push_str(&format!(
-                "{}: {} -> {} ({percent}) in {}..{}, p = {:.3}\n",
-                series.name,
-                change.before,
-                change.after,
-                short(&change.last_old),
-                short(&change.first_new),
-                change.p
-            ));
+/// Removes the changes of all metrics that are not discoveries among all metrics. A metric is one test for steps and one
+/// for drifts: its smallest p-value counts, and 1 if nothing was found.
+fn control(found: &mut [Changes], alpha: f64) {
+    let least = |p_values: &mut dyn Iterator<Item = f64>| p_values.fold(1.0, f64::min);
+    let steps: Vec<f64> =
+        found.iter().map(|changes| least(&mut changes.steps.iter().map(|step| step.p))).collect();
+    let drifts: Vec<f64> = found
+        .iter()
+        .map(|changes| least(&mut changes.drifts.iter().map(|drift| drift.p)))
+        .collect();
+    for (i, (steps, drifts)) in adjusted(&steps).into_iter().zip(adjusted(&drifts)).enumerate() {
+        if steps > alpha {
+            found[i].steps.clear();
+        }
+        if drifts > alpha {
+            found[i].drifts.clear();
         }
     }
-    if text.is_empty() {
-        text.push_str("no change points\n");
-    }
-    text
+}
+
+fn points(name: &str, records: &[Record]) -> Vec<(usize, f64)> {
+    let value = |record: &Record| record.metrics.get(name).copied();
+    records.iter().enumerate().filter_map(|(i, record)| Some((i, value(record)?))).collect()
+}
+
+fn series(name: &str, points: Vec<(usize, f64)>, found: &Changes, records: &[Record]) -> Series {
+    let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
+    let commit = |at: usize| records[points[at].0].commit.clone();
+    let percent = |before: f64, after: f64| (before != 0.0).then(|| (after / before - 1.0) * 100.0);
+    let changes = (0..found.steps.len()).map(|i| {
+        let Step { at, p } = found.steps[i];
+        let from = if i == 0 { 0 } else { found.steps[i - 1].at };
+        let until = found.steps.get(i + 1).map_or(values.len(), |next| next.at);
+        let (before, after) = (median_of(&values[from..at]), median_of(&values[at..until]));
+        Change {
+            at,
+            last_old: commit(at - 1),
+            first_new: commit(at),
+            before,
+            after,
+            percent: percent(before, after),
+            p,
+            accepted: is_accepted(at, &points, records),
+        }
+    });
+    let changes = changes.collect();
+    let drifts = found.drifts.iter().map(|drift| Drift {
+        from: drift.from,
+        until: drift.until,
+        first: commit(drift.from),
+        last: commit(drift.until - 1),
+        before: drift.before,
+        after: drift.after,
+        percent: percent(drift.before, drift.after),
+        p: drift.p,
+    });
+    let drifts = drifts.collect();
+    Series { name: name.to_owned(), unit: unit(name), changes, drifts, points }
+}
+
+/// Whether a commit near a step was accepted.
+fn is_accepted(at: usize, points: &[(usize, f64)], records: &[Record]) -> bool {
+    let from = points[(at - 1).saturating_sub(ACCEPTED_WITHIN)].0 + 1;
+    let until = points[(at + ACCEPTED_WITHIN).min(points.len() - 1)].0;
+    records[from..=until].iter().any(|record| record.accepted)
 }
 
 #[cfg(test)]
@@ -133,5 +217,37 @@ mod tests {
         assert!(better.worse_recently(10).is_none());
         let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
         assert!(neutral.worse_recently(10).is_none());
+    }
+
+    #[test]
+    fn an_accepted_change_is_still_shown_and_no_longer_worse() {
+        for (accepted, holds) in [(17, false), (18, true), (20, true), (22, true), (23, false)] {
+            let mut records = sample();
+            records[accepted].accepted = true;
+            let all = analyse(&records, &Rules::default());
+            assert_eq!(all[1].changes.len(), 1);
+            assert_eq!(all[1].worse_recently(10).is_none(), holds, "{accepted}");
+        }
+    }
+
+    #[test]
+    fn a_drift_is_reported_as_one_drift() {
+        let mut records = sample();
+        for (i, record) in records.iter_mut().enumerate() {
+            let noise = (i * 7919 % 13) as f64 / 13.0;
+            record.metrics.insert("uav/words".into(), 1000.0 + 5.0 * i as f64 + 8.0 * noise);
+        }
+        let all = analyse(&records, &Rules::default());
+        assert!(all[1].changes.is_empty(), "{:?}", all[1].changes);
+        let [drift] = &all[1].drifts[..] else { panic!("{:?}", all[1].drifts) };
+        assert_eq!((drift.from, drift.until), (0, 30));
+        assert!((13.0..16.0).contains(&drift.percent.unwrap()), "{drift:?}");
+        assert!(summary(&all).contains("drifts from"), "{}", summary(&all));
+    }
+
+    #[test]
+    fn units_follow_from_the_names() {
+        let names = ["a/seconds", "a/4 ranks/message_bytes", "a/cells", "a/rays", "a/time_wall_s"];
+        assert_eq!(names.map(unit), ["s", "bytes", "cells", "count", "s"]);
     }
 }

@@ -2,15 +2,18 @@
 
 use super::files::put;
 use super::programs::ProgramArguments;
+use super::session::progress;
+use bench::gate::build::top_level;
 use bench::gate::report::{LayerName, Report};
-use bench::gate::{GateError, Options, gate};
+use bench::gate::{GateError, Options, gate, power};
 use clap::Args;
 use report::gate::{json, junit, markdown, text};
+use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::verify::report::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use std::{env, fs, io};
 
@@ -59,7 +62,17 @@ pub struct Arguments {
     /// Exit code 3 if a requested layer was left out
     #[arg(long)]
     require_layers: bool,
-    /// Where revisions are built and kept [default: target/gate]
+    /// The repository of the revisions and of the working tree [default: that of the current directory]
+    #[arg(long, value_name = "DIR")]
+    repository: Option<PathBuf>,
+    /// Measure the gate itself: which planted slow-downs each layer finds, for these sizes in percent [default: 0,0.1,0.3,1,3,10]
+    #[arg(long, value_name = "PERCENT", value_delimiter = ',', num_args = 0..=1, value_parser = percentage,
+          default_missing_value = "0,0.1,0.3,1,3,10", conflicts_with_all = ["baseline", "candidate", "record"])]
+    selftest: Option<Vec<f64>>,
+    /// Gates per slow-down in --selftest
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
+    trials: u16,
+    /// Where revisions are built and kept [default: target/gate in the repository]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     #[command(flatten)]
@@ -76,6 +89,7 @@ pub fn run(arguments: Arguments) -> u8 {
             return EXIT_INPUT;
         }
     };
+    let repository = top_level(arguments.repository.as_deref().unwrap_or(Path::new(".")));
     let options = Options {
         baseline: arguments.baseline.clone(),
         candidate: arguments.candidate.clone(),
@@ -85,17 +99,15 @@ pub fn run(arguments: Arguments) -> u8 {
         seed: arguments.seed,
         limit: Duration::from_secs(arguments.timeout),
         budget_s: arguments.budget,
-        cache: arguments.cache.clone().unwrap_or_else(|| programs.paths.root.join("target/gate")),
+        cache: arguments.cache.clone().unwrap_or_else(|| repository.join("target/gate")),
+        repository,
     };
+    if let Some(sizes) = &arguments.selftest {
+        return selftest(sizes, usize::from(arguments.trials), &options, &programs);
+    }
     let report = match gate(&options, &programs) {
         Ok(report) => report,
-        Err(error) => {
-            eprintln!("harness: {error}");
-            return match error {
-                GateError::Input(_) => EXIT_INPUT,
-                GateError::Missing(_) => EXIT_MISSING,
-            };
-        }
+        Err(error) => return refuse(&error),
     };
     print!("{}", text(&report));
     if let Err(error) = write(&report, &arguments) {
@@ -103,6 +115,33 @@ pub fn run(arguments: Arguments) -> u8 {
         return exit_first(exit_code(&report, &arguments), EXIT_INPUT);
     }
     exit_code(&report, &arguments)
+}
+
+fn refuse(error: &GateError) -> u8 {
+    eprintln!("harness: {error}");
+    match error {
+        GateError::Input(_) => EXIT_INPUT,
+        GateError::Missing(_) => EXIT_MISSING,
+    }
+}
+
+/// Prints the power of the gate; returns the exit code.
+fn selftest(sizes: &[f64], trials: usize, options: &Options, programs: &Programs) -> u8 {
+    match power::power(sizes, trials, options, &programs.paths.harness, &mut progress()) {
+        Ok(rows) => {
+            print!("{}", power::table(&rows));
+            if interrupt::requested() { EXIT_INTERRUPTED } else { EXIT_HOLDS }
+        }
+        Err(error) => refuse(&error),
+    }
+}
+
+fn percentage(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| format!("{text:?} is not a number"))?;
+    match (0.0..=1000.0).contains(&number) {
+        true => Ok(number),
+        false => Err(format!("{number} is not between 0 and 1000 percent")),
+    }
 }
 
 fn exit_code(report: &Report, arguments: &Arguments) -> u8 {

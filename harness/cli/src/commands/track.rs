@@ -3,10 +3,9 @@
 use super::files::put;
 use bench::statistics::change_points::Rules;
 use bench::track::history::{self, Record};
-use bench::track::{Series, analyse, summary};
+use bench::track::{Series, analyse, link, summary};
 use clap::Args;
 use report::track::{export, page};
-use run::engine::paths::Paths;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
 use std::fs;
 use std::path::PathBuf;
@@ -25,12 +24,18 @@ pub struct Arguments {
     /// The commit of the appended values
     #[arg(long, value_name = "REVISION", default_value = "HEAD")]
     commit: String,
-    /// The repository that the commit is in [default: the one that the harness is in]
+    /// Accept the changes of all metrics at this commit of the history, so that they no longer fail; may be repeated
+    #[arg(long, value_name = "COMMIT")]
+    accept: Vec<String>,
+    /// The repository that the commit is in [default: that of the current directory]
     #[arg(long, value_name = "DIR")]
     repository: Option<PathBuf>,
     /// Write the trend page
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    /// Address of a commit for the links of the page, with {commit} [default: from the remote `origin` of the repository]
+    #[arg(long, value_name = "URL")]
+    link: Option<String>,
     /// Write the last record in Bencher Metric Format
     #[arg(long, value_name = "FILE")]
     bencher: Option<PathBuf>,
@@ -49,7 +54,7 @@ pub struct Arguments {
     /// Exit code 1 (and a failed test) if the last change of a metric is for the worse and within its last N values
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
-    /// Significance level: the probability of a false change point
+    /// Rate of false discoveries: the probability of any false change point if nothing changed
     #[arg(long, default_value_t = 0.01)]
     alpha: f64,
     /// Ignore smaller changes; percent
@@ -82,6 +87,9 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     }
+    for commit in &arguments.accept {
+        history::accept(&arguments.history, commit)?;
+    }
     let records = history::read(&arguments.history)?;
     let effect_min = arguments.effect_min / 100.0;
     let rules =
@@ -97,9 +105,7 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
 fn append(arguments: &Arguments) -> Result<(), String> {
     // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
-    let repository = arguments.repository.clone();
-    let repository = repository.unwrap_or_else(|| Paths::find().root);
-    let mut record = Record::of_commit(&arguments.commit, &repository)?;
+    let mut record = Record::of_commit(&arguments.commit, &repository(arguments))?;
     for file in &arguments.add {
         let wrong = |why: String| format!("{}: {why}", file.display());
         let text = fs::read(file).map_err(|error| wrong(error.to_string()))?;
@@ -110,11 +116,16 @@ fn append(arguments: &Arguments) -> Result<(), String> {
         .map_err(|error| format!("{}: {error}", arguments.history.display()))
 }
 
+fn repository(arguments: &Arguments) -> PathBuf {
+    arguments.repository.clone().unwrap_or_else(|| PathBuf::from("."))
+}
+
 fn write(arguments: &Arguments, records: &[Record], all: &[Series]) -> std::io::Result<()> {
     let none = Record::new(String::new());
     let last = records.last().unwrap_or(&none);
+    let link = arguments.link.clone().or_else(|| link::of_repository(&repository(arguments)));
     let forms: [(&Option<PathBuf>, &dyn Fn() -> String); 6] = [
-        (&arguments.page, &|| page::page(records, all)),
+        (&arguments.page, &|| page::page(records, all, link.as_deref())),
         (&arguments.bencher, &|| export::bencher(last)),
         (&arguments.github_benchmark, &|| export::github(last)),
         (&arguments.csv, &|| export::csv(records)),

@@ -141,4 +141,88 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     assert_eq!(fs::read_to_string(fixture.path("trend.csv")).unwrap().lines().count(), 17);
     assert!(fs::read_to_string(fixture.path("trend.html")).unwrap().contains("commit-10"));
     assert_eq!(fixture.harness("track history.jsonl --fail-recent 5").code, 0);
+    // The last line but five has the first commit with the new values.
+    let history = fs::read_to_string(fixture.path("history.jsonl")).unwrap();
+    let first_new = history.lines().nth(10).unwrap().split("\"commit\":\"").nth(1).unwrap();
+    let accepted = fixture
+        .harness(&format!("track history.jsonl --fail-recent 6 --accept {}", &first_new[..12]));
+    assert_eq!(accepted.code, 0, "{}", accepted.printed);
+    assert!(accepted.printed.contains(", accepted"), "{}", accepted.printed);
+    assert_eq!(fixture.harness("track history.jsonl --accept f00").code, 2);
+}
+
+#[test]
+fn revisions_of_another_repository_are_built_and_kept_whole() {
+    let fixture = Fixture::new();
+    let git = |arguments: &str| {
+        let mut command = Command::new("git");
+        let identity = ["-c", "user.name=a", "-c", "user.email=a@b"];
+        command.args(identity).args(arguments.split(' ')).current_dir(fixture.path("other"));
+        assert!(command.status().unwrap().success(), "{arguments}");
+    };
+    // The program reads a file that its build puts beside it, and one of its sources.
+    let program = "#!/bin/sh\nhere=$(dirname \"$0\")\nwhile [ $# -gt 0 ]; do [ \"$1\" = --json ] && json=$2; shift; done\n\
+                   printf '{\"cells\": 1, \"digest\": \"00\", \"counters\": {\"words\": [%s]}}' \"$(cat \"$here/words\")\" > \"$json\"\n";
+    fixture.write("other/program", program);
+    fixture.write(
+        "other/make",
+        "mkdir -p $1/lib && cp program $1/lib/ && cp words $1/lib/ && chmod +x $1/lib/program\n",
+    );
+    git("init --quiet");
+    for words in ["40", "41"] {
+        fixture.write("other/words", words);
+        git("add .");
+        git(&format!("commit --quiet -m words-{words}"));
+    }
+    fixture.write("other/words", "43");
+    let engine = fs::read_to_string(fixture.path("engine.toml")).unwrap();
+    let build = "[build]\ncommand = ['sh', 'make', '{target}']\nprogram = '{target}/lib/program'\n";
+    fixture.write("built.toml", &format!("{engine}{build}"));
+    let gate = "gate --engine built.toml --rules gate.toml --layers counters --repository other/ --cache kept";
+    for (revisions, change) in [
+        ("--baseline HEAD~1 --candidate HEAD", "words 40 -> 41"),
+        ("--baseline HEAD~1 --candidate HEAD", "words 40 -> 41"),
+        ("--baseline HEAD", "words 41 -> 43"),
+    ] {
+        let outcome = fixture.harness(&format!("{gate} {revisions}"));
+        assert_eq!(outcome.code, 1, "{}", outcome.printed);
+        assert!(outcome.printed.contains(change), "{}", outcome.printed);
+    }
+    let again = fixture.harness(&format!("{gate} --baseline HEAD~1 --candidate HEAD"));
+    assert!(!again.printed.contains("building"), "{}", again.printed);
+    let elsewhere = fixture.harness(&format!("{} --baseline HEAD~1", gate.replace("other/", ".")));
+    assert_eq!(elsewhere.code, 2, "{}", elsewhere.printed);
+}
+
+#[test]
+fn the_exact_layers_find_planted_slow_downs_and_their_phase() {
+    let fixture = Fixture::new();
+    let selftest = "gate --selftest 0,3 --trials 1 --layers counters,instructions";
+    let outcome = fixture.harness(selftest);
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    let row = |name: &str| {
+        let mut rows = outcome.printed.lines().filter(|line| line.starts_with(name));
+        let row = rows.next().unwrap_or_else(|| panic!("{name} is missing in {}", outcome.printed));
+        row[name.len()..].split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let found = "1 of 1, 1 named";
+    // Without valgrind there are no instructions.
+    let expected = match row("no slow-down").as_str() {
+        "0 of 1 left out left out" => [
+            format!("{found} left out left out"),
+            "0 of 1, 0 named left out left out".to_owned(),
+            "0 of 1 left out left out".to_owned(),
+        ],
+        other => {
+            assert_eq!(other, "0 of 1 0 of 1 left out", "{}", outcome.printed);
+            [
+                format!("{found} {found} left out"),
+                format!("0 of 1, 0 named {found} left out"),
+                "0 of 1 0 of 1 left out".to_owned(),
+            ]
+        }
+    };
+    let kinds = ["operations, counted", "operations, not counted"];
+    let rows = kinds.map(|kind| row(&format!("3 % more {kind}")));
+    assert_eq!([&rows[0], &rows[1], &row("3 % waiting")], expected.each_ref());
 }

@@ -1,6 +1,6 @@
 //! Figures of load balance: useful time per rank, and load imbalance by weights and partitioner.
 
-use super::groups::by_case;
+use super::groups::{Subject, by_subject};
 use super::paper;
 use crate::figure::{Axis, Bars, Body, Claims, Figure, Provenance, svg};
 use bench::experiments::cause::heaviest_base_leaf;
@@ -14,18 +14,18 @@ const SHOWN: [usize; 3] = [16, 32, 64];
 /// Useful time per rank on 16, 32 and 64 ranks, and load imbalance by weights and partitioner.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     let mut out = Vec::new();
-    for (case, all) in by_case(groups, "strong") {
+    for (subject, all) in by_subject(groups, "strong") {
         for ranks in SHOWN {
             let sims = all.iter().filter(|g| g.setup.ranks == ranks && g.setup.comm == Comm::Sim);
             // Of several meshes, the one whose size is nearest to the paper's.
             let distance = |g: &&&Group| (g.cells() as f64 / paper::CELLS_OF_BALANCE).ln().abs();
             let nearest = sims.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            out.extend(nearest.and_then(|g| per_rank(case, g)));
+            out.extend(nearest.and_then(|g| per_rank(subject, g)));
         }
     }
-    for (case, all) in by_case(groups, "weights") {
+    for (subject, all) in by_subject(groups, "weights") {
         for (mesh, of) in by_mesh(&all) {
-            out.push(imbalance(case, mesh, &of));
+            out.push(imbalance(subject, mesh, &of));
         }
     }
     out
@@ -44,7 +44,7 @@ fn by_mesh<'a>(all: &[&'a Group]) -> Vec<((u64, usize), Vec<&'a Group>)> {
 }
 
 /// The counterpart of the paper's Figures 21 to 23.
-fn per_rank(case: &str, group: &Group) -> Option<Figure> {
+fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
     let run = &group.typical;
     if run.useful_s.by_rank.is_empty() {
         return None;
@@ -54,10 +54,10 @@ fn per_rank(case: &str, group: &Group) -> Option<Figure> {
     let lambda = run.useful_s.lambda(ranks);
     let cells = run.counters.get("leaves").map_or(1.0, |l| l.lambda(ranks));
     Some(Figure {
-        id: format!("per-rank-{case}-{ranks}"),
-        title: format!("Useful time per rank: {case}, {ranks} ranks"),
+        id: format!("per-rank-{}-{ranks}", subject.file()),
+        title: format!("Useful time per rank: {subject}, {ranks} ranks"),
         caption: format!(
-            "Useful time (CPU time outside communication) per rank: {case}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
+            "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
              the load on 16, 32 and 64 ranks at 100 million cells. Load imbalance λ = max/mean: {lambda:.3} by time, {cells:.3} by cells. {}.",
             grouped(run.cells),
             group.rank_times_caption()
@@ -66,7 +66,10 @@ fn per_rank(case: &str, group: &Group) -> Option<Figure> {
         y: Axis::linear("useful time / s"),
         body: Body::Bars(Bars {
             categories: (0..ranks).map(|r| r.to_string()).collect(),
-            segments: vec![("useful time".into(), run.useful_s.by_rank.clone())],
+            segments: vec![(
+                format!("{}: useful time", subject.engine),
+                run.useful_s.by_rank.clone(),
+            )],
             references: vec![(format!("mean; λ = {lambda:.2}"), mean)],
             provenance: Provenance::Projected,
         }),
@@ -76,7 +79,7 @@ fn per_rank(case: &str, group: &Group) -> Option<Figure> {
 }
 
 /// Load imbalance by cells, for weights and partitioners.
-fn imbalance(case: &str, (cells, ranks): (u64, usize), of: &[&Group]) -> Figure {
+fn imbalance(subject: Subject, (cells, ranks): (u64, usize), of: &[&Group]) -> Figure {
     let lambda = |g: &&Group| {
         let run = &g.typical;
         run.counters.get("leaves").map_or(f64::NAN, |l| l.lambda(ranks))
@@ -87,13 +90,13 @@ fn imbalance(case: &str, (cells, ranks): (u64, usize), of: &[&Group]) -> Figure 
     let mut references = vec![("target, 1.10".to_owned(), 1.1)];
     references.extend(bound.map(|b| (format!("lower bound, {b:.2}"), b)));
     Figure {
-        id: format!("balance-{case}-{:.0}M-{ranks}", cells as f64 / 1e6),
+        id: format!("balance-{}-{:.0}M-{ranks}", subject.file(), cells as f64 / 1e6),
         title: format!(
-            "Load imbalance by weights and partitioner: {case}, {} cells, {ranks} ranks",
+            "Load imbalance by weights and partitioner: {subject}, {} cells, {ranks} ranks",
             grouped(cells)
         ),
         caption: format!(
-            "Load imbalance λ = max/mean of the number of cells per rank: {case}, {} cells on {ranks} simulated ranks, by the partitioner of the base \
+            "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {} cells on {ranks} simulated ranks, by the partitioner of the base \
              tree and the weights of its leaves. The paper gives every base leaf weight 1 (unit), but its base tree has depth 7; here the depth is \
              automatic. The counts repeat exactly.",
             grouped(cells)
@@ -102,7 +105,10 @@ fn imbalance(case: &str, (cells, ranks): (u64, usize), of: &[&Group]) -> Figure 
         y: Axis::linear("λ = max/mean of cells per rank"),
         body: Body::Bars(Bars {
             categories: of.iter().map(|g| division(&g.setup)).collect(),
-            segments: vec![("by cells".into(), of.iter().map(lambda).collect())],
+            segments: vec![(
+                format!("{}: by cells", subject.engine),
+                of.iter().map(lambda).collect(),
+            )],
             references,
             provenance: Provenance::Measured,
         }),

@@ -1,6 +1,6 @@
 //! The figures of a record: counterparts of the paper's Figures 17 to 23, messages, rate and memory.
 
-use super::groups::{by_case, point, provenance, repetitions};
+use super::groups::{by_case, engines, point, provenance, repetitions};
 use super::paper::{self, cited};
 use super::{balance, matrix, scaling};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
@@ -21,32 +21,44 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     all
 }
 
-/// The groups of every number and kind of ranks, by cells, with a name for the legend.
-fn by_layout<'a>(all: &[&'a Group]) -> Vec<(String, Vec<&'a Group>)> {
-    let mut out: Vec<((usize, Comm), Vec<&Group>)> = Vec::new();
+/// What one line of a figure over cells shows: case, program, number and kind of ranks.
+type Line<'a> = (&'a str, &'a str, usize, Comm);
+
+/// The groups of every line, by cells.
+fn by_line<'a>(all: &[&'a Group]) -> Vec<(Line<'a>, Vec<&'a Group>)> {
+    let mut out: Vec<(Line, Vec<&Group>)> = Vec::new();
     for group in all {
-        let layout = (group.setup.ranks, group.setup.comm);
-        match out.iter_mut().find(|(l, _)| *l == layout) {
+        let s = &group.setup;
+        let line = (s.case.as_str(), s.engine.as_str(), s.ranks, s.comm);
+        match out.iter_mut().find(|(l, _)| *l == line) {
             Some((_, groups)) => groups.push(group),
-            None => out.push((layout, vec![group])),
+            None => out.push((line, vec![group])),
         }
     }
-    out.sort_by_key(|(layout, _)| *layout);
-    let named = |((ranks, _), mut groups): ((usize, Comm), Vec<&'a Group>)| {
-        groups.sort_by_key(|g| g.cells());
-        (format!("{ranks} {}", if ranks == 1 { "rank" } else { "ranks" }), groups)
+    // Programs and cases stay in the order of the record.
+    let first = |line: &Line| {
+        all.iter()
+            .position(|g| (g.setup.case.as_str(), g.setup.engine.as_str()) == (line.0, line.1))
     };
-    out.into_iter().map(named).collect()
+    out.sort_by_key(|(line, _)| (first(line), line.2, line.3));
+    for (_, groups) in &mut out {
+        groups.sort_by_key(|g| g.cells());
+    }
+    out
 }
 
-/// A series per number and kind of ranks.
+/// A series per program, number and kind of ranks, and per case if there are several.
 fn series(all: &[&Group], value: impl Fn(&Group) -> Point) -> Vec<Series> {
-    let of_layout = |(style, (name, groups)): (usize, (String, Vec<&Group>))| {
+    let one_case = all.iter().all(|g| g.setup.case == all[0].setup.case);
+    let of_line = |(style, ((case, engine, ranks, _), groups)): (usize, (Line, Vec<&Group>))| {
         let how = provenance(groups[0]);
         let points = groups.iter().map(|g| value(g)).collect();
-        Series::new(&format!("{name}, {}", how.word()), how, style, points)
+        let case = if one_case { String::new() } else { format!("{case}, ") };
+        let s = if ranks == 1 { "" } else { "s" };
+        let name = format!("{case}{engine}, {ranks} rank{s}, {}", how.word());
+        Series::new(&name, how, style, points)
     };
-    by_layout(all).into_iter().enumerate().map(of_layout).collect()
+    by_line(all).into_iter().enumerate().map(of_line).collect()
 }
 
 fn time(group: &Group) -> Point {
@@ -63,9 +75,10 @@ fn time_over_cells(groups: &Groups) -> Vec<Figure> {
             id: format!("time-over-cells-{case}"),
             title: format!("Run time over cells, by spacing: {case}"),
             caption: format!(
-                "Run time over the number of cells of {case} at n = {} (the paper's Figure 17). The spacing is halved from point to \
-                 point. {}. Lines join meshes of one family of spacings. The points of the paper are from its text: 50 million cells \
+                "Run time of {} over the number of cells of {case} at n = {} (the paper's Figure 17). The spacing is halved from \
+                 point to point. {}. Lines join meshes of one family of spacings. The points of the paper are from its text: 50 million cells \
                  in 22 min on 1 rank and in 117 s on 32 ranks, 1e9 cells in under 45 min on 64 ranks, on hardware of 2013 and for another geometry.",
+                engines(&all),
                 all[0].setup.layer_cells_min,
                 repetitions(&all)
             ),
@@ -90,9 +103,10 @@ fn time_over_layers(groups: &Groups) -> Vec<Figure> {
             id: format!("time-over-layers-{case}"),
             title: format!("Run time over cells, by layer thickness: {case}"),
             caption: format!(
-                "Run time over the number of cells of {case} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to \
+                "Run time of {} over the number of cells of {case} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to \
                  right (the paper's Figure 18, whose curve bends upward). {}. Lines join consecutive values of n. The largest mesh in \
                  the text of the paper, 1.6e9 cells in 132 min, was made with thicker layers on \"the same hardware\".",
+                engines(&all),
                 all[0].setup.spacing_min,
                 layers.join(", "),
                 repetitions(&all)
@@ -114,6 +128,17 @@ fn measured(groups: &Groups, predicate: impl Fn(&Setup) -> bool) -> Vec<&Group> 
     groups.all.iter().filter(is_measured).collect()
 }
 
+/// The cases of some groups without repetitions, as text.
+fn cases(all: &[&Group]) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for group in all {
+        if !names.contains(&group.setup.case.as_str()) {
+            names.push(&group.setup.case);
+        }
+    }
+    names.join(", ")
+}
+
 fn rate(groups: &Groups) -> Option<Figure> {
     let all = measured(groups, |s| s.experiment == "spacing");
     let value = |g: &Group| {
@@ -130,8 +155,9 @@ fn rate(groups: &Groups) -> Option<Figure> {
         id: "rate".into(),
         title: "Cells per second and core".into(),
         caption: format!(
-            "Cells per second and core over the number of cells: {}. {}. Rates are cells over median times.",
-            all[0].setup.case,
+            "Cells per second and core of {} over the number of cells: {}. {}. Rates are cells over median times.",
+            engines(&all),
+            cases(&all),
             repetitions(&all)
         ),
         x: Axis::log("cells"),
@@ -150,8 +176,9 @@ fn memory(groups: &Groups) -> Option<Figure> {
         id: "memory".into(),
         title: "Peak memory per cell".into(),
         caption: format!(
-            "Peak resident memory of all ranks over the number of cells, program and facets included: {}. {}.",
-            all[0].setup.case,
+            "Peak resident memory of all ranks of {} over the number of cells, program and facets included: {}. {}.",
+            engines(&all),
+            cases(&all),
             repetitions(&all)
         ),
         x: Axis::log("cells"),

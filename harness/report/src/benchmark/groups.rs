@@ -1,9 +1,10 @@
 //! Groups of runs in the form that figures and tables need: by case, as points, with provenance and labels.
 
 use crate::figure::{Point, Provenance};
-use bench::experiments::entry::Comm;
+use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
 use bench::statistics::Median;
+use std::fmt;
 
 /// How the times of a group were obtained.
 pub fn provenance(group: &Group) -> Provenance {
@@ -39,14 +40,73 @@ pub fn repetitions(groups: &[&Group]) -> String {
 
 /// The groups of an experiment by case, in the order of the record.
 pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(&'a str, Vec<&'a Group>)> {
-    let mut out: Vec<(&str, Vec<&Group>)> = Vec::new();
+    partition(groups, experiment, |group| group.setup.case.as_str())
+}
+
+/// The groups of an experiment by engine and case, in the order of the record.
+pub fn by_subject<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
+    partition(groups, experiment, |group| Subject::of(&group.setup))
+}
+
+fn partition<'a, K: PartialEq>(
+    groups: &'a Groups,
+    experiment: &str,
+    key: impl Fn(&'a Group) -> K,
+) -> Vec<(K, Vec<&'a Group>)> {
+    let mut out: Vec<(K, Vec<&Group>)> = Vec::new();
     for group in groups.all.iter().filter(|g| g.setup.experiment == experiment) {
-        match out.iter_mut().find(|(case, _)| *case == group.setup.case) {
+        let key = key(group);
+        match out.iter_mut().find(|(other, _)| *other == key) {
             Some((_, all)) => all.push(group),
-            None => out.push((&group.setup.case, vec![group])),
+            None => out.push((key, vec![group])),
         }
     }
     out
+}
+
+/// The program and the case of a figure that shows only one of each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Subject<'a> {
+    /// The program.
+    pub engine: &'a str,
+    /// The case.
+    pub case: &'a str,
+}
+
+impl<'a> Subject<'a> {
+    /// The program and the case of a run.
+    pub fn of(setup: &'a Setup) -> Self {
+        Self { engine: &setup.engine, case: &setup.case }
+    }
+
+    /// A name for files: the case, and before it the program unless that is the mesher of this repository.
+    pub fn file(&self) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };
+        match self.engine {
+            OWN => self.case.to_owned(),
+            engine => format!("{}-{}", engine.chars().map(plain).collect::<String>(), self.case),
+        }
+    }
+}
+
+impl fmt::Display for Subject<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} by {}", self.case, self.engine)
+    }
+}
+
+/// The engine whose name is not in names of files.
+const OWN: &str = "mesher";
+
+/// The programs of some groups without repetitions, as text.
+pub fn engines(groups: &[&Group]) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for group in groups {
+        if !names.contains(&group.setup.engine.as_str()) {
+            names.push(&group.setup.engine);
+        }
+    }
+    names.join(", ")
 }
 
 /// Whether a group is in the summary and in the tables of phases: scaling on at least 16 simulated ranks.

@@ -1,6 +1,6 @@
 //! The page of a benchmark report.
 
-use super::groups::is_summarised;
+use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
 use super::lint::{Finding, RULES, Verdict};
 use super::tables;
@@ -76,7 +76,7 @@ fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
         ul {
             @for group in groups.all.iter().filter(|g| is_summarised(g)) {
                 li {
-                    b { (group.setup.case) } ", " (group.setup.experiment) " scaling, " (grouped(group.cells())) " cells: "
+                    b { (Subject::of(&group.setup)) } ", " (group.setup.experiment) " scaling, " (grouped(group.cells())) " cells: "
                     (with_code(&sentence(&group.typical, &groups.reference(group).typical, network)))
                 }
             }

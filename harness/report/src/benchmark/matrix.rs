@@ -1,6 +1,6 @@
 //! Figures of message matrices: bytes and messages between pairs of ranks.
 
-use super::groups::cells_label;
+use super::groups::{Subject, cells_label};
 use crate::figure::{Axis, Body, Claims, Figure, HeatMap, Layer, svg};
 use bench::experiments::entry::Run;
 use bench::experiments::group::Groups;
@@ -13,6 +13,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
 
 fn figure(run: &Run) -> Figure {
     let s = &run.setup;
+    let subject = Subject::of(s);
     let layer = |label: &str, quantity: usize| {
         let entry = |e: &[u64; 4]| (e[0] as usize, e[1] as usize, e[quantity] as f64);
         Layer { label: label.to_owned(), entries: run.message_matrix.iter().map(entry).collect() }
@@ -20,18 +21,16 @@ fn figure(run: &Run) -> Figure {
     let total = |quantity: usize| run.message_matrix.iter().map(|e| e[quantity]).sum::<u64>();
     let pairs = s.ranks * s.ranks.saturating_sub(1);
     Figure {
-        id: format!("messages-{}-{}-{}", s.case, cells_label(run.cells), s.ranks),
+        id: format!("messages-{}-{}-{}", subject.file(), cells_label(run.cells), s.ranks),
         title: format!(
-            "Messages between pairs of ranks: {}, {} cells, {} ranks",
-            s.case,
+            "Messages between pairs of ranks: {subject}, {} cells, {} ranks",
             grouped(run.cells),
             s.ranks
         ),
         caption: format!(
-            "Bytes and messages sent between pairs of ranks in point-to-point communication: {}, {} cells, n = {}, {} simulated ranks, partition: \
+            "Bytes and messages sent between pairs of ranks in point-to-point communication: {subject}, {} cells, n = {}, {} simulated ranks, partition: \
              {}. The total is {} messages with {:.1} MB between {} of {} ordered pairs; white pairs exchange nothing. Collective calls are not \
              included{}. The counts repeat exactly.",
-            s.case,
             grouped(run.cells),
             s.layer_cells_min,
             s.ranks,

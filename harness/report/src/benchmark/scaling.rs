@@ -1,6 +1,6 @@
 //! Figures over ranks: speedup, efficiency and its factors, time by phase.
 
-use super::groups::{by_case, cells_label, point, provenance, repetitions};
+use super::groups::{Subject, by_subject, cells_label, point, provenance, repetitions};
 use super::paper::{self, cited};
 use crate::figure::{Axis, Bars, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::Comm;
@@ -15,16 +15,16 @@ const PHASES_SHOWN: usize = 6;
 /// Speedup, efficiencies and phases of every mesh in strong scaling; efficiencies and phases in weak scaling.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     let mut out = Vec::new();
-    for (case, all) in by_case(groups, "strong") {
+    for (subject, all) in by_subject(groups, "strong") {
         for mesh in meshes(&all) {
-            out.push(speedup(groups, case, &mesh));
-            out.extend(efficiency(groups, case, &mesh, "strong"));
-            out.extend(phases(groups, case, &mesh, "strong"));
+            out.push(speedup(groups, subject, &mesh));
+            out.extend(efficiency(groups, subject, &mesh, "strong"));
+            out.extend(phases(groups, subject, &mesh, "strong"));
         }
     }
-    for (case, all) in by_case(groups, "weak") {
-        out.extend(efficiency(groups, case, &all, "weak"));
-        out.extend(phases(groups, case, &all, "weak"));
+    for (subject, all) in by_subject(groups, "weak") {
+        out.extend(efficiency(groups, subject, &all, "weak"));
+        out.extend(phases(groups, subject, &all, "weak"));
     }
     out
 }
@@ -63,7 +63,7 @@ fn ideal(all: &[&Group], value: impl Fn(f64) -> f64) -> Series {
 }
 
 /// The counterpart of the paper's Figures 19 and 20.
-fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
+fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
     let mut series = vec![ideal(mesh, |r| r)];
     let kinds = [Provenance::Measured, Provenance::Oversubscribed, Provenance::Projected];
     for (style, kind) in kinds.into_iter().enumerate() {
@@ -75,7 +75,12 @@ fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
         };
         let points: Vec<Point> = with_provenance(mesh, kind).iter().map(speedup).collect();
         if !points.is_empty() {
-            series.push(Series::new(kind.word(), kind, style, points));
+            series.push(Series::new(
+                &format!("{}, {}", subject.engine, kind.word()),
+                kind,
+                style,
+                points,
+            ));
         }
     }
     let cells = mesh[0].cells();
@@ -85,10 +90,10 @@ fn speedup(groups: &Groups, case: &str, mesh: &[&Group]) -> Figure {
     }
     let base_case = base_cases(groups, mesh);
     Figure {
-        id: format!("speedup-{case}-{}", cells_label(cells)),
-        title: format!("Speedup: {case}, {} cells", grouped(cells)),
+        id: format!("speedup-{}-{}", subject.file(), cells_label(cells)),
+        title: format!("Speedup: {subject}, {} cells", grouped(cells)),
         caption: format!(
-            "Speedup of {case} with {} cells at n = {} over one rank of the same program: {}. {}. Hollow markers: projected from \
+            "Speedup of {subject} with {} cells at n = {} over one rank of the same program: {}. {}. Hollow markers: projected from \
              simulated ranks (critical path of CPU times plus messages at {:.2} µs and {:.1} GB/s), or measured with more ranks than \
              cores.{} Lines join powers of two.",
             grouped(cells),
@@ -139,7 +144,12 @@ fn base_cases(groups: &Groups, mesh: &[&Group]) -> String {
 type Factor = fn(&Efficiency) -> f64;
 
 /// Global efficiency and its factors on simulated ranks.
-fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Option<Figure> {
+fn efficiency(
+    groups: &Groups,
+    subject: Subject,
+    all: &[&Group],
+    experiment: &str,
+) -> Option<Figure> {
     let simulated = with_provenance(all, Provenance::Projected);
     if simulated.len() < 2 {
         return None;
@@ -158,7 +168,12 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
             Point { count: g.time_s.count, ..Point::exact(g.setup.ranks as f64, value(&e)) }
         };
         let points = simulated.iter().map(factor).collect();
-        series.push(Series::new(name, Provenance::Projected, style, points));
+        series.push(Series::new(
+            &format!("{}: {name}", subject.engine),
+            Provenance::Projected,
+            style,
+            points,
+        ));
     }
     // In weak scaling, computation scaling exceeds 1: the fixed costs per cell fall as the mesh grows.
     let efficiency_max = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
@@ -174,10 +189,10 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
         format!("-{}", cells_label(last.cells()))
     };
     Some(Figure {
-        id: format!("efficiency-{experiment}-{case}{suffix}"),
-        title: format!("Efficiency in {experiment} scaling: {case}, {size}"),
+        id: format!("efficiency-{experiment}-{}{suffix}", subject.file()),
+        title: format!("Efficiency in {experiment} scaling: {subject}, {size}"),
         caption: format!(
-            "Efficiencies by the POP definitions in {experiment} scaling of {case}, {size}, n = {}. The base case is {base_case}. {}, \
+            "Efficiencies by the POP definitions in {experiment} scaling of {subject}, {size}, n = {}. The base case is {base_case}. {}, \
              projected from simulated ranks. Lines join powers of two.",
             last.setup.layer_cells_min,
             last.rank_times_caption()
@@ -196,7 +211,7 @@ fn efficiency(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> 
 }
 
 /// Time by phase, summed over ranks: with ideal scaling, all bars are equal.
-fn phases(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Option<Figure> {
+fn phases(groups: &Groups, subject: Subject, all: &[&Group], experiment: &str) -> Option<Figure> {
     let simulated = with_provenance(all, Provenance::Projected);
     let last = &simulated.last()?.typical;
     let network = &groups.network;
@@ -218,18 +233,18 @@ fn phases(groups: &Groups, case: &str, all: &[&Group], experiment: &str) -> Opti
     };
     let (shown, rest) = names.split_at(names.len().min(PHASES_SHOWN));
     let mut segments: Vec<(String, Vec<f64>)> =
-        shown.iter().map(|name| ((*name).to_owned(), values(&[name]))).collect();
+        shown.iter().map(|name| (format!("{}: {name}", subject.engine), values(&[name]))).collect();
     if !rest.is_empty() {
-        segments.push(("others".into(), values(rest)));
+        segments.push((format!("{}: others", subject.engine), values(rest)));
     }
     let cells = last.cells;
     let suffix = if weak { String::new() } else { format!("-{}", cells_label(cells)) };
     let unit = if weak { "rank seconds per million cells" } else { "rank seconds" };
     Some(Figure {
-        id: format!("phases-{experiment}-{case}{suffix}"),
-        title: format!("Time by phase in {experiment} scaling: {case}"),
+        id: format!("phases-{experiment}-{}{suffix}", subject.file()),
+        title: format!("Time by phase in {experiment} scaling: {subject}"),
         caption: format!(
-            "Critical path of each phase times the number of ranks, in {unit}, in {experiment} scaling of {case} ({} cells on {} ranks). With ideal \
+            "Critical path of each phase times the number of ranks, in {unit}, in {experiment} scaling of {subject} ({} cells on {} ranks). With ideal \
              scaling all bars are equal. {}, projected from simulated ranks.",
             grouped(cells),
             last.setup.ranks,

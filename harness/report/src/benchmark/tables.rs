@@ -1,6 +1,6 @@
 //! The tables of the page of a benchmark report.
 
-use super::groups::is_summarised;
+use super::groups::{Subject, is_summarised};
 use crate::page::table;
 use bench::experiments::entry::Phase;
 use bench::experiments::group::{Group, Groups, Projection};
@@ -8,7 +8,8 @@ use bench::experiments::pop;
 use bench::experiments::table::{division, grouped};
 use maud::{Markup, html};
 
-const EXPERIMENT: [&str; 20] = [
+const EXPERIMENT: [&str; 21] = [
+    "engine",
     "case",
     "cells",
     "n",
@@ -54,6 +55,7 @@ fn row(groups: &Groups, group: &Group) -> Vec<Markup> {
     let e = group.efficiency(groups.reference(group), &groups.network);
     let leaves = group.typical.counters.get("leaves");
     fields([
+        s.engine.clone(),
         s.case.clone(),
         grouped(group.cells()),
         s.layer_cells_min.to_string(),
@@ -84,6 +86,7 @@ fn fields<const N: usize>(texts: [String; N]) -> Vec<Markup> {
 /// Projected and measured times of the same meshes on equally many ranks; empty if the record has no such pairs.
 pub fn projections(groups: &Groups) -> Markup {
     let columns = [
+        "engine",
         "case",
         "experiment",
         "cells",
@@ -95,6 +98,7 @@ pub fn projections(groups: &Groups) -> Markup {
     ];
     let row = |p: &Projection| {
         fields([
+            p.sim.setup.engine.clone(),
             p.sim.setup.case.clone(),
             p.sim.setup.experiment.clone(),
             grouped(p.sim.cells()),
@@ -116,7 +120,7 @@ pub fn phases(groups: &Groups) -> Markup {
         let is_same_study = |o: &&mut &Group| {
             let weak = group.setup.experiment == "weak";
             o.setup.experiment == group.setup.experiment
-                && o.setup.case == group.setup.case
+                && Subject::of(&o.setup) == Subject::of(&group.setup)
                 && (weak || o.cells() == group.cells())
         };
         match largest.iter_mut().find(is_same_study) {
@@ -165,7 +169,7 @@ fn phases_of(groups: &Groups, group: &Group) -> Markup {
     let s = &run.setup;
     html! {
         h3 {
-            "phases: " (s.case) ", " (s.experiment) " scaling, " (grouped(run.cells)) " cells, " (s.ranks) " simulated ranks"
+            "phases: " (Subject::of(s)) ", " (s.experiment) " scaling, " (grouped(run.cells)) " cells, " (s.ranks) " simulated ranks"
         }
         (table(None, &columns, &rows))
     }

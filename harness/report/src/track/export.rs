@@ -4,7 +4,7 @@ use crate::figure::csv::table;
 use crate::json::pretty;
 use crate::verification::junit::to_text;
 use bench::track::history::Record;
-use bench::track::{Series, summary};
+use bench::track::{Series, summary, unit};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use serde_json::{Map, Value, json};
 
@@ -23,16 +23,6 @@ pub fn bencher(record: &Record) -> String {
 pub fn github(record: &Record) -> String {
     let entry = |(name, value): (&String, &f64)| json!({ "name": name, "unit": unit(name), "value": value });
     pretty(&Value::Array(record.metrics.iter().map(entry).collect()))
-}
-
-fn unit(name: &str) -> &'static str {
-    match name.rsplit('/').next().unwrap_or(name) {
-        "seconds" => "s",
-        "message_bytes" => "bytes",
-        "instructions" => "instructions",
-        "cells" | "leaves" => "cells",
-        _ => "count",
-    }
 }
 
 /// The whole history as CSV, one value per line.
@@ -61,7 +51,7 @@ pub fn junit(all: &[Series], recent: usize) -> String {
             None => TestCaseStatus::success(),
         };
         let mut test = TestCase::new(series.name.as_str(), status);
-        if !series.changes.is_empty() {
+        if !series.changes.is_empty() || !series.drifts.is_empty() {
             test.set_system_out(summary(std::slice::from_ref(series)));
         }
         suite.add_test_case(test);

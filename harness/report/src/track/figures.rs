@@ -82,42 +82,54 @@ fn relative(style: usize, series: &Series) -> Plotted {
     Plotted::new(case_and_metric(series).1, Provenance::Measured, style, points).not_joined()
 }
 
-/// The figure of one metric, with its change points as vertical lines.
+/// The figure of one metric, with its steps as vertical lines and its drifts as dashed lines. Outliers do not widen the
+/// axis: they are drawn at its ends.
 pub fn of_metric(records: &[Record], series: &Series) -> Figure {
-    let points = series.points.iter().map(|&(commit, value)| Point::exact(commit as f64, value));
     let note = |&(commit, value): &(usize, f64)| {
         let record = &records[commit];
-        format!("{} {value}\n{}", short_commit(&record.commit), record.subject)
+        format!("{} {value} {}\n{}", short_commit(&record.commit), series.unit, record.subject)
     };
     let mark = |change: &Change| {
         let position = |at: usize| series.points[at].0 as f64;
-        let (name, style) = match (series.is_cost(), change.after > change.before) {
-            (false, _) => ("change", 3),
-            (true, true) => ("increase", 1),
-            (true, false) => ("decrease", 2),
+        let (name, style) = match (series.is_cost(), change.accepted, change.after > change.before)
+        {
+            (false, _, _) => ("change", 3),
+            (true, true, _) => ("accepted", 3),
+            (true, false, true) => ("increase", 1),
+            (true, false, false) => ("decrease", 2),
         };
         // Between the last commit with the old value and the first with the new one.
         let x = (position(change.at) + position(change.at - 1)) / 2.0;
         Mark { name: name.to_owned(), x, style }
     };
-    let values = series.points.iter().map(|p| p.1);
-    let range = range(
-        values.clone().fold(f64::INFINITY, f64::min),
-        values.fold(f64::NEG_INFINITY, f64::max),
-    );
-    let plotted =
-        Plotted::new(case_and_metric(series).1, Provenance::Measured, 0, points.collect());
-    let notes = series.points.iter().map(note).collect();
+    let (low, high) = range(series);
+    let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
+    let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
+    let plotted = |name: &str, how: Provenance, style: usize, shown: &[&(usize, f64)]| {
+        let point =
+            |&&(commit, value): &&(usize, f64)| Point::exact(commit as f64, value.clamp(low, high));
+        let notes = shown.iter().map(|point| note(point)).collect();
+        let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
+        Plotted { notes, ..plotted.not_joined() }
+    };
+    let mut lines = vec![plotted(case_and_metric(series).1, Provenance::Measured, 0, &inside)];
+    if !outside.is_empty() {
+        let name = "beyond the axis, drawn at its end";
+        lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
+    }
+    lines.extend(series.drifts.iter().map(|drift| {
+        let x = |at: usize| series.points[at].0 as f64;
+        let ends = [(x(drift.from), drift.before), (x(drift.until - 1), drift.after)];
+        let points = ends.map(|(x, y)| Point::exact(x, y.clamp(low, high)));
+        Plotted::new("drift", Provenance::Bound, 4, points.to_vec())
+    }));
     Figure {
         id: format!("metric-{}", series.name.replace(['/', ' '], "-")),
         title: series.name.clone(),
         caption: String::new(),
         x: commits(records.len()),
-        y: Axis { range: Some(range), ..Axis::linear("") },
-        body: Body::Points {
-            series: vec![Plotted { notes, ..plotted.not_joined() }],
-            marks: series.changes.iter().map(mark).collect(),
-        },
+        y: Axis { range: Some((low, high)), ..Axis::linear(series.unit) },
+        body: Body::Points { series: lines, marks: series.changes.iter().map(mark).collect() },
         height: HEIGHT,
         claims: Claims::default(),
     }
@@ -128,10 +140,26 @@ pub fn short_commit(commit: &str) -> String {
     commit.chars().take(10).collect()
 }
 
-/// The range shown: a little more than that of the values, so that a constant is in the middle and noise looks small.
-fn range(low: f64, high: f64) -> (f64, f64) {
+/// Fraction of the values at either end that may be outliers.
+const OUTLIERS: f64 = 0.05;
+
+/// The range shown: that of the values without outliers, with a margin, so that a constant is in the middle and noise looks
+/// small. The levels between steps are never outliers.
+fn range(series: &Series) -> (f64, f64) {
+    let mut sorted: Vec<f64> = series.points.iter().map(|p| p.1).collect();
+    sorted.sort_by(f64::total_cmp);
+    let cut = (sorted.len() as f64 * OUTLIERS).ceil() as usize;
+    let kept = match sorted.len() > 2 * cut {
+        true => &sorted[cut..sorted.len() - cut],
+        false => &sorted[..],
+    };
+    let levels = series.changes.iter().flat_map(|change| [change.before, change.after]);
+    let ends = series.drifts.iter().flat_map(|drift| [drift.before, drift.after]);
+    let shown = || kept.iter().copied().chain(levels.clone()).chain(ends.clone());
+    let low = shown().fold(f64::INFINITY, f64::min);
+    let high = shown().fold(f64::NEG_INFINITY, f64::max);
     let middle = (low + high) / 2.0;
-    let half = ((high - low) * 0.6).max(middle.abs() * 0.02).max(1e-9);
+    let half = ((high - low) * 0.8).max(middle.abs() * 0.02).max(1e-9);
     (middle - half, middle + half)
 }
 
@@ -178,6 +206,21 @@ mod tests {
         assert!(by_case(&records, &analyse(&records, &Rules::default())).is_empty());
         assert!(by_case(&[], &[]).is_empty());
         assert_eq!(commits(3).ticks, [0.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn an_outlier_does_not_squash_the_plot() {
+        let mut records = bench::testing::history();
+        records[5].metrics.insert("uav/words".into(), 1e9);
+        let all = analyse(&records, &Rules::default());
+        let words = all.iter().find(|s| s.name == "uav/words").unwrap();
+        let figure = of_metric(&records, words);
+        let (low, high) = figure.y.range.unwrap();
+        assert!((500.0..1000.0).contains(&low) && (1110.0..1500.0).contains(&high), "{low} {high}");
+        let Body::Points { series, .. } = figure.body else { panic!() };
+        assert_eq!((series[0].points.len(), series[1].points.len()), (29, 1));
+        assert_eq!(series[1].points[0].y, high);
+        assert!(series[1].notes[0].contains("1000000000"), "{:?}", series[1].notes);
     }
 
     #[test]

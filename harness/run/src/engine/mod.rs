@@ -13,6 +13,7 @@ pub mod p4est;
 pub mod paths;
 pub mod process;
 pub mod programs;
+mod reap;
 pub mod report;
 pub mod runner;
 mod session;

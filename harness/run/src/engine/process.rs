@@ -9,6 +9,7 @@
 use super::failure::{End, Failure, describe_activity};
 use super::interrupt;
 use super::memory::MemorySampler;
+use super::reap::try_reap;
 use super::session;
 use rustix::process::{Signal, kill_process, kill_process_group, setsid};
 use std::fs::{self, File};
@@ -23,6 +24,8 @@ use std::time::{Duration, Instant};
 pub struct Finished {
     /// Wall time from start to end, in seconds.
     pub time_wall_s: f64,
+    /// CPU time of the child and of all descendants that were waited for, in seconds.
+    pub time_cpu_s: f64,
     /// File with the standard output.
     pub stdout: PathBuf,
     /// Peak memory of the child and its descendants, if it was sampled.
@@ -62,19 +65,21 @@ impl<'a> Watch<'a> {
 pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     let failure = |end| Failure::new(watch.name, end);
     let mut sampler = watch.sample_memory.then(MemorySampler::new);
-    let (start, mut child) = start(command, watch).map_err(|error| {
+    let (start, child) = start(command, watch).map_err(|error| {
         let program = Path::new(command.get_program()).display();
         failure(End::Missing(format!("cannot be started: {program}: {error}")))
     })?;
-    let end = wait(&mut child, start, watch, sampler.as_mut());
+    let end = wait(&child, start, watch, sampler.as_mut());
+    let time_wall_s = start.elapsed().as_secs_f64();
     kill_session(child.id());
     match end {
-        Ok(None) => Ok(Finished {
-            time_wall_s: start.elapsed().as_secs_f64(),
+        Ok(Ok(time_cpu_s)) => Ok(Finished {
+            time_wall_s,
+            time_cpu_s,
             stdout: watch.log("stdout"),
             peak_rss_bytes: sampler.map(|sampler| sampler.peak_bytes()),
         }),
-        Ok(Some(end)) => Err(failure(end)),
+        Ok(Err(end)) => Err(failure(end)),
         Err(error) => Err(failure(End::Unusable(format!("could not be waited for: {error}")))),
     }
 }
@@ -88,28 +93,28 @@ fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child)> {
     Ok((start, command.spawn()?))
 }
 
-/// How the child ended; `None` if it exited with code 0.
+/// The CPU time of a child that exited with code 0, or how it ended otherwise.
 fn wait(
-    child: &mut Child,
+    child: &Child,
     start: Instant,
     watch: &Watch,
     mut sampler: Option<&mut MemorySampler>,
-) -> io::Result<Option<End>> {
+) -> io::Result<Result<f64, End>> {
     let mut pause = Duration::from_millis(1);
     loop {
-        if let Some(status) = child.try_wait()? {
+        if let Some((status, time_cpu_s)) = try_reap(child)? {
             // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
             let interrupted = interrupt::requested().then_some(End::Interrupted);
-            return Ok(interrupted.or_else(|| judge(status, watch)));
+            return Ok(interrupted.or_else(|| judge(status, watch)).map_or(Ok(time_cpu_s), Err));
         }
         if interrupt::requested() {
             end_child(child)?;
-            return Ok(Some(End::Interrupted));
+            return Ok(Err(End::Interrupted));
         }
         if start.elapsed() >= watch.limit {
             let activity = watch.status.map(|status| describe_activity(&read_status(status)));
             end_child(child)?;
-            return Ok(Some(End::TimedOut { limit: watch.limit, activity }));
+            return Ok(Err(End::TimedOut { limit: watch.limit, activity }));
         }
         if let Some(sampler) = &mut sampler {
             sampler.sample(child.id());
@@ -150,19 +155,22 @@ fn last_lines(text: &str) -> String {
 }
 
 /// Sends SIGTERM, on which `mpirun` ends its ranks, and kills the child if it does not end within a few seconds.
-fn end_child(child: &mut Child) -> io::Result<()> {
+fn end_child(child: &Child) -> io::Result<()> {
     if let Some(group) = session::pid_of(child.id()) {
         let _ = kill_process_group(group, Signal::TERM);
     }
     let patience = Instant::now() + Duration::from_secs(3);
     while Instant::now() < patience {
-        if child.try_wait()?.is_some() {
+        if try_reap(child)?.is_some() {
             return Ok(());
         }
         std::thread::sleep(Duration::from_millis(10));
     }
     kill_session(child.id());
-    child.wait().map(drop)
+    while try_reap(child)?.is_none() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    Ok(())
 }
 
 /// Kills every process of the session that `leader` led. Processes may be started while the session is being killed,
@@ -276,6 +284,18 @@ mod tests {
         let id = fs::read_to_string(logs.path().join("id")).unwrap();
         let stat = fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
         assert!(!session::session_and_liveness(&stat).is_some_and(|(_, alive)| alive), "{stat}");
+    }
+
+    #[test]
+    fn the_cpu_time_is_that_of_all_processes() {
+        let logs = tempfile::tempdir().unwrap();
+        let watch = Watch::new("child", Duration::from_secs(60), logs.path());
+        // A grandchild computes, and its parent waits for it.
+        let count = "i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done";
+        let finished = shell(&format!("sh -c '{count}'; true"), &watch).unwrap();
+        assert!(finished.time_cpu_s > 0.005, "{finished:?}");
+        let idle = shell("sleep 0.2", &watch).unwrap();
+        assert!(idle.time_cpu_s < idle.time_wall_s / 2.0, "{idle:?}");
     }
 
     #[test]

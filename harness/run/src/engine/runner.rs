@@ -33,6 +33,8 @@ pub struct Completed {
     pub report: RunReport,
     /// Wall time from start to end of the process, in seconds.
     pub time_process_s: f64,
+    /// CPU time of the whole process, including all its descendants, in seconds; seen from outside.
+    pub time_process_cpu_s: f64,
     /// The command that was run.
     pub command: Command,
     /// The mesh's directory, if it was written.
@@ -164,7 +166,8 @@ impl Engine {
                 .map_err(|why| self.unusable(format!("ended, but {why}")))?,
         };
         let report = completed(report, &finished);
-        Ok(Completed { report, time_process_s: finished.time_wall_s, command, mesh })
+        let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
+        Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
     }
 
     /// Writes the manifest of leaves that the engine wrote without one: the inputs of the case, the counts and digests

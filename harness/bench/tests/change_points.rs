@@ -1,0 +1,151 @@
+//! False alarms and power of the change point detector on simulated series. All seeds are fixed.
+
+use bench::statistics::change_points::{Changes, Rules, change_points};
+use bench::statistics::random::Random;
+
+/// Series per kind of noise.
+const SERIES: u64 = 200;
+
+fn uniform(random: &mut Random) -> f64 {
+    (random.below(1 << 30) as f64 + 0.5) / f64::from(1 << 30)
+}
+
+fn normal(random: &mut Random) -> f64 {
+    (-2.0 * uniform(random).ln()).sqrt() * (std::f64::consts::TAU * uniform(random)).cos()
+}
+
+/// Normal values in which one of twenty is an outlier.
+fn contaminated(random: &mut Random) -> f64 {
+    let value = normal(random);
+    if random.below(20) == 0 { value + 3.0 + 8.0 * uniform(random) } else { value }
+}
+
+/// Student's t with three degrees of freedom.
+fn heavy_tailed(random: &mut Random) -> f64 {
+    let squares: f64 = (0..3).map(|_| normal(random).powi(2)).sum();
+    normal(random) / (squares / 3.0).sqrt()
+}
+
+/// Independent values around 100.
+fn independent(count: usize, seed: u64, draw: impl Fn(&mut Random) -> f64) -> Vec<f64> {
+    let mut random = Random(seed * 7919 + count as u64);
+    (0..count).map(|_| 100.0 + draw(&mut random)).collect()
+}
+
+/// A stationary first-order autoregression around 100.
+fn autoregressive(count: usize, seed: u64, phi: f64) -> Vec<f64> {
+    let mut random = Random(seed * 104_729 + count as u64);
+    let mut value = normal(&mut random) / (1.0 - phi * phi).sqrt();
+    let mut next = || {
+        value = phi * value + normal(&mut random);
+        100.0 + value
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+fn found(values: &[f64]) -> Changes {
+    change_points(values, &Rules::default())
+}
+
+fn places(values: &[f64]) -> Vec<usize> {
+    found(values).steps.into_iter().map(|step| step.at).collect()
+}
+
+/// Percentage of series with a step.
+fn alarms(series: impl Fn(u64) -> Vec<f64>) -> f64 {
+    let alarms = (0..SERIES).filter(|seed| !places(&series(*seed)).is_empty()).count();
+    100.0 * alarms as f64 / SERIES as f64
+}
+
+#[test]
+fn independent_noise_of_any_kind_rarely_has_a_step() {
+    for count in [20, 60] {
+        assert!(alarms(|seed| independent(count, seed, normal)) <= 1.0, "normal, {count}");
+        assert!(alarms(|seed| independent(count, seed, uniform)) <= 1.0, "uniform, {count}");
+        assert!(alarms(|seed| independent(count, seed, heavy_tailed)) <= 1.0, "heavy, {count}");
+        assert!(alarms(|seed| independent(count, seed, contaminated)) <= 2.0, "outliers, {count}");
+    }
+}
+
+#[test]
+fn autocorrelated_noise_is_no_sequence_of_steps() {
+    for count in [30, 100] {
+        let rate = alarms(|seed| autoregressive(count, seed, 0.7));
+        assert!(rate <= 5.0, "{rate} % of {count} values");
+    }
+}
+
+#[test]
+fn a_drift_is_no_staircase() {
+    for slope in [0.02, 0.1, 1.0] {
+        let drifting = |seed| {
+            let mut values = independent(60, seed, normal);
+            values.iter_mut().enumerate().for_each(|(i, value)| *value += slope * i as f64);
+            values
+        };
+        assert!(alarms(drifting) <= 5.0, "slope {slope}");
+    }
+}
+
+#[test]
+fn clear_steps_are_located_to_one_value() {
+    let with_step = |seed: u64, size: f64| {
+        let mut values = independent(60, seed, normal);
+        values[40..].iter_mut().for_each(|value| *value += size);
+        values
+    };
+    let right = |size: f64| {
+        let is_right = |seed: &u64| matches!(places(&with_step(*seed, size))[..], [39..=41]);
+        (0..50).filter(is_right).count()
+    };
+    assert!(right(5.0) >= 48, "{}", right(5.0));
+    assert!(right(3.0) >= 44, "{}", right(3.0));
+}
+
+#[test]
+fn several_steps_are_separated_and_outliers_are_not_steps() {
+    let mut values = independent(90, 3, normal);
+    values[30..].iter_mut().for_each(|value| *value *= 1.1);
+    values[65..].iter_mut().for_each(|value| *value *= 0.8);
+    for (outlier, size) in [(10, 40.0), (50, -30.0), (89, 60.0)] {
+        values[outlier] += size;
+    }
+    assert_eq!(places(&values), [30, 65]);
+}
+
+#[test]
+fn a_step_within_a_drift_is_found_and_both_drifts_are_reported() {
+    let mut values = independent(80, 5, normal);
+    values.iter_mut().enumerate().for_each(|(i, value)| *value += 0.5 * i as f64);
+    values[40..].iter_mut().for_each(|value| *value += 20.0);
+    let changes = found(&values);
+    assert!(matches!(changes.steps[..], [step] if step.at == 40), "{changes:?}");
+    let [before, after] = changes.drifts[..] else { panic!("{changes:?}") };
+    assert_eq!((before.from, before.until, after.from, after.until), (0, 40, 40, 80));
+    let rise = |drift: bench::statistics::change_points::Drift| drift.after - drift.before;
+    assert!((17.0..22.0).contains(&rise(before)) && (17.0..22.0).contains(&rise(after)));
+}
+
+#[test]
+fn an_exact_counter_needs_few_values_after_the_change() {
+    let mut values = vec![7.0; 30];
+    values.push(8.0);
+    assert_eq!(places(&values), [0usize; 0]);
+    values.extend([8.0, 8.0]);
+    assert_eq!(places(&values), [30]);
+    values.extend([8.0; 30]);
+    assert_eq!(places(&values), [30]);
+}
+
+#[test]
+fn short_and_degenerate_series_have_no_changes() {
+    for values in [&[][..], &[1.0], &[1.0, 2.0, 3.0], &[5.0; 50], &[0.0; 20], &[f64::NAN; 9]] {
+        assert_eq!(found(values), Changes::default(), "{values:?}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_result() {
+    let values = autoregressive(50, 8, 0.3);
+    assert_eq!(found(&values), found(&values));
+}
