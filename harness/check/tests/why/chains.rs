@@ -47,7 +47,7 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(32))]
+    #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
     fn every_split_has_a_chain_and_every_deleted_point_a_rule(
