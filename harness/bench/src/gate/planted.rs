@@ -26,7 +26,7 @@ pub enum Kind {
     Waiting,
 }
 
-/// A slow-down.
+/// A slow-down; none if it has 0 percent.
 #[derive(Clone, Copy, Debug)]
 pub struct SlowDown {
     /// How.
@@ -41,22 +41,21 @@ pub struct SlowDown {
 ///
 /// # Errors
 /// If the report cannot be written.
-pub fn run(json: Option<&Path>, slow: Option<SlowDown>) -> io::Result<()> {
+pub fn run(json: Option<&Path>, slow: SlowDown) -> io::Result<()> {
     let start = Instant::now();
     let total: u64 = OPERATIONS.iter().sum();
     let mut counters = serde_json::Map::new();
     let mut phases = Vec::new();
     for (i, work) in [planted_first, planted_second, planted_third].into_iter().enumerate() {
-        let more = slow.filter(|slow| slow.phase == i && slow.kind != Kind::Waiting);
-        let more = more.map(|slow| ((slow.percent / 100.0 * total as f64) as u64, slow.kind));
-        let (more, kind) = more.unwrap_or((0, Kind::Counted));
+        let here = slow.phase == i && slow.kind != Kind::Waiting;
+        let more = if here { (slow.percent / 100.0 * total as f64) as u64 } else { 0 };
         let cpu = ProcessTime::now();
         black_box(work(black_box(OPERATIONS[i] + more)));
         phases.push(json!({ "name": PHASES[i], "time_cpu_s": [cpu.elapsed().as_secs_f64()] }));
-        let counted = if kind == Kind::Counted { more } else { 0 };
+        let counted = if slow.kind == Kind::Counted { more } else { 0 };
         counters.insert(format!("{}_operations", PHASES[i]), json!([OPERATIONS[i] + counted]));
     }
-    if let Some(slow) = slow.filter(|slow| slow.kind == Kind::Waiting) {
+    if slow.kind == Kind::Waiting {
         std::thread::sleep(start.elapsed().mul_f64(slow.percent / 100.0));
     }
     let Some(path) = json else { return Ok(()) };
@@ -90,7 +89,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("run.json");
         for (kind, counted) in [(Kind::Counted, 12_000_000), (Kind::Uncounted, 10_000_000)] {
-            run(Some(&path), Some(SlowDown { kind, phase: 1, percent: 10.0 })).unwrap();
+            run(Some(&path), SlowDown { kind, phase: 1, percent: 10.0 }).unwrap();
             let report = run::engine::report::RunReport::read(&path).unwrap();
             assert_eq!(report.counters["planted_second_operations"], [counted], "{kind:?}");
             assert_eq!(report.counters["planted_first_operations"], [4_000_000]);

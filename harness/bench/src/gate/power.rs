@@ -102,7 +102,7 @@ impl Test<'_> {
     fn write_files(&self) -> io::Result<()> {
         fs::write(self.place.join("engine.toml"), ENGINE)?;
         fs::write(self.place.join("case.toml"), "# The programs do not read it.\n")?;
-        self.script("baseline", "")
+        self.script("baseline", &arguments(None, 0, 0.0))
     }
 
     /// Writes a script that starts the program with these arguments.
@@ -117,10 +117,7 @@ impl Test<'_> {
     /// Runs the gate once and adds the outcome to the row.
     fn trial(&self, row: &mut Row, trial: usize) -> Result<(), GateError> {
         let phase = trial % PHASES.len();
-        let arguments = row.kind.map_or(String::new(), |kind| {
-            let kind = kind.to_possible_value().map(|v| v.get_name().to_owned());
-            format!("--kind {} --phase {phase} --percent {}", kind.unwrap_or_default(), row.percent)
-        });
+        let arguments = arguments(row.kind, phase, row.percent);
         let wrong = |error: io::Error| GateError::Input(error.to_string());
         self.script("candidate", &arguments).map_err(wrong)?;
         let requested = &self.options.layers;
@@ -166,6 +163,12 @@ impl Test<'_> {
             .map_err(GateError::Input)?;
         gate(&options, &programs)
     }
+}
+
+/// The arguments of the program. Without a slow-down there are as many, so that reading them costs the same.
+fn arguments(kind: Option<Kind>, phase: usize, percent: f64) -> String {
+    let kind = kind.unwrap_or(Kind::Counted).to_possible_value().expect("no kind is hidden");
+    format!("--kind {} --phase {phase} --percent {percent}", kind.get_name())
 }
 
 /// Whether the regressions of a layer name this phase and no other.

@@ -267,6 +267,9 @@ impl Search<'_> {
 /// Number of exceedances after which a p-value is known well enough.
 const EXCEEDANCES_MAX: usize = 50;
 
+/// Smallest p-value: no extrapolation is better than this.
+const P_MIN: f64 = 1e-9;
+
 /// Fraction of the gains to which the tail is fitted.
 const TAIL: f64 = 0.1;
 
@@ -278,5 +281,5 @@ fn tail(gains: &mut [f64], observed: f64) -> f64 {
     let start = largest[0].max(1.0).ln();
     let excess = largest.iter().map(|gain| gain.max(1.0).ln() - start).sum::<f64>();
     let mean = (excess / largest.len() as f64).max(1e-9);
-    TAIL * (-(observed.ln() - start) / mean).exp()
+    (TAIL * (-(observed.ln() - start) / mean).exp()).max(P_MIN)
 }

@@ -25,10 +25,10 @@ pub fn summary(all: &[Series]) -> String {
         }
         for drift in &series.drifts {
             text.push_str(&format!(
-                "{}: drifts from {:.6} to {:.6}{unit} ({}) over {}..{}, p = {:.2e}\n",
+                "{}: drifts from {} to {}{unit} ({}) over {}..{}, p = {:.2e}\n",
                 series.name,
-                drift.before,
-                drift.after,
+                rounded(drift.before),
+                rounded(drift.after),
                 relative(drift.percent),
                 short(&drift.first),
                 short(&drift.last),
@@ -40,4 +40,29 @@ pub fn summary(all: &[Series]) -> String {
         text.push_str("no change points\n");
     }
     text
+}
+
+/// The value with five significant digits.
+fn rounded(value: f64) -> f64 {
+    if value == 0.0 {
+        return value;
+    }
+    let unit = 10f64.powf(value.abs().log10().floor() - 4.0);
+    // Dividing by a power of ten is exact in the digits that are printed; multiplying by its inverse is not.
+    if unit < 1.0 {
+        (value / unit).round() / (1.0 / unit).round()
+    } else {
+        (value / unit).round() * unit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded;
+
+    #[test]
+    fn values_have_five_significant_digits() {
+        let values = [0.0, 999_701_499.175, 1_118_011_144.6, 0.123_456_789, -12.345_678];
+        assert_eq!(values.map(rounded), [0.0, 999_700_000.0, 1_118_000_000.0, 0.123_46, -12.346]);
+    }
 }

@@ -11,8 +11,8 @@ pub struct Arguments {
     /// A case file, which is not read
     case: PathBuf,
     /// How the program is slowed down
-    #[arg(long)]
-    kind: Option<Kind>,
+    #[arg(long, default_value = "counted")]
+    kind: Kind,
     /// The phase that is slowed down, from 0
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..PHASES.len() as i64))]
     phase: u8,
@@ -26,11 +26,11 @@ pub struct Arguments {
 
 /// Does the work; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
-    let slow = arguments.kind.map(|kind| SlowDown {
-        kind,
+    let slow = SlowDown {
+        kind: arguments.kind,
         phase: usize::from(arguments.phase),
         percent: arguments.percent,
-    });
+    };
     match planted::run(arguments.json.as_deref(), slow) {
         Ok(()) => EXIT_HOLDS,
         Err(error) => {

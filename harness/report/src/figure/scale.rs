@@ -107,7 +107,11 @@ impl Number {
             let scale = 10f64.powi((3 - exponent as i32).max(0));
             return Self::Decimal(((value * scale).round() / scale).to_string());
         }
-        let mantissa = (value / 10f64.powf(exponent) * 100.0).round() / 100.0;
+        let mut exponent = exponent;
+        let mut mantissa = (value / 10f64.powf(exponent) * 100.0).round() / 100.0;
+        if mantissa.abs() >= 10.0 {
+            (mantissa, exponent) = (mantissa / 10.0, exponent + 1.0);
+        }
         let text = if mantissa == 1.0 { String::new() } else { mantissa.to_string() };
         Self::Scientific(text, exponent as i32)
     }
@@ -167,9 +171,11 @@ mod tests {
 
     #[test]
     fn tick_labels_are_short() {
-        let numbers = [0.0, 1.0, 0.05, 2.5, 1024.0, 1e6, 5e7, 1e-6, 0.001, 1.15, 0.1 + 0.2];
-        let labels =
-            ["0", "1", "0.05", "2.5", "1024", "10⁶", "5·10⁷", "10⁻⁶", "0.001", "1.15", "0.3"];
+        let numbers =
+            [0.0, 1.0, 0.05, 2.5, 1024.0, 1e6, 5e7, 1e-6, 0.001, 1.15, 0.1 + 0.2, 9.999e8];
+        let labels = [
+            "0", "1", "0.05", "2.5", "1024", "10⁶", "5·10⁷", "10⁻⁶", "0.001", "1.15", "0.3", "10⁹",
+        ];
         assert_eq!(numbers.map(tick_label), labels);
     }
 }

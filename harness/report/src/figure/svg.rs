@@ -59,10 +59,11 @@ fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark
             entries.push((&mark.name, Symbol::Mark(mark.style)));
         }
     }
-    let frame = frame(canvas, figure, &entries);
     let all = || series.iter().flat_map(|s| s.points.iter());
     let x = Scale::of(&figure.x, all().map(|p| p.x));
     let y = Scale::of(&figure.y, all().flat_map(|p| [p.y, p.low, p.high]));
+    let widest = y.ticks.iter().map(|tick| width(&tick_label(*tick))).fold(0.0, f64::max);
+    let frame = frame(canvas, figure, &entries, LEFT.max(BESIDE_TICKS + widest));
     axes(canvas, &frame, (&figure.x, &x), (&figure.y, &y));
     for mark in marks {
         let at = frame.x(x.position(mark.x));
@@ -102,12 +103,18 @@ fn reference_dashes(index: usize) -> &'static str {
     [DOTTED, "40 20", "6 6"][index % 3]
 }
 
+/// Usual left edge of the data.
+const LEFT: f64 = 230.0;
+
+/// Space for the label of the vertical axis.
+const BESIDE_TICKS: f64 = 130.0;
+
 /// Width of a symbol in the legend.
 const SYMBOL: f64 = 80.0;
 
 /// Draws the legend above the data, in as many rows as it needs, and returns the rectangle that is left for the data.
-fn frame(canvas: &mut Canvas, figure: &Figure, entries: &[(&str, Symbol)]) -> Frame {
-    let (left, right) = (230.0, f64::from(WIDTH) - 40.0);
+fn frame(canvas: &mut Canvas, figure: &Figure, entries: &[(&str, Symbol)], left: f64) -> Frame {
+    let right = f64::from(WIDTH) - 40.0;
     let (mut x, mut y) = (left, 36.0);
     for (name, symbol) in entries {
         let entry = SYMBOL + width(name) + 60.0;
@@ -180,7 +187,7 @@ fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
         .map(|(style, s)| (s.0.as_str(), Symbol::Bar(style)))
         .chain(references.map(|(i, r)| (r.0.as_str(), Symbol::Reference(i))))
         .collect();
-    let mut frame = frame(canvas, figure, &entries);
+    let mut frame = frame(canvas, figure, &entries, LEFT);
     let count = bars.categories.len();
     let step = (frame.right - frame.left) / count.max(1) as f64;
     let labels = labels(&bars.categories, step);
