@@ -2,17 +2,21 @@
 README.md states the settings and why they are fair."""
 
 import argparse
-import json
 import math
 import os
 import re
+import resource
 import subprocess
+import sys
 import tempfile
 import time
 import tomllib
 from pathlib import Path
 
 import numpy as np
+
+sys.path.append(str(Path(__file__).parents[1]))
+import leafset  # noqa: E402
 
 LEVEL_BLOCKS_MAX = 6  # at most 64 blocks along an edge of the root
 
@@ -89,13 +93,14 @@ def write_case(case, stl, place, ranks):
 
 
 def run(place, *command):
-    """Runs an OpenFOAM program and returns its wall time."""
-    start = time.monotonic()
-    done = subprocess.run(command, cwd=place, env=os.environ | {"WM_PROJECT_DIR": "/usr/share/openfoam"}, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True, check=False)
+    """Runs an OpenFOAM program and returns its name, its wall time and its CPU time."""
+    cpu_s = lambda: sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
+    wall, cpu = time.perf_counter(), cpu_s()
+    done = subprocess.run(command, cwd=place, env=os.environ | {"WM_PROJECT_DIR": "/usr/share/openfoam", "PWD": str(place)},
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"{command[0]} ended with code {done.returncode}:\n{done.stdout[-4000:]}")
-    return time.monotonic() - start
+    return command[3 if command[0] == "mpirun" else 0], time.perf_counter() - wall, cpu_s() - cpu
 
 
 def lists(path, dtype, width=1):
@@ -113,41 +118,35 @@ def leaves(mesh, case, blocks):
     points, (offsets, labels) = lists(mesh / "points", "<f8", 3)[0], lists(mesh / "faces", "<i4")
     lowest = np.minimum.reduceat(points[labels[:, 0]], offsets[:-1, 0])
     cells = [lists(mesh / name, "<i4")[0][:, 0] for name in ("owner", "neighbour")]
-    level = lists(mesh / "cellLevel", "<i4")[0][:, 0].astype(np.uint64) + np.uint64(blocks)
+    level = lists(mesh / "cellLevel", "<i4")[0][:, 0] + blocks
     corner = np.full((len(level), 3), np.inf)
     for cell in cells:
         np.minimum.at(corner, cell, lowest[: len(cell)])
-    unit = 2**19 / case["root"]["edge"]
-    corner = np.rint((corner - case["root"]["origin"]) * unit).astype(np.uint64)
-    key = np.zeros(len(level), np.uint64)
-    for bit in range(19):
-        for axis in range(3):
-            key |= (corner[:, axis] >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return np.sort(key << np.uint64(7) | level << np.uint64(2))
+    return leafset.leaf_words((corner - case["root"]["origin"]) * (2**19 / case["root"]["edge"]), level)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("case", type=Path, help="case file with a binary STL file, a [root] table and keep = \"all\"")
-    parser.add_argument("--out", type=Path, metavar="DIR", required=True, help="directory for the leaf set")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="directory for the leaf set")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="run report")
     parser.add_argument("--ranks", type=int, default=1, help="number of MPI ranks")
     options = parser.parse_args()
-    case = tomllib.loads(options.case.read_text())
+    case, ranks = tomllib.loads(options.case.read_text()), options.ranks
     with tempfile.TemporaryDirectory() as place:
-        place, ranks = Path(place), options.ranks
+        place = Path(place)
         blocks = write_case(case, options.case.parent / case["geometry"], place, ranks)
-        times = {"blockMesh": run(place, "blockMesh")}
+        phases = [run(place, "blockMesh")]
+        meshes = [place / "constant/polyMesh"]
         if ranks == 1:
-            times["snappyHexMesh"] = run(place, "snappyHexMesh", "-overwrite")
-            meshes = [place / "constant/polyMesh"]
+            phases.append(run(place, "snappyHexMesh", "-overwrite"))
         else:
-            times["decomposePar"] = run(place, "decomposePar")
-            times["snappyHexMesh"] = run(place, "mpirun", "-n", str(ranks), "snappyHexMesh", "-overwrite", "-parallel")
+            phases.append(run(place, "decomposePar"))
+            phases.append(run(place, "mpirun", "-n", str(ranks), "snappyHexMesh", "-overwrite", "-parallel"))
             meshes = [place / f"processor{rank}/constant/polyMesh" for rank in range(ranks)]
-        print(json.dumps(times))
-        options.out.mkdir(parents=True, exist_ok=True)
-        for rank, mesh in enumerate(meshes):
-            np.save(options.out / f"leaves-{rank:05}.npy", leaves(mesh, case, blocks))
+        parts = [leaves(mesh, case, blocks) for mesh in meshes]
+    leafset.write(parts, options.out)
+    leafset.report(parts, phases, options.json)
 
 
 if __name__ == "__main__":
