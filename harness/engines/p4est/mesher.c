@@ -14,20 +14,16 @@
  */
 #define _POSIX_C_SOURCE 200809L
 
-#include <float.h>
 #include <math.h>
-#include <stdbool.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <time.h>
 
 #include "leaves.h"
-#include "stl.h"
+#include "search.h"
 
 const char *const program_name = "p4est-mesher";
 
-/* Vertices are rounded to this number of units along an edge of the root, which makes most tests below exact. */
-#define UNITS (1 << 27)
 /* One unit of p4est, at level 19, in units. */
 #define QUADRANT_UNITS 256
 
@@ -67,23 +63,17 @@ static struct job read_case(const char *path)
     return job;
 }
 
-/* The facets, and those near each octant on the path from the root to the last octant visited. */
+/* Where to refine. */
 struct search {
-    struct facets facets;
+    struct tree tree;
     double reach[P8EST_MAXLEVEL + 1];
     int level_surface, level_limit;
-    uint32_t *near[P8EST_MAXLEVEL + 1];
-    size_t count[P8EST_MAXLEVEL + 1];
-    p8est_quadrant_t of[P8EST_MAXLEVEL + 1];
     double time_s;
 };
 
 static struct search new_search(const struct job *job)
 {
-    struct search s = {.facets = read_stl(job->geometry)};
-    for (size_t i = 0; i < 3 * s.facets.count; ++i)
-        for (int a = 0; a < 3; ++a)
-            s.facets.vertices[i][a] = nearbyint((s.facets.vertices[i][a] - job->origin[a]) * (UNITS / job->edge));
+    struct search s = {.tree = tree_of(read_stl(job->geometry), job->origin, job->edge)};
     while (ldexp(job->edge, -s.level_surface) > job->spacing)
         ++s.level_surface;
     if (s.level_surface > P8EST_QMAXLEVEL)
@@ -94,77 +84,7 @@ static struct search new_search(const struct job *job)
         s.reach[level] = reach;
         reach += job->layers * ldexp(UNITS, -level);
     }
-    for (int level = 0; level <= P8EST_MAXLEVEL; ++level)
-        s.of[level].level = -1;
     return s;
-}
-
-/* Whether a facet and a closed cube share a point: separating axes. */
-static bool meets(const double facet[3][3], const double centre[3], double half)
-{
-    double v[3][3], e[3][3];
-    for (int a = 0; a < 3; ++a) {
-        for (int i = 0; i < 3; ++i)
-            v[i][a] = facet[i][a] - centre[a];
-        if (fmin(v[0][a], fmin(v[1][a], v[2][a])) > half || fmax(v[0][a], fmax(v[1][a], v[2][a])) < -half)
-            return false;
-    }
-    for (int i = 0; i < 3; ++i)
-        for (int a = 0; a < 3; ++a)
-            e[i][a] = v[(i + 1) % 3][a] - v[i][a];
-    for (int i = 0; i < 3; ++i)
-        for (int a = 0; a < 3; ++a) {
-            int b = (a + 1) % 3, c = (a + 2) % 3;
-            double low = DBL_MAX, high = -DBL_MAX, radius = half * (fabs(e[i][b]) + fabs(e[i][c]));
-            for (int j = 0; j < 3; ++j) {
-                double along = v[j][c] * e[i][b] - v[j][b] * e[i][c];
-                low = fmin(low, along);
-                high = fmax(high, along);
-            }
-            if (low > radius || high < -radius)
-                return false;
-        }
-    double distance = 0, radius = 0;
-    for (int a = 0; a < 3; ++a) {
-        double normal = e[0][(a + 1) % 3] * e[1][(a + 2) % 3] - e[0][(a + 2) % 3] * e[1][(a + 1) % 3];
-        distance += normal * v[0][a];
-        radius += half * fabs(normal);
-    }
-    return fabs(distance) <= radius;
-}
-
-/* The number of facets within reach of an octant, listed in s->near of its level. At the last level that is split, only
- * whether there are any. An octant's list is chosen from that of its parent, whose reach contains its own. */
-static size_t facets_near(struct search *s, const p8est_quadrant_t *octant)
-{
-    int level = octant->level;
-    if (s->of[level].level == level && p8est_quadrant_is_equal(&s->of[level], octant))
-        return s->count[level];
-    size_t candidates = s->facets.count;
-    const uint32_t *from = NULL;
-    if (level > 0) {
-        p8est_quadrant_t parent;
-        p8est_quadrant_parent(octant, &parent);
-        candidates = facets_near(s, &parent);
-        from = s->near[level - 1];
-    }
-    bool last = level == s->level_surface - 1;
-    if (!last && (s->near[level] = realloc(s->near[level], (candidates + 1) * sizeof(uint32_t))) == NULL)
-        fail(EXIT_INPUT, "not enough memory for lists of %zu facets", candidates);
-    double half = ldexp(UNITS, -level - 1);
-    double centre[3] = {(double) octant->x * QUADRANT_UNITS + half, (double) octant->y * QUADRANT_UNITS + half,
-                        (double) octant->z * QUADRANT_UNITS + half};
-    size_t count = 0;
-    for (size_t i = 0; i < candidates && !(last && count > 0); ++i) {
-        uint32_t facet = from == NULL ? (uint32_t) i : from[i];
-        if (!meets((const double(*)[3]) s->facets.vertices + 3 * (size_t) facet, centre, half + s->reach[level]))
-            continue;
-        if (!last)
-            s->near[level][count] = facet;
-        ++count;
-    }
-    s->of[level] = *octant;
-    return s->count[level] = count;
 }
 
 static double clock_s(clockid_t clock)
@@ -181,9 +101,12 @@ static int must_split(p8est_t *forest, p4est_topidx_t tree, p8est_quadrant_t *oc
     if (octant->level >= s->level_limit)
         return 0;
     double start = clock_s(CLOCK_MONOTONIC);
-    size_t count = facets_near(s, octant);
+    double half = ldexp(UNITS, -octant->level - 1);
+    double centre[3] = {(double) octant->x * QUADRANT_UNITS + half, (double) octant->y * QUADRANT_UNITS + half,
+                        (double) octant->z * QUADRANT_UNITS + half};
+    bool split = any_meets(&s->tree, 0, 0, s->tree.facets.count, centre, half + s->reach[octant->level]);
     s->time_s += clock_s(CLOCK_MONOTONIC) - start;
-    return count > 0;
+    return split;
 }
 
 /* CPU times of phases, in seconds. */
@@ -311,7 +234,7 @@ int main(int argc, char **argv)
         struct figures *all = malloc((size_t) forest->mpisize * sizeof own);
         sc_MPI_Gather(&own, sizeof own, sc_MPI_BYTE, all, sizeof own, sc_MPI_BYTE, 0, sc_MPI_COMM_WORLD);
         if (forest->mpirank == 0)
-            write_json(json, all, forest->mpisize, forest, search.facets.count);
+            write_json(json, all, forest->mpisize, forest, search.tree.facets.count);
         free(all);
     }
     p8est_destroy(forest);
