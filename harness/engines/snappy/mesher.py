@@ -7,6 +7,7 @@ import os
 import re
 import resource
 import subprocess
+import sys
 import tempfile
 import time
 import tomllib
@@ -14,7 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-import leafset
+sys.path.append(str(Path(__file__).parents[1]))
+import leafset  # noqa: E402
+
+LEVEL_BLOCKS_MAX = 6  # at most 64 blocks along an edge of the root
 
 HEADER = "FoamFile {{ version 2.0; format ascii; class dictionary; object {}; }}\n"
 CONTROL = "application none; startTime 0; endTime 1; deltaT 1; writeInterval 1; writeFormat binary; writePrecision 17;\n"
@@ -24,12 +28,12 @@ boundary (far {{ type patch; faces ((0 3 2 1) (4 5 6 7) (0 1 5 4) (2 3 7 6) (1 2
 """
 # A surface that is a face zone divides no region, so both sides of the body are kept.
 SNAPPY = """castellatedMesh true; snap false; addLayers false;
-geometry {{ body.stl {{ type triSurfaceMesh; name body; }} region {{ type searchableBox; min ({low}); max ({high}); }} }}
+geometry {{ body.stl {{ type triSurfaceMesh; name body; }} }}
 castellatedMeshControls
 {{
     maxLocalCells 2000000000; maxGlobalCells 2000000000; minRefinementCells 0; maxLoadUnbalance 0.1;
     nCellsBetweenLevels {layers}; resolveFeatureAngle 30; allowFreeStandingZoneFaces true;
-    features (); refinementSurfaces {{ body {{ level ({level} {level}); faceZone body; cellZone body; cellZoneInside inside; }} }} refinementRegions {{ region {{ mode inside; levels ((1e15 {level_region})); }} }}
+    features (); refinementSurfaces {{ body {{ level ({level} {level}); faceZone body; }} }} refinementRegions {{}}
     locationInMesh ({inside});
 }}
 // Required, although nothing is snapped and no layers are added.
@@ -48,7 +52,7 @@ meshQualityControls
 }}
 mergeTolerance 1e-6;
 """
-DECOMPOSE = "numberOfSubdomains {ranks}; method simple;\nsimpleCoeffs {{ n ({ranks} 1 1); delta 0.001; }}\n"
+DECOMPOSE = "numberOfSubdomains {ranks}; method hierarchical;\nhierarchicalCoeffs {{ n ({ranks} 1 1); delta 0.001; order xyz; }}\n"
 
 
 def level_for(edge, spacing):
@@ -64,29 +68,24 @@ def bounds(stl):
 
 
 def write_case(case, stl, place, ranks):
-    """Writes OpenFOAM's input and returns the level of the blocks. snappyHexMesh refines only where the surface separates the
-    centres of neighbouring cells, so it gets blocks at most half as long as the body, and smaller cells around the body: at
-    most half as long as the shortest edge of its bounding box, but at least a sixteenth of the longest."""
+    """Writes OpenFOAM's input and returns the level of the blocks: the first whose blocks are at most half as long as the
+    shortest edge of the body's bounding box, because snappyHexMesh refines only blocks whose surface it meets."""
     (place / "system").mkdir()
     (place / "constant/triSurface").mkdir(parents=True)
     (place / "constant/triSurface/body.stl").symlink_to(stl.resolve())
     origin, edge = np.array(case["root"]["origin"], float), case["root"]["edge"]
     surface = level_for(edge, case["spacing_min"])
     low, high = bounds(stl)
-    blocks = min(level_for(edge, max(high - low) / 2), surface)
-    region = min(level_for(edge, max(min(high - low) / 2, max(high - low) / 16)), surface)
-    margin = edge / 2 ** (blocks + 1)  # so that the region contains centres of blocks
-    point = lambda values: " ".join(repr(float(value)) for value in values)
+    shortest = max(min(high - low), edge / 2**LEVEL_BLOCKS_MAX)
+    blocks = min(level_for(edge, shortest / 2), surface, LEVEL_BLOCKS_MAX)
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    corners = " ".join(f"({point(origin + edge * np.array([x, y, z]))})" for z in (0, 1) for x, y in square)
+    corners = " ".join("({!r} {!r} {!r})".format(*map(float, origin + edge * np.array([x, y, z]))) for z in (0, 1) for x, y in square)
     # Any point off the faces of the finest cells; both sides are kept.
-    inside = point(origin + edge * (1 + math.sqrt(2)) / 2 ** (surface + 3))
+    inside = " ".join(repr(float(c)) for c in origin + edge * (1 + math.sqrt(2)) / 2 ** (surface + 3))
     files = {
         "controlDict": CONTROL, "fvSchemes": "", "fvSolution": "", "decomposeParDict": DECOMPOSE.format(ranks=ranks),
         "blockMeshDict": BLOCKS.format(corners=corners, n=2**blocks),
-        "snappyHexMeshDict": SNAPPY.format(
-            layers=case.get("layer_cells_min", 4), level=surface - blocks, level_region=region - blocks, inside=inside,
-            low=point(low - margin), high=point(high + margin))}
+        "snappyHexMeshDict": SNAPPY.format(layers=case.get("layer_cells_min", 4), level=surface - blocks, inside=inside)}
     for name, text in files.items():
         sections = "ddtSchemes {} gradSchemes {} divSchemes {} laplacianSchemes {} interpolationSchemes {} snGradSchemes {}\n"
         (place / "system" / name).write_text(HEADER.format(name) + (sections if name == "fvSchemes" else text))
