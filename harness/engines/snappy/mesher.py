@@ -7,7 +7,6 @@ import os
 import re
 import resource
 import subprocess
-import sys
 import tempfile
 import time
 import tomllib
@@ -15,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parents[1]))
-import leafset  # noqa: E402
+import leafset
 
 LEVEL_BLOCKS_MAX = 6  # at most 64 blocks along an edge of the root
 
@@ -26,14 +24,15 @@ BLOCKS = """vertices ({corners});
 blocks (hex (0 1 2 3 4 5 6 7) ({n} {n} {n}) simpleGrading (1 1 1));
 boundary (far {{ type patch; faces ((0 3 2 1) (4 5 6 7) (0 1 5 4) (2 3 7 6) (1 2 6 5) (3 0 4 7)); }});
 """
-# A surface that is a face zone divides no region, so both sides of the body are kept.
+# A surface that is a face zone divides no region, so both sides of the body are kept. Without a cell zone, snappyHexMesh fails
+# where every face of the zone is free-standing.
 SNAPPY = """castellatedMesh true; snap false; addLayers false;
 geometry {{ body.stl {{ type triSurfaceMesh; name body; }} }}
 castellatedMeshControls
 {{
     maxLocalCells 2000000000; maxGlobalCells 2000000000; minRefinementCells 0; maxLoadUnbalance 0.1;
     nCellsBetweenLevels {layers}; resolveFeatureAngle 30; allowFreeStandingZoneFaces true;
-    features (); refinementSurfaces {{ body {{ level ({level} {level}); faceZone body; }} }} refinementRegions {{}}
+    features (); refinementSurfaces {{ body {{ level ({level} {level}); faceZone body; cellZone body; cellZoneInside inside; }} }} refinementRegions {{}}
     locationInMesh ({inside});
 }}
 // Required, although nothing is snapped and no layers are added.
@@ -52,7 +51,7 @@ meshQualityControls
 }}
 mergeTolerance 1e-6;
 """
-DECOMPOSE = "numberOfSubdomains {ranks}; method hierarchical;\nhierarchicalCoeffs {{ n ({ranks} 1 1); delta 0.001; order xyz; }}\n"
+DECOMPOSE = "numberOfSubdomains {ranks}; method simple;\nsimpleCoeffs {{ n ({ranks} 1 1); delta 0.001; }}\n"
 
 
 def level_for(edge, spacing):
