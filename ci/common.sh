@@ -22,3 +22,57 @@ fail() {
     printf '%s: %s\n' "$(basename "$0")" "$*" >&2
     exit "$code"
 }
+
+# as_root COMMAND...: runs COMMAND as root, through sudo if necessary.
+as_root() {
+    if [ "$(id -u)" = 0 ]; then
+        "$@"
+    elif command -v sudo >/dev/null; then
+        sudo "$@"
+    else
+        fail 3 "\"$*\" requires root and sudo is not installed: run this script as root"
+    fi
+}
+
+# Fetches the package lists, at most once and only if something is missing.
+apt_updated=0
+apt_update() {
+    [ "$apt_updated" = 0 ] || return 0
+    command -v apt-get >/dev/null || fail 3 "this machine has no apt-get: install these packages by hand: $*"
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq update ||
+        fail 3 "apt-get update failed: check the network and the Debian mirror"
+    apt_updated=1
+}
+
+apt_install() {
+    apt_update "$@"
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 install -y \
+        --no-install-recommends "$@" >/dev/null ||
+        fail 3 "these packages could not be installed: $*"
+}
+
+is_installed() {
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]
+}
+
+# install_packages PACKAGE...: installs those Debian packages that are not installed.
+install_packages() {
+    local package missing=()
+    for package in "$@"; do
+        is_installed "$package" || missing+=("$package")
+    done
+    if [ "${#missing[@]}" = 0 ]; then
+        log "Debian packages: all installed"
+        return
+    fi
+    log "Debian packages: installing ${missing[*]}"
+    apt_install "${missing[@]}"
+}
+
+# pip and uv bring their own certificates; those of the system may include the certificate of a proxy.
+use_system_certificates() {
+    local certificates=/etc/ssl/certs/ca-certificates.crt
+    if [ -f "$certificates" ]; then
+        export PIP_CERT="${PIP_CERT:-$certificates}" UV_NATIVE_TLS="${UV_NATIVE_TLS:-1}"
+    fi
+}

@@ -6,46 +6,24 @@
  * cube with exactly these leaves, balances it over faces, edges and corners, and writes the resulting
  * leaves to OUT/leaves-00000.npy, sorted, with side bits 0. The directory OUT must exist.
  *
- * A leaf word is morton57 << 7 | level << 2 | side. The coordinates of p4est are in units of level 19, like
- * those of leaf words, but p4est splits no octant beyond level 18.
- *
  * Exit codes: 0 success, 2 the tree cannot be read or is not complete, 3 it has leaves of level 19, 4 the
  * result could not be written.
  */
 #include <dirent.h>
-#include <inttypes.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include <p8est_bits.h>
 #include <p8est_build.h>
-#include <p8est_extended.h>
 
-#if P8EST_MAXLEVEL != 19
-#error "leaf words have coordinates in units of level 19, and p4est must have the same"
-#endif
+#include "leaves.h"
 
-enum { EXIT_TREE = 2, EXIT_DEPTH = 3, EXIT_WRITE = 4 };
+enum { EXIT_TREE = 2, EXIT_DEPTH = 3 };
+
+const char *const program_name = "p4est-balance";
 
 /* A growing array of leaf words. */
 struct words {
     uint64_t *data;
     size_t count;
 };
-
-/* Prints a message and exits. */
-static _Noreturn void fail(int code, const char *format, ...)
-{
-    va_list values;
-    va_start(values, format);
-    fputs("p4est-balance: ", stderr);
-    vfprintf(stderr, format, values);
-    fputc('\n', stderr);
-    va_end(values);
-    exit(code);
-}
 
 /* Reads the header of a .npy file of 1-D little-endian u64 and returns the number of elements. */
 static size_t read_npy_header(FILE *file, const char *path)
@@ -130,16 +108,6 @@ static p4est_qcoord_t coordinate(uint64_t morton, int axis)
     return value;
 }
 
-/* The morton57 of three coordinates. */
-static uint64_t interleaved(p4est_qcoord_t x, p4est_qcoord_t y, p4est_qcoord_t z)
-{
-    uint64_t morton = 0;
-    for (int bit = 0; bit < 19; ++bit)
-        morton |= (uint64_t) (x >> bit & 1) << (3 * bit) | (uint64_t) (y >> bit & 1) << (3 * bit + 1) |
-                  (uint64_t) (z >> bit & 1) << (3 * bit + 2);
-    return morton;
-}
-
 /* The forest with exactly these leaves. p4est fills gaps to make a tree complete, so the leaves are checked
  * to be contiguous, and the number of leaves is compared with that of the input. */
 static p8est_t *forest_of(p8est_t *root, const struct words *words)
@@ -172,32 +140,6 @@ static p8est_t *forest_of(p8est_t *root, const struct words *words)
     return forest;
 }
 
-/* Writes the words of the quadrants as the only part of a leaf-set directory. */
-static void write_npy(const char *directory, const sc_array_t *quadrants)
-{
-    char path[4096], header[128];
-    if (snprintf(path, sizeof path, "%s/leaves-00000.npy", directory) >= (int) sizeof path)
-        fail(EXIT_WRITE, "the path of %s is too long", directory);
-    FILE *file = fopen(path, "wb");
-    if (file == NULL)
-        fail(EXIT_WRITE, "%s cannot be written", path);
-    size_t count = quadrants->elem_count;
-    int used = snprintf(header, sizeof header,
-                        "{'descr': '<u8', 'fortran_order': False, 'shape': (%zu,), }", count);
-    /* The first ten bytes and the header have 128 bytes together, of which the last is a line feed. */
-    memset(header + used, ' ', 118 - (size_t) used);
-    header[117] = '\n';
-    fwrite("\x93NUMPY\x01\x00\x76\x00", 1, 10, file);
-    fwrite(header, 1, 118, file);
-    for (size_t i = 0; i < count; ++i) {
-        const p8est_quadrant_t *leaf = p8est_quadrant_array_index((sc_array_t *) quadrants, i);
-        uint64_t word = interleaved(leaf->x, leaf->y, leaf->z) << 7 | (uint64_t) leaf->level << 2;
-        fwrite(&word, sizeof word, 1, file);
-    }
-    if (ferror(file) | fclose(file))
-        fail(EXIT_WRITE, "%s could not be written completely", path);
-}
-
 int main(int argc, char **argv)
 {
     if (argc != 3) {
@@ -216,7 +158,7 @@ int main(int argc, char **argv)
     free(words.data);
 
     p8est_balance(forest, P8EST_CONNECT_FULL, NULL);
-    write_npy(argv[2], &p8est_tree_array_index(forest->trees, 0)->quadrants);
+    write_part(argv[2], 0, &p8est_tree_array_index(forest->trees, 0)->quadrants);
 
     p8est_destroy(forest);
     p8est_connectivity_destroy(cube);
