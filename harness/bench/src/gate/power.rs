@@ -28,6 +28,17 @@ json = ["--json", "{json}"]
 generator = true
 "#;
 
+/// The rules. The few allocations are those of reading the arguments, which differ.
+const RULES: &str = r#"
+[tolerance]
+instructions = 0.2
+[tolerance.of]
+allocations = 2.0
+[[case]]
+name = "case.toml"
+layers = ["counters", "instructions", "time"]
+"#;
+
 /// The layers that can find a slow-down.
 const LAYERS: [LayerName; 3] = [LayerName::Counters, LayerName::Instructions, LayerName::Time];
 
@@ -144,11 +155,7 @@ impl Test<'_> {
     fn gate(&self, layers: Vec<LayerName>, trial: usize) -> Result<Report, GateError> {
         let text = |name: &str| self.place.join(name).to_string_lossy().into_owned();
         let rules = self.place.join("gate.toml");
-        let case =
-            "[[case]]\nname = \"case.toml\"\nlayers = [\"counters\", \"instructions\", \"time\"]\n";
-        let tolerance = "[tolerance]\ninstructions = 0.2\n";
-        fs::write(&rules, format!("{tolerance}{case}"))
-            .map_err(|error| GateError::Input(error.to_string()))?;
+        fs::write(&rules, RULES).map_err(|error| GateError::Input(error.to_string()))?;
         let options = Options {
             baseline: Some(text("baseline")),
             candidate: Some(text("candidate")),
