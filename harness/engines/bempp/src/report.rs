@@ -46,8 +46,10 @@ pub fn write(
     comm: &impl CommunicatorCollectives,
 ) -> io::Result<()> {
     let digest = Digest::of(words).0;
-    let counts =
-        gathered(comm, &[words.len() as u64, peak_rss_bytes(), (digest >> 64) as u64, digest as u64]);
+    let counts = gathered(
+        comm,
+        &[words.len() as u64, peak_rss_bytes(), (digest >> 64) as u64, digest as u64],
+    );
     let times: Vec<f64> = clock.phases.iter().flat_map(|phase| phase.1).collect();
     let times = gathered(comm, &times);
     if comm.rank() != 0 {
@@ -85,6 +87,8 @@ fn gathered<T: Equivalence + Clone + Default>(
 /// The peak of this process so far, from `/proc`; 0 if it is not known.
 fn peak_rss_bytes() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<u64>().ok());
+    let kib = status.lines().find_map(|line| {
+        line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<u64>().ok()
+    });
     kib.unwrap_or(0) * 1024
 }
