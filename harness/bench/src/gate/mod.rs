@@ -116,8 +116,14 @@ pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError>
 }
 
 fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result<(), GateError> {
-    let requested = |name| bench.options.layers.is_empty() || bench.options.layers.contains(&name);
-    for name in LayerName::ALL.into_iter().filter(|&name| requested(name)) {
+    // Without a choice of layers, those are requested for which the rules have a case.
+    let has_case =
+        |name: &LayerName| bench.cases.iter().any(|case| case.rule.layers.contains(name));
+    let requested = |name: &LayerName| match bench.options.layers.is_empty() {
+        true => has_case(name),
+        false => bench.options.layers.contains(name),
+    };
+    for name in LayerName::ALL.into_iter().filter(requested) {
         if interrupt::requested() {
             break;
         }

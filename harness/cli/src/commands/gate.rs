@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Only these cases of the rules
     #[arg(long, value_delimiter = ',')]
     case: Vec<String>,
-    /// Only these layers
+    /// Only these layers [default: those for which the rules have a case]
     #[arg(long, value_delimiter = ',')]
     layers: Vec<LayerName>,
     /// Time for one case in the layer of time [default: from the rules]
@@ -145,12 +145,12 @@ fn percentage(text: &str) -> Result<f64, String> {
 }
 
 fn exit_code(report: &Report, arguments: &Arguments) -> u8 {
+    let layers = &report.layers;
+    let incomplete = layers.is_empty() || layers.iter().any(|layer| layer.left_out.is_some());
     match (report.interrupted, report.holds()) {
         (true, _) => EXIT_INTERRUPTED,
         (_, false) => EXIT_FAILED,
-        _ if arguments.require_layers && report.layers.iter().any(|l| l.left_out.is_some()) => {
-            EXIT_MISSING
-        }
+        _ if arguments.require_layers && incomplete => EXIT_MISSING,
         _ => EXIT_HOLDS,
     }
 }
