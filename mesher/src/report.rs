@@ -1,4 +1,4 @@
-//! The report of a run: a table for people ([`mod@text`]), JSON for programs, and warnings.
+//! The report of a run: a table for people, JSON for programs, and warnings.
 
 mod text;
 mod warnings;

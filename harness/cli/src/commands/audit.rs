@@ -18,7 +18,7 @@ pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
     mesh: PathBuf,
     /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines or path of a file
-    /// with [promises]
+    /// with a table of promises
     #[arg(long, value_name = "ENGINE")]
     promises: Option<String>,
     /// Exit code 3 if a check had nothing to check
