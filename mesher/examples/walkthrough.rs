@@ -24,7 +24,7 @@ const SECTION: u32 = (1 << (LEVEL_MAX - 1)) + 1;
 const ROOT_EDGE: f64 = 1.6;
 /// Edge of a drawing, in SVG user units.
 const EDGE: f64 = 480.0;
-/// Fill by rank: Okabe and Ito's colours, which colour-blind readers can tell apart.
+/// Fill by rank: Okabe and Ito's colours, which colour-blind readers can distinguish.
 const RANK_FILL: [&str; RANKS] = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7"];
 
 /// A leaf that the section cuts: its rectangle in drawing units, its side and the rank that emits it.

@@ -56,8 +56,8 @@ fn ranks_of_mpi_print_help_and_command_line_errors_once() {
     let finished = run(workspace.mpirun(3, &["--version"]));
     finished.succeeds();
     assert_eq!(finished.stdout.lines().count(), 1, "{finished:?}");
-    run(workspace.mpirun(3, &["case.toml", "--weights", "rehearsal"]))
-        .refuses_under_launcher(2, &["'rehearsal'", "--weights"]);
+    run(workspace.mpirun(3, &["case.toml", "--weights", "none-such"]))
+        .refuses_under_launcher(2, &["'none-such'", "--weights"]);
 }
 
 #[test]

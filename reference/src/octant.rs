@@ -59,6 +59,12 @@ impl Octant {
     /// The octant of level 0.
     pub const ROOT: Octant = Octant { min: [0; 3], level: 0 };
 
+    /// The order of candidates, and of octants that are reported as examples: coarsest first, then by key.
+    #[must_use]
+    pub fn coarsest_first(&self) -> (u32, u64) {
+        (self.level, self.key())
+    }
+
     /// The edge, in lattice units.
     #[must_use]
     pub fn edge(&self) -> i64 {

@@ -2,7 +2,6 @@
 use crate::error::Error;
 use crate::lattice::{Input, Seed, location};
 use crate::octant::{Extent, ROOT_EDGE, Side};
-use crate::sides::coarsest_first;
 use crate::tree::{Index, Tree};
 
 /// The leaf that contains each seed, in the order of the seeds.
@@ -44,7 +43,7 @@ fn nearest_centroid(tree: &Tree, input: &Input, seed: &Seed) -> Option<[f64; 3]>
     let nearest = free.map(|leaf| tree.octant(leaf)).min_by_key(|octant| {
         let centroid = octant.centroid();
         let square: i64 = (0..3).map(|a| (centroid[a] - point[a]).pow(2)).sum();
-        (square, coarsest_first(octant))
+        (square, octant.coarsest_first())
     })?;
     Some(location(&input.root, nearest.centroid()))
 }

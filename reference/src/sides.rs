@@ -51,7 +51,7 @@ pub fn assign(tree: &mut Tree, input: &Input) -> Result<Vec<Component>, Error> {
     let seeded = seeds::leaves(tree, input)?;
     let mut assigned = Vec::new();
     for mut leaves in components(tree) {
-        leaves.sort_by_cached_key(|&leaf| coarsest_first(&tree.octant(leaf)));
+        leaves.sort_by_cached_key(|&leaf| tree.octant(leaf).coarsest_first());
         let verdict = if seeded.is_empty() {
             let candidates = leaves.iter().take(CANDIDATES_MAX).map(|&leaf| tree.octant(leaf));
             vote(candidates, &input.facets)
@@ -81,13 +81,8 @@ fn side_of_flow(is_flow: bool, keep: Keep) -> Side {
 #[must_use]
 pub fn example(tree: &Tree, input: &Input, components: &[&Component]) -> Option<[f64; 3]> {
     let first = components.iter().map(|component| tree.octant(component.leaves[0]));
-    let octant = first.min_by_key(coarsest_first)?;
+    let octant = first.min_by_key(Octant::coarsest_first)?;
     Some(location(&input.root, octant.centroid()))
-}
-
-/// The order of candidates, and of octants that are reported as examples.
-pub(crate) fn coarsest_first(octant: &Octant) -> (u32, u64) {
-    (octant.level, octant.key())
 }
 
 /// The components, each a set of leaves.

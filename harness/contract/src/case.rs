@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
-use crate::manifest::{Enclosed, ExtentBox, Keep};
-use crate::seed;
+use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
+use crate::seed::BaseTree;
 use crate::stl::{self, StlError};
 
 pub use geometries::Facet;
@@ -171,8 +171,41 @@ impl Case {
             seeds: file.seeds.clone(),
             enclosed: file.enclosed,
         };
-        seed::refuse_crossing(&case)?;
+        case.refuse_crossing_seeds()?;
         Ok(case)
+    }
+
+    /// Refuses a seed in a crossing leaf of T0.
+    fn refuse_crossing_seeds(&self) -> Result<(), String> {
+        let base = BaseTree {
+            facets: &self.facets_lattice,
+            level: self.level_surface,
+            boxes: &self.boxes,
+        };
+        for (i, (&seed, at)) in self.seeds_lattice.iter().zip(&self.seeds).enumerate() {
+            if let (leaf, Some(facet)) = base.leaf_at(seed) {
+                let leaf = self.root.describe(&leaf);
+                return Err(format!(
+                    "seed {i} at {at:?} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
+                     from the surface"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The manifest of a mesh of this case, without leaves.
+    pub fn manifest(&self, tree: Tree, program: String) -> Manifest {
+        Manifest {
+            level_surface: self.level_surface,
+            layer_cells_min: self.layer_cells_min,
+            keep: self.keep,
+            keep_crossing: self.keep_crossing,
+            boxes: self.boxes.clone(),
+            seeds: self.seeds_lattice.clone(),
+            enclosed: self.enclosed,
+            ..Manifest::without_leaves(tree, self.root, program)
+        }
     }
 
     /// Deepest level that the surface or a box requires.
@@ -327,6 +360,19 @@ mod tests {
         assert!(why.starts_with("seed 1 at [4.0, 0.0, 0.0] lies outside the root"), "{why}");
         assert!(with("seeds = [[0, 0, nan]]").unwrap_err().contains("seed 0"));
         assert!(with("enclosed = 'drop'").is_err());
+    }
+
+    #[test]
+    fn a_seed_in_a_crossing_leaf_is_an_error() {
+        let seeded = |seed: [f64; 3]| {
+            let text = format!(
+                "spacing_min = 1.0\nseeds = [{seed:?}]\n[root]\norigin = [-1.0, -1.0, -1.0]\nedge = 8.0"
+            );
+            Case::from_parts(&text, vec![UNIT])
+        };
+        let why = seeded([0.5, 0.5, 0.5]).unwrap_err();
+        assert!(why.contains("seed 0") && why.contains("facet 0 crosses"), "{why}");
+        assert!(seeded([5.5, 5.5, 5.5]).is_ok());
     }
 
     #[test]

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::case::Case;
 use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::octant::{LEVEL_MAX, Octant};
@@ -199,21 +198,21 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// The manifest of a mesh of this case, without leaves.
-    pub fn of_case(case: &Case, tree: Tree, program: &str) -> Self {
+    /// The manifest of a mesh without rules and leaves: everything is kept, and no level is required.
+    pub fn without_leaves(tree: Tree, root: Root, program: String) -> Self {
         let Tally { leaves, by_level, by_side, digest, octants } = Tally::default();
         Self {
             schema: SCHEMA.to_owned(),
-            program: program.to_owned(),
+            program,
             tree,
-            root: case.root,
-            level_surface: case.level_surface,
-            layer_cells_min: case.layer_cells_min,
-            keep: case.keep,
-            keep_crossing: case.keep_crossing,
-            boxes: case.boxes.clone(),
-            seeds: case.seeds_lattice.clone(),
-            enclosed: case.enclosed,
+            root,
+            level_surface: 0,
+            layer_cells_min: 1,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: Vec::new(),
+            seeds: Vec::new(),
+            enclosed: Enclosed::default(),
             sides: Sides::Known,
             leaves,
             leaves_by_level: by_level,

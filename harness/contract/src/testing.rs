@@ -2,10 +2,9 @@
 
 use proptest::prelude::*;
 
-use crate::digest::Digest;
 use crate::lattice::{FacetLattice, Root};
 use crate::leafset::LeafSet;
-use crate::manifest::{self, Ambiguous, BySide, Enclosed, Keep, Manifest};
+use crate::manifest::{Manifest, Tree};
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::triangle::Triangle;
 use crate::word::{self, Leaf, Side};
@@ -92,28 +91,8 @@ fn pick(seed: u64, octant: &Octant, salt: u32) -> u64 {
 
 /// A mesh of these parts with a correct manifest. Its inputs delete nothing and require no refinement.
 pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
-    let empty = Manifest {
-        schema: manifest::SCHEMA.to_owned(),
-        program: "test".to_owned(),
-        tree: manifest::Tree::Final,
-        root: Root { origin: [0.0; 3], edge: 8.0 },
-        level_surface: 0,
-        layer_cells_min: 1,
-        keep: Keep::All,
-        keep_crossing: true,
-        boxes: Vec::new(),
-        seeds: Vec::new(),
-        enclosed: Enclosed::Delete,
-        sides: manifest::Sides::Known,
-        leaves: 0,
-        leaves_by_level: [0; 20],
-        leaves_by_side: BySide::default(),
-        components: None,
-        components_ambiguous: Ambiguous::default(),
-        digest: Digest::default(),
-        octant_digests: vec![Digest::default(); manifest::OCTANTS],
-        parts: Vec::new(),
-    };
+    let root = Root { origin: [0.0; 3], edge: 8.0 };
+    let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
     LeafSet::new(empty, Vec::new()).with_parts(parts)
 }
 

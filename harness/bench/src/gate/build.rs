@@ -7,8 +7,9 @@
 //! Invariant: a directory that contains the file `built` has the result of the build command in that file.
 
 use super::{GateError, Options};
-use run::engine::description::{Build, Values, fill};
+use run::engine::description::Build;
 use run::engine::failure::{End, Failure};
+use run::engine::placeholders::{Values, fill};
 use run::engine::process::{self, Watch};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -17,6 +17,7 @@ pub mod measures;
 pub mod phases;
 pub mod planted;
 pub mod power;
+pub mod quantity;
 pub mod report;
 pub mod rules;
 pub mod subject;

@@ -3,12 +3,9 @@
 //! Invariant: a phase that became slower is a regression only if the other phases do not save that time, because
 //! work may move from one phase to another.
 
+use super::quantity::{OUTSIDE, Quantity, certainty, size};
 use super::report::{Finding, Verdict};
 use super::rules::TimeRules;
-use super::time::{Quantity, certainty, size};
-
-/// CPU time of the process outside all phases that it reports: before the first, between them, after the last.
-pub const OUTSIDE: &str = "outside the phases";
 
 /// Returns a finding for every phase that changed; `whole` is the CPU time of the process.
 pub(super) fn findings(

@@ -4,7 +4,8 @@
 //! CPU time of every phase that the program reports, with what lies outside all phases. All of them are tested together:
 //! [`adjusted`] controls the rate of false discoveries.
 
-use super::phases::{self, OUTSIDE};
+use super::phases;
+use super::quantity::{CPU, OUTSIDE, Quantity, WALL, certainty, size};
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
@@ -12,7 +13,6 @@ use super::{Bench, left_out};
 use crate::statistics::comparison::{Comparison, Round, compare};
 use crate::statistics::false_discovery::adjusted;
 use crate::statistics::random::Random;
-use crate::statistics::trimmed_mean;
 use run::engine::failure::Failure;
 use run::engine::interrupt;
 use run::engine::layout::SERIAL;
@@ -20,11 +20,6 @@ use run::engine::options::RunOptions;
 use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine};
 use std::path::Path;
-
-/// CPU time of the whole process.
-pub const CPU: &str = "CPU time";
-/// Wall time of the whole process.
-pub const WALL: &str = "wall time";
 
 /// Compares the times of candidate and baseline.
 pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
@@ -57,30 +52,6 @@ pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
     }
     layer.findings.extend(judged(bench, &mut measured));
     layer
-}
-
-/// A quantity of all rounds of a case.
-#[derive(Debug)]
-pub(super) struct Quantity {
-    /// [`CPU`], [`WALL`], or the name of a phase.
-    pub name: String,
-    pub rounds: Vec<Round>,
-    /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
-    pub found: Option<Comparison>,
-}
-
-impl Quantity {
-    fn new(name: &str) -> Self {
-        Self { name: name.to_owned(), rounds: Vec::new(), found: None }
-    }
-
-    /// Mean times of baseline and candidate, in seconds.
-    pub fn means(&self) -> (f64, f64) {
-        let mean = |of: &dyn Fn(&Round) -> f64| {
-            trimmed_mean(&self.rounds.iter().map(of).collect::<Vec<f64>>()).exp()
-        };
-        (mean(&|round| (round.a + round.a_again) / 2.0), mean(&|round| round.b))
-    }
 }
 
 /// The three runs of a round.
@@ -185,25 +156,8 @@ fn whole_finding(case: &str, quantity: &Quantity, rules: &TimeRules) -> Option<F
     })
 }
 
-/// The certainty of an effect, as text.
-pub(super) fn certainty(found: &Comparison) -> String {
-    let percent = |ratio: f64| ratio * 100.0;
-    format!(
-        "99 % interval {:+.1} to {:+.1} %, p = {:.5} among all times; noise floor {:.1} %",
-        percent(found.low),
-        percent(found.high),
-        found.p,
-        percent(found.floor)
-    )
-}
-
 /// An effect with a p-value below this is not reported as unchanged.
 const SUSPICIOUS: f64 = 0.01;
-
-/// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
-pub(super) fn size(effect: f64) -> f64 {
-    if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect }
-}
 
 /// A change must be significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
 /// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was

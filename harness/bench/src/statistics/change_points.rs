@@ -149,7 +149,7 @@ impl Search<'_> {
     }
 
     /// Returns the p-value of all boundaries together: how often the model fits as much better than a straight line if
-    /// the series is that line with its residuals in random order. Outliers are moved in each permutation anew.
+    /// the series is that line with its residuals in random order. Outliers are moved in each permutation.
     fn p_of_model(&mut self) -> f64 {
         let (n, phi, mean) = (self.values.len(), self.model.phi, self.model.mean);
         let (segments, floor) =

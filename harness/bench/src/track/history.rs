@@ -8,8 +8,8 @@
 //! "subject": "first line of its message", "metrics": {"CASE/METRIC": number}, "accepted": true (absent if false)}`.
 
 use crate::gate::measures::Measures;
+use crate::gate::quantity::{CPU, WALL};
 use crate::gate::report::{LayerName, Report};
-use crate::gate::time::{CPU, WALL};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};

@@ -3,7 +3,6 @@
 //! Invariants: the leaves tile the root in Morton order; a node has eight children; the root is node 0 or a leaf.
 
 use super::search::Graph;
-use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant, UNITS_PER_CELL};
 use contract::word::{self, KEY_END, Side};
 
@@ -179,18 +178,6 @@ pub fn is_free(word: u64) -> bool {
 pub fn shared_face_centre(a: &Octant, b: &Octant) -> [f64; 3] {
     let ((a_low, a_high), (b_low, b_high)) = (a.bounds(), b.bounds());
     std::array::from_fn(|i| (a_low[i].max(b_low[i]) + a_high[i].min(b_high[i])) as f64 / 2.0)
-}
-
-/// The point of the root's boundary nearest to a point of the root, in lattice units.
-pub fn nearest_boundary(at: [f64; 3]) -> [f64; 3] {
-    let edge = UNITS_PER_EDGE as f64;
-    let faces = (0..3).flat_map(|axis| [(axis, 0.0), (axis, edge)]);
-    let distance = |&(axis, face): &(usize, f64)| (at[axis] - face).abs();
-    let nearest = faces.min_by(|p, q| distance(p).total_cmp(&distance(q)));
-    let (axis, face) = nearest.expect("a cube has faces");
-    let mut on_face = at;
-    on_face[axis] = face;
-    on_face
 }
 
 /// Number of common ancestors of two level-19 cells, themselves excluded.

@@ -6,8 +6,8 @@
 //! narrowest point of the path is one of the finest grid: its ball is the largest that passes.
 
 use super::clearance::{Clearance, Point};
-use super::leaves::{Leaves, nearest_boundary, shared_face_centre};
-use super::search::{self, Goal, Graph, Interrupted};
+use super::leaves::{Leaves, shared_face_centre};
+use super::search::{self, Goal, Graph, Interrupted, nearest_boundary};
 use crate::geometry::distance::{dot, sub};
 
 /// A point and its distance to the nearest facet, in lattice units.

@@ -3,7 +3,7 @@
 
 use std::collections::BinaryHeap;
 
-use super::leaves::nearest_boundary;
+use contract::lattice::UNITS_PER_EDGE;
 
 /// Places, numbered from 0, some of which are joined.
 pub trait Graph {
@@ -141,6 +141,18 @@ pub fn shortest(
         });
     }
     Ok(None)
+}
+
+/// The point of the root's boundary nearest to a point of the root, in lattice units.
+pub fn nearest_boundary(at: [f64; 3]) -> [f64; 3] {
+    let edge = UNITS_PER_EDGE as f64;
+    let faces = (0..3).flat_map(|axis| [(axis, 0.0), (axis, edge)]);
+    let distance = |&(axis, face): &(usize, f64)| (at[axis] - face).abs();
+    let nearest = faces.min_by(|p, q| distance(p).total_cmp(&distance(q)));
+    let (axis, face) = nearest.expect("a cube has faces");
+    let mut on_face = at;
+    on_face[axis] = face;
+    on_face
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f32 {

@@ -11,7 +11,7 @@ use std::cmp::Reverse;
 use super::Mesh;
 use super::base::Cause;
 use super::leaves::{id, parent};
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::Octant;
 use rustc_hash::FxHashSet;
 
 /// Octants that are pursued per step.
@@ -108,7 +108,7 @@ impl Mesh<'_> {
         }
         let first = octant.level + if is_deep { 2 } else { 1 };
         let mut found = None;
-        self.any_leaf_near(&octant, first..=LEVEL_MAX, &mut |leaf| {
+        self.any_leaf_near(&octant, first..=self.level_deepest, &mut |leaf| {
             let next = parent(&leaf);
             let rules = [
                 (Rule::Layer, true, self.forces_by_layer(&leaf, &octant)),

@@ -21,7 +21,7 @@ use std::ops::RangeInclusive;
 
 use super::Mesh;
 use super::leaves::{Node, id, parent};
-use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use contract::octant::{CELLS_PER_EDGE, Octant};
 use contract::tree::OFFSETS;
 
 /// Edge of a cell of a level, in level-19 cells.
@@ -51,7 +51,7 @@ impl Mesh<'_> {
         if let Some(&known) = self.known.deep.borrow().get(&id) {
             return known;
         }
-        let levels = octant.level + 2..=LEVEL_MAX;
+        let levels = octant.level + 2..=self.level_deepest;
         let forces = &mut |leaf: Octant| {
             let from = parent(&leaf);
             self.forces_by_layer(&leaf, octant) && self.is_deep(&from)
@@ -76,7 +76,8 @@ impl Mesh<'_> {
         let level = octant.level + 1;
         let forces =
             &mut |leaf: Octant| self.forces_by_layer(&leaf, octant) && self.is_deep(&parent(&leaf));
-        let justified = level <= LEVEL_MAX && self.any_leaf_near(octant, level..=level, forces);
+        let justified =
+            level <= self.level_deepest && self.any_leaf_near(octant, level..=level, forces);
         self.known.justified.borrow_mut().insert(id, justified);
         justified
     }
@@ -180,7 +181,7 @@ impl Search<'_, '_> {
     /// Whether an octant is split before the step that is asked about. Above the parents of the leaves that are
     /// searched, this need not be known: a leaf is visited only if its own parent is split.
     fn counts_as_split(&self, at: &Octant) -> bool {
-        if at.level == LEVEL_MAX {
+        if at.level >= self.mesh.level_deepest {
             false
         } else if at.level + 1 < self.first {
             true

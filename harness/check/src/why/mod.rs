@@ -44,6 +44,8 @@ pub struct Mesh<'a> {
     is_base: bool,
     /// Whether a split in the mesh counts only if it is justified itself, so that needless splits justify nothing.
     distrusts: bool,
+    /// Deepest level of a leaf that can force an octant to split; no search goes deeper.
+    level_deepest: u8,
     /// Answers for octants that were asked about before.
     known: Known,
 }
@@ -79,12 +81,17 @@ impl<'a> Mesh<'a> {
             None if terms.keep_crossing => Surface::Leaves,
             None => Surface::Unknown,
         };
-        Ok(Self { leaves, terms, surface, is_base, distrusts: false, known: Known::default() })
+        let of_mesh =
+            leaves.manifest.leaves_by_level.iter().rposition(|&n| n > 0).unwrap_or(0) as u8;
+        let level_deepest = of_mesh.max(required(&terms));
+        let known = Known::default();
+        Ok(Self { leaves, terms, surface, is_base, distrusts: false, level_deepest, known })
     }
 
     /// The same mesh, in which needless splits justify nothing.
     fn distrusting(self) -> Self {
-        Self { distrusts: true, ..self }
+        let level_deepest = required(&self.terms);
+        Self { distrusts: true, level_deepest, ..self }
     }
 
     /// An error if a search found a word that no correct mesh contains.
@@ -101,4 +108,9 @@ impl<'a> Mesh<'a> {
     fn place(&self, octant: &Octant) -> answer::Place {
         answer::Place::new(octant, &self.terms.root)
     }
+}
+
+/// The deepest level that the surface or a box requires.
+fn required(terms: &Terms) -> u8 {
+    terms.boxes.iter().map(|extent| extent.level).fold(terms.level_surface, u8::max)
 }

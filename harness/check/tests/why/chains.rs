@@ -57,9 +57,7 @@ proptest! {
         picks in prop::collection::vec(any::<prop::sample::Index>(), 4),
         points in prop::collection::vec(prop::array::uniform3(-8.0f64..8.0), 4),
     ) {
-        // Without crossing leaves, boxes finer than the surface make the search for the deleted ones take minutes.
-        let with_boxes = text.contains("keep_crossing = true");
-        let text = if with_boxes { text + &boxes.concat() } else { text };
+        let text = text + &boxes.concat();
         let correct = made(&text, &facets);
         let root = &correct.case.root;
         let answers = with_mesh(&correct.mesh, Some(&correct.case), |mesh| {

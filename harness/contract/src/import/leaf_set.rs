@@ -3,11 +3,9 @@
 use super::cells::Cells;
 use super::{ImportError, root};
 use crate::case::Case;
-use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
-use crate::manifest::{self, Ambiguous, BySide, Keep, Manifest, Sides};
-use crate::octant::LEVEL_MAX;
+use crate::manifest::{Manifest, Sides, Tree};
 use crate::word;
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
@@ -33,34 +31,22 @@ pub fn leaf_set(
     }
     let words = cells.words(&root)?;
     let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
-    let manifest = Manifest {
-        schema: manifest::SCHEMA.to_owned(),
-        program,
-        tree: manifest::Tree::Final,
-        root,
-        level_surface: case.map_or(finest, |case| case.level_surface),
-        layer_cells_min: case.map_or(1, |case| case.layer_cells_min),
-        keep: case.map_or(Keep::All, |case| case.keep),
-        keep_crossing: case.is_none_or(|case| case.keep_crossing),
-        boxes: case.map(|case| case.boxes.clone()).unwrap_or_default(),
-        seeds: case.map(|case| case.seeds_lattice.clone()).unwrap_or_default(),
-        enclosed: case.map(|case| case.enclosed).unwrap_or_default(),
-        sides: if cells.sides.is_some() { Sides::Known } else { Sides::Unknown },
-        leaves: 0,
-        leaves_by_level: [0; LEVEL_MAX as usize + 1],
-        leaves_by_side: BySide::default(),
-        components: None,
-        components_ambiguous: Ambiguous::default(),
-        digest: Digest::default(),
-        octant_digests: Vec::new(),
-        parts: Vec::new(),
+    let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };
+    let manifest = match case {
+        Some(case) => case.manifest(Tree::Final, program),
+        None => {
+            let any = Manifest::without_leaves(Tree::Final, root, program);
+            Manifest { level_surface: finest, ..any }
+        }
     };
+    let manifest = Manifest { root, sides, ..manifest };
     Ok(LeafSet::new(manifest, Vec::new()).with_parts(vec![words]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::digest::Digest;
     use crate::import::testing::cells_of;
     use crate::testing::words_of;
 

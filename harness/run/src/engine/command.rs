@@ -1,10 +1,10 @@
 //! The command line of a run, assembled from the templates of an engine file.
 
-use super::description::{LAUNCHER, Values, fill};
 use super::failure::End;
 use super::launcher::Launcher;
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
+use super::placeholders::{LAUNCHER, Values, fill};
 use super::templates::Templates;
 use std::path::Path;
 use std::process::Command;

@@ -5,11 +5,12 @@
 //! unknown placeholders are errors when the file is read.
 
 use super::paths::Paths;
+use super::placeholders::Values;
 use super::takes::{Limits, Takes};
 use super::templates::Templates;
 use check::promises::Promises;
+use contract::case::Case;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -66,9 +67,6 @@ pub struct Build {
     pub program: String,
 }
 
-/// Values of placeholders.
-pub type Values<'a> = BTreeMap<&'a str, String>;
-
 impl Description {
     /// Reads the engine file with this name in the repository, or at this path if it ends in `.toml`.
     ///
@@ -110,6 +108,13 @@ impl Description {
         Ok(description)
     }
 
+    /// Why the engine is not run on a case; `None` if it is.
+    pub fn declines(&self, case: &Case) -> Option<String> {
+        let lacks = || self.takes.lacks(case).map(|feature| format!("does not support {feature}"));
+        let why = self.limits.exceeded_by(case).or_else(lacks)?;
+        Some(format!("{} {why}", self.name))
+    }
+
     /// Values of the placeholders for paths on this machine.
     pub fn places(&self, paths: &Paths) -> Values<'static> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -124,31 +129,14 @@ impl Description {
     }
 }
 
-/// The word in `parallel` that stands for the launcher's words.
-pub const LAUNCHER: &str = "{launcher}";
-
-/// Names between braces.
-pub(super) fn placeholders(word: &str) -> impl Iterator<Item = &str> {
-    word.split('{').skip(1).filter_map(|rest| rest.split_once('}')).map(|(name, _)| name)
-}
-
-/// A word with its placeholders replaced by their values; those without a value are left as they are.
-pub fn fill(word: &str, values: &Values) -> String {
-    let mut filled = word.to_owned();
-    for name in placeholders(word) {
-        if let Some(value) = values.get(name) {
-            filled = filled.replace(&format!("{{{name}}}"), value);
-        }
-    }
-    filled
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const LEAST: &str = "about = 'x'\nprogram = '{here}/m.py'\n[run]\nserial = ['{program}', '{case}']\n\
                          out = ['--out', '{out}']\n";
+
+    const LEAST_FILE: &str = "[run]\nserial = ['m', '{case}', '{out}']\n";
 
     #[test]
     fn our_own_engine_files_are_valid() {
@@ -188,9 +176,42 @@ mod tests {
     }
 
     #[test]
-    fn a_value_is_not_searched_for_placeholders() {
-        let values = Values::from([("case", "{out}".to_owned()), ("out", "o".to_owned())]);
-        assert_eq!(fill("a{case}b", &values), "a{out}b");
-        assert_eq!(fill("{none}", &values), "{none}");
+    fn a_promise_that_no_command_could_show_is_refused() {
+        let with = |of: &str, more: &str| {
+            Description::parse(&format!(
+                "{LEAST_FILE}{more}[promises]\nindependent_of = ['{of}']\n"
+            ))
+        };
+        for of in ["ranks", "partitioner", "threads"] {
+            assert!(with(of, "").unwrap_err().contains("with which to vary it"), "{of}");
+        }
+        assert!(with("threads", "environment = { OMP_NUM_THREADS = '{threads}' }\n").is_ok());
+        assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
+        let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err();
+        assert!(empty.contains("[promises] is empty"), "{empty}");
+    }
+
+    #[test]
+    fn a_case_beyond_the_capabilities_is_declined_with_the_reason() {
+        let text = format!(
+            "{LEAST_FILE}[takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 3\n"
+        );
+        let engine = Description::parse(&text).unwrap();
+        let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
+        let declines = |case: &str| {
+            engine.declines(&Case::from_parts(&case.replace("ROOT", root), vec![]).unwrap())
+        };
+        assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
+        let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
+        assert!(deep.contains("levels up to 3"), "{deep}");
+        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
+        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
+        assert!(seeds.ends_with("does not support seeds"), "{seeds}");
+        let enclosed =
+            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
+        assert!(enclosed.ends_with("enclosed = keep"), "{enclosed}");
+        let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
+                     max = [1.0, 1.0, 1.0]\nspacing = 1.0";
+        assert!(declines(boxed).unwrap().contains("boxes"));
     }
 }

@@ -11,6 +11,7 @@ mod memory;
 pub mod options;
 pub mod p4est;
 pub mod paths;
+pub mod placeholders;
 pub mod process;
 pub mod programs;
 mod reap;

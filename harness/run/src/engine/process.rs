@@ -138,7 +138,7 @@ fn judge(status: ExitStatus, watch: &Watch) -> Option<End> {
 /// Lines of the standard error that a message shows.
 const LINES_SHOWN: usize = 3;
 
-/// The last lines of a standard error, in one line: programs print the error at the end. Lines without letters are
+/// The last lines of a standard error, in one line: programs print the error at the end. Lines without a word are
 /// ignored, and so are the paragraphs between rules of dashes that `mpirun` adds after the program's own error.
 fn last_lines(text: &str) -> String {
     let mut of_mpirun = false;

@@ -1,17 +1,18 @@
 //! An engine: any program that meshes a case, ours included, run as its engine file describes.
 
 use super::command;
-use super::description::{Description, Values, fill};
+use super::description::Description;
 use super::failure::{End, Failure};
 use super::launcher::{self, Launcher};
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
 use super::paths::{Paths, on_path};
+use super::placeholders::{Values, fill};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use contract::case::Case;
 use contract::leafset::{self, LeafSet};
-use contract::manifest::{self, Manifest, Tree};
+use contract::manifest::{self, Tree};
 use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -176,7 +177,7 @@ impl Engine {
         let parts = leafset::read_parts(mesh).map_err(|error| error.to_string())?;
         let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
         let case = Case::read(case).map_err(|error| error.to_string())?;
-        let empty = Manifest::of_case(&case, tree, &self.label());
+        let empty = case.manifest(tree, self.label());
         let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
         set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
         set.manifest.write(mesh).map_err(|error| format!("{}: {error}", mesh.display()))

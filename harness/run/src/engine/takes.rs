@@ -1,6 +1,5 @@
 //! The cases that an engine supports: the tables `[takes]` and `[limits]` of its file. No command runs it on any other.
 
-use super::description::Description;
 use contract::case::Case;
 use contract::manifest::{Enclosed, Keep};
 use contract::plain::StlForm;
@@ -58,65 +57,33 @@ impl Default for Limits {
     }
 }
 
-impl Description {
-    /// Why the engine is not run on a case; `None` if it is.
-    pub fn declines(&self, case: &Case) -> Option<String> {
+impl Limits {
+    /// What of a case is beyond the limits, as the rest of a sentence about the engine; `None` if nothing is.
+    pub fn exceeded_by(&self, case: &Case) -> Option<String> {
         let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
-        let name = &self.name;
-        if level > self.limits.level_max {
-            let limit = self.limits.level_max;
+        if level > self.level_max {
             return Some(format!(
-                "{name} supports levels up to {limit}, and the case needs {level}"
+                "supports levels up to {}, and the case needs {level}",
+                self.level_max
             ));
         }
-        if facets > self.limits.facets_max {
-            let limit = self.limits.facets_max;
-            return Some(format!("{name} supports {limit} facets, and the case has {facets}"));
-        }
-        if !case.boxes.is_empty() && !self.takes.boxes {
-            return Some(format!("{name} does not support extent boxes"));
-        }
-        if !self.takes.keep.contains(&case.keep) {
-            return Some(format!("{name} does not support keep = {:?}", case.keep).to_lowercase());
-        }
-        if !case.keep_crossing && !self.takes.drop_crossing {
-            return Some(format!("{name} does not support keep_crossing = false"));
-        }
-        if !case.seeds.is_empty() && !self.takes.seeds {
-            return Some(format!("{name} does not support seeds"));
-        }
-        if case.enclosed == Enclosed::Keep && !self.takes.keep_enclosed {
-            return Some(format!("{name} does not support enclosed = keep"));
-        }
-        None
+        (facets > self.facets_max)
+            .then(|| format!("supports {} facets, and the case has {facets}", self.facets_max))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_case_beyond_the_capabilities_is_declined_with_the_reason() {
-        let least = "[run]\nserial = ['m', '{case}', '{out}']\n";
-        let text =
-            format!("{least}[takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 3\n");
-        let engine = Description::parse(&text).unwrap();
-        let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
-        let declines = |case: &str| {
-            engine.declines(&Case::from_parts(&case.replace("ROOT", root), vec![]).unwrap())
-        };
-        assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
-        let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
-        assert!(deep.contains("levels up to 3"), "{deep}");
-        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
-        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
-        assert!(seeds.ends_with("does not support seeds"), "{seeds}");
-        let enclosed =
-            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
-        assert!(enclosed.ends_with("enclosed = keep"), "{enclosed}");
-        let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
-                     max = [1.0, 1.0, 1.0]\nspacing = 1.0";
-        assert!(declines(boxed).unwrap().contains("boxes"));
+impl Takes {
+    /// A feature of a case that is not supported; `None` if there is none.
+    pub fn lacks(&self, case: &Case) -> Option<String> {
+        let features = [
+            (!case.boxes.is_empty() && !self.boxes, "extent boxes"),
+            (!case.keep_crossing && !self.drop_crossing, "keep_crossing = false"),
+            (!case.seeds.is_empty() && !self.seeds, "seeds"),
+            (case.enclosed == Enclosed::Keep && !self.keep_enclosed, "enclosed = keep"),
+        ];
+        let keep = || format!("keep = {:?}", case.keep).to_lowercase();
+        let lacked =
+            features.into_iter().find(|(lacked, _)| *lacked).map(|(_, name)| name.to_owned());
+        lacked.or_else(|| (!self.keep.contains(&case.keep)).then(keep))
     }
 }

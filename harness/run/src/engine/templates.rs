@@ -1,6 +1,6 @@
 //! The command templates of an engine file: the table `[run]`.
 
-use super::description::{LAUNCHER, placeholders};
+use super::placeholders::{LAUNCHER, placeholders};
 use check::promises::{Independence, Promises};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -129,26 +129,5 @@ impl Templates {
             }
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::engine::description::Description;
-
-    const LEAST: &str = "[run]\nserial = ['m', '{case}', '{out}']\n";
-
-    #[test]
-    fn a_promise_that_no_command_could_show_is_refused() {
-        let with = |of: &str, more: &str| {
-            Description::parse(&format!("{LEAST}{more}[promises]\nindependent_of = ['{of}']\n"))
-        };
-        for of in ["ranks", "partitioner", "threads"] {
-            assert!(with(of, "").unwrap_err().contains("with which to vary it"), "{of}");
-        }
-        assert!(with("threads", "environment = { OMP_NUM_THREADS = '{threads}' }\n").is_ok());
-        assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
-        let empty = Description::parse(&format!("{LEAST}[promises]\n")).unwrap_err();
-        assert!(empty.contains("[promises] is empty"), "{empty}");
     }
 }
