@@ -111,12 +111,12 @@ impl PartFile {
         Ok(words)
     }
 
-    /// Index of the first word that is not less than `word`, in a sorted file.
+    /// Index of the first word in a range of a sorted file that is not less than `word`; the range's end if there is none.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn lower_bound(&self, word: u64) -> std::io::Result<u64> {
-        let (mut low, mut high) = (0, self.len);
+    pub fn lower_bound(&self, range: Range<u64>, word: u64) -> std::io::Result<u64> {
+        let (mut low, mut high) = (range.start, range.end);
         while low < high {
             let middle = low + (high - low) / 2;
             let mut at = [0];
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(part.read_all().unwrap(), words);
         for probe in [0, 1, 2, 5000, 9801, 9802] {
             let expected = words.partition_point(|&w| w < probe) as u64;
-            assert_eq!(part.lower_bound(probe).unwrap(), expected);
+            assert_eq!(part.lower_bound(0..part.len(), probe).unwrap(), expected);
             let mapped = part.map().unwrap();
             assert_eq!(mapped.lower_bound(0..mapped.len(), probe), expected as usize);
             assert_eq!(mapped.lower_bound(3..5, probe), (expected as usize).clamp(3, 5));

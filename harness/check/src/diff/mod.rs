@@ -185,10 +185,10 @@ fn octant_words(set: &LeafDir, index: usize) -> Result<Vec<u64>, ReadError> {
     let mut words = Vec::new();
     for part in &set.parts {
         let read = || -> std::io::Result<Vec<u64>> {
-            let from = part.lower_bound((index as u64) << 55)?;
+            let from = part.lower_bound(0..part.len(), (index as u64) << 55)?;
             // One past the last octant does not fit a word.
             let end = (index as u64 + 1).checked_mul(1 << 55);
-            let until = end.map_or(Ok(part.len()), |end| part.lower_bound(end))?;
+            let until = end.map_or(Ok(part.len()), |end| part.lower_bound(0..part.len(), end))?;
             let count = usize::try_from(until - from).expect("an octant fits the address space");
             let mut words = vec![0; count];
             part.read_at(from, &mut words)?;

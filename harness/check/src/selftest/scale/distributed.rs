@@ -198,10 +198,10 @@ fn range(file: &PartFile, octant: &Octant) -> io::Result<(u64, u64)> {
     let end = key + word::span(octant.level);
     // One past the last octant does not fit a word.
     let until = match end.checked_mul(1 << 7) {
-        Some(end) => file.lower_bound(end)?,
+        Some(end) => file.lower_bound(0..file.len(), end)?,
         None => file.len(),
     };
-    Ok((file.lower_bound(key << 7)?, until))
+    Ok((file.lower_bound(0..file.len(), key << 7)?, until))
 }
 
 fn read_octant(file: &PartFile, octant: &Octant) -> io::Result<(u64, Vec<u64>)> {

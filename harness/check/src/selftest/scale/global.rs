@@ -72,7 +72,8 @@ fn emptied(original: &DistributedMesh) -> io::Result<Option<GlobalChange>> {
     for file in original.parts() {
         // The leaves in the corner come first in every part.
         let end = word::span(octant.level) << 7;
-        let mut words = vec![0; usize::try_from(file.lower_bound(end)?).unwrap_or(usize::MAX)];
+        let mut words =
+            vec![0; usize::try_from(file.lower_bound(0..file.len(), end)?).unwrap_or(usize::MAX)];
         file.read_at(0, &mut words)?;
         any |= !words.is_empty();
         surface |= words.iter().any(|&w| has_side(w, Side::Crossing));

@@ -1,0 +1,313 @@
+//! Meshes on disk, read leaf by leaf in Morton order.
+//!
+//! The parts of a leaf-set directory are sorted, so the leaves of an octant are one interval of each. A search by octants
+//! therefore reads only the blocks that meet the selection, and merges parts without comparing them: an octant whose leaves
+//! are in more than one part is split until each octant has only one.
+
+use std::ops::Range;
+use std::path::Path;
+
+use contract::leafset::{self, LeafDir, ReadError};
+use contract::manifest::Manifest;
+use contract::npy::PartFile;
+use contract::octant::{LEVEL_MAX, Octant};
+use contract::word::{self, KEY_END, Side};
+
+use crate::error::ExportError;
+use crate::selection::Selection;
+
+/// Number of words that are read at once: few enough that a slice reads little besides its own leaves.
+const BLOCK: u64 = 1 << 12;
+
+/// A leaf of a mesh on disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Its octant.
+    pub octant: Octant,
+    /// Its side.
+    pub side: Side,
+    /// Index of its part, which is the rank that wrote it.
+    pub part: u32,
+}
+
+/// A mesh on disk, opened for reading.
+#[derive(Debug)]
+pub struct Mesh {
+    /// Its manifest.
+    pub manifest: Manifest,
+    parts: Vec<PartFile>,
+}
+
+/// Leaves of an octant in one part: an interval of indices.
+type Interval = (usize, Range<u64>);
+
+impl Mesh {
+    /// Opens a leaf-set directory.
+    ///
+    /// # Errors
+    /// If the directory is not a leaf set.
+    pub fn open(path: &Path) -> Result<Self, ExportError> {
+        let LeafDir { manifest, parts } = leafset::open(path)?;
+        Ok(Self { manifest, parts })
+    }
+
+    /// Visits the selected leaves whose Morton codes are in `keys`, in Morton order.
+    ///
+    /// # Errors
+    /// If a part cannot be read or is not a sequence of leaves; or the first error of `visit`, which ends the traversal.
+    pub fn visit<E: From<ExportError>>(
+        &self,
+        keys: Range<u64>,
+        selection: &Selection,
+        visit: &mut impl FnMut(Leaf) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut intervals = Vec::new();
+        for (part, file) in self.parts.iter().enumerate() {
+            let bound = |key| self.lower_bound(part, 0..file.len(), key);
+            let interval = bound(keys.start)?..bound(keys.end)?;
+            intervals.extend((!interval.is_empty()).then_some((part, interval)));
+        }
+        self.visit_octant(Octant::ROOT, &intervals, selection, visit)
+    }
+
+    /// Ranges of Morton codes, in order, that together contain all leaves: each is an octant of at most `leaves_max`
+    /// leaves, or several neighbouring ones. Leaves are counted before selection.
+    ///
+    /// # Errors
+    /// If a part cannot be read.
+    pub fn blocks(&self, leaves_max: u64) -> Result<Vec<Range<u64>>, ExportError> {
+        let mut blocks: Vec<(Range<u64>, u64)> = Vec::new();
+        let all = self.parts.iter().enumerate().map(|(part, file)| (part, 0..file.len())).collect();
+        let mut stack: Vec<(Octant, Vec<Interval>)> = vec![(Octant::ROOT, all)];
+        while let Some((octant, intervals)) = stack.pop() {
+            let leaves: u64 = intervals.iter().map(|(_, i)| i.end - i.start).sum();
+            if leaves == 0 {
+                continue;
+            }
+            if leaves > leaves_max && octant.level < LEVEL_MAX {
+                let children = self.children(octant, &intervals)?;
+                stack.extend(children.into_iter().rev());
+                continue;
+            }
+            let start = word::key_of(octant.corner);
+            let end = start + word::span(octant.level);
+            match blocks.last_mut() {
+                Some((keys, count)) if *count + leaves <= leaves_max => {
+                    keys.end = end;
+                    *count += leaves;
+                }
+                _ => blocks.push((start..end, leaves)),
+            }
+        }
+        Ok(blocks.into_iter().map(|(keys, _)| keys).collect())
+    }
+
+    /// The range of all Morton codes.
+    pub const ALL: Range<u64> = 0..KEY_END;
+
+    fn visit_octant<E: From<ExportError>>(
+        &self,
+        octant: Octant,
+        intervals: &[Interval],
+        selection: &Selection,
+        visit: &mut impl FnMut(Leaf) -> Result<(), E>,
+    ) -> Result<(), E> {
+        if intervals.is_empty() || !selection.meets(&octant) {
+            return Ok(());
+        }
+        match intervals {
+            [(part, interval)]
+                if interval.end - interval.start <= BLOCK || octant.level == LEVEL_MAX =>
+            {
+                self.visit_block(octant, *part, interval.clone(), selection, visit)
+            }
+            _ if octant.level == LEVEL_MAX => {
+                // Two parts have the same leaf.
+                let (part, interval) = &intervals[1];
+                Err(self.order(*part, interval.start).into())
+            }
+            _ => {
+                for (child, intervals) in self.children(octant, intervals)? {
+                    self.visit_octant(child, &intervals, selection, visit)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Visits the selected leaves of one interval, which is read as a whole.
+    fn visit_block<E: From<ExportError>>(
+        &self,
+        octant: Octant,
+        part: usize,
+        interval: Range<u64>,
+        selection: &Selection,
+        visit: &mut impl FnMut(Leaf) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let file = &self.parts[part];
+        let mut words = vec![0; (interval.end - interval.start) as usize];
+        file.read_at(interval.start, &mut words).map_err(|e| self.unreadable(part, e))?;
+        // Leaves that ascend and do not overlap begin where the one before ends, or later.
+        let mut key_min = word::key_of(octant.corner);
+        let key_end = key_min + word::span(octant.level);
+        for (&w, index) in words.iter().zip(interval.start..) {
+            let leaf = word::decode(w).map_err(|error| ExportError::Word {
+                part: file.path().to_owned(),
+                index,
+                error,
+            })?;
+            let end = word::key(w) + word::span(leaf.octant.level);
+            if word::key(w) < key_min || end > key_end {
+                return Err(self.order(part, index).into());
+            }
+            key_min = end;
+            let leaf = Leaf { octant: leaf.octant, side: leaf.side, part: part as u32 };
+            if selection.has(&leaf) {
+                visit(leaf)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The children of an octant that contain leaves, with their intervals.
+    fn children(
+        &self,
+        octant: Octant,
+        intervals: &[Interval],
+    ) -> Result<Vec<(Octant, Vec<Interval>)>, ExportError> {
+        let mut children: Vec<(Octant, Vec<Interval>)> = Vec::new();
+        let mut starts: Vec<u64> = intervals.iter().map(|(_, i)| i.start).collect();
+        for child in (0..8).map(|d| octant.child(d)) {
+            let key_end = word::key_of(child.corner) + word::span(child.level);
+            let mut parts = Vec::new();
+            for (start, (part, interval)) in starts.iter_mut().zip(intervals) {
+                let end = self.lower_bound(*part, *start..interval.end, key_end)?;
+                parts.extend((*start < end).then(|| (*part, *start..end)));
+                *start = end;
+            }
+            if !parts.is_empty() {
+                children.push((child, parts));
+            }
+        }
+        Ok(children)
+    }
+
+    /// Index of the first leaf in a range of a part whose Morton code is at least `key`.
+    fn lower_bound(&self, part: usize, range: Range<u64>, key: u64) -> Result<u64, ExportError> {
+        // The code one past the last one does not fit in a word.
+        if key >= KEY_END {
+            return Ok(range.end);
+        }
+        let bound = self.parts[part].lower_bound(range, key << 7);
+        bound.map_err(|e| self.unreadable(part, e))
+    }
+
+    fn unreadable(&self, part: usize, error: std::io::Error) -> ExportError {
+        ReadError::part(&self.parts[part], error).into()
+    }
+
+    fn order(&self, part: usize, index: u64) -> ExportError {
+        ExportError::Order { part: self.parts[part].path().to_owned(), index }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::lattice::Root;
+    use contract::leafset::LeafSet;
+    use contract::manifest::Tree;
+    use contract::testing::random_words;
+    use proptest::prelude::*;
+
+    /// A mesh on disk whose leaves are dealt to parts by `part`.
+    fn on_disk(
+        words: &[u64],
+        parts: usize,
+        part: impl Fn(usize) -> usize,
+    ) -> (tempfile::TempDir, Mesh) {
+        let mut dealt = vec![Vec::new(); parts];
+        words.iter().enumerate().for_each(|(i, &w)| dealt[part(i) % parts].push(w));
+        let root = Root { origin: [0.0; 3], edge: 1.0 };
+        let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
+        let set = LeafSet::new(empty, Vec::new()).with_parts(dealt);
+        let dir = tempfile::tempdir().unwrap();
+        set.write(dir.path()).unwrap();
+        let mesh = Mesh::open(dir.path()).unwrap();
+        (dir, mesh)
+    }
+
+    fn words(
+        mesh: &Mesh,
+        keys: Range<u64>,
+        selection: &Selection,
+    ) -> Result<Vec<u64>, ExportError> {
+        let mut words = Vec::new();
+        mesh.visit(keys, selection, &mut |leaf: Leaf| {
+            words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
+            Ok::<(), ExportError>(())
+        })?;
+        Ok(words)
+    }
+
+    proptest! {
+        #[test]
+        fn all_leaves_of_interleaved_parts_are_visited_in_order(
+            leaves in random_words(5), parts in 1usize..4, run in 1usize..40
+        ) {
+            let (_dir, mesh) = on_disk(&leaves, parts, |i| i / run);
+            prop_assert_eq!(&words(&mesh, Mesh::ALL, &Selection::default()).unwrap(), &leaves);
+        }
+
+        #[test]
+        fn blocks_are_disjoint_and_contain_all_leaves(
+            leaves in random_words(5), parts in 1usize..4, leaves_max in 1u64..100
+        ) {
+            let (_dir, mesh) = on_disk(&leaves, parts, |i| i / 7);
+            let blocks = mesh.blocks(leaves_max).unwrap();
+            prop_assert!(blocks.windows(2).all(|w| w[0].end <= w[1].start));
+            let mut visited = Vec::new();
+            for keys in blocks {
+                let block = words(&mesh, keys, &Selection::default()).unwrap();
+                prop_assert!(!block.is_empty() && block.len() as u64 <= leaves_max);
+                visited.extend(block);
+            }
+            prop_assert_eq!(visited, leaves);
+        }
+
+        #[test]
+        fn a_selection_has_the_leaves_that_satisfy_it(
+            leaves in random_words(5), axis in 0usize..3, at in 0.0f64..=1.0, level in 0u8..6
+        ) {
+            let (_dir, mesh) = on_disk(&leaves, 2, |i| i / 9);
+            let slice = crate::selection::Slice::new(&mesh.manifest.root, axis, at);
+            let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
+            let mut expected = Vec::new();
+            mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
+                expected.extend(selection.has(&leaf).then(|| {
+                    word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
+                }));
+                Ok::<(), ExportError>(())
+            }).unwrap();
+            prop_assert_eq!(words(&mesh, Mesh::ALL, &selection).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn leaves_out_of_order_and_invalid_words_are_errors_that_name_the_leaf() {
+        let leaves: Vec<u64> = contract::testing::words_of(|o| o.level < 1);
+        let mut swapped = leaves.clone();
+        swapped.swap(2, 3);
+        let mut overlapping = leaves.clone();
+        overlapping
+            .insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
+        let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
+        for (leaves, expected) in
+            [(swapped, "leaf 3"), (overlapping, "leaf 1"), (invalid, "leaf 0")]
+        {
+            let (_dir, mesh) = on_disk(&leaves, 1, |_| 0);
+            let error = words(&mesh, Mesh::ALL, &Selection::default()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

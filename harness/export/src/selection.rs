@@ -1,0 +1,100 @@
+//! Parts of a mesh: which leaves an export contains.
+
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
+use contract::word::Side;
+
+use crate::mesh::Leaf;
+
+/// The leaves that satisfy every condition; without conditions, all leaves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selection {
+    /// Leaves whose interior meets this box, given by its two corners in lattice units.
+    pub clip: Option<[[i64; 3]; 2]>,
+    /// Leaves of at most this level.
+    pub level_max: Option<u8>,
+    /// Leaves of this side.
+    pub side: Option<Side>,
+    /// Leaves of this part, which is the rank that wrote them.
+    pub rank: Option<u32>,
+    /// Leaves that a plane normal to an axis cuts.
+    pub slice: Option<Slice>,
+}
+
+/// A plane normal to an axis. A plane in the common face of two leaves cuts the one on its positive side; on the root's
+/// maximum face, it cuts the last leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slice {
+    /// The axis: 0, 1 or 2.
+    pub axis: usize,
+    /// Position along the axis, in lattice units.
+    pub at: i64,
+}
+
+impl Slice {
+    /// The plane at a coordinate in the user's units; `None` if it does not meet the root.
+    pub fn new(root: &Root, axis: usize, coordinate: f64) -> Option<Self> {
+        let position = (coordinate - root.origin[axis]) / root.edge;
+        (0.0..=1.0)
+            .contains(&position)
+            .then(|| Self { axis, at: (position * UNITS_PER_EDGE as f64).round_ties_even() as i64 })
+    }
+
+    /// The layer of level-19 cells that the plane cuts.
+    pub fn layer(&self) -> u32 {
+        (self.at / UNITS_PER_CELL).min(i64::from(CELLS_PER_EDGE) - 1) as u32
+    }
+
+    /// Whether the plane cuts the octant.
+    pub fn cuts(&self, octant: &Octant) -> bool {
+        let low = octant.corner[self.axis];
+        (low..low + octant.edge()).contains(&self.layer())
+    }
+}
+
+impl Selection {
+    /// Whether the leaf is selected.
+    pub fn has(&self, leaf: &Leaf) -> bool {
+        self.meets(&leaf.octant)
+            && self.level_max.is_none_or(|level| leaf.octant.level <= level)
+            && self.side.is_none_or(|side| leaf.side == side)
+            && self.rank.is_none_or(|rank| leaf.part == rank)
+    }
+
+    /// Whether an octant may contain selected leaves, by its position.
+    pub fn meets(&self, octant: &Octant) -> bool {
+        let (low, high) = octant.bounds();
+        self.slice.is_none_or(|slice| slice.cuts(octant))
+            && self
+                .clip
+                .is_none_or(|[from, to]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_cuts_exactly_one_of_the_two_leaves_that_share_a_face() {
+        let root = Root { origin: [-1.0, 0.0, 0.0], edge: 2.0 };
+        let children: Vec<Octant> = (0..8).map(|d| Octant::ROOT.child(d)).collect();
+        for (coordinate, digit) in [(-1.0, 0), (-0.3, 0), (0.0, 1), (0.5, 1), (1.0, 1)] {
+            let slice = Slice::new(&root, 0, coordinate).unwrap();
+            let cut: Vec<u8> = (0..8).filter(|&d| slice.cuts(&children[d as usize])).collect();
+            assert_eq!(cut.len(), 4, "{coordinate}");
+            assert!(cut.iter().all(|d| d & 1 == digit), "{coordinate}");
+        }
+        assert_eq!(Slice::new(&root, 0, 1.1), None);
+        assert_eq!(Slice::new(&root, 0, f64::NAN), None);
+    }
+
+    #[test]
+    fn a_clip_box_excludes_leaves_that_only_touch_it() {
+        let half = UNITS_PER_EDGE / 2;
+        let selection =
+            Selection { clip: Some([[half; 3], [half + 1; 3]]), ..Selection::default() };
+        let chosen: Vec<u8> = (0..8).filter(|&d| selection.meets(&Octant::ROOT.child(d))).collect();
+        assert_eq!(chosen, [7]);
+    }
+}
