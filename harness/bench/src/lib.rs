@@ -15,3 +15,9 @@ pub mod targets;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 pub mod track;
+
+/// Prints what a long command does on standard error. If that cannot be written, the command goes on.
+fn announce(what: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{what}");
+}

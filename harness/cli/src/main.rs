@@ -1,5 +1,8 @@
 //! The command `harness`; see `harness --help`.
 
+#[macro_use]
+mod output;
+
 mod cli;
 mod commands;
 
@@ -33,5 +36,5 @@ fn main() -> ExitCode {
         }
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     };
-    ExitCode::from(code)
+    ExitCode::from(output::finish(code))
 }

@@ -115,3 +115,50 @@ fn why_answers_for_a_directory_and_finds_needless_splits() {
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {output:?}");
     }
 }
+
+#[test]
+fn a_closed_pipe_ends_the_printing_and_not_the_command() {
+    let script =
+        format!("set -o pipefail; {} completions bash | true", env!("CARGO_BIN_EXE_harness"));
+    for _ in 0..5 {
+        let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
+        assert_eq!((ended.status.code(), ended.stderr), (Some(0), Vec::new()));
+    }
+}
+
+#[test]
+fn output_that_cannot_be_written_is_an_exit_code() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    let ended = command.args(["man"]).stdout(full()).output().unwrap();
+    assert_eq!(ended.status.code(), Some(4));
+    let message = String::from_utf8(ended.stderr).unwrap();
+    assert!(message.contains("standard output cannot be written"), "{message}");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    let ended = command.args(["track", "missing.jsonl"]).stderr(full()).status().unwrap();
+    assert_eq!(ended.code(), Some(2));
+}
+
+#[test]
+fn what_cannot_be_meant_is_invalid_input() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("f.json");
+    std::fs::write(&file, "no record").unwrap();
+    let file = file.to_str().unwrap();
+    for (arguments, why) in [
+        (&["track", "missing.jsonl"][..], "missing.jsonl is missing"),
+        (&["track", file, "--alpha", "7"], "greater than 0 and at most 1"),
+        (&["track", file, "--alpha", "nan"], "greater than 0 and at most 1"),
+        (&["track", file, "--effect-min", "1e9"], "percentage"),
+        (&["gate", "--baseline", file], "neither a record of harness gate"),
+        (&["gate", "--budget", "nan"], "greater than 0"),
+        (&["gate", "--selftest", "inf"], "percentage"),
+    ] {
+        let output = harness(arguments);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            output.status.code() == Some(2) && message.contains(why),
+            "{arguments:?}: {message}"
+        );
+    }
+}

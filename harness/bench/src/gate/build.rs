@@ -92,7 +92,7 @@ fn wrong(path: &Path, error: &std::io::Error) -> GateError {
 fn make(build: &Build, places: &Places, options: &Options) -> Result<PathBuf, GateError> {
     let (values, label) = (places.values(options)?, places.label);
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    eprintln!("harness gate: building {label}");
+    crate::announce(&format!("harness gate: building {label}"));
     let (program, arguments) =
         words.split_first().ok_or_else(|| GateError::Input("an empty build command".into()))?;
     let mut command = Command::new(program);

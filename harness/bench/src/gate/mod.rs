@@ -129,7 +129,7 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
             break;
         }
         let start = Instant::now();
-        eprintln!("harness gate: {name}");
+        crate::announce(&format!("harness gate: {name}"));
         let mut layer = match name {
             LayerName::Correctness => {
                 correctness::layer(bench, baseline, &mut report.candidate_measures)?

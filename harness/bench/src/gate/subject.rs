@@ -5,6 +5,7 @@ use super::measures::{Measured, Measures};
 use super::{GateError, Options};
 use run::engine::runner::Engine;
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 /// A program under comparison.
@@ -92,6 +93,12 @@ impl Subject {
 
     fn find(named: &str, options: &Options, engine: &Engine) -> Result<Self, GateError> {
         if Path::new(named).is_file() {
+            let mode = fs::metadata(named).map_or(0, |metadata| metadata.permissions().mode());
+            if mode & 0o111 == 0 {
+                let why =
+                    "neither a record of harness gate --record nor a program that can be executed";
+                return Err(GateError::Input(format!("{named} is {why}")));
+            }
             let program =
                 fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
             let measured = Measured { named: named.to_owned(), revision: None };

@@ -67,7 +67,7 @@ pub fn shrink(
     let case = PlainCase::read(case).map_err(Unknown::Error)?;
     let given = Trial { case, ranks: probe.ranks() };
     let Some(first) = failure(&given, probe, check)? else { return Ok(None) };
-    eprintln!("harness shrink: the case fails {first}");
+    crate::announce(&format!("harness shrink: the case fails {first}"));
     let facets_before = given.case.facets.len();
     let mut trials = 1;
     let spent = |trials| {
@@ -85,7 +85,9 @@ pub fn shrink(
         // A trial that cannot be run does not count as the same failure.
         same(trial).is_ok_and(|failure| failure.is_some())
     };
-    let trial = reduce::reduce(given, &mut fails, &mut |text| eprintln!("harness shrink: {text}"));
+    let trial = reduce::reduce(given, &mut fails, &mut |text| {
+        crate::announce(&format!("harness shrink: {text}"))
+    });
     let minimal = !spent(trials);
     let failure = same(&trial)?.ok_or_else(|| {
         let why = "the failure does not repeat: it depends on more than the case";

@@ -11,9 +11,10 @@ use crate::gate::measures::Measures;
 use crate::gate::quantity::{CPU, WALL};
 use crate::gate::report::{LayerName, Report};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::process::Command;
 
@@ -116,6 +117,7 @@ pub fn read(path: &Path) -> Result<Vec<Record>, String> {
 
 fn parse(text: &str) -> Result<Vec<Record>, String> {
     let mut records: Vec<Record> = Vec::new();
+    let mut index: HashMap<String, usize> = HashMap::new();
     for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let wrong = |why: String| format!("line {}: {why}", i + 1);
         let record: Record =
@@ -123,12 +125,15 @@ fn parse(text: &str) -> Result<Vec<Record>, String> {
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
-        match records.iter_mut().find(|other| other.commit == record.commit) {
-            Some(same) => {
-                same.metrics.extend(record.metrics);
-                same.accepted |= record.accepted;
+        match index.get(&record.commit) {
+            Some(&same) => {
+                records[same].metrics.extend(record.metrics);
+                records[same].accepted |= record.accepted;
             }
-            None => records.push(record),
+            None => {
+                index.insert(record.commit.clone(), records.len());
+                records.push(record);
+            }
         }
     }
     Ok(records)
@@ -156,7 +161,8 @@ pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
     append(path, &record).map_err(|error| wrong(&error.to_string()))
 }
 
-/// Appends a record in a single write, so that no partial line remains.
+/// Appends a record on a line of its own, under a lock that other processes respect. If the record cannot be written as a
+/// whole, the file is left as it was.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -167,7 +173,20 @@ pub fn append(path: &Path, record: &Record) -> io::Result<()> {
     // Strings and finite numbers only.
     let mut line = serde_json::to_string(record).expect("a record is representable in JSON");
     line.push('\n');
-    OpenOptions::new().create(true).append(true).open(path)?.write_all(line.as_bytes())
+    let mut file = OpenOptions::new().create(true).read(true).append(true).open(path)?;
+    file.lock()?;
+    let length = file.metadata()?.len();
+    if length > 0 {
+        let mut last = [0];
+        file.read_exact_at(&mut last, length - 1)?;
+        if last != *b"\n" {
+            line.insert(0, '\n');
+        }
+    }
+    file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).inspect_err(|_| {
+        // Nobody else has appended since, because of the lock.
+        let _ = file.set_len(length);
+    })
 }
 
 #[cfg(test)]
@@ -209,6 +228,34 @@ mod tests {
         assert_eq!(read(&path).unwrap()[1].metrics["x"], 1.0);
         assert!(accept(&path, "abc").unwrap_err().contains("several"));
         assert!(accept(&path, "f00").unwrap_err().contains("no values of commit f00"));
+    }
+
+    #[test]
+    fn a_record_after_an_unfinished_line_has_a_line_of_its_own() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        append(&path, &record("a", &[("x", 1.0)])).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.trim_end()).unwrap();
+        append(&path, &record("b", &[("x", 2.0)])).unwrap();
+        assert_eq!(read(&path).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn concurrent_records_are_all_kept() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let path = &path;
+                scope.spawn(move || {
+                    for i in 0..50 {
+                        append(path, &record(&format!("{thread}-{i}"), &[("x", 1.0)])).unwrap();
+                    }
+                });
+            }
+        });
+        assert_eq!(read(&path).unwrap().len(), 200);
     }
 
     #[test]

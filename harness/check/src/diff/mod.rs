@@ -1,8 +1,7 @@
-//! The differences of two meshes: first of their manifests, then of the leaves in the first octant that
-//! differs. Only that octant is read, so meshes of any size are compared quickly.
+//! The differences of two meshes: of their inputs and counts, and of the leaves in the first octant that differs.
 //!
-//! The comparison trusts the digests in the manifests; the check `manifest` establishes that they agree with
-//! the leaves.
+//! All leaves are read once, to count and digest them, with memory for one buffer. A comparison that trusts the digests in the
+//! manifests reads only the first octant that differs.
 
 mod region;
 pub mod rule;
@@ -14,13 +13,29 @@ use std::path::Path;
 use crate::checks::Terms;
 use contract::case::Case;
 use contract::leafset::{self, LeafDir, ReadError};
-use contract::manifest::{Manifest, octant_index};
+use contract::manifest::{Manifest, Tally, octant_index};
 use contract::octant::Octant;
 use contract::word;
+
+/// What a comparison trusts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Trust {
+    /// The leaves in the part files.
+    #[default]
+    Leaves,
+    /// The counts and digests in the manifests.
+    Manifests,
+}
 
 /// The differences of two leaf sets.
 #[derive(Clone, Debug, Default)]
 pub struct DiffReport {
+    /// What was compared.
+    pub compared: Trust,
+    /// Number of leaves of the first mesh.
+    pub leaves: u64,
+    /// Manifests with counts or digests that their leaves do not have, one sentence each.
+    pub contradictions: Vec<String>,
     /// Manifest fields that differ, with both values.
     pub fields: Vec<String>,
     /// Level-3 octants whose digests differ.
@@ -46,11 +61,17 @@ const OCTANTS_LISTED: usize = 8;
 
 impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for field in &self.fields {
-            writeln!(f, "{field}")?;
+        for line in self.contradictions.iter().chain(&self.fields) {
+            writeln!(f, "{line}")?;
         }
         if self.same_leaves() {
-            return write!(f, "the leaves are the same");
+            let leaves = self.leaves;
+            return match self.compared {
+                Trust::Leaves => write!(f, "the leaves are the same ({leaves} compared)"),
+                Trust::Manifests => {
+                    write!(f, "the leaves are the same ({leaves}, by the digests in the manifests)")
+                }
+            };
         }
         let paths: Vec<_> = self.octants.iter().take(OCTANTS_LISTED).map(Octant::path).collect();
         let more = if self.octants.len() > OCTANTS_LISTED { ", ..." } else { "" };
@@ -72,9 +93,25 @@ impl fmt::Display for DiffReport {
 ///
 /// # Errors
 /// If a directory cannot be read.
-pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadError> {
-    let (a, b) = (leafset::open(a)?, leafset::open(b)?);
-    let mut report = manifests(&a.manifest, &b.manifest);
+pub fn diff(
+    a: &Path,
+    b: &Path,
+    case: Option<&Case>,
+    trust: Trust,
+) -> Result<DiffReport, ReadError> {
+    let (mut a, mut b) = (leafset::open(a)?, leafset::open(b)?);
+    let mut contradictions = Vec::new();
+    if trust == Trust::Leaves {
+        for (name, set) in [("A", &mut a), ("B", &mut b)] {
+            if recount(set)? {
+                contradictions.push(format!(
+                    "the manifest of {name} contradicts its leaves: run harness audit on the directory"
+                ));
+            }
+        }
+    }
+    let mut report =
+        DiffReport { compared: trust, contradictions, ..manifests(&a.manifest, &b.manifest) };
     for i in octants_differing(&a.manifest, &b.manifest) {
         if let Some((x, y)) = first_difference(&a, &b, i)? {
             report.leaf = Some(rule::sides(x, y, &a.manifest.root));
@@ -88,7 +125,34 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadE
 /// Compares two manifests, digests included.
 pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
     let octants = octants_differing(a, b).into_iter().map(level_3).collect();
-    DiffReport { fields: fields(a, b), octants, ..DiffReport::default() }
+    let compared = Trust::Manifests;
+    DiffReport {
+        compared,
+        leaves: a.leaves,
+        fields: fields(a, b),
+        octants,
+        ..DiffReport::default()
+    }
+}
+
+/// Number of words that are read at once.
+const CHUNK: u64 = 1 << 16;
+
+/// Replaces the counts and digests in a manifest by those of the leaves. Returns whether they differed.
+fn recount(set: &mut LeafDir) -> Result<bool, ReadError> {
+    let mut tally = Tally::default();
+    for part in &set.parts {
+        let mut words = Vec::new();
+        for first in (0..part.len()).step_by(CHUNK as usize) {
+            words.resize(CHUNK.min(part.len() - first) as usize, 0);
+            part.read_at(first, &mut words).map_err(|error| ReadError::part(part, error))?;
+            words.iter().for_each(|&word| tally.add(word));
+        }
+    }
+    tally.finish();
+    let stated = set.manifest.clone();
+    set.manifest.set_tally(tally);
+    Ok(set.manifest != stated)
 }
 
 /// Level-3 octants whose digests differ.
@@ -199,4 +263,35 @@ fn octant_words(set: &LeafDir, index: usize) -> Result<Vec<u64>, ReadError> {
     debug_assert!(words.iter().all(|&w| octant_index(w) == index));
     words.sort_unstable();
     Ok(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::{leaf_set, words_of};
+
+    fn written(words: Vec<u64>) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        leaf_set(vec![words]).write(dir.path()).unwrap();
+        dir
+    }
+
+    #[test]
+    fn a_leaf_that_its_manifest_does_not_show_is_found_unless_manifests_are_trusted() {
+        let words = words_of(|o| o.level < 2);
+        let (a, b) = (written(words.clone()), written(words.clone()));
+        let compare = |trust| diff(a.path(), b.path(), None, trust).unwrap();
+        assert!(compare(Trust::Leaves).contradictions.is_empty());
+        assert_eq!(compare(Trust::Leaves).to_string(), "the leaves are the same (64 compared)");
+
+        let manifest = std::fs::read(b.path().join("mesh.json")).unwrap();
+        let mut changed = words;
+        changed[9] |= 1;
+        leaf_set(vec![changed]).write(b.path()).unwrap();
+        std::fs::write(b.path().join("mesh.json"), manifest).unwrap();
+        assert!(compare(Trust::Manifests).same_leaves());
+        let found = compare(Trust::Leaves);
+        assert!(!found.same_leaves() && found.leaf.is_some());
+        assert!(found.to_string().contains("manifest of B contradicts"), "{found}");
+    }
 }

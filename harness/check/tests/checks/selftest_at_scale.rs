@@ -71,6 +71,19 @@ fn every_corruption_that_a_mesh_can_have_is_planted_and_reported() {
 }
 
 #[test]
+fn a_mesh_without_its_base_tree_is_corrupted_in_every_other_way() {
+    let place = tempfile::tempdir().unwrap();
+    let correct = support::selftest_case(CASES[3].0, CASES[3].1);
+    let source = Source { base: None, ..written("boxes", &correct, place.path()) };
+    let report = run(&[source], 1, 1);
+    assert!(report.holds(), "{report}");
+    assert!(report.kills.len() > 30, "{report}");
+    for (name, reason) in &report.left_out {
+        assert!(!name.starts_with("T0 ") || reason.contains("T0"), "{name}: {reason}");
+    }
+}
+
+#[test]
 fn windows_depend_on_the_seed_and_not_on_the_number_of_jobs() {
     let place = tempfile::tempdir().unwrap();
     let (name, text) = CASES[0];

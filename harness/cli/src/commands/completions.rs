@@ -13,6 +13,8 @@ pub struct Arguments {
 
 /// Prints the script for the command line `definition`; returns the exit code.
 pub fn run(arguments: &Arguments, definition: &mut Command) -> u8 {
-    generate(arguments.shell, definition, "harness", &mut std::io::stdout());
+    let mut script = Vec::new();
+    generate(arguments.shell, definition, "harness", &mut script);
+    print!("{}", String::from_utf8_lossy(&script));
     EXIT_HOLDS
 }

@@ -1,6 +1,6 @@
 //! `harness diff`: prints the first difference between two leaf-set directories.
 
-use check::diff;
+use check::diff::{self, Trust};
 use clap::Args;
 use contract::case::Case;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
@@ -16,13 +16,17 @@ pub struct Arguments {
     /// The case of both meshes: its facets help to find the deciding rule
     #[arg(long)]
     case: Option<PathBuf>,
+    /// Compare the counts and digests in the manifests instead of reading all leaves
+    #[arg(long)]
+    trust_manifests: bool,
 }
 
 /// Compares and prints; returns the exit code.
-pub fn run(Arguments { a, b, case }: &Arguments) -> u8 {
+pub fn run(Arguments { a, b, case, trust_manifests }: &Arguments) -> u8 {
+    let trust = if *trust_manifests { Trust::Manifests } else { Trust::Leaves };
     let compared = case.as_deref().map(Case::read).transpose().map_err(|error| error.to_string());
     match compared
-        .and_then(|case| diff::diff(a, b, case.as_ref()).map_err(|error| error.to_string()))
+        .and_then(|case| diff::diff(a, b, case.as_ref(), trust).map_err(|error| error.to_string()))
     {
         Ok(report) => {
             println!("{report}");

@@ -3,6 +3,7 @@
 use super::files::put;
 use super::programs::ProgramArguments;
 use super::session::progress;
+use super::values::{percentage, seconds};
 use bench::gate::build::top_level;
 use bench::gate::report::{LayerName, Report};
 use bench::gate::{GateError, Options, gate, power};
@@ -39,7 +40,7 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',')]
     layers: Vec<LayerName>,
     /// Time for one case in the layer of time [default: from the rules]
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     budget: Option<f64>,
     /// Seed of the order of runs and of the permutation tests
     #[arg(long, default_value_t = 1)]
@@ -133,14 +134,6 @@ fn selftest(sizes: &[f64], trials: usize, options: &Options, programs: &Programs
             if interrupt::requested() { EXIT_INTERRUPTED } else { EXIT_HOLDS }
         }
         Err(error) => refuse(&error),
-    }
-}
-
-fn percentage(text: &str) -> Result<f64, String> {
-    let number: f64 = text.parse().map_err(|_| format!("{text:?} is not a number"))?;
-    match (0.0..=1000.0).contains(&number) {
-        true => Ok(number),
-        false => Err(format!("{number} is not between 0 and 1000 percent")),
     }
 }
 

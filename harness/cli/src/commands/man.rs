@@ -3,7 +3,6 @@
 use clap::{Args, Command};
 use clap_mangen::{Man, generate_to};
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
-use std::io;
 use std::path::PathBuf;
 
 /// `harness man`.
@@ -17,7 +16,11 @@ pub struct Arguments {
 /// Writes the pages of the command line `definition`; returns the exit code.
 pub fn run(arguments: &Arguments, definition: Command) -> u8 {
     let written = match &arguments.directory {
-        None => Man::new(definition).render(&mut io::stdout()),
+        None => {
+            let mut page = Vec::new();
+            let rendered = Man::new(definition).render(&mut page);
+            rendered.map(|()| print!("{}", String::from_utf8_lossy(&page)))
+        }
         Some(directory) => {
             std::fs::create_dir_all(directory).and_then(|()| generate_to(definition, directory))
         }

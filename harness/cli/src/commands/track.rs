@@ -1,6 +1,7 @@
 //! `harness track`: appends metrics to the history and reports change points.
 
 use super::files::put;
+use super::values::{percentage, probability};
 use bench::statistics::change_points::Rules;
 use bench::track::history::{self, Record};
 use bench::track::{Series, analyse, link, summary};
@@ -55,10 +56,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
     /// Rate of false discoveries: the probability of any false change point if nothing changed
-    #[arg(long, default_value_t = 0.01)]
+    #[arg(long, default_value_t = 0.01, value_parser = probability)]
     alpha: f64,
     /// Ignore smaller changes; percent
-    #[arg(long, default_value_t = 0.1)]
+    #[arg(long, default_value_t = 0.1, value_parser = percentage)]
     effect_min: f64,
     /// Seed of the permutation test
     #[arg(long, default_value_t = 1)]
@@ -86,6 +87,11 @@ pub fn run(arguments: &Arguments) -> u8 {
 fn try_run(arguments: &Arguments) -> Result<u8, String> {
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
+    } else if !arguments.history.exists() {
+        let history = arguments.history.display();
+        return Err(format!(
+            "{history} is missing: give a history, or the first values with --add or --value"
+        ));
     }
     for commit in &arguments.accept {
         history::accept(&arguments.history, commit)?;

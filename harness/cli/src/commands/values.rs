@@ -8,6 +8,28 @@ pub fn cell_count(text: &str) -> Result<u64, String> {
     cells.map(|c| c as u64).ok_or_else(|| "give a number of cells from 1e3 to 1e12".to_owned())
 }
 
+/// Parses a number that is greater than 0, and at most `max`.
+fn positive(text: &str, max: f64) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= max);
+    number.ok_or_else(|| format!("give a number greater than 0 and at most {max}"))
+}
+
+/// Parses a probability that is not 0.
+pub fn probability(text: &str) -> Result<f64, String> {
+    positive(text, 1.0)
+}
+
+/// Parses a time in seconds: more than 0, and at most a week.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    positive(text, 7.0 * 86_400.0)
+}
+
+/// Parses a percentage from 0 to 1000.
+pub fn percentage(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|n| (0.0..=1000.0).contains(n));
+    number.ok_or_else(|| "give a percentage from 0 to 1000".to_owned())
+}
+
 /// Parses a root from four numbers.
 pub fn root(text: &str) -> Result<Root, String> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();

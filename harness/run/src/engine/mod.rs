@@ -9,6 +9,7 @@ pub mod launcher;
 pub mod layout;
 mod memory;
 pub mod options;
+mod output;
 pub mod p4est;
 pub mod paths;
 pub mod placeholders;

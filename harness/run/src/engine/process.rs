@@ -4,15 +4,17 @@
 //! - a child leads a session of its own, so that its descendants can be found even if they left its process group, as
 //!   the ranks of OpenMPI's `mpirun` do;
 //! - when [`run`] returns, no process of that session is left, however the child ended;
-//! - the child's output goes to files, so that no pipe can fill and no output is lost with a hang.
+//! - the child's output goes to files of bounded size, so that no pipe can fill, and neither can the disk, and no output is
+//!   lost with a hang.
 
 use super::failure::{End, Failure, describe_activity};
 use super::interrupt;
 use super::memory::MemorySampler;
+use super::output::Output;
 use super::reap::try_reap;
 use super::session;
 use rustix::process::{Signal, kill_process, kill_process_group, setsid};
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
@@ -65,13 +67,15 @@ impl<'a> Watch<'a> {
 pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     let failure = |end| Failure::new(watch.name, end);
     let mut sampler = watch.sample_memory.then(MemorySampler::new);
-    let (start, child) = start(command, watch).map_err(|error| {
+    let (start, child, mut outputs) = start(command, watch).map_err(|error| {
         let program = Path::new(command.get_program()).display();
         failure(End::Missing(format!("cannot be started: {program}: {error}")))
     })?;
-    let end = wait(&child, start, watch, sampler.as_mut());
+    let end = wait(&child, start, watch, sampler.as_mut(), &mut outputs);
     let time_wall_s = start.elapsed().as_secs_f64();
     kill_session(child.id());
+    let finished = outputs.into_iter().try_for_each(Output::finish);
+    finished.map_err(|error| failure(End::Unusable(format!("has no readable output: {error}"))))?;
     match end {
         Ok(Ok(time_cpu_s)) => Ok(Finished {
             time_wall_s,
@@ -84,13 +88,13 @@ pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     }
 }
 
-fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child)> {
-    let (stdout, stderr) = (File::create(watch.log("stdout"))?, File::create(watch.log("stderr"))?);
-    command.stdin(Stdio::null()).stdout(stdout).stderr(stderr);
+fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child, [Output; 2])> {
+    let outputs = [Output::create(&watch.log("stdout"))?, Output::create(&watch.log("stderr"))?];
+    command.stdin(Stdio::null()).stdout(outputs[0].stdio()?).stderr(outputs[1].stdio()?);
     // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
     unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
     let start = Instant::now();
-    Ok((start, command.spawn()?))
+    Ok((start, command.spawn()?, outputs))
 }
 
 /// The CPU time of a child that exited with code 0, or how it ended otherwise.
@@ -99,6 +103,7 @@ fn wait(
     start: Instant,
     watch: &Watch,
     mut sampler: Option<&mut MemorySampler>,
+    outputs: &mut [Output; 2],
 ) -> io::Result<Result<f64, End>> {
     let mut pause = Duration::from_millis(1);
     loop {
@@ -116,6 +121,7 @@ fn wait(
             end_child(child)?;
             return Ok(Err(End::TimedOut { limit: watch.limit, activity }));
         }
+        outputs.iter_mut().for_each(Output::discard_middle);
         if let Some(sampler) = &mut sampler {
             sampler.sample(child.id());
         }
@@ -128,8 +134,8 @@ fn judge(status: ExitStatus, watch: &Watch) -> Option<End> {
     match status.code() {
         Some(0) => None,
         Some(code) => {
-            let text = fs::read_to_string(watch.log("stderr")).unwrap_or_default();
-            Some(End::Exited { code, error: last_lines(&text) })
+            let text = fs::read(watch.log("stderr")).unwrap_or_default();
+            Some(End::Exited { code, error: last_lines(&String::from_utf8_lossy(&text)) })
         }
         None => Some(End::Signalled(status.signal().unwrap_or(0))),
     }
@@ -150,7 +156,22 @@ fn last_lines(text: &str) -> String {
     let lines: Vec<&str> = text.lines().map(str::trim).filter(is_own).collect();
     match lines.len() {
         0 => "it printed no error".to_owned(),
-        count => lines[count.saturating_sub(LINES_SHOWN)..].join(" | "),
+        count => lines[count.saturating_sub(LINES_SHOWN)..]
+            .iter()
+            .map(start_of)
+            .collect::<Vec<_>>()
+            .join(" | "),
+    }
+}
+
+/// Characters of a line that a message shows.
+const CHARACTERS_SHOWN: usize = 300;
+
+/// A line, cut if it is too long for a message.
+fn start_of(line: &&str) -> String {
+    match line.char_indices().nth(CHARACTERS_SHOWN) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => (*line).to_owned(),
     }
 }
 
@@ -244,6 +265,14 @@ mod tests {
             "too deep\n{rule}\nPrimary job terminated\n{rule}\n{rule}\nmpirun detected\n{rule}\n"
         );
         assert_eq!(last_lines(&text), "too deep");
+    }
+
+    #[test]
+    fn a_flood_of_output_does_not_hide_the_error_at_its_end() {
+        let script =
+            "head -c 50000000 /dev/zero | tr '\\0' x >&2; echo >&2; echo the reason >&2; exit 7";
+        let End::Exited { code: 7, error } = end_of(script, 60_000) else { panic!() };
+        assert!(error.ends_with("... | the reason") && error.len() < 1000, "{}", error.len());
     }
 
     #[test]

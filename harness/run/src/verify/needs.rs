@@ -38,13 +38,18 @@ pub struct Needs {
 const PROBE: &str = "spacing_min = 1.0\nroot_scale = 2.0\nkeep = KEEP\n[generator]\n\
                      shape = \"cube\"\nfacets = 12\n";
 const PROBE_RANKS: usize = 2;
-const PROBE_LIMIT: Duration = Duration::from_secs(60);
+/// Longest time for a probe.
+const PROBE_LIMIT_MAX: Duration = Duration::from_secs(60);
+
+fn probe_limit(options: &Options) -> Duration {
+    options.limit.min(PROBE_LIMIT_MAX)
+}
 
 impl Needs {
     /// Tries the prerequisites of these options.
     pub fn probe(options: &Options, programs: &Programs, place: &Path) -> Self {
         let probed = match options.mpi {
-            true => probe_mpi(programs, place),
+            true => probe_mpi(programs, place, probe_limit(options)),
             false => Err("--no-mpi was given".to_owned()),
         };
         let mut needs = match probed {
@@ -58,13 +63,13 @@ impl Needs {
             (true, true) => None,
         };
         match options.oracles {
-            true => needs.probe_oracles(&programs.paths, place),
+            true => needs.probe_oracles(&programs.paths, place, probe_limit(options)),
             false => needs.oracles = Some("--no-oracles was given".to_owned()),
         }
         needs
     }
 
-    fn probe_oracles(&mut self, paths: &Paths, place: &Path) {
+    fn probe_oracles(&mut self, paths: &Paths, place: &Path, limit: Duration) {
         let written = tempfile::tempdir_in(place).and_then(|probe| {
             let question = Question::write(&[[0.0; 3]], &[], probe.path())?;
             Ok((probe, question))
@@ -74,7 +79,7 @@ impl Needs {
             Err(error) => return self.oracles = Some(error.to_string()),
         };
         for oracle in ORACLES {
-            match question.ask(oracle, paths, PROBE_LIMIT) {
+            match question.ask(oracle, paths, limit) {
                 Ok(_) => self.oracles_found.push(oracle),
                 Err(failure) if failure.is_interrupt() => return,
                 Err(failure) => self.oracles_missing.push(failure),
@@ -126,7 +131,7 @@ impl Needs {
 
 /// Checks that `mpirun` starts the engine and, if the engine reports the number of its ranks, that they communicate,
 /// which the ranks of a mesher without MPI do not. Returns what remains unknown.
-fn probe_mpi(programs: &Programs, place: &Path) -> Result<Option<String>, String> {
+fn probe_mpi(programs: &Programs, place: &Path, limit: Duration) -> Result<Option<String>, String> {
     if !programs.paths.mpirun.is_file() {
         return Err("mpirun is not on the PATH (ci/setup installs it)".to_owned());
     }
@@ -147,7 +152,7 @@ fn probe_mpi(programs: &Programs, place: &Path) -> Result<Option<String>, String
         level_base: Some("auto".into()),
         ..Layout::on(Ranks::Mpi(PROBE_RANKS))
     };
-    let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), PROBE_LIMIT));
+    let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), limit));
     let ranks = completed.map_err(|failure| format!("on MPI, {failure}"))?.report.ranks;
     match (engine.writes_report(), ranks) {
         (false, _) => {

@@ -121,6 +121,8 @@ pub const EXIT_FAILED: u8 = 1;
 pub const EXIT_INPUT: u8 = 2;
 /// Exit code: a required prerequisite is missing.
 pub const EXIT_MISSING: u8 = 3;
+/// Exit code: standard output cannot be written.
+pub const EXIT_OUTPUT: u8 = 4;
 /// Exit code: interrupted by the user.
 pub const EXIT_INTERRUPTED: u8 = 130;
 

@@ -1,0 +1,52 @@
+//! Printing that never panics. The macros here replace those of the standard library in the whole program: a closed pipe, as in
+//! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
+
+use run::verify::report::{EXIT_HOLDS, EXIT_OUTPUT};
+use std::fmt::Arguments;
+use std::io::{self, ErrorKind, Write, stderr, stdout};
+use std::sync::OnceLock;
+
+/// The first error of standard output, except that of a closed pipe.
+static FAILURE: OnceLock<io::Error> = OnceLock::new();
+
+macro_rules! print {
+    ($($text:tt)*) => { $crate::output::write(format_args!($($text)*)) };
+}
+
+macro_rules! println {
+    ($($text:tt)*) => { $crate::output::write(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::output::write_error(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+/// Writes to standard output.
+pub fn write(text: Arguments) {
+    note(stdout().lock().write_fmt(text));
+}
+
+/// Writes to standard error. If that fails, there is no place left to report it.
+pub fn write_error(text: Arguments) {
+    let _ = stderr().lock().write_fmt(text);
+}
+
+fn note(written: io::Result<()>) {
+    if let Err(error) = written
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        let _ = FAILURE.set(error);
+    }
+}
+
+/// The exit code of a command that returned `code`: [`EXIT_OUTPUT`] if the command succeeded, but its output was lost.
+pub fn finish(code: u8) -> u8 {
+    note(stdout().flush());
+    match FAILURE.get() {
+        Some(error) => {
+            eprintln!("harness: standard output cannot be written: {error}");
+            if code == EXIT_HOLDS { EXIT_OUTPUT } else { code }
+        }
+        None => code,
+    }
+}
