@@ -1,9 +1,11 @@
 //! STL files, binary and text, including common deviations from the format.
 
+mod text;
+
 use crate::error::Error;
 use geometries::Facet;
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::Read;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -67,12 +69,11 @@ impl Stl {
         Error::input(format!("{}: {what}", self.path.display()))
     }
 
-    /// Whether the file begins with "solid" and has no zero byte near its beginning.
+    /// Whether the beginning of the file may be that of text: the first word, if there is one, is `solid`, and no byte is zero.
     fn looks_like_text(&self) -> Result<bool, Error> {
         let mut head = vec![0; self.length.min(1024) as usize];
         self.file.read_exact_at(&mut head, 0).map_err(|e| self.fail(e))?;
-        let text = head.trim_ascii_start();
-        Ok(text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid") && !head.contains(&0))
+        Ok(text::may_begin_with_solid(&head) && !head.contains(&0))
     }
 
     /// Facets `first..end` of a binary file.
@@ -104,30 +105,7 @@ impl Stl {
         }
         let mut bytes = Vec::new();
         self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
-        let mut facets = Vec::new();
-        for (i, solid) in solids(&bytes).into_iter().enumerate() {
-            let broken = |facet: usize, e: std::io::Error| {
-                self.fail(format!(
-                    "facet {facet}, in solid {}, is malformed ({e}): export it again",
-                    i + 1
-                ))
-            };
-            let complete =
-                solid.lines().last().is_some_and(|l| l.trim_start().starts_with("endsolid"));
-            if !complete {
-                return Err(self.fail(format!(
-                    "solid {} has no \"endsolid\": the file is truncated; export it again",
-                    i + 1
-                )));
-            }
-            let mut text = Cursor::new(solid);
-            let first = facets.len();
-            for triangle in stl_io::create_stl_reader(&mut text).map_err(|e| broken(first, e))? {
-                let triangle = triangle.map_err(|e| broken(facets.len(), e))?;
-                facets.push(triangle.vertices.map(|v| v.0));
-            }
-        }
-        Ok(facets)
+        text::parse(&bytes).map_err(|why| self.fail(format!("{why}: export it again")))
     }
 }
 
@@ -136,29 +114,6 @@ fn record(bytes: &[u8; RECORD as usize]) -> Facet {
     let coordinate =
         |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
     std::array::from_fn(|v| std::array::from_fn(|a| coordinate(12 + 12 * v + 4 * a)))
-}
-
-/// The solids of a text file, each in the form that `stl_io` reads: lower case, with line feeds and a name.
-fn solids(bytes: &[u8]) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for line in String::from_utf8_lossy(bytes).split(['\n', '\r']) {
-        let line = line.trim().to_ascii_lowercase();
-        let mut words = line.split_whitespace();
-        let Some(first) = words.next() else { continue };
-        let open = out.last().is_some_and(|s| !s.ends_with("endsolid x\n"));
-        match (first, out.last_mut()) {
-            ("solid", _) => out.push("solid x\n".into()),
-            ("endsolid", Some(s)) if open => s.push_str("endsolid x\n"),
-            // Normals are not used, and often are not numbers.
-            ("facet", Some(s)) => s.push_str("facet normal 0 0 0\n"),
-            (_, Some(s)) => {
-                s.push_str(&line);
-                s.push('\n');
-            }
-            (_, None) => {}
-        }
-    }
-    out
 }
 
 /// Checks that all coordinates are finite; `first` is the index of the first facet, for the error.

@@ -1,6 +1,7 @@
 //! Reader of case files: TOML in which an unknown key is an error.
 use crate::case::{BoxSpec, Case, Enclosed, Keep, Root};
 use crate::error::Error;
+use crate::input_file;
 use crate::stl;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -43,9 +44,9 @@ const ROOT_SCALE: f64 = 10.0;
 /// The case file or the geometry cannot be read or is invalid. Lengths are checked later, by
 /// [`Input::new`](crate::lattice::Input::new).
 pub fn read(path: &Path) -> Result<Case, Error> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| Error::Read { path: path.to_owned(), source })?;
     let invalid = |problem: String| Error::CaseFile { path: path.to_owned(), problem };
+    let text = String::from_utf8(input_file::read(path)?)
+        .map_err(|error| invalid(format!("{error}; save it as UTF-8")))?;
     let file: CaseFile = toml::from_str(&text).map_err(|error| invalid(explain(&error, &text)))?;
     let facets: Vec<stl::Facet> = match (&file.geometry, &file.generator) {
         (Some(geometry), None) => {

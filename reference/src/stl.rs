@@ -5,6 +5,7 @@
 mod ascii;
 
 use crate::error::Error;
+use crate::input_file;
 use std::path::Path;
 
 /// The three vertices of a facet, in the precision of STL.
@@ -19,8 +20,7 @@ const FACET_BYTES: usize = 50;
 /// # Errors
 /// The file cannot be read, is damaged or is not STL, or a vertex is not finite.
 pub fn read(path: &Path) -> Result<Vec<Facet>, Error> {
-    let bytes =
-        std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    let bytes = input_file::read(path)?;
     parse(&bytes).map_err(|problem| Error::Stl { path: path.to_owned(), problem })
 }
 

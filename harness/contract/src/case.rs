@@ -1,5 +1,6 @@
 //! Case files, which describe the input of a mesher (reference/DEFINITION.md, section 10).
 
+use crate::files;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -116,7 +117,7 @@ impl Case {
     /// # Errors
     /// If a file cannot be read, or if the case is invalid.
     pub fn read(path: &Path) -> Result<Self, CaseError> {
-        let text = std::fs::read_to_string(path)
+        let text = files::read_text(path)
             .map_err(|source| CaseError::Io { path: path.to_owned(), source })?;
         let wrong = |why: String| CaseError::Content { path: path.to_owned(), why };
         let file: CaseFile = toml::from_str(&text).map_err(|e| wrong(explain(&e)))?;
@@ -220,7 +221,9 @@ fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
     match (&file.geometry, &file.generator) {
         (Some(stl), None) => {
             let path = case.parent().unwrap_or(Path::new("")).join(stl);
-            stl::read(&path).map_err(|source| CaseError::Stl { path, source })
+            stl::read(&path)
+                .map(|body| body.facets)
+                .map_err(|source| CaseError::Stl { path, source })
         }
         (None, Some(generator)) => generator.facets().map_err(|e| wrong(e.to_string())),
         _ => Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),

@@ -1,5 +1,6 @@
 //! The catalogue of cases (`geometries/catalogue.toml`): cases by name, by size, or by the path of a case file.
 
+use crate::files;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -148,7 +149,7 @@ fn from_path(argument: &str) -> Result<Selected, String> {
 
 fn read(path: &Path) -> Result<Vec<Selected>, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let text = files::read_text(path).map_err(|error| wrong(error.to_string()))?;
     let file: CatalogueFile = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let directory = path.parent().unwrap_or(Path::new("."));
     let selected = |entry: Entry| {
@@ -168,7 +169,7 @@ fn read(path: &Path) -> Result<Vec<Selected>, String> {
 /// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported
 /// when the case is used.
 fn missing_geometry(case: &Path) -> Option<String> {
-    let text = fs::read_to_string(case).ok()?;
+    let text = files::read_text(case).ok()?;
     let geometry = toml::from_str::<Geometry>(&text).ok()?.geometry?;
     let exists = case.parent()?.join(&geometry).exists();
     (!exists).then(|| {

@@ -1,9 +1,38 @@
-//! Files that are either complete or absent.
+//! Reading without waiting, and files that are either complete or absent.
 
-use std::fs::Permissions;
+use std::fs::{self, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+
+/// Reads a regular file. A pipe could wait for a writer forever, and a device has no end.
+///
+/// # Errors
+/// If it is no regular file, or cannot be read.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    refuse_special(path)?;
+    fs::read(path)
+}
+
+/// Reads a regular file of text.
+///
+/// # Errors
+/// If it is no regular file, cannot be read, or is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    refuse_special(path)?;
+    fs::read_to_string(path)
+}
+
+/// Refuses what is there and is no regular file.
+///
+/// # Errors
+/// If it is a directory, a pipe or a device, or missing.
+pub fn refuse_special(path: &Path) -> io::Result<()> {
+    match fs::metadata(path)?.is_file() {
+        true => Ok(()),
+        false => Err(io::Error::other("it is a directory, a pipe or a device: give a file")),
+    }
+}
 
 /// Writes a file so that no reader and no crash ever leaves a partial one at `path`: `write` fills a temporary
 /// file in the same directory, which is flushed to disk and then renamed. An existing file is replaced.
@@ -32,7 +61,6 @@ pub fn write_atomically(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::digest::Digest;
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 use crate::manifest::{self, Manifest, Part, Tally};
 use crate::npy::{self, NpyError, PartFile};
 
@@ -127,7 +127,7 @@ pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
 pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
     let path = dir.join(manifest::FILE);
     let text =
-        fs::read_to_string(&path).map_err(|source| ReadError::Io { path: path.clone(), source })?;
+        files::read_text(&path).map_err(|source| ReadError::Io { path: path.clone(), source })?;
     let manifest: Manifest = serde_json::from_str(&text)
         .map_err(|e| ReadError::Manifest { path: path.clone(), why: e.to_string() })?;
     let wrong = |why| Err(ReadError::Manifest { path, why });

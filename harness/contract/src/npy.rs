@@ -1,5 +1,6 @@
 //! Part files: one-dimensional NumPy arrays of type `<u8`.
 
+use crate::files;
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Read, Write};
 use std::ops::Range;
@@ -54,6 +55,7 @@ impl PartFile {
     /// # Errors
     /// If the file cannot be read, or is not a part file.
     pub fn open(path: &Path) -> Result<Self, NpyError> {
+        files::refuse_special(path)?;
         let file = File::open(path)?;
         let mut head = Vec::new();
         (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head)?;

@@ -4,6 +4,7 @@
 //! unchanged f32 values, and a root that was given by `root_scale` is written with its origin and edge.
 
 use crate::case::{Case, Facet};
+use crate::files;
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::fs;
@@ -27,7 +28,7 @@ impl PlainCase {
     /// One sentence, if it is not a valid case.
     pub fn read(path: &Path) -> Result<Self, String> {
         let case = Case::read(path).map_err(|error| error.to_string())?;
-        let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
+        let text = files::read_text(path).map_err(|error| error.to_string())?;
         let mut table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
         for key in ["geometry", "generator", "root_scale"] {
             table.remove(key);

@@ -4,6 +4,9 @@
 use std::path::Path;
 
 use geometries::Facet;
+use serde::Serialize;
+
+use crate::files;
 
 /// Why a body cannot be read: the predicate of a sentence whose subject is the file.
 #[derive(Debug, thiserror::Error)]
@@ -16,15 +19,45 @@ pub enum StlError {
     Format(String),
 }
 
+/// A solid of an STL file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Solid {
+    /// The name in an ASCII file, possibly empty; none in a binary file, which is one solid.
+    pub name: Option<String>,
+    /// Index of the first facet.
+    pub facet_first: usize,
+    /// Number of facets.
+    pub facets: usize,
+}
+
+/// The content of an STL file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Body {
+    /// The facets of all solids.
+    pub facets: Vec<Facet>,
+    /// The solids, in the order of the file.
+    pub solids: Vec<Solid>,
+}
+
 /// Reads a binary or ASCII STL file into memory.
 ///
 /// # Errors
 /// If the file cannot be read, or is not an STL file.
-pub fn read(path: &Path) -> Result<Vec<Facet>, StlError> {
-    let bytes = std::fs::read(path)?;
-    match binary(&bytes) {
-        Some(facets) => Ok(facets),
-        None => ascii(&bytes),
+pub fn read(path: &Path) -> Result<Body, StlError> {
+    parse(&files::read(path)?)
+}
+
+/// Parses the bytes of an STL file.
+///
+/// # Errors
+/// If they are not an STL file.
+pub fn parse(bytes: &[u8]) -> Result<Body, StlError> {
+    match binary(bytes) {
+        Some(facets) => {
+            let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
+            Ok(Body { facets, solids })
+        }
+        None => ascii(bytes),
     }
 }
 
@@ -47,64 +80,119 @@ fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     Some(bytes[84..].chunks_exact(50).map(facet).collect())
 }
 
-/// The facets of all solids of an ASCII file. A solid's name may be any text, so lines with a name are removed
-/// before the rest is split into words.
-fn ascii(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
-    let text = String::from_utf8_lossy(bytes);
-    let mut lines = text.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty()).peekable();
-    if lines.peek().is_none_or(|l| first_word(l) != "solid") {
-        return Err(wrong("it is not binary and does not begin with `solid`"));
-    }
-    let (mut words, mut open) = (Vec::new(), false);
-    for line in lines {
-        match first_word(line).as_str() {
-            "solid" if open => return Err(wrong("a solid begins before `endsolid`")),
-            "solid" => open = true,
-            "endsolid" => open = false,
-            _ if open => words.extend(line.split_whitespace()),
-            _ => return Err(wrong(&format!("{line:?} is outside all solids"))),
-        }
-    }
-    if open {
-        return Err(wrong("it ends before `endsolid`"));
-    }
-    let mut facets = Vec::new();
-    let mut words = words.into_iter().peekable();
-    while words.peek().is_some() {
-        facets.push(facet(&mut words)?);
-    }
-    Ok(facets)
+/// A word, and the number of line ends before it.
+type Word<'a> = (&'a [u8], usize);
+
+/// The words of a text. A carriage return before a line feed ends one more line, which does no harm: lines are only compared.
+fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let lines = text.split(|b| matches!(b, b'\n' | b'\r')).enumerate();
+    lines.flat_map(|(line, text)| {
+        let words = text.split(|b| matches!(b, b' ' | b'\t' | 0x0b | 0x0c));
+        words.filter(|word| !word.is_empty()).map(move |word| (word, line))
+    })
 }
 
-/// One facet. Its normal is ignored.
-fn facet<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<Facet, StlError> {
-    expect(words, &["facet", "normal"])?;
-    let normal = words.by_ref().take(3).count();
-    expect(words, if normal == 3 { &["outer", "loop"] } else { &["a normal of three numbers"] })?;
+/// The solids of an ASCII file (reference/DEFINITION.md, section 10).
+fn ascii(bytes: &[u8]) -> Result<Body, StlError> {
+    if bytes.contains(&0) {
+        return Err(wrong("it is not binary, and text has no zero bytes"));
+    }
+    let mut words = words(bytes);
+    let mut body = Body::default();
+    if words.clone().next().is_none_or(|(word, _)| !is(word, "solid")) {
+        return Err(wrong("it is not binary and does not begin with `solid`"));
+    }
+    while words.clone().next().is_some() {
+        let line = expect(&mut words, "solid")?;
+        let name = Some(name(&mut words, line, true));
+        let facet_first = body.facets.len();
+        let line = loop {
+            match words.next() {
+                Some((word, _)) if is(word, "facet") => body.facets.push(facet(&mut words)?),
+                Some((word, line)) if is(word, "endsolid") => break line,
+                other => return Err(unexpected("facet` or `endsolid", other)),
+            }
+        };
+        self::name(&mut words, line, false);
+        if starts_facet(&words, line) {
+            return Err(wrong("a facet follows on the line of `endsolid`"));
+        }
+        let facets = body.facets.len() - facet_first;
+        body.solids.push(Solid { name, facet_first, facets });
+    }
+    Ok(body)
+}
+
+/// The words of a line up to its end, up to a facet, or, after `solid`, up to `endsolid`.
+fn name<'a>(
+    words: &mut (impl Iterator<Item = Word<'a>> + Clone),
+    line: usize,
+    of_solid: bool,
+) -> String {
+    let mut name = Vec::new();
+    while let Some((word, at)) = words.clone().next()
+        && at == line
+        && !(of_solid && is(word, "endsolid"))
+        && !starts_facet(words, line)
+    {
+        name.push(String::from_utf8_lossy(word));
+        words.next();
+    }
+    name.join(" ")
+}
+
+/// Whether the first seven words of a facet follow on a line.
+fn starts_facet<'a>(words: &(impl Iterator<Item = Word<'a>> + Clone), line: usize) -> bool {
+    let start: Vec<&[u8]> =
+        words.clone().take(7).take_while(|&(_, at)| at == line).map(|(word, _)| word).collect();
+    let wanted = [(0, "facet"), (1, "normal"), (5, "outer"), (6, "loop")];
+    start.len() == 7 && wanted.iter().all(|&(i, wanted)| is(start[i], wanted))
+}
+
+/// A facet after its first word. Its normal is ignored.
+fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, StlError> {
+    expect(words, "normal")?;
+    if words.take(3).count() < 3 {
+        return Err(unexpected("a normal", None));
+    }
+    expect(words, "outer")?;
+    expect(words, "loop")?;
     let mut facet = Facet::default();
     for vertex in &mut facet {
-        expect(words, &["vertex"])?;
-        for c in vertex {
-            let text = words.next().unwrap_or_default();
-            *c = text.parse().map_err(|_| wrong(&format!("{text:?} is not a coordinate")))?;
+        expect(words, "vertex")?;
+        for coordinate in vertex {
+            let word = words.next();
+            let text = word.and_then(|(word, _)| str::from_utf8(word).ok());
+            let number = text.and_then(|text| text.parse().ok());
+            *coordinate = number.ok_or_else(|| unexpected("a number", word))?;
         }
     }
-    expect(words, &["endloop", "endfacet"])?;
+    expect(words, "endloop")?;
+    expect(words, "endfacet")?;
     Ok(facet)
 }
 
-fn expect<'a>(words: &mut impl Iterator<Item = &'a str>, key: &[&str]) -> Result<(), StlError> {
-    for key in key {
-        let word = words.next().unwrap_or_default();
-        if !word.eq_ignore_ascii_case(key) {
-            return Err(wrong(&format!("`{key}` expected, found {word:?}")));
-        }
+/// Takes this word; returns its line.
+fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize, StlError> {
+    match words.next() {
+        Some((word, line)) if is(word, wanted) => Ok(line),
+        other => Err(unexpected(wanted, other)),
     }
-    Ok(())
 }
 
-fn first_word(line: &str) -> String {
-    line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase()
+fn is(word: &[u8], wanted: &str) -> bool {
+    word.eq_ignore_ascii_case(wanted.as_bytes())
+}
+
+fn unexpected(wanted: &str, found: Option<Word>) -> StlError {
+    match found {
+        Some((word, _)) => {
+            let shown = String::from_utf8_lossy(&word[..word.len().min(40)]);
+            wrong(&format!("`{wanted}` expected, found {shown:?}"))
+        }
+        None => wrong(&format!("it ends where `{wanted}` was expected")),
+    }
 }
 
 fn wrong(why: &str) -> StlError {
@@ -120,7 +208,7 @@ mod tests {
     const EXPECTED: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, -0.25]];
 
     fn of(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
-        binary(bytes).map_or_else(|| ascii(bytes), Ok)
+        parse(bytes).map(|body| body.facets)
     }
 
     #[test]
@@ -161,5 +249,21 @@ mod tests {
         ] {
             assert!(of(text.as_bytes()).is_err(), "{text:?}");
         }
+    }
+
+    #[test]
+    fn every_solid_has_its_name_and_first_facet() {
+        let one_line = FACET.replace('\n', " ");
+        let text = format!(
+            "solid endfacet of a wing\n{FACET}{FACET}endsolid endfacet of a wing\r\nSOLID\n{one_line}\nendsolid\n\
+             solid b {one_line} endsolid b\n"
+        );
+        let solid = |name: &str, facet_first, facets| Solid {
+            name: Some(name.into()),
+            facet_first,
+            facets,
+        };
+        let expected = [solid("endfacet of a wing", 0, 2), solid("", 2, 1), solid("b", 3, 1)];
+        assert_eq!(parse(text.as_bytes()).unwrap().solids, expected);
     }
 }

@@ -1,8 +1,7 @@
 //! Parser of ASCII STL: any number of solids, as words separated by any white space.
 //!
 //! Files in use contain upper and lower case, three kinds of line end, blank lines and solids
-//! without a name. Lines matter only after `solid` and `endsolid`, where the rest of the line is a
-//! name.
+//! without a name. Lines matter only after `solid` and `endsolid`, for names (DEFINITION, section 10).
 use super::Facet;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
@@ -21,15 +20,19 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
         if !word.eq_ignore_ascii_case(b"solid") {
             return Err(words.unexpected("solid", Some(word)));
         }
-        words.skip_line();
+        words.skip_name(true);
         loop {
             match words.next() {
                 Some(word) if word.eq_ignore_ascii_case(b"facet") => {
                     facets.push(facet(&mut words)?);
                 }
-                Some(word) if word.eq_ignore_ascii_case(b"endsolid") => break words.skip_line(),
+                Some(word) if word.eq_ignore_ascii_case(b"endsolid") => break,
                 other => return Err(words.unexpected("facet or endsolid", other)),
             }
+        }
+        words.skip_name(false);
+        if words.starts_facet() {
+            return Err(words.unexpected("the end of the line", words.clone().next()));
         }
     }
     Ok(facets)
@@ -40,7 +43,7 @@ fn facet(words: &mut Words) -> Result<Facet, String> {
     words.expect("normal")?;
     for _ in 0..3 {
         // Normals are not used: exporters write arbitrary words for facets without area.
-        words.next();
+        words.next().ok_or_else(|| words.unexpected("a normal", None))?;
     }
     words.expect("outer")?;
     words.expect("loop")?;
@@ -56,7 +59,13 @@ fn facet(words: &mut Words) -> Result<Facet, String> {
     Ok(vertices)
 }
 
+/// White space in the sense of C, with the vertical tab, which `u8::is_ascii_whitespace` lacks.
+fn is_white(byte: &u8) -> bool {
+    byte.is_ascii_whitespace() || *byte == 0x0b
+}
+
 /// An iterator over the words of a text that counts lines.
+#[derive(Clone)]
 struct Words<'a> {
     rest: &'a [u8],
     line: usize,
@@ -72,21 +81,44 @@ impl<'a> Words<'a> {
     }
 
     fn next(&mut self) -> Option<&'a [u8]> {
-        while self.rest.first().is_some_and(u8::is_ascii_whitespace) {
+        while self.rest.first().is_some_and(is_white) {
             self.step();
         }
-        let length = self.rest.iter().take_while(|byte| !byte.is_ascii_whitespace()).count();
+        let length = self.rest.iter().take_while(|byte| !is_white(byte)).count();
         let (word, rest) = self.rest.split_at(length);
         self.rest = rest;
         self.after_return &= word.is_empty();
         (!word.is_empty()).then_some(word)
     }
 
-    /// Skips to the end of the line.
-    fn skip_line(&mut self) {
-        while self.rest.first().is_some_and(|&byte| byte != b'\n' && byte != b'\r') {
+    /// The next word, if it is on the same line as the previous one.
+    fn next_on_line(&mut self) -> Option<&'a [u8]> {
+        while self.rest.first().is_some_and(|byte| is_white(byte) && !b"\n\r".contains(byte)) {
             self.step();
         }
+        if self.rest.first().is_none_or(is_white) { None } else { self.next() }
+    }
+
+    /// Skips a name: the words up to the end of the line, up to a facet, or, if `in_solid`, up to `endsolid`.
+    fn skip_name(&mut self, in_solid: bool) {
+        loop {
+            let mut after = self.clone();
+            let Some(word) = after.next_on_line() else { return };
+            if (in_solid && word.eq_ignore_ascii_case(b"endsolid")) || self.starts_facet() {
+                return;
+            }
+            *self = after;
+        }
+    }
+
+    /// Whether the line continues with the first seven words of a facet.
+    fn starts_facet(&self) -> bool {
+        let mut words = self.clone();
+        let start: [Option<&[u8]>; 7] = std::array::from_fn(|_| words.next_on_line());
+        let is = |i: usize, wanted: &[u8]| {
+            start[i].is_some_and(|word| word.eq_ignore_ascii_case(wanted))
+        };
+        is(0, b"facet") && is(1, b"normal") && is(5, b"outer") && is(6, b"loop")
     }
 
     fn step(&mut self) {

@@ -91,7 +91,7 @@ pub struct Content {
 /// If the file cannot be read.
 pub fn read(path: &Path) -> io::Result<Content> {
     let mut content = Content::default();
-    for (i, text) in std::fs::read_to_string(path)?.lines().enumerate() {
+    for (i, text) in contract::files::read_text(path)?.lines().enumerate() {
         match serde_json::from_str::<Line>(text) {
             _ if text.trim().is_empty() => {}
             Ok(line) if line.schema == SCHEMA => content.lines.push(line),

@@ -35,8 +35,8 @@ impl Base {
     /// One sentence, if the case is invalid or the directory cannot be written.
     pub fn read(path: &Path, directory: &Path) -> Result<Self, String> {
         let case = Case::read(path).map_err(|error| error.to_string())?;
-        let text =
-            fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = contract::files::read_text(path)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         let mut table: Table =
             text.parse().map_err(|error| format!("{}: {error}", path.display()))?;
         let stl = directory.join(format!("{}.stl", case.name));

@@ -110,7 +110,7 @@ impl Rules {
     /// If the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, GateError> {
         let wrong = |why: String| GateError::Input(format!("{}: {why}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         let mut rules: Self =
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();

@@ -137,7 +137,7 @@ impl Targets {
     /// One sentence with the file, the position and the error.
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("{}: {why}", path.display());
-        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         let mut targets: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         targets.directory = path.parent().unwrap_or(Path::new(".")).to_owned();
         targets.check().map_err(wrong)?;

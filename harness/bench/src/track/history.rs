@@ -108,7 +108,7 @@ impl Record {
 /// One sentence with the number of the invalid line.
 pub fn read(path: &Path) -> Result<Vec<Record>, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let text = match fs::read_to_string(path) {
+    let text = match contract::files::read_text(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         other => other.map_err(|error| wrong(error.to_string()))?,
     };

@@ -87,7 +87,7 @@ impl AuditRecord {
     /// One sentence, if the file cannot be read or is not a record.
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("{}: {why}", path.display());
-        let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         let record: Self = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         match record.schema == SCHEMA {
             true => Ok(record),

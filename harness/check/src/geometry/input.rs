@@ -5,9 +5,7 @@ use std::path::Path;
 use contract::case::{Case, Facet};
 use contract::lattice::{FacetLattice, Root};
 use contract::manifest::Keep;
-use contract::stl;
-
-use super::solids::{self, Solid};
+use contract::stl::{self, Body, Solid};
 
 /// Root and spacing given by the user, in the user's units. They take precedence over a case file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,8 +45,8 @@ impl Input {
             return Self::from_case(path, requested);
         }
         let named = |error: String| format!("{}: {error}", path.display());
-        let facets = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
-        let solids = solids::read(path, facets.len()).map_err(|error| named(error.to_string()))?;
+        let body = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
+        let Body { facets, solids } = body;
         let input = Self::new(facets, requested).map_err(named)?;
         Ok(Self { solids, ..input })
     }

@@ -24,7 +24,6 @@ pub mod openings;
 pub mod report;
 pub mod sheets;
 pub mod shells;
-pub mod solids;
 pub mod text;
 pub mod width;
 

@@ -1,6 +1,7 @@
 //! The result of a diagnosis as data; JSON of the schema `octree-geometry/1` when serialised.
 
 use contract::lattice::Root;
+use contract::stl::Solid;
 use serde::Serialize;
 
 use super::edges::Edges;
@@ -9,7 +10,6 @@ use super::finding::{Finding, Kind};
 use super::input::Input;
 use super::meaning;
 use super::shells::Shell;
-use super::solids::Solid;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-geometry/1";

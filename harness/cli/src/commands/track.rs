@@ -114,7 +114,7 @@ fn append(arguments: &Arguments) -> Result<(), String> {
     let mut record = Record::of_commit(&arguments.commit, &repository(arguments))?;
     for file in &arguments.add {
         let wrong = |why: String| format!("{}: {why}", file.display());
-        let text = fs::read(file).map_err(|error| wrong(error.to_string()))?;
+        let text = contract::files::read(file).map_err(|error| wrong(error.to_string()))?;
         record.add(&text).map_err(wrong)?;
     }
     record.metrics.extend(arguments.value.iter().cloned());

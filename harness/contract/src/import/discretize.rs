@@ -10,10 +10,10 @@
 
 use super::cells::Cells;
 use super::{ImportError, Request, refuse_sides};
+use crate::files;
 use crate::lattice::Root;
 use crate::octant::CELLS_PER_EDGE;
 use serde::Deserialize;
-use std::fs;
 use std::path::Path;
 
 /// Rounding errors of `write_UBC`: half a unit of the last decimal of the corner, and of the smallest edge.
@@ -49,7 +49,7 @@ struct CellState {
 /// If the file cannot be read or is damaged, or if the smallest cells are not equal cubes.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     refuse_sides(request, "discretize's file")?;
-    let text = fs::read_to_string(path)?;
+    let text = files::read_text(path)?;
     match text.trim_start().starts_with('{') {
         true => from_json(&text),
         false => from_ubc(&text, request.root),

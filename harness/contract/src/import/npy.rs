@@ -2,9 +2,9 @@
 
 use super::cells::Cells;
 use super::{ImportError, Request, table, text};
+use crate::files;
 use crate::npy::read_header;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
-use std::fs;
 use std::path::Path;
 
 /// The numbers of a column: the one of row r is at the byte `first + r * stride`.
@@ -28,7 +28,7 @@ struct Number {
 /// # Errors
 /// If the file cannot be read, is not an array of numbers, or is shorter or longer than its header states.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
-    let bytes = fs::read(path)?;
+    let bytes = files::read(path)?;
     let (header, offset) = read_header(&bytes)
         .map_err(|error| ImportError::content(format!("has no npy header: {error}")))?;
     let data = &bytes[offset as usize..];

@@ -10,8 +10,8 @@
 
 use super::cells::Cells;
 use super::{ImportError, Request, refuse_sides, root};
+use crate::files;
 use crate::lattice::Root;
-use std::fs;
 use std::path::Path;
 
 /// `P8EST_ONDISK_FORMAT`.
@@ -27,7 +27,7 @@ const QUADRANT_BYTES: u64 = 16;
 /// If the file cannot be read, is damaged, or has trees that are not cubes along the axes.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     refuse_sides(request, "p4est's file")?;
-    let bytes = fs::read(path)?;
+    let bytes = files::read(path)?;
     let mut input = Input { bytes: &bytes, at: 0 };
     let trees = connectivity(&mut input)?;
     input.align()?;

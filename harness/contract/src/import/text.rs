@@ -5,7 +5,7 @@
 
 use super::cells::Cells;
 use super::{ImportError, Request, table};
-use std::fs;
+use crate::files;
 use std::path::Path;
 
 /// Reads a table.
@@ -13,7 +13,7 @@ use std::path::Path;
 /// # Errors
 /// If the file cannot be read, a line has another number of fields than the first, or a field is not a number.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
-    let text = fs::read_to_string(path)?;
+    let text = files::read_text(path)?;
     let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !is_comment(line)).peekable();
     let Some(&(number, first)) = lines.peek() else {
         return Err(ImportError::content("has no cells"));

@@ -79,7 +79,7 @@ impl Description {
         };
         let wrong = |why: String| format!("{}: {why}", path.display());
         let own = OWN.iter().find(|(own, _)| *own == name);
-        let text = match (std::fs::read_to_string(&path), own) {
+        let text = match (contract::files::read_text(&path), own) {
             (Err(error), Some((_, text))) if error.kind() == ErrorKind::NotFound => {
                 (*text).to_owned()
             }

@@ -86,7 +86,7 @@ impl RunReport {
     /// One sentence, if the file cannot be read or does not have the fields that are required.
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("the run report {} is unusable: {why}", path.display());
-        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))
     }
 

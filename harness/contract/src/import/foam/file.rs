@@ -1,7 +1,7 @@
 //! OpenFOAM's files: the dictionary `FoamFile` at the beginning, and the tokens of what follows. `lists` reads the lists.
 
+use crate::files;
 use crate::import::ImportError;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A file whose dictionary has been read.
@@ -26,7 +26,7 @@ impl FoamFile {
             return Err(ImportError::content("is compressed: decompress it with gunzip")
                 .of_file(&path.with_extension("gz")));
         }
-        let bytes = fs::read(path).map_err(|error| ImportError::from(error).of_file(path))?;
+        let bytes = files::read(path).map_err(|error| ImportError::from(error).of_file(path))?;
         let mut file = Self {
             path: path.to_owned(),
             bytes,
