@@ -58,7 +58,7 @@ fn mesh(options: &Options, comm: &impl CommunicatorCollectives) -> Result<(), St
     let case = Case::read(&options.case).map_err(|error| error.to_string())?;
     let mut clock = Clock::start();
     let points = points(&case, comm);
-    clock.end("sample");
+    clock.end("search");
     // A leaf with any point is split down to the surface level.
     let tree = Octree::new(&points, case.level_surface.into(), 0, comm);
     clock.end("tree");
