@@ -122,7 +122,11 @@ fn programs(arguments: &Arguments) -> Result<Programs, u8> {
     if arguments.engine.iter().any(|name| name != "reference") {
         require(programs.mesher.program())?;
     }
-    for engine in engines(arguments, &programs) {
+    let engines = engines(arguments, &programs);
+    if engines.len() < arguments.engine.len() {
+        return Err(wrong("--engine has two programs of one name: rename a file".to_owned()));
+    }
+    for engine in engines {
         require(engine.program())?;
     }
     Ok(programs)

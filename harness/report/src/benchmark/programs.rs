@@ -30,7 +30,8 @@ fn time(comparison: &Comparison) -> Figure {
     let mut all = series(comparison, |g| g.cpu_s().map(|time| point(cells(g), time)));
     let search = series(comparison, |g| g.search_s().map(|time| point(cells(g), time)));
     let search = search.into_iter().filter(|series| !series.points.is_empty()).zip(all.len()..);
-    let named = |(s, style)| Series { name: format!("{}: search", s.name), style, ..s };
+    let named =
+        |(s, style): (Series, usize)| Series { name: format!("{}: search", s.name), style, ..s };
     all.extend(search.map(named).collect::<Vec<_>>());
     figure(comparison, "time", "CPU time", Axis::log("CPU time / s"), all)
 }
