@@ -27,7 +27,8 @@ fn session() -> Line {
         commit: "0123456789ab".into(),
     };
     let command = vec!["harness".into(), "bench".into()];
-    line(Entry::Session(Box::new(Session { command, machine, load_average: 0.0 })))
+    let lacks = [("other".to_owned(), vec!["MPI".to_owned()])].into();
+    line(Entry::Session(Box::new(Session { command, machine, load_average: 0.0, lacks })))
 }
 
 /// Six repetitions of a run with nearly the same load on every rank.
@@ -75,6 +76,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             digest: "0".repeat(32),
             time_wall_s: 2.0 * useful.max,
             time_launch_s: 3.0 * useful.max,
+            time_cpu_s: 3.0 * useful.sum,
             peak_rss_bytes: Spread::of(&vec![1e6; ranks]),
             useful_s: Spread::of(&both_phases),
             phases: vec![phase("refine"), phase("grade")],
@@ -186,14 +188,15 @@ fn two_programs_are_never_in_one_series() {
         if let Entry::Run(run) = &mut line.entry {
             run.setup.engine = "other".into();
             run.time_wall_s *= 3.0;
+            run.phases[0].name = "search".into();
         }
         line
     };
     lines.extend(record().iter().map(other));
     let place = tempfile::tempdir().unwrap();
     let written = report(place.path(), &lines, &[]).unwrap();
-    // Figures over cells show both programs, and all others one.
-    assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4);
+    // Figures over cells show both programs, all others one; three compare them on one core.
+    assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4 + 3);
     let read = |name: &str| {
         std::fs::read_to_string(place.path().join("figures").join(format!("{name}.csv"))).unwrap()
     };
@@ -206,10 +209,23 @@ fn two_programs_are_never_in_one_series() {
             }
         }
     }
+    for name in ["time", "rate", "memory"] {
+        let text = read(&format!("programs-{name}-uav-4"));
+        for engine in ["mesher", "other"] {
+            assert_eq!(
+                text.matches(&format!("\n{engine},measured,")).count(),
+                5,
+                "{name}:\n{text}"
+            );
+        }
+        let search = text.matches("\nother: search,measured,").count();
+        assert_eq!(search, if name == "time" { 5 } else { 0 }, "{text}");
+    }
     assert!(read("speedup-other-uav-50M").contains("\"other, projected\",projected,64,"));
     assert!(read("phases-weak-other-uav").contains("64,other: grade,"));
     let page = std::fs::read_to_string(&written.page).unwrap();
     assert!(page.contains("Speedup: uav by other") && page.contains("uav by mesher"), "{page}");
+    assert!(page.contains("other does not provide: MPI"), "{page}");
     assert!(page.matches("<td>other</td>").count() == page.matches("<td>mesher</td>").count());
 }
 

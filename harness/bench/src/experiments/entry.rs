@@ -38,6 +38,8 @@ pub enum Entry {
     Run(Box<Run>),
     /// A program failed.
     Failure(Failure),
+    /// A program was not run on a mesh.
+    LeftOut(LeftOut),
     /// A mesh was written and `harness audit` read it.
     Audit(Audited),
     /// A target was compared with measurements.
@@ -53,6 +55,9 @@ pub struct Session {
     pub machine: Machine,
     /// Load average at the beginning: a high value means that other work may have disturbed the runs.
     pub load_average: f64,
+    /// By program: what it does not do or promise.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub lacks: BTreeMap<String, Vec<String>>,
 }
 
 /// A machine, and the software that affects measurements on it.
@@ -199,6 +204,9 @@ pub struct Run {
     pub time_wall_s: f64,
     /// Wall time by the harness's clock, from the start of the launcher to its end.
     pub time_launch_s: f64,
+    /// CPU time of the whole process and of all its descendants, seen from outside, in seconds; 0 in old records.
+    #[serde(default)]
+    pub time_cpu_s: f64,
     /// Peak resident memory per rank, or of the whole process if ranks are simulated.
     pub peak_rss_bytes: Spread,
     /// CPU time outside calls to other ranks, over all phases.
@@ -221,6 +229,15 @@ pub struct Failure {
     /// The command line.
     pub command: String,
     /// The failure in a sentence.
+    pub why: String,
+}
+
+/// A run that was not made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// A run's parameters.
+    pub setup: Setup,
+    /// The reason in a sentence.
     pub why: String,
 }
 

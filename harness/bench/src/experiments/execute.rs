@@ -88,7 +88,7 @@ impl Runner<'_> {
         };
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
-        let Completed { report, time_process_s, command, .. } = completed?;
+        let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
         kept.map_err(Failed::Reason)?;
         if setup.comm == Comm::Sim && report.phases.is_empty() {
             let why =
@@ -101,6 +101,7 @@ impl Runner<'_> {
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
             command: shown(&command, self.place),
             time_launch_s: time_process_s,
+            time_cpu_s: time_process_cpu_s,
             ..measurements(setup.clone(), report)
         })
     }
@@ -209,6 +210,7 @@ fn measurements(setup: Setup, report: RunReport) -> Run {
         cells: report.cells,
         time_wall_s,
         time_launch_s: 0.0,
+        time_cpu_s: 0.0,
         peak_rss_bytes: Spread::brief(&peak_rss_bytes(&setup, &report)),
         useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
         phases: report.phases.iter().map(phase).collect(),

@@ -1,9 +1,10 @@
 //! Repetitions of the same setup, and the statistics of each such group.
 
-use super::entry::{Comm, Entry, Line, Network, Phase, Run, Setup, Spread};
+use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Phase, Run, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::statistics::{Median, median};
+use std::collections::BTreeMap;
 
 /// The repetitions of one run.
 #[derive(Clone, Debug)]
@@ -134,6 +135,10 @@ pub struct Groups {
     pub all: Vec<Group>,
     /// The last run of every setup that contains a message matrix, including warm-ups.
     pub matrices: Vec<Run>,
+    /// Runs that failed or were left out.
+    pub left_out: Vec<LeftOut>,
+    /// By program: what it does not do or promise.
+    pub lacks: BTreeMap<String, Vec<String>>,
     /// The network of the last line that has one.
     pub network: Network,
 }
@@ -144,9 +149,16 @@ impl Groups {
         let mut network = ASSUMED;
         let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
         let mut matrices: Vec<Run> = Vec::new();
+        let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
         for line in lines {
             match &line.entry {
                 Entry::Network(n) => network = *n,
+                Entry::Session(session) => lacks.extend(session.lacks.clone()),
+                Entry::LeftOut(left) => left_out.push(left.clone()),
+                Entry::Failure(Failure { setup, why, .. }) => {
+                    let why = format!("{} failed: {why}", setup.engine);
+                    left_out.push(LeftOut { setup: setup.clone(), why });
+                }
                 Entry::Run(run) if !run.warm_up => {
                     match by_setup.iter_mut().find(|(setup, _)| *setup == run.setup) {
                         Some((_, runs)) => runs.push((**run).clone()),
@@ -165,7 +177,8 @@ impl Groups {
             matrices.push(run.clone());
         }
         let group = |(setup, runs): (Setup, Vec<Run>)| Group::of(setup, runs, &network);
-        Self { all: by_setup.into_iter().filter_map(group).collect(), matrices, network }
+        let all = by_setup.into_iter().filter_map(group).collect();
+        Self { all, matrices, left_out, lacks, network }
     }
 
     /// Returns the groups whose setup satisfies `predicate`, in ascending order of `key`.

@@ -9,13 +9,16 @@
 pub mod cause;
 pub mod entry;
 pub mod execute;
-pub mod foreign;
+mod feasible;
+#[cfg(test)]
+mod foreign;
 pub mod group;
 pub mod machine;
 pub mod network;
 pub mod plan;
 mod points;
 pub mod pop;
+pub mod programs;
 pub mod record;
 pub mod session;
 pub mod sizing;
@@ -27,6 +30,7 @@ use plan::Study;
 use points::warmers;
 use run::engine::programs::Programs;
 use session::{Bench, BenchError, Options, Point};
+use std::collections::BTreeMap;
 use std::path::Path;
 use variant::Base;
 
@@ -53,24 +57,28 @@ pub fn bench(
     if options.studies.iter().flat_map(|s| &s.layouts).any(|l| l.comm == Comm::Sim) {
         bench.measure_network()?;
     }
-    for study in &options.studies {
-        bench.study(study)?;
+    for studies in options.studies.chunk_by(Study::has_meshes_of) {
+        bench.studies(studies)?;
     }
     let failures = bench.lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
     Ok(Outcome { lines: bench.lines, failures })
 }
 
 impl Bench<'_> {
-    /// Runs a study.
-    fn study(&mut self, study: &Study) -> Result<(), BenchError> {
-        let base = self.base(&study.case)?;
+    /// Runs the studies of the same meshes by several programs, which take turns.
+    fn studies(&mut self, studies: &[Study]) -> Result<(), BenchError> {
+        let first = &studies[0];
+        let base = self.base(&first.case)?;
         (self.progress)(&format!(
             "{} scaling of {}: choosing spacings",
-            study.experiment, base.name
+            first.experiment, base.name
         ));
-        let mut points = self.points(study, &base)?;
+        let (mut sizes, mut points) = (BTreeMap::new(), Vec::new());
+        for study in studies {
+            points.extend(self.points(study, &base, &mut sizes)?);
+        }
         self.warm_up(&mut points)?;
-        for repeat in 0..study.repeats {
+        for repeat in 0..first.repeats {
             for point in points.iter_mut().filter(|p| !p.failed) {
                 self.run(point, repeat, false)?;
             }
@@ -85,10 +93,19 @@ impl Bench<'_> {
         Base::read(&path, self.runner.place).map_err(BenchError::Input)
     }
 
-    /// Meshes every case once, excluded from statistics, to fill the file cache.
+    /// Meshes every case once, excluded from statistics, to fill the file cache. A program that would exceed the time or
+    /// the memory is not run on that mesh.
     fn warm_up(&mut self, points: &mut [Point]) -> Result<(), BenchError> {
         for index in warmers(points) {
-            self.run(&mut points[index], 0, true)?;
+            let setup = points[index].setup.clone();
+            let Some(why) = feasible::excess(&self.lines, &setup, self.runner.limit) else {
+                self.run(&mut points[index], 0, true)?;
+                continue;
+            };
+            let case = points[index].case.clone();
+            let of_mesh = |p: &&mut Point| p.case == case && p.setup.engine == setup.engine;
+            points.iter_mut().filter(of_mesh).for_each(|point| point.failed = true);
+            self.leave_out(setup, why)?;
         }
         Ok(())
     }

@@ -51,6 +51,8 @@ pub struct Layout {
 /// One experiment on one case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
+    /// The program, by its name in the record.
+    pub engine: String,
     /// The kind of experiment.
     pub experiment: Experiment,
     /// The case's name in the catalogue, or a case file.
@@ -73,6 +75,8 @@ pub struct Study {
 /// Changes of a preset by the command line.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
+    /// The program, by its name in the record.
+    pub engine: String,
     /// Cases instead of the preset's.
     pub cases: Vec<String>,
     /// Experiments instead of all.
@@ -102,6 +106,22 @@ pub struct Overrides {
 }
 
 const MILLION: u64 = 1_000_000;
+
+impl Study {
+    /// Whether another study has the same meshes.
+    pub fn has_meshes_of(&self, other: &Self) -> bool {
+        let meshes = |s: &Self| (s.experiment, s.cells, s.case.clone());
+        meshes(self) == meshes(other)
+    }
+}
+
+/// Returns the studies of several programs, those of the same meshes in succession.
+pub fn comparison(preset: Preset, programs: &[Overrides]) -> Vec<Study> {
+    let all: Vec<Study> = programs.iter().flat_map(|p| studies(preset, p)).collect();
+    let mut sorted = all.clone();
+    sorted.sort_by_key(|study| all.iter().position(|other| other.has_meshes_of(study)));
+    sorted
+}
 
 /// Returns the studies of a preset with the overrides applied.
 pub fn studies(preset: Preset, overrides: &Overrides) -> Vec<Study> {
@@ -192,6 +212,7 @@ fn change(study: &mut Study, overrides: &Overrides) {
         study.partitioners.clone_from(&overrides.partitioners);
     }
     study.repeats = overrides.repeats.unwrap_or(study.repeats);
+    study.engine.clone_from(&overrides.engine);
 }
 
 fn small() -> Vec<Study> {
@@ -246,8 +267,9 @@ fn study(
         // The default of the mesher.
         _ => (words(&[""]), words(&[""])),
     };
-    let (case, layouts) = (case.to_owned(), layouts.to_vec());
-    Study { experiment, case, cells: Some(cells), layers, layouts, weights, partitioners, repeats }
+    let (engine, case, layouts) = (String::new(), case.to_owned(), layouts.to_vec());
+    let cells = Some(cells);
+    Study { engine, experiment, case, cells, layers, layouts, weights, partitioners, repeats }
 }
 
 /// Returns layouts of simulated runs followed by runs on MPI.

@@ -11,33 +11,28 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 impl Bench<'_> {
-    /// Returns the runs of a study.
-    pub(crate) fn points(&mut self, study: &Study, base: &Base) -> Result<Vec<Point>, BenchError> {
-        let mut sizes: BTreeMap<u32, Sizes> = BTreeMap::new();
+    /// Returns the runs of a study; `sizes` has the known sizes of the case by n.
+    pub(crate) fn points(
+        &mut self,
+        study: &Study,
+        base: &Base,
+        sizes: &mut BTreeMap<u32, Sizes>,
+    ) -> Result<Vec<Point>, BenchError> {
         let own = [base.layer_cells_min];
         let layers = if study.layers.is_empty() { &own[..] } else { &study.layers };
         let mut points = Vec::new();
         for &n in layers {
             for layout in &study.layouts {
-                for spacing in self.spacings(study, base, layout, &mut sizes)? {
+                for spacing in self.spacings(study, base, layout, sizes)? {
                     let case = base.variant(spacing, n).map_err(BenchError::Input)?;
-                    if let Some(why) = self.declined(&case)? {
-                        (self.progress)(&format!("left out, spacing {spacing:.3e}, n {n}: {why}"));
+                    if let Some(why) = self.declined(study, &case)? {
+                        let setup = setup(study, base, layout, spacing, n, ["", ""]);
+                        self.leave_out(setup, why)?;
                         continue;
                     }
-                    for (weights, partitioner) in pairs(&study.weights, &study.partitioners) {
-                        points.push(Point {
-                            setup: self.setup(
-                                study,
-                                base,
-                                layout,
-                                spacing,
-                                n,
-                                [weights, partitioner],
-                            ),
-                            case: case.clone(),
-                            failed: false,
-                        });
+                    for choice in pairs(&study.weights, &study.partitioners) {
+                        let setup = setup(study, base, layout, spacing, n, choice);
+                        points.push(Point { setup, case: case.clone(), failed: false });
                     }
                 }
             }
@@ -46,32 +41,10 @@ impl Bench<'_> {
     }
 
     /// Returns the reason in the engine's description for which it is not run on a case.
-    fn declined(&self, case: &Path) -> Result<Option<String>, BenchError> {
-        let engine = self.runner.programs.labelled(&self.options.engine);
+    fn declined(&self, study: &Study, case: &Path) -> Result<Option<String>, BenchError> {
+        let engine = self.runner.programs.labelled(&study.engine);
         let case = Case::read(case).map_err(|error| BenchError::Input(error.to_string()))?;
         Ok(engine.description().declines(&case))
-    }
-
-    fn setup(
-        &self,
-        study: &Study,
-        base: &Base,
-        layout: &Layout,
-        spacing_min: f64,
-        layer_cells_min: u32,
-        [weights, partitioner]: [&str; 2],
-    ) -> Setup {
-        Setup {
-            experiment: study.experiment.to_string(),
-            engine: self.options.engine.clone(),
-            case: base.name.clone(),
-            spacing_min,
-            layer_cells_min,
-            ranks: layout.ranks,
-            comm: layout.comm,
-            partitioner: partitioner.to_owned(),
-            weights: weights.to_owned(),
-        }
     }
 
     /// Returns the spacings of a study's meshes for a number of ranks.
@@ -123,8 +96,29 @@ impl Bench<'_> {
     }
 }
 
-/// Returns, for every mesh, the index of the point that warms it up: the one on the most ranks that reports a message matrix,
-/// otherwise the first.
+fn setup(
+    study: &Study,
+    base: &Base,
+    layout: &Layout,
+    spacing_min: f64,
+    layer_cells_min: u32,
+    [weights, partitioner]: [&str; 2],
+) -> Setup {
+    Setup {
+        experiment: study.experiment.to_string(),
+        engine: study.engine.clone(),
+        case: base.name.clone(),
+        spacing_min,
+        layer_cells_min,
+        ranks: layout.ranks,
+        comm: layout.comm,
+        partitioner: partitioner.to_owned(),
+        weights: weights.to_owned(),
+    }
+}
+
+/// Returns, for every mesh of every engine, the index of the point that warms it up: the one on the most ranks that reports
+/// a message matrix, otherwise the first.
 pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
     let worth = |point: &Point| match execute::has_message_matrix(&point.setup) {
         true => point.setup.ranks,
@@ -132,7 +126,8 @@ pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
     };
     let mut best: Vec<usize> = Vec::new();
     for (index, point) in points.iter().enumerate() {
-        match best.iter_mut().find(|b| points[**b].case == point.case) {
+        let mesh = |p: &Point| (p.setup.engine.clone(), p.case.clone());
+        match best.iter_mut().find(|b| mesh(&points[**b]) == mesh(point)) {
             Some(chosen) if worth(point) > worth(&points[*chosen]) => *chosen = index,
             Some(_) => {}
             None => best.push(index),
@@ -142,10 +137,10 @@ pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
 }
 
 /// Returns all combinations except `rebalance` with METIS, which is identical to `area`.
-fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<(&'a str, &'a str)> {
+fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<[&'a str; 2]> {
     let all =
-        weights.iter().flat_map(|w| partitioners.iter().map(move |p| (w.as_str(), p.as_str())));
-    all.filter(|pair| partitioners.len() == 1 || *pair != ("rebalance", "metis")).collect()
+        weights.iter().flat_map(|w| partitioners.iter().map(move |p| [w.as_str(), p.as_str()]));
+    all.filter(|pair| partitioners.len() == 1 || *pair != ["rebalance", "metis"]).collect()
 }
 
 #[cfg(test)]
@@ -171,5 +166,7 @@ mod tests {
         let mut weak = points;
         weak.iter_mut().for_each(|p| p.setup.experiment = "weak".into());
         assert_eq!(warmers(&weak), [0, 4]);
+        weak[2].setup.engine = "another".into();
+        assert_eq!(warmers(&weak), [0, 2, 4]);
     }
 }

@@ -1,6 +1,6 @@
 //! A measurement session: makes runs, checks that equal meshes have equal digests, and appends to the record.
 
-use super::entry::{Comm, Entry, Failure, Line, Network, Run, Session, Setup};
+use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup};
 use super::execute::{Failed, Runner};
 use super::plan::Study;
 use super::record::Record;
@@ -8,7 +8,7 @@ use super::{machine, network, table};
 use check::promises::Independence;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -17,8 +17,6 @@ use std::time::Duration;
 pub struct Options {
     /// The studies, in order.
     pub studies: Vec<Study>,
-    /// `mesher`, `reference`, or the name of the engine in the record.
-    pub engine: String,
     /// How ranks are started.
     pub launcher: Launcher,
     /// Latency and bandwidth; measured by default if the launcher exists.
@@ -49,6 +47,7 @@ pub enum BenchError {
 pub(crate) struct Point {
     pub setup: Setup,
     pub case: PathBuf,
+    /// Whether a run failed, or none is possible.
     pub failed: bool,
 }
 
@@ -58,9 +57,9 @@ pub(crate) fn temporary_directory() -> Result<tempfile::TempDir, BenchError> {
     place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))
 }
 
-/// Everything that a mesh, and so its digest, depends on: case, spacing, n, and the partition unless the engine promises
-/// independence of it.
-type Mesh = (String, String, u32, String);
+/// Everything that a mesh, and so its digest, depends on: engine, case, spacing, n, and the partition unless the engine
+/// promises independence of it.
+type Mesh = [String; 5];
 
 /// A running session.
 pub(crate) struct Bench<'a> {
@@ -103,10 +102,16 @@ impl Bench<'_> {
     fn begin(&mut self) -> Result<(), BenchError> {
         let catalogue = &self.runner.programs.paths.catalogue;
         let repository = catalogue.path().parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        let engines: BTreeSet<&String> = self.options.studies.iter().map(|s| &s.engine).collect();
+        let lacks = |engine: &String| {
+            let lacks = self.runner.programs.labelled(engine).description().lacks();
+            (engine.clone(), lacks)
+        };
         let session = Session {
             command: self.options.command.clone(),
             machine: machine::describe(&self.options.launcher.program(), repository),
             load_average: machine::load_average(),
+            lacks: engines.into_iter().map(lacks).collect(),
         };
         self.append(Entry::Session(Box::new(session)))
     }
@@ -135,9 +140,10 @@ impl Bench<'_> {
     ) -> Result<(), BenchError> {
         let s = &point.setup;
         (self.progress)(&format!(
-            "{} {}: {} {} ranks, spacing {:.3e}, n {}{}",
+            "{} {} by {}: {} {} ranks, spacing {:.3e}, n {}{}",
             s.experiment,
             s.case,
+            s.engine,
             match s.comm {
                 Comm::Sim => "simulated",
                 Comm::Mpi => "MPI",
@@ -166,8 +172,14 @@ impl Bench<'_> {
     fn failed(&mut self, point: &mut Point, why: String) -> Result<(), BenchError> {
         (self.progress)(&format!("failed: {why}"));
         point.failed = true;
-        let command = format!("{} on {} ranks", self.options.engine, point.setup.ranks);
+        let command = format!("{} on {} ranks", point.setup.engine, point.setup.ranks);
         self.append(Entry::Failure(Failure { setup: point.setup.clone(), command, why }))
+    }
+
+    /// Leaves a run out, with the reason.
+    pub(crate) fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), BenchError> {
+        (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
+        self.append(Entry::LeftOut(LeftOut { setup, why }))
     }
 
     /// Writes a mesh to the record's file system and audits it.
@@ -185,7 +197,7 @@ impl Bench<'_> {
 
     /// Requires the mesh of an engine that promises the definition to be that of the mesher, once for each mesh.
     fn right_mesh(&self, point: &Point, run: &Run) -> Result<(), String> {
-        let engine = self.runner.programs.labelled(&self.options.engine);
+        let engine = self.runner.programs.labelled(&point.setup.engine);
         if !run.warm_up || engine.name() == "mesher" || !engine.description().promises.definition {
             return Ok(());
         }
@@ -213,7 +225,7 @@ impl Bench<'_> {
 
     /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result.
     fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
-        let promises = &self.runner.programs.labelled(&self.options.engine).description().promises;
+        let promises = &self.runner.programs.labelled(&run.setup.engine).description().promises;
         if !promises.is_deterministic() {
             return Ok(());
         }
@@ -225,7 +237,8 @@ impl Bench<'_> {
         if !promises.is_independent_of(Independence::Partitioner) {
             partition.push_str(&s.partitioner);
         }
-        let mesh = (s.case.clone(), format!("{:e}", s.spacing_min), s.layer_cells_min, partition);
+        let (spacing, n) = (format!("{:e}", s.spacing_min), s.layer_cells_min.to_string());
+        let mesh = [s.engine.clone(), s.case.clone(), spacing, n, partition];
         let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
         if *first == run.digest {
             return Ok(());

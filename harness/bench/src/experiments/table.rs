@@ -3,7 +3,7 @@
 use super::cause::sentence;
 use super::entry::{Comm, Network, Setup};
 use super::group::{Group, Groups};
-use super::pop;
+use super::{pop, programs};
 use std::fmt::Write;
 
 /// Returns all tables of a record's runs.
@@ -28,6 +28,7 @@ pub fn tables(groups: &Groups) -> String {
         }
     }
     projections(&mut out, groups);
+    out.push_str(&programs::tables(groups));
     out
 }
 

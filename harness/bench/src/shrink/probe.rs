@@ -224,12 +224,22 @@ fn failed_run(failure: RunFailure, ranks: Ranks) -> Result<Failure, Unknown> {
     let end = match &failure.end {
         End::Missing(_) | End::Interrupted => return Err(Unknown::Error(failure.to_string())),
         End::TimedOut { .. } => "hangs".to_owned(),
-        End::Exited { code, .. } => format!("code {code}"),
+        End::Exited { code, error } => format!("code {code} {}", place_in_source(error)),
         End::Signalled(signal) => format!("signal {signal}"),
         End::Unusable(_) => "unusable output".to_owned(),
     };
     let sentence = format!("{ranks}: {failure}");
     Ok(Failure { check: "runs".to_owned(), end: Some(end), sentence })
+}
+
+/// The place in a source file that an error names first, such as `tree.rs:12`; empty if it names none. A program that
+/// panics elsewhere fails differently.
+fn place_in_source(error: &str) -> String {
+    let is_place = |word: &&str| {
+        let (file, line) = word.split_once(':').unwrap_or_default();
+        file.contains('.') && line.starts_with(|c: char| c.is_ascii_digit())
+    };
+    error.split_whitespace().find(is_place).unwrap_or_default().to_owned()
 }
 
 fn failed_check(result: &CheckResult, ranks: Ranks) -> Failure {
@@ -239,4 +249,21 @@ fn failed_check(result: &CheckResult, ranks: Ranks) -> Failure {
         count => format!("{ranks}: {count} findings, the first: {first}"),
     };
     Failure { check: result.name.to_owned(), end: None, sentence }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_elsewhere_is_another_failure() {
+        let failed = |error: &str| {
+            let end = End::Exited { code: 70, error: error.to_owned() };
+            failed_run(RunFailure::new("m", end), Ranks::Mpi(2)).unwrap()
+        };
+        let first = failed("m: panicked at src/tree.rs:12:40: | 7 points");
+        assert!(first.is_same_as(&failed("m: panicked at src/tree.rs:12:40: | 9 points")));
+        assert!(!first.is_same_as(&failed("m: panicked at src/tools.rs:12:40: | 7 points")));
+        assert!(failed("error: 7 points").is_same_as(&failed("error: 9 points at 12:30")));
+    }
 }

@@ -14,7 +14,7 @@ use crate::checks::{self, CheckResult, Terms};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset;
-use contract::manifest::{Keep, Manifest, Sides, Tree as Kind};
+use contract::manifest::{Keep, Manifest, Tree as Kind};
 use contract::tree::Tree;
 
 pub(crate) mod merge;
@@ -142,14 +142,11 @@ fn checks(manifest: &Manifest, pass: Pass, requirements: Requirements) -> Vec<Ch
     let mut of_tree = match requirements {
         Requirements::Promises(promises, case) if !promises.definition => {
             let terms = case.map_or_else(|| Terms::of_manifest(manifest), Terms::of_case);
+            let terms = Terms { sides: manifest.sides, ..terms };
             checks::promised(&tree, &terms, case, promises)
         }
         _ => of_definition(manifest, &tree),
     };
-    if manifest.sides == Sides::Unknown {
-        let by_definition = matches!(requirements, Requirements::Definition);
-        of_tree.iter_mut().for_each(|check| without_sides(check, manifest, by_definition));
-    }
     of_tree.iter_mut().filter(|c| c.examined == 0 && c.was_run()).for_each(|c| c.examined = leaves);
     checks.extend(of_tree);
     checks
@@ -186,20 +183,11 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
     results.into_iter().map(|result| checks::with_premise(result, tree, None, &terms)).collect()
 }
 
-/// Withdraws the result of a check that needs the sides, which it took from meaningless codes in the words.
-fn without_sides(check: &mut CheckResult, manifest: &Manifest, by_definition: bool) {
-    let deletes = manifest.keep != Keep::All || !manifest.keep_crossing;
-    if ["sides", checks::kept::NAME].contains(&check.name)
-        || check.name == "complete" && deletes && by_definition
-    {
-        *check = CheckResult::nothing(check.name, "the sides of the leaves are unknown");
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use contract::leafset::LeafSet;
+    use contract::manifest::Sides;
     use contract::testing::{leaf_set, random_words, words_of};
     use proptest::prelude::*;
 

@@ -139,6 +139,7 @@ mod tests {
             boxes: Vec::new(),
             seeds: Vec::new(),
             enclosed: Enclosed::Delete,
+            sides: Default::default(),
         }
     }
 

@@ -1,14 +1,18 @@
 //! What each check needs in a mesh to have anything to check. A check without its premise cannot fail, so it must not
 //! count as one that holds.
 
-use super::{CheckResult, Terms};
+use super::{CheckResult, Terms, kept};
+use contract::manifest::{Keep, Sides};
 use contract::tree::{DELETED, HOLES, Handle, Tree};
 use contract::word::Side;
 
+/// Why a check of sides has nothing to check in a mesh without them.
+pub const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
+
 const CROSSING: u8 = 1 << Side::Crossing as u8;
 
-/// The result of a check, marked if it has no findings because its premise is missing. `tree` is the mesh, with the deleted
-/// crossing leaves where they are known; `base` is T0.
+/// The result of a check, marked if it has no findings because its premise is missing, and withdrawn if it was taken from
+/// sides without a meaning. `tree` is the mesh, with the deleted crossing leaves where they are known; `base` is T0.
 pub fn with_premise(
     result: CheckResult,
     tree: &Tree,
@@ -16,9 +20,17 @@ pub fn with_premise(
     terms: &Terms,
 ) -> CheckResult {
     match result.holds() && result.was_run() {
+        _ if lacks_sides(result.name, terms) => CheckResult::nothing(result.name, UNKNOWN_SIDES),
         true => CheckResult { nothing_to_check: missing(result.name, tree, base, terms), ..result },
         false => result,
     }
+}
+
+/// Whether a check needs the sides of the leaves, which are unknown.
+fn lacks_sides(name: &str, terms: &Terms) -> bool {
+    let deletes = terms.keep != Keep::All || !terms.keep_crossing;
+    let needs = name == "sides" || name == kept::NAME || name == "complete" && deletes;
+    terms.sides == Sides::Unknown && needs
 }
 
 /// Why a check had nothing to check; `None` if it had something, or if it has no premise.
@@ -61,7 +73,7 @@ fn one_level(tree: &Tree) -> Option<String> {
 mod tests {
     use super::*;
     use contract::lattice::Root;
-    use contract::manifest::{Enclosed, Keep};
+    use contract::manifest::Enclosed;
     use contract::testing::words_of;
 
     fn terms(layer_cells_min: u32) -> Terms {
@@ -75,6 +87,7 @@ mod tests {
             boxes: Vec::new(),
             seeds: Vec::new(),
             enclosed: Enclosed::Delete,
+            sides: Sides::Known,
         }
     }
 
@@ -94,6 +107,18 @@ mod tests {
         result.report("wrong".to_owned());
         let result = with_premise(result, &Tree::of_words(&[0]), None, &terms(4));
         assert!(result.was_run() && !result.holds());
+    }
+
+    #[test]
+    fn a_finding_from_unknown_sides_is_withdrawn() {
+        let of = |name: &'static str, keep: Keep| {
+            let mut result = CheckResult::new(name);
+            result.report("wrong".to_owned());
+            let terms = Terms { sides: Sides::Unknown, keep, ..terms(1) };
+            with_premise(result, &Tree::of_words(&[0]), None, &terms).was_run()
+        };
+        assert!(!of("sides", Keep::All) && !of("kept", Keep::All) && of("balance", Keep::All));
+        assert!(of("complete", Keep::All) && !of("complete", Keep::Outside));
     }
 
     #[test]

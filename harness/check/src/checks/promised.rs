@@ -4,10 +4,10 @@
 use super::facets::Facets;
 use super::region::{BAND_CELLS, Space, Survey};
 use super::surface::Crossed;
-use super::{CheckResult, Terms, balance, complete, layer, spacing, with_premise};
+use super::{CheckResult, Terms, balance, complete, layer, premise, spacing, with_premise};
 use crate::promises::Promises;
 use contract::case::Case;
-use contract::manifest::Keep;
+use contract::manifest::{Keep, Sides};
 use contract::tree::Tree;
 
 /// Checks what is promised about a mesh, in the order in which findings are most helpful. Without a case, promises that
@@ -44,7 +44,12 @@ pub fn promised(
         results.push(spacing::check_boxes(tree, terms));
     }
     if promises.sides.is_some() {
-        results.push(survey.as_ref().map_or_else(|| without("sides"), Survey::check_sides));
+        let unknown = || CheckResult::nothing("sides", premise::UNKNOWN_SIDES);
+        results.push(match &survey {
+            _ if terms.sides == Sides::Unknown => unknown(),
+            Some(survey) => survey.check_sides(),
+            None => without("sides"),
+        });
     }
     if let Some(touching) = promises.balance {
         let levels = promises.levels();

@@ -2,7 +2,7 @@
 
 use contract::case::Case;
 use contract::lattice::Root;
-use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest};
+use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest, Sides};
 use contract::octant::Octant;
 use contract::tree::Kind;
 use contract::word::Side;
@@ -26,6 +26,8 @@ pub struct Terms {
     pub seeds: Vec<[i64; 3]>,
     /// The treatment of enclosed components.
     pub enclosed: Enclosed,
+    /// Whether the sides in the leaf words have a meaning.
+    pub sides: Sides,
 }
 
 impl Terms {
@@ -40,6 +42,7 @@ impl Terms {
             boxes: case.boxes.clone(),
             seeds: case.seeds_lattice.clone(),
             enclosed: case.enclosed,
+            sides: Sides::Known,
         }
     }
 
@@ -54,6 +57,7 @@ impl Terms {
             boxes: manifest.boxes.clone(),
             seeds: manifest.seeds.clone(),
             enclosed: manifest.enclosed,
+            sides: manifest.sides,
         }
     }
 

@@ -267,6 +267,7 @@ mod tests {
             boxes: vec![],
             seeds: vec![],
             enclosed: Enclosed::Delete,
+            sides: Default::default(),
         }
     }
 

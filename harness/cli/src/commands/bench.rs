@@ -3,13 +3,14 @@
 use super::session::{SessionArguments, progress, refuse, require};
 use super::values::cell_count;
 use bench::experiments::entry::Entry;
-use bench::experiments::foreign::{OWN, label};
 use bench::experiments::group::Groups;
-use bench::experiments::plan::{self, Experiment, Overrides, Preset, studies};
+use bench::experiments::plan::{self, Experiment, Overrides, Preset, comparison};
 use bench::experiments::session::Options;
 use bench::experiments::{bench, table};
 use clap::Args;
+use run::engine::description::is_own;
 use run::engine::programs::Programs;
+use run::engine::runner::Engine;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
 
 /// `harness bench`.
@@ -41,9 +42,10 @@ pub struct Arguments {
     /// Partitioners: metis, morton
     #[arg(long, value_delimiter = ',')]
     pub partitioners: Vec<String>,
-    /// Program to measure: mesher, reference, or an engine description (a name in harness/engines or a TOML file)
-    #[arg(long, value_name = "NAME|FILE", default_value = "mesher")]
-    pub engine: String,
+    /// Programs to measure: mesher, reference, or engine descriptions (names in harness/engines or TOML files). Several
+    /// programs mesh the same cases in turn and are compared
+    #[arg(long, value_name = "NAME|FILE", value_delimiter = ',', default_value = "mesher")]
+    pub engine: Vec<String>,
     /// Print the tables of an existing record without measuring
     #[arg(long)]
     pub show: bool,
@@ -96,25 +98,54 @@ fn measure(arguments: &Arguments) -> Result<u8, u8> {
 /// # Errors
 /// The exit code, if the options contradict each other or the program to be measured is missing.
 fn programs(arguments: &Arguments) -> Result<Programs, u8> {
-    let own = OWN.contains(&arguments.engine.as_str());
-    if !own && (!arguments.weights.is_empty() || !arguments.partitioners.is_empty()) {
-        eprintln!(
-            "harness: --weights and --partitioners apply to the mesher only: remove them or --engine"
-        );
-        return Err(EXIT_INPUT);
-    }
-    let engine = if own { "mesher" } else { arguments.engine.as_str() };
-    let given = arguments.session.programs.given();
-    let programs = Programs::find_with_engine(engine, given).map_err(|why| {
+    let wrong = |why: String| {
         eprintln!("harness: {why}");
         EXIT_INPUT
-    })?;
+    };
+    let foreign: Vec<&String> = arguments.engine.iter().filter(|name| !is_own(name)).collect();
+    let chooses = !arguments.weights.is_empty() || !arguments.partitioners.is_empty();
+    if chooses && !foreign.is_empty() {
+        let why = "--weights and --partitioners apply to the mesher only: remove them or --engine";
+        return Err(wrong(why.to_owned()));
+    }
+    let given = arguments.session.programs.given();
+    if arguments.engine.len() > 1 && given.mesher.is_some() {
+        return Err(wrong("--mesher replaces the program of one engine: name one".to_owned()));
+    }
+    let first = foreign.first().map_or("mesher", |name| name.as_str());
+    let mut programs = Programs::find_with_engine(first, given).map_err(wrong)?;
+    for name in foreign.iter().skip(1) {
+        let engine = Engine::find(name, None, &programs.paths).map_err(wrong)?;
+        programs.others.push(engine);
+    }
     // Our mesher chooses the spacings, also for other engines.
-    match arguments.engine.as_str() {
-        "reference" => require(programs.reference.program())?,
-        _ => require(programs.mesher.program())?,
+    if arguments.engine.iter().any(|name| name != "reference") {
+        require(programs.mesher.program())?;
+    }
+    let engines = engines(arguments, &programs);
+    if engines.len() < arguments.engine.len() {
+        return Err(wrong("--engine has two programs of one name: rename a file".to_owned()));
+    }
+    for engine in engines {
+        require(engine.program())?;
     }
     Ok(programs)
+}
+
+/// The engines that are measured, each once, in the order of the command line.
+fn engines<'a>(arguments: &Arguments, programs: &'a Programs) -> Vec<&'a Engine> {
+    let known = [&programs.mesher, &programs.reference, &programs.engine];
+    let named = |name: &String| {
+        let mut known = known.into_iter().chain(&programs.others);
+        known.find(|engine| engine.name() == name)
+    };
+    let mut engines: Vec<&Engine> = Vec::new();
+    for engine in arguments.engine.iter().filter_map(named) {
+        if engines.iter().all(|other| other.label() != engine.label()) {
+            engines.push(engine);
+        }
+    }
+    engines
 }
 
 fn show(arguments: &Arguments) -> u8 {
@@ -129,11 +160,20 @@ fn show(arguments: &Arguments) -> u8 {
 
 /// Returns the options of the library.
 fn options(arguments: &Arguments, programs: &Programs) -> Options {
+    let all = engines(arguments, programs);
+    let overrides: Vec<Overrides> =
+        all.iter().map(|engine| overrides(arguments, engine, all.len() > 1)).collect();
+    arguments.session.options(comparison(arguments.preset, &overrides))
+}
+
+/// Returns the changes of the preset for one engine.
+fn overrides(arguments: &Arguments, engine: &Engine, compared: bool) -> Overrides {
     let session = &arguments.session;
-    let templates = &programs.engine.description().run;
+    let templates = &engine.description().run;
     let (sim, mpi) = (templates.simulated.is_some(), templates.parallel.is_some());
     let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
-    let overrides = Overrides {
+    Overrides {
+        engine: engine.label(),
         cases: arguments.cases.clone(),
         experiments: arguments.experiment.clone(),
         ranks: list(&arguments.ranks),
@@ -144,9 +184,9 @@ fn options(arguments: &Arguments, programs: &Programs) -> Options {
         partitioners: arguments.partitioners.clone(),
         repeats: session.repeat.map(usize::from),
         no_mpi: session.no_mpi || !session.launcher.is_found() || !mpi,
-        no_sim: !sim,
-        serial: arguments.engine == "reference" || !sim && !mpi,
-        no_choice: !OWN.contains(&arguments.engine.as_str()),
-    };
-    session.options(studies(arguments.preset, &overrides), label(&arguments.engine))
+        // Only some programs have simulated ranks.
+        no_sim: !sim || compared,
+        serial: !sim && !mpi,
+        no_choice: !is_own(engine.name()),
+    }
 }

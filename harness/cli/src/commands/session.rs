@@ -55,10 +55,9 @@ impl SessionArguments {
     }
 
     /// Returns the options of a session with these studies.
-    pub fn options(&self, studies: Vec<Study>, engine: String) -> Options {
+    pub fn options(&self, studies: Vec<Study>) -> Options {
         Options {
             studies,
-            engine,
             launcher: self.launcher.clone(),
             network: self.network,
             record: self.record_path(),

@@ -2,7 +2,6 @@
 
 use super::session::{SessionArguments, progress, refuse, require};
 use bench::experiments::entry::{Entry, Judged, Line, Machine, Verdict};
-use bench::experiments::foreign::label;
 use bench::experiments::session::BenchError;
 use bench::targets::{self, Overrides, Targets};
 use clap::Args;
@@ -64,7 +63,7 @@ fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
         no_launcher: !session.launcher.is_found(),
     };
     // The runs are those that rows need, not those of an experiment.
-    let options = session.options(Vec::new(), label("mesher"));
+    let options = session.options(Vec::new());
     let outcome = targets::measure(&options, targets, &overrides, &programs, &mut progress())
         .map_err(|error| refuse(&error))?;
     let written = publish(targets, &outcome.rows, &outcome.lines, session.report.as_deref());

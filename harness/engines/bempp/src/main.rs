@@ -11,6 +11,7 @@ use contract::case::Case;
 use contract::lattice::Root;
 use contract::octant::Octant;
 use contract::word::{self, Leaf, Side};
+use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives};
 use report::Clock;
 use std::fs;
@@ -31,6 +32,11 @@ fn main() -> ExitCode {
     };
     let universe = mpi::initialize().expect("MPI is initialised once");
     let comm = universe.world();
+    // A rank that unwinds would wait in MPI_Finalize for the others, which wait for it.
+    std::panic::set_hook(Box::new(|panic| {
+        eprintln!("bempp-mesher: {panic}");
+        SimpleCommunicator::world().abort(70)
+    }));
     match mesh(&options, &comm) {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
@@ -58,7 +64,7 @@ fn mesh(options: &Options, comm: &impl CommunicatorCollectives) -> Result<(), St
     let case = Case::read(&options.case).map_err(|error| error.to_string())?;
     let mut clock = Clock::start();
     let points = points(&case, comm);
-    clock.end("sample");
+    clock.end("search");
     // A leaf with any point is split down to the surface level.
     let tree = Octree::new(&points, case.level_surface.into(), 0, comm);
     clock.end("tree");

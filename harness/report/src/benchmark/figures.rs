@@ -2,7 +2,7 @@
 
 use super::groups::{by_case, engines, point, provenance, repetitions};
 use super::paper::{self, cited};
-use super::{balance, matrix, scaling};
+use super::{balance, matrix, programs, scaling};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
@@ -18,6 +18,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     all.extend(matrix::figures(groups));
     all.extend(rate(groups));
     all.extend(memory(groups));
+    all.extend(programs::figures(groups));
     all
 }
 

@@ -3,7 +3,7 @@
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
 use super::lint::{Finding, RULES, Verdict};
-use super::tables;
+use super::{programs, tables};
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
 use bench::experiments::cause::sentence;
@@ -43,6 +43,7 @@ pub fn page(
         (tables::experiments(groups))
         (tables::projections(groups))
         (tables::phases(groups))
+        (programs::tables(groups))
         @if let Some(trend) = trend {
             h2 id="trend" { "Changes over commits" }
             pre { (trend) }

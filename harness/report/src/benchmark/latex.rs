@@ -126,6 +126,7 @@ mod tests {
             ],
             machine,
             load_average: 0.0,
+            lacks: Default::default(),
         };
         let line = Line {
             schema: String::new(),

@@ -8,6 +8,7 @@ pub mod latex;
 pub mod lint;
 pub mod matrix;
 pub mod paper;
+pub mod programs;
 pub mod scaling;
 pub mod tables;
 

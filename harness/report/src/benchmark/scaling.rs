@@ -17,7 +17,9 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     let mut out = Vec::new();
     for (subject, all) in by_subject(groups, "strong") {
         for mesh in meshes(&all) {
-            out.push(speedup(groups, subject, &mesh));
+            if mesh.iter().any(|group| group.setup.ranks > 1) {
+                out.push(speedup(groups, subject, &mesh));
+            }
             out.extend(efficiency(groups, subject, &mesh, "strong"));
             out.extend(phases(groups, subject, &mesh, "strong"));
         }

@@ -20,6 +20,11 @@ const OWN: [(&str, &str); 2] = [
     ("reference", include_str!("../../../engines/reference.toml")),
 ];
 
+/// Whether an engine of this repository has this name.
+pub fn is_own(name: &str) -> bool {
+    OWN.iter().any(|(own, _)| *own == name)
+}
+
 /// An engine file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -145,12 +145,13 @@ fn judge(status: ExitStatus, watch: &Watch) -> Option<End> {
 const LINES_SHOWN: usize = 3;
 
 /// The last lines of a standard error, in one line: programs print the error at the end. Lines without a word are
-/// ignored, and so are the paragraphs between rules of dashes that `mpirun` adds after the program's own error.
+/// ignored, and so are the paragraphs between rules of dashes and the messages that `mpirun` adds after the program's own error.
 fn last_lines(text: &str) -> String {
     let mut of_mpirun = false;
     let is_own = |line: &&str| {
         let rule = line.len() >= 60 && line.chars().all(|c| c == '-');
         of_mpirun ^= rule;
+        let of_mpirun = of_mpirun || line.contains("ORTE_ERROR_LOG");
         !of_mpirun && line.contains(char::is_alphabetic)
     };
     let lines: Vec<&str> = text.lines().map(str::trim).filter(is_own).collect();

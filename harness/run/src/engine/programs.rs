@@ -20,6 +20,8 @@ pub struct Programs {
     pub paths: Paths,
     /// The engine under test.
     pub engine: Engine,
+    /// Further engines under test, in a comparison.
+    pub others: Vec<Engine>,
     /// The mesher of this repository. It is the engine under test unless another one was named.
     pub mesher: Engine,
     /// The reference of this repository.
@@ -47,12 +49,13 @@ impl Programs {
             _ => Engine::find("mesher", None, &paths)?,
         };
         let reference = Engine::find("reference", given.reference.as_deref(), &paths)?;
-        Ok(Self { paths, engine, mesher, reference })
+        Ok(Self { paths, engine, others: Vec::new(), mesher, reference })
     }
 
-    /// The engine that is called `label` in results: the mesher, the reference or the engine under test.
+    /// The engine that is called `label` in results: the mesher, the reference or an engine under test.
     pub fn labelled(&self, label: &str) -> &Engine {
         let own = [&self.mesher, &self.reference];
-        own.into_iter().find(|engine| engine.name() == label).unwrap_or(&self.engine)
+        let mut all = own.into_iter().chain(&self.others);
+        all.find(|engine| engine.label() == label).unwrap_or(&self.engine)
     }
 }

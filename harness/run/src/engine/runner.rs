@@ -1,7 +1,7 @@
 //! An engine: any program that meshes a case, ours included, run as its engine file describes.
 
 use super::command;
-use super::description::Description;
+use super::description::{self, Description};
 use super::failure::{End, Failure};
 use super::launcher::{self, Launcher};
 use super::layout::{Layout, Ranks};
@@ -222,10 +222,14 @@ impl Engine {
         self.failure(End::Unusable(why))
     }
 
-    /// The engine's name without directories.
-    fn label(&self) -> String {
-        let stem = Path::new(self.name()).file_stem().unwrap_or_default();
-        stem.to_string_lossy().into_owned()
+    /// The engine's name in results: without directories, unless it would then pass for one of this repository.
+    pub fn label(&self) -> String {
+        let name = self.name();
+        let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
+        match !description::is_own(name) && description::is_own(&stem) {
+            true => name.to_owned(),
+            false => stem.into_owned(),
+        }
     }
 }
 

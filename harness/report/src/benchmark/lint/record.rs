@@ -84,7 +84,8 @@ mod tests {
             compiler: "r".into(),
             commit: commit.into(),
         };
-        line(Entry::Session(Box::new(Session { command: vec![], machine, load_average })))
+        let (command, lacks) = (vec![], Default::default());
+        line(Entry::Session(Box::new(Session { command, machine, load_average, lacks })))
     }
 
     fn is_broken(lines: &[Line]) -> bool {

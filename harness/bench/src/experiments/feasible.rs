@@ -1,0 +1,70 @@
+//! Which runs are worth starting: a slow program is not started on a mesh that it would not finish.
+
+use super::entry::{Entry, Line, Run, Setup};
+use std::time::Duration;
+
+/// Returns the reason for which a run would exceed `limit` or the memory of the machine, extrapolated from the finest coarser
+/// mesh of the same program; `None` if it would not, or if the lines have no such mesh.
+pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<String> {
+    let finest = coarser(lines, setup)?;
+    // Cells, and with them time and memory, grow with the inverse square of the spacing.
+    let growth = (finest.setup.spacing_min / setup.spacing_min).powi(2);
+    let from = |what: String| {
+        let cells = finest.cells as f64;
+        format!("{} would {what}, extrapolated from {cells:.1e} cells", setup.engine)
+    };
+    let (time_s, bytes) = (finest.time_launch_s * growth, finest.peak_rss_bytes.sum * growth);
+    if time_s > limit.as_secs_f64() {
+        return Some(from(format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())));
+    }
+    let memory = lines.iter().find_map(|line| match &line.entry {
+        Entry::Session(session) => Some(session.machine.memory_bytes as f64),
+        _ => None,
+    })?;
+    let [needed, available] = [bytes, memory].map(|b| b / 1e9);
+    let why = || format!("need {needed:.0} GB of memory, and the machine has {available:.0} GB");
+    (bytes > memory).then(|| from(why()))
+}
+
+/// Returns the finest mesh of a program that is coarser than that of `setup`, on the same ranks.
+fn coarser<'a>(lines: &'a [Line], setup: &Setup) -> Option<&'a Run> {
+    let same = |s: &Setup| {
+        (&s.engine, &s.case, s.layer_cells_min, s.ranks, s.comm)
+            == (&setup.engine, &setup.case, setup.layer_cells_min, setup.ranks, setup.comm)
+    };
+    let runs = lines.iter().filter_map(|line| match &line.entry {
+        Entry::Run(run) if same(&run.setup) => Some(&**run),
+        _ => None,
+    });
+    runs.filter(|run| run.setup.spacing_min > setup.spacing_min)
+        .min_by(|a, b| a.setup.spacing_min.total_cmp(&b.setup.spacing_min))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::entry::{Comm, Machine, Session};
+    use crate::testing::{line, run};
+
+    #[test]
+    fn a_run_is_left_out_if_a_coarser_one_was_too_long_or_too_large() {
+        let of = |bytes: f64| {
+            let mut coarse = run(Comm::Solo, 1000, &[("a", &[2.0])]);
+            (coarse.time_launch_s, coarse.peak_rss_bytes.sum) = (2.0, bytes);
+            let machine = Machine { memory_bytes: 8 << 30, ..Machine::default() };
+            let (command, lacks) = (Vec::new(), Default::default());
+            let session = Session { command, machine, load_average: 0.0, lacks };
+            [line(Entry::Session(Box::new(session))), line(Entry::Run(Box::new(coarse)))]
+        };
+        let finer = |lines: &[Line], spacing_min: f64, limit: u64| {
+            let setup = run(Comm::Solo, 1, &[("a", &[0.0])]).setup;
+            excess(lines, &Setup { spacing_min, ..setup }, Duration::from_secs(limit))
+        };
+        let (small, large) = (of(1e6), of(1e13));
+        assert_eq!(finer(&small, 0.01, 300), None);
+        assert!(finer(&small, 0.01, 100).unwrap().contains("take 200 s, more than --timeout 100"));
+        assert!(finer(&large, 0.05, 300).unwrap().contains("need 40000 GB of memory"));
+        // The same spacing is no coarser mesh.
+        assert_eq!(finer(&large, 0.1, 1), None);
+    }
+}
