@@ -5,4 +5,5 @@
 
 pub mod error;
 pub mod mesh;
+pub mod p8est;
 pub mod selection;
