@@ -5,5 +5,6 @@
 
 pub mod error;
 pub mod mesh;
+pub mod near_body;
 pub mod p8est;
 pub mod selection;
