@@ -8,10 +8,10 @@
 //! The parts of the mesh become the saved partition if each is one interval of the Morton curve; otherwise the file has
 //! one part.
 
-use std::io::{self, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use contract::files::write_atomically;
+use contract::files;
 use contract::import::p4est::{ALIGNMENT, FILLER, FORMAT};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{LEVEL_MAX, Octant};
@@ -19,61 +19,60 @@ use contract::word::{self, KEY_END};
 
 use crate::error::ExportError;
 use crate::mesh::{Leaf, Mesh};
+use crate::options::{Options, Summary};
 use crate::selection::Selection;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
+/// Bytes of a quadrant: x, y, z, level, and one byte of data.
+const RECORD_BYTES: usize = 17;
 /// `sizeof(p8est_quadrant_t)`, which `p8est_load` compares.
 const QUADRANT_STRUCT_BYTES: u64 = 24;
 /// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
 const VERSION: &[u8] = b"2.2";
 
-/// Counts of a forest that was written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Summary {
-    /// Quadrants that are leaves of the mesh.
-    pub leaves: u64,
-    /// Quadrants that fill holes.
-    pub fillers: u64,
-    /// Parts of the saved partition.
-    pub parts: usize,
-}
+/// Number of quadrants between two reports of progress.
+const STEP: u64 = 1 << 16;
 
 /// Writes the selected leaves and the fillers as a forest. The mesh is read twice, because the numbers of quadrants precede them.
 ///
 /// # Errors
-/// If the mesh cannot be read, has leaves deeper than level 18 or none, or if the file cannot be written; then no file is left.
-pub fn write(mesh: &Mesh, selection: &Selection, path: &Path) -> Result<Summary, ExportError> {
-    let counts = Counts::of(mesh, selection)?;
+/// If no leaf is selected, if one is deeper than level 18, if the mesh cannot be read or the file cannot be written, or if
+/// the user interrupts.
+pub fn write(
+    mesh: &Mesh,
+    selection: &Selection,
+    path: &Path,
+    options: &Options<'_>,
+) -> Result<Summary, ExportError> {
+    let counts = Counts::of(mesh, selection, options)?;
     if counts.leaves == 0 {
         return Err(ExportError::Request(
-            "no leaf is selected, so there is no forest to write: select more of the mesh"
-                .to_owned(),
+            "no leaf satisfies all conditions of the selection: remove one of them".to_owned(),
         ));
     }
     let ends = counts.saved_partition();
-    let mut failed = None;
-    let written = write_atomically(path, |out| {
-        let mut bytes = connectivity(&mesh.manifest.root);
-        bytes.extend(header(&ends));
-        pad(&mut bytes);
-        out.write_all(&bytes)?;
-        let quadrants = quadrants(mesh, selection, &mut |quadrant| quadrant.write(out));
-        quadrants.map_err(|error| {
-            let reason = io::Error::other(error.to_string());
-            failed = Some(error);
-            reason
-        })
-    });
-    match (written, failed) {
-        (Ok(()), _) => {
-            let quadrants = ends.last().copied().unwrap_or(0);
-            let fillers = quadrants - counts.leaves;
-            Ok(Summary { leaves: counts.leaves, fillers, parts: ends.len() })
-        }
-        (Err(_), Some(error)) => Err(error),
-        (Err(error), None) => Err(error.into()),
-    }
+    let total = ends[ends.len() - 1];
+    let named = |error| ExportError::write(path, error);
+    let bytes = files::fill_atomically(path, named, |file| {
+        let mut out = BufWriter::new(file);
+        let mut start = connectivity(&mesh.manifest.root);
+        start.extend(header(&ends));
+        pad(&mut start);
+        out.write_all(&start).map_err(named)?;
+        let mut done = 0;
+        quadrants(mesh, selection, &mut |quadrant| {
+            if done % STEP == 0 {
+                options.check()?;
+                options.watch.progress(done, total);
+            }
+            done += 1;
+            out.write_all(&quadrant.record()).map_err(named)
+        })?;
+        out.flush().map_err(named)?;
+        Ok(start.len() as u64 + total * RECORD_BYTES as u64)
+    })?;
+    Ok(Summary { leaves: counts.leaves, files: 1, bytes })
 }
 
 /// An octant of the forest, its data, and the part of the mesh in which it, or the next leaf, is.
@@ -84,14 +83,14 @@ struct Quadrant {
 }
 
 impl Quadrant {
-    fn write(&self, out: &mut dyn Write) -> Result<(), ExportError> {
-        let mut record = [0; 17];
+    fn record(&self) -> [u8; RECORD_BYTES] {
+        let mut record = [0; RECORD_BYTES];
         let numbers = self.octant.corner.into_iter().chain([u32::from(self.octant.level)]);
         for (field, number) in record.chunks_exact_mut(4).zip(numbers) {
             field.copy_from_slice(&number.to_le_bytes());
         }
-        record[16] = self.data;
-        Ok(out.write_all(&record)?)
+        record[RECORD_BYTES - 1] = self.data;
+        record
     }
 }
 
@@ -102,7 +101,7 @@ fn quadrants(
     visit: &mut impl FnMut(Quadrant) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let (mut next, mut part_last) = (0, 0);
-    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, part }| {
+    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(ExportError::Request(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
@@ -144,11 +143,15 @@ struct Counts {
 }
 
 impl Counts {
-    fn of(mesh: &Mesh, selection: &Selection) -> Result<Self, ExportError> {
-        let parts = mesh.manifest.parts.len();
-        let mut counts = Self { leaves: 0, by_part: vec![0; parts.max(1)], in_order: true };
-        let mut part_max = 0;
+    fn of(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Self, ExportError> {
+        let by_part = vec![0; mesh.parts().max(1)];
+        let mut counts = Self { leaves: 0, by_part, in_order: true };
+        let (mut part_max, mut done) = (0, 0);
         quadrants(mesh, selection, &mut |quadrant| {
+            if done % STEP == 0 {
+                options.check()?;
+            }
+            done += 1;
             counts.leaves += u64::from(quadrant.data != FILLER);
             counts.by_part[quadrant.part as usize] += 1;
             counts.in_order &= quadrant.part >= part_max;
@@ -216,6 +219,7 @@ fn pad(bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::Watch;
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
     use contract::manifest::{Manifest, Tree};
@@ -223,7 +227,19 @@ mod tests {
     use contract::word::Side;
     use proptest::prelude::*;
     use std::fs;
+    use std::num::NonZero;
 
+    struct Nobody;
+
+    impl Watch for Nobody {
+        fn progress(&self, _: u64, _: u64) {}
+
+        fn is_interrupted(&self) -> bool {
+            false
+        }
+    }
+
+    const OPTIONS: Options<'static> = Options { jobs: NonZero::<usize>::MIN, watch: &Nobody };
     const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
 
     fn mesh_of(parts: Vec<Vec<u64>>) -> Mesh {
@@ -243,7 +259,9 @@ mod tests {
 
     fn exported(mesh: &Mesh, selection: &Selection) -> (tempfile::TempDir, Summary) {
         let dir = tempfile::tempdir().unwrap();
-        let summary = write(mesh, selection, &dir.path().join("forest.p8est")).unwrap();
+        let path = dir.path().join("forest.p8est");
+        let summary = write(mesh, selection, &path, &OPTIONS).unwrap();
+        assert_eq!(fs::metadata(path).unwrap().len(), summary.bytes);
         (dir, summary)
     }
 
@@ -275,9 +293,7 @@ mod tests {
             let complete = import(&path, false);
             let filled: u64 = complete.words.iter().map(|&w| word::span(word::level(w))).sum();
             prop_assert_eq!(filled, KEY_END);
-            prop_assert_eq!(complete.manifest.leaves, summary.leaves + summary.fillers);
             let ends = partition(&path);
-            prop_assert_eq!(ends.len(), summary.parts);
             prop_assert_eq!(*ends.last().unwrap(), complete.manifest.leaves);
             prop_assert!(ends.windows(2).all(|e| e[0] <= e[1]));
             // Leaves that alternate between parts have no partition along the curve.
@@ -308,7 +324,8 @@ mod tests {
             let (dir, summary) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let mut bytes = fs::read(&path).unwrap();
-            let quadrants = 17 * (summary.leaves + summary.fillers) as usize;
+            prop_assert!(summary.leaves > 0);
+            let quadrants = 17 * *partition(&path).last().unwrap() as usize;
             let at = bytes.len() - 1 - at.index(quadrants);
             bytes[at] ^= 1 << bit;
             fs::write(&path, bytes).unwrap();
@@ -358,15 +375,17 @@ mod tests {
         let deep = words_of(|o| o.corner == [0; 3] && o.level < 19);
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
-        let refusal = |selection: &Selection| write(&mesh_of(vec![deep.clone()]), selection, &path);
+        let refusal =
+            |selection: &Selection| write(&mesh_of(vec![deep.clone()]), selection, &path, &OPTIONS);
         let error = refusal(&Selection::default()).unwrap_err().to_string();
         assert!(error.contains("p4est has levels 0 to 18"), "{error}");
         let none = Selection { side: Some(Side::Inside), ..Selection::default() };
         let error = refusal(&none).unwrap_err().to_string();
-        assert!(error.contains("no leaf is selected"), "{error}");
+        assert!(error.contains("no leaf satisfies"), "{error}");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
         // The eight leaves of level 19 become one quadrant of level 18.
         let coarse = Selection { level_max: Some(18), ..Selection::default() };
-        assert_eq!(refusal(&coarse).unwrap().fillers, 1);
+        let leaves = refusal(&coarse).unwrap().leaves;
+        assert_eq!(partition(&path), [leaves + 1]);
     }
 }

@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `programs`, `session` and `values` are shared.
+//! The commands, one file each with its arguments; `files`, `programs`, `selection`, `session` and `values` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -11,9 +11,11 @@ pub mod geometry;
 pub mod import;
 pub mod leak;
 pub mod man;
+pub mod near_body;
 pub mod planted;
 mod programs;
 pub mod report;
+mod selection;
 pub mod selftest;
 mod session;
 pub mod shrink;

@@ -1,5 +1,6 @@
 //! `harness near-body`: the surface that a mesh hands over to a near-body mesher, and its gap to the wall.
 
+use super::selection::SelectionArguments;
 use clap::Args;
 use contract::case::Case;
 use contract::files::write_atomically;
@@ -10,7 +11,6 @@ use export::near_body::gap::{Gap, gaps};
 use export::near_body::polygons::Polygons;
 use export::near_body::report::Report;
 use export::near_body::{files, of_case};
-use export::selection::Selection;
 use run::engine::interrupt;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
@@ -44,6 +44,9 @@ pub struct Arguments {
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Which cells' faces are considered.
+    #[command(flatten)]
+    selection: SelectionArguments,
 }
 
 /// Measures, prints and writes; returns the exit code.
@@ -67,9 +70,10 @@ fn found(arguments: &Arguments) -> Result<Report, ExportError> {
     let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
     let mesh = Mesh::open(&arguments.mesh)?;
     let case = arguments.case.as_deref().map(|name| read_case(name, &mesh)).transpose()?;
-    let faces = front(&mesh, &Selection::default(), &check)?;
+    let selection = arguments.selection.of(&mesh).map_err(ExportError::Request)?;
+    let faces = front(&mesh, &selection, &check)?;
     if faces.is_empty() {
-        let why = "the mesh has no cells that border a crossing cell, deleted or not: no surface to hand over";
+        let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface to hand over";
         return Err(ExportError::Request(why.to_owned()));
     }
     let gaps = case.map(|case| gaps(&case, &faces, &check)).transpose()?;
@@ -81,7 +85,8 @@ fn found(arguments: &Arguments) -> Result<Report, ExportError> {
 
 /// The case, which must be that of the mesh.
 fn read_case(name: &str, mesh: &Mesh) -> Result<Case, ExportError> {
-    let path = Paths::find().catalogue.case_file(name, Path::new("")).map_err(ExportError::Request)?;
+    let path =
+        Paths::find().catalogue.case_file(name, Path::new("")).map_err(ExportError::Request)?;
     let case = Case::read(&path).map_err(|error| ExportError::Request(error.to_string()))?;
     of_case(mesh, &case)?;
     Ok(case)

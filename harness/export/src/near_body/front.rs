@@ -90,14 +90,12 @@ fn front_holding(
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
     key: u64,
-    level: u8,
-    side: Side,
-    part: u32,
+    leaf: Leaf,
 }
 
 impl Entry {
     fn is_open(&self) -> bool {
-        self.side == Side::Crossing
+        self.leaf.side == Side::Crossing
     }
 }
 
@@ -148,9 +146,8 @@ impl Search<'_> {
         let mut leaves = Vec::new();
         let mut closed = 0;
         self.mesh.visit(keys, &Selection::default(), &mut |leaf: Leaf| {
-            let Leaf { octant: Octant { corner, level }, side, part } = leaf;
-            let entry = Entry { key: word::key_of(corner), level, side, part };
-            closed += if entry.is_open() { 0 } else { word::span(level) };
+            let entry = Entry { key: word::key_of(leaf.octant.corner), leaf };
+            closed += if entry.is_open() { 0 } else { word::span(leaf.octant.level) };
             leaves.push(entry);
             Ok::<(), ExportError>(())
         })?;
@@ -159,14 +156,14 @@ impl Search<'_> {
             self.found.within(Node { octant, leaves: &leaves });
         }
         let mut layers = Layers::default();
-        for leaf in leaves {
-            let corner = word::corner_of(leaf.key);
-            let edge = Octant { corner, level: leaf.level }.edge();
+        for entry in leaves {
+            let Octant { corner, .. } = entry.leaf.octant;
+            let edge = entry.leaf.octant.edge();
             for axis in 0..3 {
                 let at = corner[axis] - octant.corner[axis];
                 let [low, high] = &mut layers[axis];
-                low.extend((at == 0).then_some(leaf));
-                high.extend((at + edge == octant.edge()).then_some(leaf));
+                low.extend((at == 0).then_some(entry));
+                high.extend((at + edge == octant.edge()).then_some(entry));
             }
         }
         Ok(layers)
@@ -189,7 +186,7 @@ struct Node<'a> {
 /// An octant as seen across a face.
 enum Kind {
     /// A leaf on a side.
-    Cell(Entry),
+    Cell(Leaf),
     /// No leaf, or a crossing one.
     Open,
     Split,
@@ -199,9 +196,9 @@ impl<'a> Node<'a> {
     fn kind(&self) -> Kind {
         match self.leaves {
             [] => Kind::Open,
-            [leaf] if leaf.level <= self.octant.level => match leaf.is_open() {
+            [entry] if entry.leaf.octant.level <= self.octant.level => match entry.is_open() {
                 true => Kind::Open,
-                false => Kind::Cell(*leaf),
+                false => Kind::Cell(entry.leaf),
             },
             _ => Kind::Split,
         }
@@ -213,8 +210,8 @@ impl<'a> Node<'a> {
             Kind::Split => {
                 let start = word::key_of(octant.corner);
                 let end = start + word::span(octant.level);
-                let first = self.leaves.partition_point(|leaf| leaf.key < start);
-                let count = self.leaves[first..].partition_point(|leaf| leaf.key < end);
+                let first = self.leaves.partition_point(|entry| entry.key < start);
+                let count = self.leaves[first..].partition_point(|entry| entry.key < end);
                 &self.leaves[first..first + count]
             }
             _ => self.leaves,
@@ -224,7 +221,7 @@ impl<'a> Node<'a> {
 }
 
 /// The leaf of which the whole of a face is exposed, and whether it is the upper of the two octants.
-type Exposed = Option<(Entry, bool)>;
+type Exposed = Option<(Leaf, bool)>;
 
 /// The faces found so far.
 struct Found<'a> {
@@ -277,14 +274,13 @@ impl Found<'_> {
 
     /// Adds the lower face of an octant along an axis, if it is exposed.
     fn add(&mut self, exposed: Exposed, above: &Octant, axis: usize) {
-        let Some((Entry { key, level: leaf_level, side, part }, is_leaf_above)) = exposed else {
+        let Some((leaf, is_leaf_above)) = exposed.filter(|(leaf, _)| self.selection.has(leaf))
+        else {
             return;
         };
-        let octant = Octant { corner: word::corner_of(key), level: leaf_level };
-        if self.selection.has(&Leaf { octant, side, part }) {
-            let (Octant { corner, level }, axis) = (*above, axis as u8);
-            self.faces.push(Face { corner, level, axis, is_leaf_above, leaf_level, side, part });
-        }
+        let Leaf { octant: Octant { level: leaf_level, .. }, side, part, .. } = leaf;
+        let (Octant { corner, level }, axis) = (*above, axis as u8);
+        self.faces.push(Face { corner, level, axis, is_leaf_above, leaf_level, side, part });
     }
 }
 
