@@ -5,8 +5,8 @@
 //!
 //! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
 //! data of each quadrant, one byte, is its side or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
-//! The parts of the mesh become the saved partition if each is one interval of the Morton curve; otherwise the file has
-//! one part.
+//! The saved partition gives each rank as many quadrants as its part of the mesh has, with the fillers before and among its leaves.
+//! Ranks of p4est own intervals of the Morton curve, and so do the parts of a mesh, except near their boundaries.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -138,15 +138,12 @@ struct Counts {
     leaves: u64,
     /// Quadrants of each part, fillers included.
     by_part: Vec<u64>,
-    /// Whether the parts follow each other along the curve.
-    in_order: bool,
 }
 
 impl Counts {
     fn of(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Self, ExportError> {
-        let by_part = vec![0; mesh.parts().max(1)];
-        let mut counts = Self { leaves: 0, by_part, in_order: true };
-        let (mut part_max, mut done) = (0, 0);
+        let mut counts = Self { leaves: 0, by_part: vec![0; mesh.parts().max(1)] };
+        let mut done = 0;
         quadrants(mesh, selection, &mut |quadrant| {
             if done % STEP == 0 {
                 options.check()?;
@@ -154,8 +151,6 @@ impl Counts {
             done += 1;
             counts.leaves += u64::from(quadrant.data != FILLER);
             counts.by_part[quadrant.part as usize] += 1;
-            counts.in_order &= quadrant.part >= part_max;
-            part_max = quadrant.part.max(part_max);
             Ok(())
         })?;
         Ok(counts)
@@ -164,12 +159,11 @@ impl Counts {
     /// Number of quadrants up to the end of each saved part.
     fn saved_partition(&self) -> Vec<u64> {
         let mut sum = 0;
-        let ends = self.by_part.iter().map(|count| {
+        let add = |count: &u64| {
             sum += count;
             sum
-        });
-        let ends: Vec<u64> = ends.collect();
-        if self.in_order { ends } else { vec![sum] }
+        };
+        self.by_part.iter().map(add).collect()
     }
 }
 
@@ -296,13 +290,7 @@ mod tests {
             let ends = partition(&path);
             prop_assert_eq!(*ends.last().unwrap(), complete.manifest.leaves);
             prop_assert!(ends.windows(2).all(|e| e[0] <= e[1]));
-            // Leaves that alternate between parts have no partition along the curve.
-            if interleaved && parts > 1 && summary.leaves > parts as u64 {
-                prop_assert_eq!(ends.len(), 1);
-            }
-            if !interleaved {
-                prop_assert_eq!(ends.len(), parts);
-            }
+            prop_assert_eq!(ends.len(), parts);
         }
 
         #[test]
@@ -321,10 +309,9 @@ mod tests {
         ) {
             prop_assume!(!words.is_empty());
             let mesh = mesh_of(vec![words]);
-            let (dir, summary) = exported(&mesh, &Selection::default());
+            let (dir, _) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let mut bytes = fs::read(&path).unwrap();
-            prop_assert!(summary.leaves > 0);
             let quadrants = 17 * *partition(&path).last().unwrap() as usize;
             let at = bytes.len() - 1 - at.index(quadrants);
             bytes[at] ^= 1 << bit;
