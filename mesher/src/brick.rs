@@ -135,6 +135,14 @@ pub fn components(mut open: u64) -> impl Iterator<Item = u64> {
     })
 }
 
+/// The face neighbours of the octants `w` within the brick along `axis`, in the positive direction if `up`.
+#[inline]
+pub const fn moved(w: u64, axis: usize, up: bool) -> u64 {
+    let m = AXES[axis];
+    let (low, unit, gap) = (m[0] | m[2], 1 << axis, 7 << axis);
+    if up { (w & low) << unit | (w & m[1]) << gap } else { w >> unit & low | w >> gap & m[1] }
+}
+
 /// The face neighbours of the octants `w` in the neighbouring brick along `axis`, in the positive direction if
 /// `up`.
 #[inline]
@@ -220,9 +228,9 @@ mod tests {
                     let wrapped = q.map(|v| v.rem_euclid(4) as u32);
                     let outside = if inside { 0 } else { 1 << morton(wrapped) };
                     assert_eq!(across(1 << bit, axis, up), outside);
-                    if inside {
-                        want |= 1 << morton(wrapped);
-                    }
+                    let within = if inside { 1 << morton(wrapped) } else { 0 };
+                    assert_eq!(moved(1 << bit, axis, up), within);
+                    want |= within;
                 }
             }
             assert_eq!(spread_faces(1 << bit), want);

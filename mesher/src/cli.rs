@@ -39,6 +39,9 @@ pub struct Args {
     /// Weights of the partition
     #[arg(long, value_enum, default_value = "rebalance")]
     pub weights: Weights,
+    /// Count the faces exposed to crossing leaves, deleted or not, and weigh each like W leaves in the last repartition: 0 counts them only
+    #[arg(long, value_name = "W", conflicts_with = "ungraded", value_parser = value_parser!(u32).range(0..=1000))]
+    pub weight_exposed: Option<u32>,
     /// Level of the base leaves: 0 to 19, or auto
     #[arg(long, default_value = "auto", value_parser = level_base)]
     pub level_base: LevelBase,

@@ -16,6 +16,7 @@ pub mod comm;
 pub mod digest;
 pub mod dilate;
 pub mod error;
+pub mod exposed;
 pub mod facet;
 pub mod grade;
 pub mod ingest;
@@ -222,32 +223,51 @@ fn make(
     debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
     comm.agree(check_interrupt())?;
 
-    // 8. Repartition after gradation: by the number of leaves.
+    // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
     if !(is_parallel && division.is_of_curve()) {
         counters.base_leaf_cells_max =
             cells_heaviest(&mesh.split, &mesh.sides.deleted, &base_leaves);
-        return Ok(mesh);
+    } else if !division.repartitions() {
+        counters.base_leaf_cells_max = repartition_by_leaves(&mut mesh, false, None, comm);
+    } else {
+        let weighted = options.weight_exposed.filter(|&weight| weight > 0).map(|weight| {
+            let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
+            (faces, weight)
+        });
+        counters.base_leaf_cells_max = record
+            .phase("rebalance", comm, || repartition_by_leaves(&mut mesh, true, weighted, comm));
     }
-    let mut by_leaves = || repartition_by_leaves(&mut mesh, division.repartitions(), comm);
-    counters.base_leaf_cells_max = match division.repartitions() {
-        true => record.phase("rebalance", comm, by_leaves),
-        false => by_leaves(),
-    };
-    debug_check(options, comm, || {
-        check::ownership(&mesh.ownership, comm);
-        check::graded(&mesh, None, comm);
-    });
+    if is_parallel && division.is_of_curve() {
+        debug_check(options, comm, || {
+            check::ownership(&mesh.ownership, comm);
+            check::graded(&mesh, None, comm);
+        });
+    }
+    if options.weight_exposed.is_some() {
+        let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
+        counters.exposed_faces = Some(faces.iter().map(|brick| u64::from(brick.faces)).sum());
+    }
     Ok(mesh)
 }
 
-/// Counts the leaves by octants of the base level, and repartitions by these counts if `moves` is true. Returns the greatest count.
-/// Collective.
-fn repartition_by_leaves(mesh: &mut Mesh, moves: bool, comm: &dyn Comm) -> u64 {
+/// Counts the leaves by octants of the base level, and repartitions by these counts if `moves` is true, with the exposed faces and the weight of
+/// each if given. Returns the greatest count of leaves. Collective.
+fn repartition_by_leaves(
+    mesh: &mut Mesh,
+    moves: bool,
+    weighted: Option<(Vec<exposed::InBrick>, u32)>,
+    comm: &dyn Comm,
+) -> u64 {
     let (inside, deleted) = (&mut mesh.sides.inside, &mut mesh.sides.deleted);
     let sets = Sets { split: &mut mesh.split, crossing: &mut mesh.crossing, inside, deleted };
     let with_crossing = mesh.rules.keep_crossing;
-    let counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
+    let mut counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
     let max = counts.max();
+    if let Some((faces, weight)) = weighted {
+        let weights =
+            faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(weight)));
+        counts.add(weights, &mesh.ownership, mesh.level_base);
+    }
     if moves {
         mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
     }

@@ -164,6 +164,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         ungraded: args.ungraded,
         out: args.out.clone(),
         check: args.check,
+        weight_exposed: args.weight_exposed,
     };
     let mut report = mesh(&case, &options, comm, record)?;
     if args.message_matrix {

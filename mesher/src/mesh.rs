@@ -20,6 +20,8 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Check invariants after each phase, which debug builds do in any case.
     pub check: bool,
+    /// Count the [exposed faces](crate::exposed), each of which weighs as much as this many leaves in the last repartition.
+    pub weight_exposed: Option<u32>,
 }
 
 /// A mesh as one rank holds it.

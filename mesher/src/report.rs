@@ -37,13 +37,18 @@ pub struct Counters {
     pub leaves: u64,
     /// Leaves in the rank's heaviest base leaf.
     pub base_leaf_cells_max: u64,
+    /// Faces exposed to crossing leaves; only on request.
+    pub exposed_faces: Option<u64>,
 }
+
+/// Name of the counter that exists only on request.
+const EXPOSED_FACES: &str = "exposed_faces";
 
 /// A counter's name in the report, and its value.
 type Counter = (&'static str, fn(&Counters) -> u64);
 
 /// All counters of the report.
-const COUNTERS: [Counter; 10] = [
+const COUNTERS: [Counter; 11] = [
     ("facet_brick_tests", |c| c.facet_brick_tests),
     ("bricks_voxelised", |c| c.bricks_voxelised),
     ("rays", |c| c.rays),
@@ -54,6 +59,7 @@ const COUNTERS: [Counter; 10] = [
     ("message_bytes", |c| c.message_bytes),
     ("leaves", |c| c.leaves),
     ("base_leaf_cells_max", |c| c.base_leaf_cells_max),
+    (EXPOSED_FACES, |c| c.exposed_faces.unwrap_or(0)),
 ];
 
 impl Counters {
@@ -216,7 +222,11 @@ impl Report {
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
             peak_rss_bytes: column(0),
             phases,
-            counters: (1..).zip(COUNTERS).map(|(i, (name, _))| (name, column(i))).collect(),
+            counters: (1..)
+                .zip(COUNTERS)
+                .filter(|(_, (name, _))| *name != EXPOSED_FACES || counters.exposed_faces.is_some())
+                .map(|(i, (name, _))| (name, column(i)))
+                .collect(),
             message_matrix: None,
         }
     }

@@ -6,7 +6,7 @@ use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
-use crate::vtu;
+use crate::{p8est, vtu};
 
 /// A format of mesh files.
 #[derive(Debug)]
@@ -33,6 +33,11 @@ pub const FORMATS: &[Format] = &[
         ending: ".pvtu",
         purpose: "the same in files of some million cells each, which many processes can read",
         write: vtu::write_files,
+    },
+    Format {
+        ending: ".p8est",
+        purpose: "a forest for p8est_load of p4est, deal.II, t8code and ForestClaw",
+        write: p8est::write,
     },
 ];
 
@@ -64,7 +69,7 @@ mod tests {
         assert_eq!(of(Path::new("mesh.pvtu")).unwrap().ending, ".pvtu");
         for name in ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".pvtu", "vtu", "mesh.VTU", ""] {
             let error = of(Path::new(name)).unwrap_err().to_string();
-            assert!(error.contains(".vtu, .pvtu"), "{name}: {error}");
+            assert!(error.contains(".vtu, .pvtu, .p8est"), "{name}: {error}");
         }
     }
 }

@@ -10,8 +10,10 @@
 pub mod error;
 pub mod format;
 pub mod mesh;
+pub mod near_body;
 pub mod options;
 pub mod ordered;
+pub mod p8est;
 pub mod pieces;
 pub mod selection;
 pub mod vtu;

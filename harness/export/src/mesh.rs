@@ -98,6 +98,18 @@ impl Mesh {
         self.visit_octant(Octant::ROOT, &intervals, before, selection, visit)
     }
 
+    /// Number of leaves whose Morton codes are in `keys`.
+    ///
+    /// # Errors
+    /// If a part cannot be read.
+    pub fn count(&self, keys: Range<u64>) -> Result<u64, ExportError> {
+        (0..self.parts.len()).try_fold(0, |sum, part| {
+            let all = 0..self.parts[part].len();
+            let start = self.lower_bound(part, all.clone(), keys.start)?;
+            Ok(sum + self.lower_bound(part, start..all.end, keys.end)? - start)
+        })
+    }
+
     /// Ranges of Morton codes, in order, that together contain all selected leaves: each is an octant of at most
     /// `leaves_max` leaves, or several neighbouring ones. All their leaves are counted, selected or not.
     ///

@@ -99,6 +99,19 @@ impl LeafCounts {
         Self(counts.bins())
     }
 
+    /// Adds weights to bricks that this rank owns, each with its level and key, as if they had so many leaves more.
+    pub fn add(
+        &mut self,
+        weights: impl Iterator<Item = (Level, u64, u64)>,
+        ownership: &Ownership,
+        level: Level,
+    ) {
+        let mut sum = Weighted::new(ownership, level);
+        sum.bins = self.0.iter().map(|&(start, leaves)| (start, leaves as i64)).collect();
+        weights.for_each(|(l, key, weight)| sum.add(l, key, weight as i64));
+        self.0 = sum.bins();
+    }
+
     /// The greatest number of leaves in one octant.
     pub fn max(&self) -> u64 {
         self.0.iter().map(|b| b.1).max().unwrap_or(0)

@@ -38,14 +38,22 @@ impl fmt::Display for Report {
         }
         writeln!(f, "components     {}", components(self))?;
         writeln!(f, "digest         {}", self.digest)?;
-        let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
+        let by_rank = |counts: &Vec<u64>| counts.iter().map(|n| *n as f64).collect::<Vec<f64>>();
         writeln!(
             f,
             "ranks          {}, cells max/mean {:.3}, base level {}",
             self.ranks,
-            imbalance(&leaves),
+            imbalance(&by_rank(&self.counters["leaves"])),
             self.level_base
         )?;
+        if let Some(faces) = self.counters.get(super::EXPOSED_FACES) {
+            writeln!(
+                f,
+                "exposed faces  {}, max/mean {:.3}",
+                grouped(faces.iter().sum()),
+                imbalance(&by_rank(faces))
+            )?;
+        }
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
         for p in &self.phases {
             let wall = p.time_wall_s.iter().fold(0.0, |m: f64, v| m.max(*v));

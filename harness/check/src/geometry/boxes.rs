@@ -57,11 +57,11 @@ impl Bounds {
         (0..3).all(|a| self.low[a] <= other.high[a] && other.low[a] <= self.high[a])
     }
 
-    /// The squared distance of a point from the box, in lattice units.
-    pub fn distance_squared_to(&self, point: [f64; 3]) -> f64 {
+    /// The squared distance from a box with these corners, in lattice units.
+    pub fn distance_squared_to_box(&self, low: [f64; 3], high: [f64; 3]) -> f64 {
         let along = |a: usize| {
-            let (low, high) = (f64::from(self.low[a]), f64::from(self.high[a]));
-            (low - point[a]).max(point[a] - high).max(0.0)
+            let (from, to) = (f64::from(self.low[a]), f64::from(self.high[a]));
+            (from - high[a]).max(low[a] - to).max(0.0)
         };
         (0..3).map(|a| along(a) * along(a)).sum()
     }

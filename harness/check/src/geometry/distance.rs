@@ -44,6 +44,30 @@ pub fn from_point(p: Point, t: &Triangle) -> (f64, Point) {
     nearest.expect("a triangle has edges")
 }
 
+/// Squared distance of a square from a triangle that it does not intersect. The square has its corners in order around it, and
+/// lies in a plane normal to an axis; the triangle may have no area.
+pub fn from_square(corners: &[Point; 4], t: &Triangle) -> f64 {
+    let bound = |a: usize, fold: fn(f64, f64) -> f64| corners.iter().map(|c| c[a]).reduce(fold);
+    let clamped = |p: Point| -> Point {
+        std::array::from_fn(|a| {
+            let (low, high) = (bound(a, f64::min), bound(a, f64::max));
+            p[a].clamp(low.expect("four corners"), high.expect("four corners"))
+        })
+    };
+    let squared = |p: Point, q: Point| dot(sub(p, q), sub(p, q));
+    let of_corners = corners.iter().map(|&corner| from_point(corner, t).0);
+    let of_vertices = t.iter().map(|&vertex| squared(vertex, clamped(vertex)));
+    let mut best = of_corners.chain(of_vertices).fold(f64::INFINITY, f64::min);
+    for i in 0..4 {
+        // An edge without length is a vertex.
+        for j in (0..3).filter(|&j| t[j] != t[(j + 1) % 3]) {
+            let (p, q) = segments(corners[i], corners[(i + 1) % 4], t[j], t[(j + 1) % 3]);
+            best = best.min(squared(p, q));
+        }
+    }
+    best
+}
+
 /// Nearest points of two segments (Ericson, Real-Time Collision Detection, section 5.1.9).
 fn segments(p: Point, p_end: Point, q: Point, q_end: Point) -> (Point, Point) {
     let (d, e, r) = (sub(p_end, p), sub(q_end, q), sub(p, q));
@@ -123,7 +147,43 @@ mod tests {
         assert_eq!(from_point([2.0, 3.0, 6.0], &[[0.0; 3]; 3]).0, 49.0);
     }
 
+    /// The facets of random squares: at any distance, or touching the square's plane.
+    fn square() -> impl Strategy<Value = [Point; 4]> {
+        (prop::array::uniform3(-9.0f64..9.0), 0.1f64..9.0, 0usize..3).prop_map(
+            |(at, edge, axis)| {
+                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(along_u, along_v)| {
+                    let mut corner = at;
+                    corner[u] += along_u * edge;
+                    corner[v] += along_v * edge;
+                    corner
+                })
+            },
+        )
+    }
+
     proptest! {
+        /// The two triangles of a square, which `nearest` measures otherwise.
+        #[test]
+        fn the_distance_of_a_square_is_that_of_its_nearer_half(
+            square in square(), t in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)), kind in 0..4
+        ) {
+            let shifted = t.map(|[x, y, z]| [x + 40.0, y, z]);
+            let t = match kind {
+                0 => [shifted[0]; 3],
+                1 => [shifted[0], shifted[1], shifted[0]],
+                _ => shifted,
+            };
+            let [a, b, c, d] = square;
+            let expected = if kind == 0 {
+                // `nearest` needs edges; the foot of a point is in one of the halves.
+                from_point(t[0], &[a, b, c]).0.min(from_point(t[0], &[a, c, d]).0)
+            } else {
+                nearest(&[a, b, c], &t).0.min(nearest(&[a, c, d], &t).0)
+            };
+            prop_assert!((from_square(&square, &t) - expected).abs() <= 1e-9 * expected);
+        }
+
         /// No pair of sampled points is nearer, and the points returned are as far apart as reported.
         #[test]
         fn no_sampled_pair_of_points_is_nearer(

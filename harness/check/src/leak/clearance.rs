@@ -1,8 +1,8 @@
-//! The distance from a point to the nearest facet, in lattice units.
+//! The distance from a point or a square to the nearest facet, in lattice units.
 
 use contract::lattice::FacetLattice;
 
-use crate::geometry::boxes::Boxes;
+use crate::geometry::boxes::{Bounds, Boxes};
 use crate::geometry::distance;
 
 /// A point, in lattice units.
@@ -27,6 +27,23 @@ impl<'a> Clearance<'a> {
         // Rounding must not exclude the facet that the bound comes from.
         let mut best = (bound + 1.0) * (bound + 1.0);
         self.within(point, &mut best, &mut |squared, _, best| *best = squared.min(*best));
+        best.sqrt()
+    }
+
+    /// Distance from a square that no facet enters to the nearest facet; infinite without facets. The square has its corners in
+    /// order around it, and lies in a plane normal to an axis. `bound` is an upper bound that the caller knows.
+    pub fn at_square(&self, corners: &[Point; 4], bound: f64) -> f64 {
+        let mut best = (bound + 1.0) * (bound + 1.0);
+        let fold = |f: fn(f64, f64) -> f64| -> Point {
+            std::array::from_fn(|a| corners.iter().map(|c| c[a]).fold(corners[0][a], f))
+        };
+        let (low, high) = (fold(f64::min), fold(f64::max));
+        self.search(
+            |bounds| bounds.distance_squared_to_box(low, high),
+            |triangle| distance::from_square(corners, triangle),
+            &mut best,
+            &mut |squared, _, best| *best = squared.min(*best),
+        );
         best.sqrt()
     }
 
@@ -59,21 +76,37 @@ impl<'a> Clearance<'a> {
     /// Calls `visit` with the squared distance and the number of every facet that is nearer than the square root of
     /// `limit`, which `visit` may lower.
     fn within(&self, point: Point, limit: &mut f64, visit: &mut impl FnMut(f64, u32, &mut f64)) {
+        self.search(
+            |bounds| bounds.distance_squared_to_box(point, point),
+            |triangle| distance::from_point(point, triangle).0,
+            limit,
+            visit,
+        );
+    }
+
+    /// The same for anything with a squared distance from boxes and from triangles.
+    fn search(
+        &self,
+        from_box: impl Fn(&Bounds) -> f64,
+        from_triangle: impl Fn(&[Point; 3]) -> f64,
+        limit: &mut f64,
+        visit: &mut impl FnMut(f64, u32, &mut f64),
+    ) {
         let Some(boxes) = &self.boxes else { return };
         boxes.search(
             |bounds, members| {
-                if bounds.distance_squared_to(point) >= *limit {
+                if from_box(bounds) >= *limit {
                     return false;
                 }
                 for &facet in members.map_or(&[][..], |m| &boxes.facets[m]) {
-                    let squared = distance::from_point(point, &self.triangle(facet)).0;
+                    let squared = from_triangle(&self.triangle(facet));
                     if squared < *limit {
                         visit(squared, facet, limit);
                     }
                 }
                 true
             },
-            |bounds| bounds.distance_squared_to(point),
+            &from_box,
         );
     }
 }
@@ -107,6 +140,21 @@ mod tests {
             let within = clearance.facets_within(point, expected * 1.5 + 1.0);
             prop_assert_eq!(within.len(), distances.iter().filter(|&&d| d < expected * 1.5 + 1.0).count());
             prop_assert_eq!(within[0].1, expected);
+        }
+
+        #[test]
+        fn the_facet_nearest_to_a_square_is_found_among_all(
+            facets in facets(), at in prop::array::uniform3(-99.0f64..4099.0), edge in 1.0f64..500.0
+        ) {
+            let clearance = Clearance::new(&facets);
+            let square = [(0.0, 0.0), (edge, 0.0), (edge, edge), (0.0, edge)]
+                .map(|(y, z)| [at[0], at[1] + y, at[2] + z]);
+            let triangle = |f: &FacetLattice| f.map(|v| v.map(|c| c as f64));
+            let distances = facets.iter().map(|f| distance::from_square(&square, &triangle(f)).sqrt());
+            let expected = distances.fold(f64::INFINITY, f64::min);
+            prop_assert_eq!(clearance.at_square(&square, f64::INFINITY), expected);
+            prop_assert_eq!(clearance.at_square(&square, expected), expected);
+            prop_assert!(expected <= clearance.at(square[0], f64::INFINITY));
         }
     }
 }

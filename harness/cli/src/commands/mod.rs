@@ -11,6 +11,7 @@ pub mod geometry;
 pub mod import;
 pub mod leak;
 pub mod man;
+pub mod near_body;
 pub mod planted;
 mod programs;
 pub mod report;

@@ -7,36 +7,47 @@
 //!
 //! Trees are placed by their vertices. `--root` maps the least cube around them onto the root: most forests are in the
 //! unit cube, whatever the size of the body.
+//!
+//! A forest that `harness export` wrote has one byte of data per quadrant: the side, or [`FILLER`]. `--sides data` reads it.
 
 use super::cells::Cells;
-use super::{ImportError, Request, refuse_sides, root};
+use super::{ImportError, Request, root, side};
 use crate::files;
 use crate::lattice::Root;
+use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX};
+use crate::word;
+
+use std::ops::Range;
 use std::path::Path;
 
 /// `P8EST_ONDISK_FORMAT`.
-const FORMAT: u64 = 0x0300_0009;
+pub const FORMAT: u64 = 0x0300_0009;
 /// Header and quadrants begin at multiples of this number of bytes.
-const ALIGNMENT: usize = 32;
+pub const ALIGNMENT: usize = 32;
 /// Bytes of x, y, z and level.
 const QUADRANT_BYTES: u64 = 16;
+/// Value of `--sides` that takes the sides from the data of the quadrants.
+const SIDES: &str = "data";
+/// The data of a quadrant that is not a leaf of the mesh: p4est's trees have no holes, so a hole is filled with such quadrants.
+pub const FILLER: u8 = 3;
 
 /// Reads a forest.
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or has trees that are not cubes along the axes.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
-    refuse_sides(request, "p4est's file")?;
     let bytes = files::read(path)?;
     let mut input = Input { bytes: &bytes, at: 0 };
     let trees = connectivity(&mut input)?;
     input.align()?;
     let (ends, data_bytes) = forest_header(&mut input, trees.len())?;
     input.align()?;
+    let with_sides = sides_requested(request, data_bytes)?;
     let stated = root::derive(&trees)?;
     let placed = request.root.unwrap_or(stated);
     let scale = placed.edge / stated.edge;
-    let mut cells = Cells { root: Some(placed), ..Cells::default() };
+    let sides = with_sides.then(Vec::new);
+    let mut cells = Cells { root: Some(placed), sides, ..Cells::default() };
     let mut begin = 0;
     for (tree, end) in ends.into_iter().enumerate() {
         let count = end
@@ -50,6 +61,18 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
         begin = end;
     }
     Ok(cells)
+}
+
+/// Whether the sides are to be read from the quadrants' data.
+fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, ImportError> {
+    match (request.sides.as_deref(), data_bytes) {
+        (None, _) => Ok(false),
+        (Some(SIDES), 1) => Ok(true),
+        (Some(name), _) => Err(ImportError::content(format!(
+            "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides {SIDES} \
+             if the quadrants have one byte of data, their side"
+        ))),
+    }
 }
 
 fn damaged(why: &str) -> ImportError {
@@ -213,12 +236,20 @@ fn add_tree(
             "the last quadrant of a tree, {last:?}, does not end in the tree's last corner"
         ))
     })?;
-    for [x, y, z, level] in quadrants.chunks_exact(stride).map(decode) {
-        if !(0..=30).contains(&level) || [x, y, z].iter().any(|&c| c < 0) {
-            let cell = cells.len();
-            return Err(damaged(&format!(
-                "cell {cell} has the corner [{x}, {y}, {z}] and the level {level}"
-            )));
+    let mut next = 0;
+    for quadrant in quadrants.chunks_exact(stride) {
+        let at @ [x, y, z, level] = decode(quadrant);
+        next = interval(at, length).filter(|interval| interval.start == next).map(|i| i.end).ok_or_else(|| {
+            damaged(&format!(
+                "the quadrant with the corner [{x}, {y}, {z}] and the level {level} is not an octant of level 0 to \
+                 {LEVEL_MAX} that begins where the one before it ends"
+            ))
+        })?;
+        if let Some(sides) = &mut cells.sides {
+            match quadrant[QUADRANT_BYTES as usize] {
+                FILLER => continue,
+                code => sides.push(side(f64::from(code), cells.edges.len())?),
+            }
         }
         let along = [x, y, z].map(|c| f64::from(c) / f64::from(length) * tree.edge);
         cells.push(
@@ -227,6 +258,22 @@ fn add_tree(
         );
     }
     Ok(())
+}
+
+/// The Morton codes, in units of level-19 cells, that a quadrant covers in a tree of this length; `None` if it is not an
+/// octant of a level that leaf words have.
+fn interval([x, y, z, level]: [i32; 4], length: u32) -> Option<Range<u64>> {
+    let level = u8::try_from(level).ok().filter(|&level| level <= LEVEL_MAX)?;
+    let edge = length >> level;
+    let mut corner = [0; 3];
+    for (cell, coordinate) in corner.iter_mut().zip([x, y, z]) {
+        let coordinate = u32::try_from(coordinate)
+            .ok()
+            .filter(|&c| c < length && c.checked_rem(edge) == Some(0))?;
+        *cell = (u64::from(coordinate) * u64::from(CELLS_PER_EDGE) / u64::from(length)) as u32;
+    }
+    let start = word::key_of(corner);
+    Some(start..start + word::span(level))
 }
 
 /// Length of a tree in integer coordinates, which differs between versions of p4est: a tree is complete, so its last

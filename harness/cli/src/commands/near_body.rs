@@ -1,0 +1,114 @@
+//! `harness near-body`: the surface that a mesh hands over to a near-body mesher, and its gap to the wall.
+
+use super::selection::SelectionArguments;
+use clap::Args;
+use contract::case::Case;
+use contract::files::write_atomically;
+use export::error::ExportError;
+use export::mesh::Mesh;
+use export::near_body::front::{Face, front};
+use export::near_body::gap::{Gap, gaps};
+use export::near_body::polygons::Polygons;
+use export::near_body::report::Report;
+use export::near_body::{files, of_case};
+use run::engine::interrupt;
+use run::engine::paths::Paths;
+use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// `harness near-body`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The surface consists of the faces at which cells that no facet touches border a crossing cell, deleted or not. Its normals point \
+away from the body. It is closed unless it reaches the root's boundary or a selection cuts it.
+
+Examples:
+  harness near-body mesh --case body.toml                       size, gap to the wall, distribution to ranks
+  harness near-body mesh --case body.toml --vtp front.vtp       the same, and the surface with the gap of every face
+  harness near-body mesh --stl front.stl                        the surface as triangles
+
+Exit codes: 0 success; 2 invalid input, or a mesh without such faces; 130 interrupted, after which no file remains.")]
+pub struct Arguments {
+    /// The mesh: a leaf-set directory
+    mesh: PathBuf,
+    /// The case that was meshed, for the gap to the wall: name in geometries/catalogue.toml or path of a case file
+    #[arg(long, value_name = "CASE")]
+    case: Option<String>,
+    /// Write the surface as triangles, in binary STL
+    #[arg(long, value_name = "FILE.stl")]
+    stl: Option<PathBuf>,
+    /// Write the surface as polygons for VTK, with level, side, rank, spacing and gap of every face
+    #[arg(long, value_name = "FILE.vtp")]
+    vtp: Option<PathBuf>,
+    /// Write the report as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Which cells' faces are considered.
+    #[command(flatten)]
+    selection: SelectionArguments,
+}
+
+/// Measures, prints and writes; returns the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    match found(arguments) {
+        Ok(report) => {
+            print!("{report}");
+            EXIT_HOLDS
+        }
+        Err(error) => {
+            eprintln!("harness: {error}");
+            match error {
+                ExportError::Interrupted => EXIT_INTERRUPTED,
+                _ => EXIT_INPUT,
+            }
+        }
+    }
+}
+
+fn found(arguments: &Arguments) -> Result<Report, ExportError> {
+    let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
+    let mesh = Mesh::open(&arguments.mesh)?;
+    let case = arguments.case.as_deref().map(|name| read_case(name, &mesh)).transpose()?;
+    let selection = arguments.selection.of(&mesh).map_err(ExportError::Request)?;
+    let faces = front(&mesh, &selection, &check)?;
+    if faces.is_empty() {
+        let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface to hand over";
+        return Err(ExportError::Request(why.to_owned()));
+    }
+    let gaps = case.map(|case| gaps(&case, &faces, &check)).transpose()?;
+    let polygons = Polygons::new(&faces);
+    let report = Report::new(&mesh, &faces, &polygons, gaps.as_deref());
+    write(arguments, &mesh, &faces, &polygons, gaps.as_deref(), &report)?;
+    Ok(report)
+}
+
+/// The case, which must be that of the mesh.
+fn read_case(name: &str, mesh: &Mesh) -> Result<Case, ExportError> {
+    let path =
+        Paths::find().catalogue.case_file(name, Path::new("")).map_err(ExportError::Request)?;
+    let case = Case::read(&path).map_err(|error| ExportError::Request(error.to_string()))?;
+    of_case(mesh, &case)?;
+    Ok(case)
+}
+
+fn write(
+    arguments: &Arguments,
+    mesh: &Mesh,
+    faces: &[Face],
+    polygons: &Polygons,
+    gaps: Option<&[Gap]>,
+    report: &Report,
+) -> Result<(), ExportError> {
+    let root = &mesh.manifest.root;
+    let replace = |path: &Option<PathBuf>, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
+        let Some(path) = path else { return Ok(()) };
+        write_atomically(path, |out| fill(out)).map_err(|error| ExportError::write(path, error))
+    };
+    replace(&arguments.stl, &|out| files::stl(root, faces, polygons, out))?;
+    replace(&arguments.vtp, &|out| files::vtp(root, faces, polygons, gaps, out))?;
+    replace(&arguments.json, &|out| {
+        serde_json::to_writer_pretty(&mut *out, report)?;
+        out.write_all(b"\n")
+    })
+}

@@ -1,0 +1,378 @@
+//! Forests for `p8est_load` of p4est 2, which deal.II, t8code and ForestClaw build on.
+//!
+//! The file is that of `p8est_save`: the connectivity of one tree, whose vertices are the corners of the root; the header; and
+//! the quadrants in Morton order. It is described in `contract::import::p4est`, which reads it.
+//!
+//! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
+//! data of each quadrant, one byte, is its side or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
+//! The saved partition gives each rank as many quadrants as its part of the mesh has, with the fillers before and among its leaves.
+//! Ranks of p4est own intervals of the Morton curve, and so do the parts of a mesh, except near their boundaries.
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use contract::files;
+use contract::import::p4est::{ALIGNMENT, FILLER, FORMAT};
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::octant::{LEVEL_MAX, Octant};
+use contract::word::{self, KEY_END};
+
+use crate::error::ExportError;
+use crate::mesh::{Leaf, Mesh};
+use crate::options::{Options, Summary};
+use crate::selection::Selection;
+
+/// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
+const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
+/// Bytes of a quadrant: x, y, z, level, and one byte of data.
+const RECORD_BYTES: usize = 17;
+/// `sizeof(p8est_quadrant_t)`, which `p8est_load` compares.
+const QUADRANT_STRUCT_BYTES: u64 = 24;
+/// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
+const VERSION: &[u8] = b"2.2";
+
+/// Number of quadrants between two reports of progress.
+const STEP: u64 = 1 << 16;
+
+/// Writes the selected leaves and the fillers as a forest. The mesh is read twice, because the numbers of quadrants precede them.
+///
+/// # Errors
+/// If no leaf is selected, if one is deeper than level 18, if the mesh cannot be read or the file cannot be written, or if
+/// the user interrupts.
+pub fn write(
+    mesh: &Mesh,
+    selection: &Selection,
+    path: &Path,
+    options: &Options<'_>,
+) -> Result<Summary, ExportError> {
+    let counts = Counts::of(mesh, selection, options)?;
+    if counts.leaves == 0 {
+        return Err(ExportError::Request(
+            "no leaf satisfies all conditions of the selection: remove one of them".to_owned(),
+        ));
+    }
+    let ends = counts.saved_partition();
+    let total = ends[ends.len() - 1];
+    let named = |error| ExportError::write(path, error);
+    let bytes = files::fill_atomically(path, named, |file| {
+        let mut out = BufWriter::new(file);
+        let mut start = connectivity(&mesh.manifest.root);
+        start.extend(header(&ends));
+        pad(&mut start);
+        out.write_all(&start).map_err(named)?;
+        let mut done = 0;
+        quadrants(mesh, selection, &mut |quadrant| {
+            if done % STEP == 0 {
+                options.check()?;
+                options.watch.progress(done, total);
+            }
+            done += 1;
+            out.write_all(&quadrant.record()).map_err(named)
+        })?;
+        out.flush().map_err(named)?;
+        Ok(start.len() as u64 + total * RECORD_BYTES as u64)
+    })?;
+    Ok(Summary { leaves: counts.leaves, files: 1, bytes })
+}
+
+/// An octant of the forest, its data, and the part of the mesh in which it, or the next leaf, is.
+struct Quadrant {
+    octant: Octant,
+    data: u8,
+    part: u32,
+}
+
+impl Quadrant {
+    fn record(&self) -> [u8; RECORD_BYTES] {
+        let mut record = [0; RECORD_BYTES];
+        let numbers = self.octant.corner.into_iter().chain([u32::from(self.octant.level)]);
+        for (field, number) in record.chunks_exact_mut(4).zip(numbers) {
+            field.copy_from_slice(&number.to_le_bytes());
+        }
+        record[RECORD_BYTES - 1] = self.data;
+        record
+    }
+}
+
+/// Visits the quadrants of the forest in Morton order.
+fn quadrants(
+    mesh: &Mesh,
+    selection: &Selection,
+    visit: &mut impl FnMut(Quadrant) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    let (mut next, mut part_last) = (0, 0);
+    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, part, .. }| {
+        if octant.level > QUADRANT_LEVEL_MAX {
+            return Err(ExportError::Request(format!(
+                "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
+            )));
+        }
+        let key = word::key_of(octant.corner);
+        fill(next, key, &mut |octant| visit(Quadrant { octant, data: FILLER, part }))?;
+        (next, part_last) = (key + word::span(octant.level), part);
+        visit(Quadrant { octant, data: side as u8, part })
+    })?;
+    fill(next, KEY_END, &mut |octant| visit(Quadrant { octant, data: FILLER, part: part_last }))
+}
+
+/// Visits the fewest octants that cover the Morton codes from `key` to `end`, in order.
+fn fill(
+    mut key: u64,
+    end: u64,
+    visit: &mut impl FnMut(Octant) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    while key < end {
+        let fits = |level: &u8| {
+            let span = word::span(*level);
+            key & (span - 1) == 0 && span <= end - key
+        };
+        let level = (0..=LEVEL_MAX).find(fits).expect("a cell of the deepest level always fits");
+        visit(Octant { corner: word::corner_of(key), level })?;
+        key += word::span(level);
+    }
+    Ok(())
+}
+
+/// Numbers of quadrants.
+struct Counts {
+    leaves: u64,
+    /// Quadrants of each part, fillers included.
+    by_part: Vec<u64>,
+}
+
+impl Counts {
+    fn of(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Self, ExportError> {
+        let mut counts = Self { leaves: 0, by_part: vec![0; mesh.parts().max(1)] };
+        let mut done = 0;
+        quadrants(mesh, selection, &mut |quadrant| {
+            if done % STEP == 0 {
+                options.check()?;
+            }
+            done += 1;
+            counts.leaves += u64::from(quadrant.data != FILLER);
+            counts.by_part[quadrant.part as usize] += 1;
+            Ok(())
+        })?;
+        Ok(counts)
+    }
+
+    /// Number of quadrants up to the end of each saved part.
+    fn saved_partition(&self) -> Vec<u64> {
+        let mut sum = 0;
+        let add = |count: &u64| {
+            sum += count;
+            sum
+        };
+        self.by_part.iter().map(add).collect()
+    }
+}
+
+/// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices.
+fn connectivity(root: &Root) -> Vec<u8> {
+    let mut bytes = b"p8est\0\0\0".to_vec();
+    bytes.extend(VERSION);
+    bytes.resize(ALIGNMENT, 0);
+    // Format, bytes of an index, and numbers of vertices, trees, edges, trees at edges, corners, trees at corners, bytes of
+    // attributes; the last number is reserved.
+    numbers(&mut bytes, &[FORMAT, 4, 8, 1, 0, 0, 0, 0, 0, 0]);
+    for vertex in 0..8 {
+        let corner = std::array::from_fn(|a| (vertex >> a & 1) * UNITS_PER_EDGE);
+        for coordinate in root.to_user(corner) {
+            bytes.extend(coordinate.to_le_bytes());
+        }
+    }
+    // Vertices of the tree; its neighbours across faces, which are itself; their faces; offsets of no edges and corners.
+    (0..8u32).for_each(|vertex| bytes.extend(vertex.to_le_bytes()));
+    bytes.extend([0; 6 * 4]);
+    bytes.extend(0..6u8);
+    bytes.extend([0; 2 * 4]);
+    pad(&mut bytes);
+    bytes
+}
+
+/// The header of the forest, given the number of quadrants up to the end of each part.
+fn header(ends: &[u64]) -> Vec<u8> {
+    let quadrants = ends[ends.len() - 1];
+    let mut bytes = Vec::new();
+    // Bytes of a coordinate, of a quadrant in memory, and of its data; whether data are saved; parts.
+    numbers(&mut bytes, &[FORMAT, 4, QUADRANT_STRUCT_BYTES, 1, 1, ends.len() as u64]);
+    numbers(&mut bytes, ends);
+    numbers(&mut bytes, &[quadrants]);
+    bytes
+}
+
+fn numbers(bytes: &mut Vec<u8>, numbers: &[u64]) {
+    numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+}
+
+/// Appends zero bytes up to a multiple of [`ALIGNMENT`].
+fn pad(bytes: &mut Vec<u8>) {
+    bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::Watch;
+    use contract::import::{Format, Request, leaf_set, read};
+    use contract::leafset::LeafSet;
+    use contract::manifest::{Manifest, Tree};
+    use contract::testing::{random_words, words_of};
+    use contract::word::Side;
+    use proptest::prelude::*;
+    use std::fs;
+    use std::num::NonZero;
+
+    struct Nobody;
+
+    impl Watch for Nobody {
+        fn progress(&self, _: u64, _: u64) {}
+
+        fn is_interrupted(&self) -> bool {
+            false
+        }
+    }
+
+    const OPTIONS: Options<'static> = Options { jobs: NonZero::<usize>::MIN, watch: &Nobody };
+    const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
+
+    fn mesh_of(parts: Vec<Vec<u64>>) -> Mesh {
+        let empty = Manifest::without_leaves(Tree::Final, ROOT, "test".to_owned());
+        let dir = tempfile::tempdir().unwrap();
+        LeafSet::new(empty, Vec::new()).with_parts(parts).write(dir.path()).unwrap();
+        // The files remain open.
+        Mesh::open(dir.path()).unwrap()
+    }
+
+    /// The leaf set that a reader makes of a file, with or without the data of the quadrants.
+    fn import(path: &Path, sides: bool) -> LeafSet {
+        let request = Request { sides: sides.then(|| "data".to_owned()), ..Request::default() };
+        let cells = read(path, Format::P4est, &request).unwrap();
+        leaf_set(&cells, None, None, "test".to_owned()).unwrap()
+    }
+
+    fn exported(mesh: &Mesh, selection: &Selection) -> (tempfile::TempDir, Summary) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("forest.p8est");
+        let summary = write(mesh, selection, &path, &OPTIONS).unwrap();
+        assert_eq!(fs::metadata(path).unwrap().len(), summary.bytes);
+        (dir, summary)
+    }
+
+    /// The saved partition: quadrants up to the end of each part.
+    fn partition(path: &Path) -> Vec<u64> {
+        let bytes = fs::read(path).unwrap();
+        let number = |i: usize| u64::from_le_bytes(bytes[384 + 8 * i..][..8].try_into().unwrap());
+        (0..number(5) as usize).map(|part| number(6 + part)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn a_forest_read_again_has_the_leaves_and_a_complete_tree(
+            words in random_words(5), parts in 1usize..5, interleaved in any::<bool>()
+        ) {
+            prop_assume!(!words.is_empty());
+            let size = words.len().div_ceil(parts);
+            let mut dealt = vec![Vec::new(); parts];
+            for (i, &w) in words.iter().enumerate() {
+                dealt[if interleaved { i % parts } else { i / size }].push(w);
+            }
+            let mesh = mesh_of(dealt);
+            let (dir, summary) = exported(&mesh, &Selection::default());
+            let path = dir.path().join("forest.p8est");
+            let set = import(&path, true);
+            prop_assert_eq!(set.manifest.digest, mesh.manifest.digest);
+            prop_assert_eq!(set.manifest.root, ROOT);
+            prop_assert_eq!(set.words, words);
+            let complete = import(&path, false);
+            let filled: u64 = complete.words.iter().map(|&w| word::span(word::level(w))).sum();
+            prop_assert_eq!(filled, KEY_END);
+            let ends = partition(&path);
+            prop_assert_eq!(*ends.last().unwrap(), complete.manifest.leaves);
+            prop_assert!(ends.windows(2).all(|e| e[0] <= e[1]));
+            prop_assert_eq!(ends.len(), parts);
+        }
+
+        #[test]
+        fn what_a_selection_leaves_out_is_filled(words in random_words(4), level in 0u8..5) {
+            let selection = Selection { level_max: Some(level), ..Selection::default() };
+            let expected: Vec<u64> =
+                words.iter().copied().filter(|&w| word::level(w) <= level).collect();
+            prop_assume!(!expected.is_empty());
+            let (dir, _) = exported(&mesh_of(vec![words]), &selection);
+            prop_assert_eq!(import(&dir.path().join("forest.p8est"), true).words, expected);
+        }
+
+        #[test]
+        fn no_changed_byte_of_a_quadrant_goes_unnoticed(
+            words in random_words(4), at in any::<prop::sample::Index>(), bit in 0u8..8
+        ) {
+            prop_assume!(!words.is_empty());
+            let mesh = mesh_of(vec![words]);
+            let (dir, _) = exported(&mesh, &Selection::default());
+            let path = dir.path().join("forest.p8est");
+            let mut bytes = fs::read(&path).unwrap();
+            let quadrants = 17 * *partition(&path).last().unwrap() as usize;
+            let at = bytes.len() - 1 - at.index(quadrants);
+            bytes[at] ^= 1 << bit;
+            fs::write(&path, bytes).unwrap();
+            let request = Request { sides: Some("data".to_owned()), ..Request::default() };
+            let read = read(&path, Format::P4est, &request)
+                .and_then(|cells| leaf_set(&cells, None, None, "test".to_owned()));
+            prop_assert!(read.map_or(true, |set| set.manifest.digest != mesh.manifest.digest));
+        }
+    }
+
+    #[test]
+    fn the_connectivity_is_that_of_p4est() {
+        let sample =
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../contract/tests/samples/unitcube.p8est");
+        let cube = connectivity(&Root { origin: [0.0; 3], edge: 1.0 });
+        assert_eq!(cube, fs::read(sample).unwrap()[..cube.len()]);
+    }
+
+    /// All intervals of 64 cells.
+    #[test]
+    fn a_hole_is_filled_with_the_fewest_octants() {
+        let unit = word::span(17);
+        for begin in 0..64 {
+            for end in begin..=64 {
+                let mut octants = Vec::new();
+                fill(begin * unit, end * unit, &mut |octant| {
+                    octants.push(octant);
+                    Ok(())
+                })
+                .unwrap();
+                let mut next = begin * unit;
+                for octant in &octants {
+                    assert_eq!(word::key_of(octant.corner), next);
+                    next += word::span(octant.level);
+                }
+                assert_eq!(next, end * unit);
+                let siblings = |w: &[Octant]| {
+                    w.iter().zip(0..).all(|(o, d)| o.level == w[0].level && o.digit() == d)
+                };
+                assert!(!octants.windows(8).any(siblings), "{begin} to {end}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_mesh_that_p4est_cannot_represent_is_refused_and_no_file_is_written() {
+        let deep = words_of(|o| o.corner == [0; 3] && o.level < 19);
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("forest.p8est");
+        let refusal =
+            |selection: &Selection| write(&mesh_of(vec![deep.clone()]), selection, &path, &OPTIONS);
+        let error = refusal(&Selection::default()).unwrap_err().to_string();
+        assert!(error.contains("p4est has levels 0 to 18"), "{error}");
+        let none = Selection { side: Some(Side::Inside), ..Selection::default() };
+        let error = refusal(&none).unwrap_err().to_string();
+        assert!(error.contains("no leaf satisfies"), "{error}");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+        // The eight leaves of level 19 become one quadrant of level 18.
+        let coarse = Selection { level_max: Some(18), ..Selection::default() };
+        let leaves = refusal(&coarse).unwrap().leaves;
+        assert_eq!(partition(&path), [leaves + 1]);
+    }
+}

@@ -1,0 +1,166 @@
+//! The faces of the mesh towards the body: those at which leaves on a side border crossing leaves, deleted or not. A near-body
+//! mesh meets the off-body mesh there, so they are work for the ranks that own the leaves.
+//!
+//! A face of a leaf is counted once if crossing leaves cover it. If they cover part of it, each quarter that is a crossing
+//! leaf's is counted: touching leaves differ by at most one level.
+//!
+//! Crossing leaves are few, so they are moved by one position in each of the six directions and sent to the ranks that hold the
+//! bricks in which they arrive. There, bit operations find the leaves of the same level, of the next finer one, and of the next coarser
+//! one. Nothing is done per leaf.
+
+use crate::brick::{self, AXES, Brick};
+use crate::brickset::{BrickSet, ones};
+use crate::comm::Comm;
+use crate::mesh::Mesh;
+use crate::octant::{self, Level};
+use crate::tree::{PerLevel, per_level};
+
+/// The six directions: an axis, and whether it is followed upwards.
+const DIRECTIONS: [(usize, bool); 6] =
+    [(0, false), (0, true), (1, false), (1, true), (2, false), (2, true)];
+
+/// Exposed faces of the leaves in a brick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InBrick {
+    /// The brick's level.
+    pub level: Level,
+    /// The brick's key.
+    pub key: u64,
+    /// Number of exposed faces.
+    pub faces: u32,
+}
+
+/// The exposed faces in bricks that this rank owns; a brick may occur several times. The mesh must be graded. Collective.
+pub fn faces(mesh: &Mesh, comm: &dyn Comm) -> Vec<InBrick> {
+    let mut search = Search { mesh, crossing: crossing(mesh), found: Vec::new() };
+    let rules = &mesh.rules;
+    for l in rules.level_surface.max(1)..=rules.level_deepest() {
+        let arrived = search.moved(l);
+        let (arrived, _) = mesh.ownership.redistribute(l, arrived, comm);
+        for (set, direction) in arrived.iter().zip(DIRECTIONS) {
+            search.same_and_finer(l, set, direction);
+        }
+        // A layer of two cells holds all leaves that touch a crossing leaf, which is a source.
+        if rules.layer_cells_min < 2 {
+            let quarters = search.quarters(l, &arrived);
+            let (quarters, _) = mesh.ownership.redistribute(l - 1, quarters, comm);
+            quarters.iter().for_each(|set| search.coarser(l - 1, set));
+        }
+    }
+    search.found
+}
+
+/// The octants in crossing leaves of T0: these and, where gradation has split one, all that it consists of.
+fn crossing(mesh: &Mesh) -> PerLevel {
+    let mut crossing = per_level();
+    for l in 0..crossing.len() {
+        crossing[l] = mesh.crossing[l].clone();
+        if l > 0 {
+            let mut split = mesh.split[l - 1].cursor();
+            let mut divided = crossing[l - 1].clone();
+            divided.retain(|b| b.bits & split.get(b.key));
+            let mut children = BrickSet::default();
+            divided.child_bricks().for_each(|b| children.push(b.key, b.bits));
+            crossing[l] = std::mem::take(&mut crossing[l]).union(children);
+        }
+    }
+    crossing
+}
+
+struct Search<'a> {
+    mesh: &'a Mesh,
+    /// Octants in crossing leaves of T0, split or not.
+    crossing: PerLevel,
+    found: Vec<InBrick>,
+}
+
+impl Search<'_> {
+    /// The face neighbours, in each direction, of the crossing leaves of level `l` in bricks that this rank owns.
+    fn moved(&self, l: Level) -> [BrickSet; 6] {
+        let mut split = self.mesh.split[l as usize].cursor();
+        let leaves: Vec<Brick> = self.crossing[l as usize]
+            .bricks()
+            .filter(|b| self.mesh.ownership.owns(l, b.key))
+            .map(|b| Brick { bits: b.bits & !split.get(b.key), ..b })
+            .collect();
+        DIRECTIONS.map(|(axis, up)| {
+            let mut bricks = Vec::new();
+            for b in leaves.iter().filter(|b| b.bits != 0) {
+                let within = brick::moved(b.bits, axis, up) & brick::valid(l);
+                bricks.push(Brick { key: b.key, bits: within });
+                let beyond = brick::across(b.bits, axis, up);
+                let next = (l >= 2).then(|| octant::neighbour(l - 2, b.key, axis, up)).flatten();
+                bricks.extend(next.map(|key| Brick { key, bits: beyond }));
+            }
+            BrickSet::from_unsorted(bricks)
+        })
+    }
+
+    /// The octants of a brick of level `l` that exist.
+    fn existing(&self, l: Level, key: u64) -> u64 {
+        match l {
+            0 => 1,
+            _ => {
+                let above = self.mesh.split[l as usize - 1].get(key >> 3);
+                brick::children(brick::byte(above, key & 7))
+            }
+        }
+    }
+
+    /// The octants of a brick that are neither split, nor in a crossing leaf, nor deleted.
+    fn on_a_side(&self, l: Level, key: u64) -> u64 {
+        let l = l as usize;
+        let deleted = &self.mesh.sides.deleted[l];
+        !(self.mesh.split[l].get(key) | self.crossing[l].get(key) | deleted.get(key))
+    }
+
+    /// Counts the faces of leaves on a side in a brick of level `l`, if this rank owns it.
+    fn count(&mut self, level: Level, key: u64, among: u64) {
+        if among != 0 && self.mesh.ownership.owns(level, key) {
+            let leaves = among & self.existing(level, key) & self.on_a_side(level, key);
+            let faces = leaves.count_ones();
+            self.found.extend((faces > 0).then_some(InBrick { level, key, faces }));
+        }
+    }
+
+    /// Counts the leaves of level `l`, and of the next finer one, in the octants at which crossing leaves of level `l` arrived.
+    fn same_and_finer(&mut self, l: Level, arrived: &BrickSet, (axis, up): (usize, bool)) {
+        // The half of every group of eight siblings from which the crossing leaves came.
+        let lower = AXES[axis][0] | AXES[axis][2];
+        let half = if up { lower } else { !lower };
+        for b in arrived.bricks() {
+            self.count(l, b.key, b.bits);
+            let split = b.bits & self.mesh.split[l as usize].get(b.key);
+            for j in ones(u64::from(brick::parents(split))).map(u64::from) {
+                let below = brick::children(brick::byte(split, j));
+                self.count(l + 1, b.key << 3 | j, below & half);
+            }
+        }
+    }
+
+    /// The parents, of level `l - 1`, of octants that do not exist and at which crossing leaves arrived, in bricks that this rank owns. For
+    /// every direction three sets: those that count for at least one, two and three faces.
+    fn quarters(&self, l: Level, arrived: &[BrickSet; 6]) -> [BrickSet; 18] {
+        let mut quarters = [const { BrickSet::EMPTY }; 18];
+        for (set, counts) in arrived.iter().zip(quarters.as_chunks_mut::<3>().0) {
+            for b in set.bricks().filter(|b| self.mesh.ownership.owns(l, b.key)) {
+                let missing = b.bits & !self.existing(l, b.key);
+                for j in ones(u64::from(brick::parents(missing))) {
+                    let parent = 1 << (8 * (b.key & 7) + u64::from(j));
+                    // Four quarters are one face.
+                    let faces = match brick::byte(missing, u64::from(j)).count_ones() {
+                        4 => 1,
+                        few => few as usize,
+                    };
+                    counts[..faces].iter_mut().for_each(|set| set.push(b.key >> 3, parent));
+                }
+            }
+        }
+        quarters
+    }
+
+    /// Counts the leaves of level `l` among some octants, which need not exist.
+    fn coarser(&mut self, l: Level, set: &BrickSet) {
+        set.bricks().for_each(|b| self.count(l, b.key, b.bits));
+    }
+}
