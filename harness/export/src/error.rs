@@ -34,6 +34,9 @@ pub enum ExportError {
     /// A file could not be written.
     #[error("{0}: choose another file")]
     Write(#[from] io::Error),
+    /// The user interrupted the export.
+    #[error("interrupted by the user")]
+    Interrupted,
     /// A request that cannot be fulfilled, as one sentence.
     #[error("{0}")]
     Request(String),

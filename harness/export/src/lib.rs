@@ -4,5 +4,6 @@
 #![deny(missing_docs)]
 
 pub mod error;
+pub mod foam;
 pub mod mesh;
 pub mod selection;
