@@ -8,39 +8,20 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// How numbers are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Style {
-    /// Text in place of binary numbers.
-    pub is_ascii: bool,
-    /// Width of labels.
-    pub label: Label,
-}
+use crate::options::{Label, Style};
 
-/// Width of the numbers of cells, faces and points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Label {
-    /// 32 bits, OpenFOAM's default.
-    #[default]
-    Bits32,
-    /// 64 bits, which OpenFOAM must have been compiled for or convert.
-    Bits64,
-}
-
-impl Label {
-    /// Greatest label.
-    pub fn max(self) -> u64 {
-        match self {
-            Self::Bits32 => i32::MAX as u64,
-            Self::Bits64 => i64::MAX as u64,
-        }
+/// Greatest label.
+pub fn label_max(label: Label) -> u64 {
+    match label {
+        Label::Bits32 => i32::MAX as u64,
+        Label::Bits64 => i64::MAX as u64,
     }
+}
 
-    fn bytes(self) -> u64 {
-        match self {
-            Self::Bits32 => 4,
-            Self::Bits64 => 8,
-        }
+fn label_bytes(label: Label) -> u64 {
+    match label {
+        Label::Bits32 => 4,
+        Label::Bits64 => 8,
     }
 }
 
@@ -48,25 +29,23 @@ const BUFFER_BYTES: usize = 1 << 16;
 /// Room for a count that is written after its list.
 const COUNT_DIGITS: usize = 20;
 
-impl Style {
-    /// The dictionary at the beginning of a file.
-    pub fn header(self, class: &str, object: &str, note: &str) -> String {
-        let (format, bits) =
-            (if self.is_ascii { "ascii" } else { "binary" }, 8 * self.label.bytes());
-        let note = if note.is_empty() { String::new() } else { format!("    note \"{note}\";\n") };
-        format!(
-            "FoamFile\n{{\n    version 2.0;\n    format {format};\n    arch \"LSB;label={bits};scalar=64\";\n{note}    \
-             class {class};\n    location \"constant/polyMesh\";\n    object {object};\n}}\n\n"
-        )
-    }
+/// The dictionary at the beginning of a file.
+pub fn header(style: Style, class: &str, object: &str, note: &str) -> String {
+    let format = if style.is_ascii { "ascii" } else { "binary" };
+    let bits = 8 * label_bytes(style.label);
+    let note = if note.is_empty() { String::new() } else { format!("    note \"{note}\";\n") };
+    format!(
+        "FoamFile\n{{\n    version 2.0;\n    format {format};\n    arch \"LSB;label={bits};scalar=64\";\n{note}    \
+         class {class};\n    location \"constant/polyMesh\";\n    object {object};\n}}\n\n"
+    )
+}
 
-    fn label(self, out: &mut impl Write, label: u64) -> io::Result<()> {
-        debug_assert!(label <= self.label.max());
-        match (self.is_ascii, self.label) {
-            (true, _) => write!(out, "{label}"),
-            (false, Label::Bits32) => out.write_all(&(label as i32).to_le_bytes()),
-            (false, Label::Bits64) => out.write_all(&(label as i64).to_le_bytes()),
-        }
+fn write_label(out: &mut impl Write, style: Style, label: u64) -> io::Result<()> {
+    debug_assert!(label <= label_max(style.label));
+    match (style.is_ascii, style.label) {
+        (true, _) => write!(out, "{label}"),
+        (false, Label::Bits32) => out.write_all(&(label as i32).to_le_bytes()),
+        (false, Label::Bits64) => out.write_all(&(label as i64).to_le_bytes()),
     }
 }
 
@@ -94,7 +73,7 @@ impl List {
     ) -> io::Result<Self> {
         let mut out = BufWriter::with_capacity(BUFFER_BYTES, File::create(dir.join(object))?);
         let has_end = style.is_ascii || count > 0;
-        write!(out, "{}{count}\n", style.header(class, object, note))?;
+        writeln!(out, "{}{count}", header(style, class, object, note))?;
         out.write_all(match (has_end, style.is_ascii) {
             (false, _) => b"",
             (true, false) => b"(",
@@ -108,7 +87,7 @@ impl List {
     /// # Errors
     /// If the file cannot be written.
     pub fn label(&mut self, label: u64) -> io::Result<()> {
-        self.style.label(&mut self.out, label)?;
+        write_label(&mut self.out, self.style, label)?;
         self.end_line()
     }
 
@@ -178,7 +157,7 @@ impl Faces {
         }
         let mut positions = List::create(dir, style, "faceCompactList", "faces", "", count + 1)?;
         let begin = positions.out.stream_position()?;
-        let at_count = begin + (count + 1) * style.label.bytes() + ")\n".len() as u64;
+        let at_count = begin + (count + 1) * label_bytes(style.label) + ")\n".len() as u64;
         let mut file = File::options().write(true).open(dir.join("faces"))?;
         file.seek(SeekFrom::Start(at_count + COUNT_DIGITS as u64))?;
         let mut vertices = BufWriter::with_capacity(BUFFER_BYTES, file);
@@ -196,11 +175,11 @@ impl Faces {
             Self::Listed(list) => list.face(vertices)?,
             Self::Compact(Compact { positions, vertices: out, count, .. }) => {
                 *count += vertices.len() as u64;
-                if *count > positions.style.label.max() {
+                if *count > label_max(positions.style.label) {
                     return Ok(false);
                 }
                 positions.label(*count)?;
-                vertices.iter().try_for_each(|&v| positions.style.label(out, v))?;
+                vertices.iter().try_for_each(|&v| write_label(out, positions.style, v))?;
             }
         }
         Ok(true)

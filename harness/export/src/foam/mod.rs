@@ -8,10 +8,11 @@
 //!
 //! - [`tree`]: the cells and what is across their faces; [`faces`]: the faces and their vertices; [`points`]: the numbers of points;
 //! - [`regions`], [`patches`], [`processors`];
-//! - [`survey`]: the boundary of a directory; [`poly_mesh`]: its files; [`lists`]: OpenFOAM's syntax.
+//! - [`survey`]: the boundary of a directory; [`poly_mesh`]: its files; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
 pub mod faces;
 pub mod lists;
+pub mod notes;
 pub mod patches;
 pub mod points;
 pub mod poly_mesh;
@@ -23,59 +24,24 @@ mod tests;
 pub mod tree;
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
-use contract::case::Case;
+use contract::files;
 use contract::manifest::Sides;
 use contract::word;
 
 use crate::error::ExportError;
 use crate::mesh::{Leaf, Mesh};
+use crate::options;
+use crate::options::{Options, Processors, Summary};
 use crate::selection::Selection;
-use lists::Style;
 use patches::Patches;
 use points::Points;
-use poly_mesh::Counts;
-use processors::{Distribution, Processors};
+use processors::Distribution;
 use regions::{Regions, Size};
 use survey::{Domain, Model, visit};
 use tree::{Builder, CELLS_MAX};
-
-/// What becomes of cells that faces do not connect with the largest region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Keep {
-    /// They are exported.
-    #[default]
-    All,
-    /// They are left out. Most solvers accept only one region.
-    Largest,
-}
-
-/// Options of the export.
-#[derive(Clone, Copy)]
-pub struct Options<'a> {
-    /// How numbers are written.
-    pub style: Style,
-    /// The regions that are exported.
-    pub regions: Keep,
-    /// Processor directories in place of one mesh.
-    pub processors: Option<Processors>,
-    /// The case of the mesh, whose solids become patches.
-    pub case: Option<&'a Case>,
-    /// Whether the user has interrupted the export.
-    pub is_interrupted: &'a dyn Fn() -> bool,
-}
-
-/// What was written.
-#[derive(Clone, Debug, Default)]
-pub struct Summary {
-    /// The directories, with what they contain.
-    pub directories: Vec<(PathBuf, Counts)>,
-    /// The regions of the selected leaves, largest volume first.
-    pub regions: Vec<Size>,
-    /// Size of all files in bytes.
-    pub bytes: u64,
-}
 
 /// Writes the selected leaves as `path`, which is a case's `constant/polyMesh`, or as one
 /// `processorN/constant/polyMesh` per processor in the same case. Directories appear under their names when all are complete.
@@ -86,42 +52,64 @@ pub fn write(
     mesh: &Mesh,
     selection: &Selection,
     path: &Path,
-    options: &Options,
+    options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
     let mut model = read(mesh, selection, options)?;
-    let regions = connect(&mut model, options.regions)?;
-    let distribution = distribute(&model, mesh, options.processors)?;
-    let targets = targets(path, distribution.as_ref().map(Distribution::len))?;
-    let mut patches = Patches::new(options.case, *selection != Selection::default())
+    let regions = connect(&mut model, options.foam.regions)?;
+    let distribution = distribute(&model, mesh, options.foam.processors)?;
+    let targets = targets(path, distribution.as_ref().map(Distribution::processors))?;
+    let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
         .map_err(ExportError::Request)?;
 
-    let staging = tempfile::Builder::new().prefix(".polyMesh-").tempdir_in(existing(path))?;
-    let mut summary = Summary { regions, ..Summary::default() };
-    for (processor, target) in (0..).zip(&targets) {
+    let named = |error| ExportError::write(path, error);
+    let staging = files::temporary_directory(&existing(path).join("polyMesh")).map_err(named)?;
+    let mut counts = Vec::new();
+    for processor in 0..targets.len() as u32 {
         let dir = staging.path().join(processor.to_string());
-        fs::create_dir(&dir)?;
+        fs::create_dir(&dir).map_err(named)?;
         let domain = Domain(distribution.as_ref().map(|distribution| (distribution, processor)));
-        let counts = poly_mesh::write(&model, &mut patches, domain, &dir)?;
-        for file in fs::read_dir(&dir)? {
-            summary.bytes += file?.metadata()?.len();
-        }
-        summary.directories.push((target.clone(), counts));
+        counts.push(poly_mesh::write(&model, &mut patches, domain, &dir).map_err(|error| {
+            match error {
+                ExportError::Write(error) => named(error),
+                error => error,
+            }
+        })?);
+        let done = counts.iter().map(|counts| counts.cells).sum();
+        options.watch.progress(done, model.words.len() as u64);
     }
+    let (files, bytes) = sizes(staging.path()).map_err(named)?;
+    options.check()?;
     for (processor, target) in targets.iter().enumerate() {
-        fs::create_dir_all(target.parent().unwrap_or(target))?;
-        fs::rename(staging.path().join(processor.to_string()), target)?;
+        let place = || {
+            fs::create_dir_all(target.parent().unwrap_or(target))?;
+            fs::rename(staging.path().join(processor.to_string()), target)
+        };
+        place().map_err(|error| ExportError::write(target, error))?;
     }
-    Ok(summary)
+    let notes = notes::notes(&counts, &regions, options.foam.regions);
+    Ok(Summary { leaves: model.words.len() as u64, files, bytes, notes })
+}
+
+/// Number and size of the files in the directories of a directory.
+fn sizes(staging: &Path) -> io::Result<(u64, u64)> {
+    let (mut files, mut bytes) = (0, 0);
+    for dir in fs::read_dir(staging)? {
+        for file in fs::read_dir(dir?.path())? {
+            files += 1;
+            bytes += file?.metadata()?.len();
+        }
+    }
+    Ok((files, bytes))
 }
 
 /// The selected leaves as cells.
 fn read<'a>(
     mesh: &Mesh,
     selection: &Selection,
-    options: &Options<'a>,
+    options: &'a Options<'a>,
 ) -> Result<Model<'a>, ExportError> {
     let root = mesh.manifest.root;
-    if options.case.is_some_and(|case| case.root != root) {
+    if options.foam.case.is_some_and(|case| case.root != root) {
         return Err(ExportError::Request(
             "the mesh has another root than the case: give the case that was meshed".to_owned(),
         ));
@@ -131,8 +119,8 @@ fn read<'a>(
     let mut visited = 0u64;
     mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
         visited += 1;
-        if visited.is_multiple_of(1 << 16) && (options.is_interrupted)() {
-            return Err(ExportError::Interrupted);
+        if visited.is_multiple_of(1 << 16) {
+            options.check()?;
         }
         let is_exported = selection.has(&leaf);
         if is_exported {
@@ -157,13 +145,12 @@ fn read<'a>(
         points: Points::default(),
         root,
         has_sides: mesh.manifest.sides == Sides::Known,
-        style: options.style,
-        is_interrupted: options.is_interrupted,
+        options,
     })
 }
 
 /// Finds the regions, removes those that are not to be exported, and numbers the points.
-fn connect(model: &mut Model, keep: Keep) -> Result<Vec<Size>, ExportError> {
+fn connect(model: &mut Model, keep: options::Regions) -> Result<Vec<Size>, ExportError> {
     let mut regions = Regions::new(model.tree.cells());
     let mut points = Points::default();
     visit(model, Domain(None), |cell, around, squares| {
@@ -175,7 +162,7 @@ fn connect(model: &mut Model, keep: Keep) -> Result<Vec<Size>, ExportError> {
     })?;
     let mut sizes = regions.sizes(&model.words);
     sizes.sort_by_key(|&(_, size)| std::cmp::Reverse(size));
-    if keep == Keep::Largest && sizes.len() > 1 {
+    if keep == options::Regions::Largest && sizes.len() > 1 {
         let keep = regions.members(sizes[0].0);
         let mut kept = keep.iter();
         model.words.retain(|_| *kept.next().expect("a flag per cell"));
@@ -213,7 +200,7 @@ fn distribute(
             Distribution::new(model.ranks.clone(), mesh.manifest.parts.len() as u32)
         }
     };
-    match (0..distribution.len()).find(|&p| distribution.cells(p).is_empty()) {
+    match (0..distribution.processors()).find(|&p| distribution.cells(p).is_empty()) {
         None => Ok(Some(distribution)),
         Some(rank) => Err(ExportError::Request(format!(
             "rank {rank} has no cell that is exported, and OpenFOAM needs one on each processor: choose a number of processors"

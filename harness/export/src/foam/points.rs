@@ -70,7 +70,7 @@ impl Points {
     }
 
     /// Number of points.
-    pub fn len(&self) -> u64 {
+    pub fn count(&self) -> u64 {
         self.bricks.last().map_or(0, |last| last.first + u64::from(last.mask.count_ones()))
     }
 
@@ -111,7 +111,7 @@ mod tests {
             seeds.iter().map(aligned).for_each(|p| points.insert(p));
             [[0; 3], [CELLS_PER_EDGE; 3]].into_iter().for_each(|p| points.insert(p));
             points.number();
-            prop_assert_eq!(points.len(), expected.len() as u64);
+            prop_assert_eq!(points.count(), expected.len() as u64);
             for (number, point) in points.iter().enumerate() {
                 prop_assert_eq!(points.find(point), Some(number as u64));
             }

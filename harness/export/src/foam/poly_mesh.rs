@@ -8,11 +8,12 @@ use contract::octant::UNITS_PER_CELL;
 use contract::word;
 
 use super::faces::Square;
-use super::lists::{Faces, List, Style};
+use super::lists::{self, Faces, List};
 use super::patches::Patches;
 use super::points::{Point, Points};
 use super::survey::{Boundary, Domain, Face, Model, survey, visit};
 use crate::error::ExportError;
+use crate::options::Style;
 
 /// Numbers of a directory's points, faces and cells.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -23,14 +24,18 @@ pub struct Counts {
     pub points: u64,
     /// Faces between two cells of the directory.
     pub faces_internal: u64,
-    /// The patches with their numbers of faces.
+    /// The patches of the whole mesh with their numbers of faces.
     pub patches: Vec<(String, u64)>,
+    /// The other processors with the numbers of common faces.
+    pub faces_between: Vec<(u32, u64)>,
 }
 
 impl Counts {
     /// All faces.
     pub fn faces(&self) -> u64 {
-        self.faces_internal + self.patches.iter().map(|(_, faces)| faces).sum::<u64>()
+        let patches = self.patches.iter().map(|(_, faces)| faces);
+        let between = self.faces_between.iter().map(|(_, faces)| faces);
+        self.faces_internal + patches.chain(between).sum::<u64>()
     }
 }
 
@@ -45,23 +50,23 @@ pub fn write(
     dir: &Path,
 ) -> Result<Counts, ExportError> {
     let boundary = survey(model, patches, domain)?;
-    let mut counts = Counts {
+    let size = |faces: &Vec<Face>| faces.len() as u64;
+    let counts = Counts {
         cells: domain.cells(model.tree.cells()).count() as u64,
-        points: boundary.points.as_ref().unwrap_or(&model.points).len(),
+        points: boundary.points.as_ref().unwrap_or(&model.points).count(),
         faces_internal: boundary.internal,
-        patches: all_patches(patches, &boundary)
-            .map(|(name, faces)| (name, faces.len() as u64))
-            .collect(),
+        patches: patches.names.iter().cloned().zip(boundary.by_patch.iter().map(size)).collect(),
+        faces_between: boundary.by_processor.iter().map(|(&p, faces)| (p, size(faces))).collect(),
     };
     // The vertices of the faces are counted as they are written; there are at least four each.
-    if 4 * counts.faces().max(counts.points / 4) > model.style.label.max() {
+    if 4 * counts.faces().max(counts.points / 4) > lists::label_max(model.options.foam.style.label)
+    {
         return Err(narrow());
     }
     write_points(model, boundary.points.as_ref().unwrap_or(&model.points), dir)?;
-    write_faces(model, patches, domain, &boundary, &counts, dir)?;
+    write_faces(model, domain, &boundary, &counts, dir)?;
     write_cells(model, domain, &counts, dir)?;
     write_boundary(model, patches, domain, &counts, dir)?;
-    counts.patches.retain(|(_, faces)| *faces > 0);
     Ok(counts)
 }
 
@@ -71,19 +76,9 @@ fn narrow() -> ExportError {
     )
 }
 
-/// All patches in the order of their faces: those of the whole mesh, then those between processors.
-fn all_patches<'b>(
-    patches: &Patches,
-    boundary: &'b Boundary,
-) -> impl Iterator<Item = (String, &'b [Face])> {
-    let of_mesh = patches.names.iter().cloned().zip(boundary.by_patch.iter().map(Vec::as_slice));
-    let between =
-        boundary.by_processor.iter().map(|(processor, faces)| (processor.to_string(), &faces[..]));
-    of_mesh.chain(between).collect::<Vec<_>>().into_iter()
-}
-
 fn write_points(model: &Model, points: &Points, dir: &Path) -> Result<(), ExportError> {
-    let mut list = List::create(dir, model.style, "vectorField", "points", "", points.len())?;
+    let mut list =
+        List::create(dir, model.options.foam.style, "vectorField", "points", "", points.count())?;
     for point in points.iter() {
         list.point(model.root.to_user(point.map(|c| i64::from(c) * UNITS_PER_CELL)))?;
     }
@@ -117,13 +112,12 @@ impl FaceFiles<'_> {
 
 fn write_faces(
     model: &Model,
-    patches: &Patches,
     domain: Domain,
     boundary: &Boundary,
     counts: &Counts,
     dir: &Path,
 ) -> Result<(), ExportError> {
-    let (style, all) = (model.style, counts.faces());
+    let (style, all) = (model.options.foam.style, counts.faces());
     let Counts { points, cells, faces_internal: internal, .. } = counts;
     let note = format!("nPoints:{points} nCells:{cells} nFaces:{all} nInternalFaces:{internal}");
     let mut neighbours = List::create(dir, style, "labelList", "neighbour", &note, *internal)?;
@@ -155,13 +149,11 @@ fn write_faces(
         }
         Ok(())
     })?;
-    for (_, faces) in all_patches(patches, boundary) {
-        for face in faces {
-            let Ok(owner) = number(face.cell) else {
-                unreachable!("a face has a cell of its directory")
-            };
-            files.push(owner, &face.square)?;
-        }
+    for face in boundary.by_patch.iter().chain(boundary.by_processor.values()).flatten() {
+        let Ok(owner) = number(face.cell) else {
+            unreachable!("a face has a cell of its directory")
+        };
+        files.push(owner, &face.square)?;
     }
     neighbours.finish()?;
     files.owner.finish()?;
@@ -176,7 +168,8 @@ fn write_cells(
     dir: &Path,
 ) -> Result<(), ExportError> {
     let write = |object: &str, label: &dyn Fn(usize) -> u64| -> Result<(), ExportError> {
-        let mut list = List::create(dir, model.style, "labelList", object, "", counts.cells)?;
+        let mut list =
+            List::create(dir, model.options.foam.style, "labelList", object, "", counts.cells)?;
         for cell in domain.cells(model.tree.cells()) {
             list.label(label(cell as usize))?;
         }
@@ -199,24 +192,26 @@ fn write_boundary(
     counts: &Counts,
     dir: &Path,
 ) -> Result<(), ExportError> {
-    let style = Style { is_ascii: true, ..model.style };
-    let mut text = style.header("polyBoundaryMesh", "boundary", "");
+    let style = Style { is_ascii: true, ..model.options.foam.style };
+    let mut text = lists::header(style, "polyBoundaryMesh", "boundary", "");
     let mut start = counts.faces_internal;
-    let _ = writeln!(text, "{}\n(", counts.patches.len());
-    for (patch, (name, faces)) in counts.patches.iter().enumerate() {
-        let place = format!("        nFaces {faces};\n        startFace {start};\n");
-        let _ = match domain.0.filter(|_| patch >= patches.names.len()) {
-            None => {
-                let type_ = patches.type_of(patch);
-                writeln!(text, "    {name}\n    {{\n        type {type_};\n{place}    }}")
-            }
-            Some((_, here)) => writeln!(
-                text,
-                "    procBoundary{here}to{name}\n    {{\n        type processor;\n        inGroups 1(processor);\n{place}        \
-                 matchTolerance 0.0001;\n        transform unknown;\n        myProcNo {here};\n        neighbProcNo {name};\n    }}"
-            ),
-        };
+    let mut entry = |name: String, kind: &str, faces: u64, more: &str| {
+        let _ = writeln!(
+            text,
+            "    {name}\n    {{\n        type {kind};\n        nFaces {faces};\n        startFace {start};\n{more}    }}"
+        );
         start += faces;
+    };
+    for (patch, (name, faces)) in counts.patches.iter().enumerate() {
+        entry(name.clone(), patches.type_of(patch), *faces, "");
+    }
+    let here = domain.0.map_or(0, |(_, processor)| processor);
+    for (there, faces) in &counts.faces_between {
+        let more = format!(
+            "        inGroups 1(processor);\n        matchTolerance 0.0001;\n        transform unknown;\n        \
+             myProcNo {here};\n        neighbProcNo {there};\n"
+        );
+        entry(format!("procBoundary{here}to{there}"), "processor", *faces, &more);
     }
     text.push_str(")\n");
     let mut file = std::fs::File::create(dir.join("boundary"))?;

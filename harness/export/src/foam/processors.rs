@@ -4,15 +4,6 @@
 
 use super::tree::CELLS_MAX;
 
-/// How cells are distributed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Processors {
-    /// As many intervals of the Morton curve, with equally many cells.
-    Equal(u32),
-    /// By the rank that wrote the leaf.
-    Ranks,
-}
-
 /// Cells distributed to processors.
 #[derive(Debug)]
 pub struct Distribution {
@@ -53,7 +44,7 @@ impl Distribution {
     }
 
     /// Number of processors.
-    pub fn len(&self) -> u32 {
+    pub fn processors(&self) -> u32 {
         self.ends.len() as u32
     }
 

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use contract::lattice::Root;
 
 use super::faces::{self, Square};
-use super::lists::Style;
 use super::patches::Patches;
 use super::points::Points;
 use super::processors::Distribution;
 use super::tree::{Around, Tree, walk};
 use crate::error::ExportError;
+use crate::options::Options;
 
 /// What all directories of an export have in common.
 pub struct Model<'a> {
@@ -26,10 +26,8 @@ pub struct Model<'a> {
     pub root: Root,
     /// Whether the words hold sides.
     pub has_sides: bool,
-    /// How numbers are written.
-    pub style: Style,
-    /// Whether the user has interrupted the export.
-    pub is_interrupted: &'a dyn Fn() -> bool,
+    /// The options of the export.
+    pub options: &'a Options<'a>,
 }
 
 /// A face at a boundary.
@@ -91,9 +89,7 @@ pub fn visit(
     walk(&model.tree, domain.cells(model.tree.cells()), &mut |cell, around| {
         if until_look == 0 {
             until_look = 1 << 14;
-            if (model.is_interrupted)() {
-                return Err(ExportError::Interrupted);
-            }
+            model.options.check()?;
         }
         until_look -= 1;
         squares.clear();

@@ -1,6 +1,7 @@
 //! The mesh as a complex of polyhedra: random trees with holes, as files, and every tree of two levels, in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZero;
 use std::path::Path;
 
 use contract::import::{self, Format, Request};
@@ -11,8 +12,8 @@ use contract::testing::{leaf_set, random_words, words_with_sides};
 use contract::word::{self, Side};
 use proptest::prelude::*;
 
-use super::lists::Label;
 use super::*;
+use crate::options::{Foam, Label, Style, Watch};
 
 /// Faces with their points, and the cells on both sides of each.
 #[derive(Debug, Default)]
@@ -23,13 +24,23 @@ struct Complex {
     neighbour: Vec<usize>,
 }
 
-const ASCII: Options = Options {
-    style: Style { is_ascii: true, label: Label::Bits32 },
-    regions: Keep::All,
-    processors: None,
-    case: None,
-    is_interrupted: &|| false,
-};
+/// Nobody waits.
+struct Unwatched;
+
+impl Watch for Unwatched {
+    fn progress(&self, _: u64, _: u64) {}
+
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+fn options<'a>(style: Style) -> Options<'a> {
+    let foam = Foam { style, ..Foam::default() };
+    Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam }
+}
+
+const ASCII: Style = Style { is_ascii: true, label: Label::Bits32 };
 
 fn on_disk(set: &LeafSet) -> (tempfile::TempDir, Mesh) {
     let dir = tempfile::tempdir().unwrap();
@@ -77,12 +88,11 @@ fn complex_of(words: &[u64]) -> Complex {
         points: Points::default(),
         root: Root { origin: [0.0; 3], edge: 1.0 },
         has_sides: true,
-        style: ASCII.style,
-        is_interrupted: &|| false,
+        options: &options(ASCII),
     };
-    connect(&mut model, Keep::All).unwrap();
-    let mut complex = Complex::default();
-    complex.points = model.points.iter().map(|p| p.map(f64::from)).collect();
+    connect(&mut model, options::Regions::All).unwrap();
+    let points = model.points.iter().map(|p| p.map(f64::from)).collect();
+    let mut complex = Complex { points, ..Complex::default() };
     let (mut boundary, mut polygon) = (Vec::new(), Vec::new());
     visit(&model, Domain(None), |cell, _, squares| {
         for square in squares {
@@ -206,16 +216,13 @@ proptest! {
         prop_assume!(!words.is_empty());
         let (dir, mesh) = on_disk(&leaf_set(vec![words.clone()]));
         let target = dir.path().join("case/constant/polyMesh");
-        let summary = write(&mesh, &Selection::default(), &target, &ASCII).unwrap();
+        let summary = write(&mesh, &Selection::default(), &target, &options(ASCII)).unwrap();
         let complex = complex_in(&target);
         complex.assert_ordered();
         complex.assert_closed(words.len());
         let octants: Vec<_> = words.iter().map(|&w| word::octant(w)).collect();
         complex.assert_adjacent(&octants, mesh.manifest.root.edge / f64::from(CELLS_PER_EDGE));
-        let counts = &summary.directories[0].1;
-        prop_assert_eq!(counts.faces(), complex.faces.len() as u64);
-        prop_assert_eq!(counts.faces_internal, complex.neighbour.len() as u64);
-        prop_assert_eq!(counts.points, complex.points.len() as u64);
+        prop_assert_eq!(summary.leaves, words.len() as u64);
     }
 
     #[test]
@@ -232,8 +239,8 @@ proptest! {
         let (dir, mesh) = on_disk(&leaf_set(dealt));
         let target = dir.path().join("case/constant/polyMesh");
         let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
-        let options = Options { style: Style { is_ascii, label }, ..ASCII };
-        let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();
+        let style = Style { is_ascii, label };
+        let summary = write(&mesh, &Selection::default(), &target, &options(style)).unwrap();
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);
         let request = Request { sides: Some("side".to_owned()), ..Request::default() };

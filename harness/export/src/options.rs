@@ -1,0 +1,101 @@
+//! What every export is given besides mesh and selection, and what it returns.
+
+use std::num::NonZero;
+
+use contract::case::Case;
+
+use crate::error::ExportError;
+
+/// Options of every export.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Number of threads.
+    pub jobs: NonZero<usize>,
+    /// Whoever waits for the export.
+    pub watch: &'a dyn Watch,
+    /// What only meshes for OpenFOAM need.
+    pub foam: Foam<'a>,
+}
+
+/// Options of meshes for OpenFOAM.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Foam<'a> {
+    /// How numbers are written.
+    pub style: Style,
+    /// The regions that are exported.
+    pub regions: Regions,
+    /// Processor directories in place of one mesh.
+    pub processors: Option<Processors>,
+    /// The case of the mesh, whose solids become patches.
+    pub case: Option<&'a Case>,
+}
+
+/// How numbers are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Style {
+    /// Text in place of binary numbers.
+    pub is_ascii: bool,
+    /// Width of labels.
+    pub label: Label,
+}
+
+/// Width of the numbers of cells, faces and points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Label {
+    /// 32 bits, OpenFOAM's default.
+    #[default]
+    Bits32,
+    /// 64 bits.
+    Bits64,
+}
+
+/// What becomes of cells that faces do not connect with the largest region.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Regions {
+    /// They are exported.
+    #[default]
+    All,
+    /// They are left out. Most solvers accept only one region.
+    Largest,
+}
+
+/// How cells are distributed to processors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Processors {
+    /// As many intervals of the Morton curve, with equally many cells.
+    Equal(u32),
+    /// By the rank that wrote the leaf.
+    Ranks,
+}
+
+impl Options<'_> {
+    /// Whether to continue.
+    ///
+    /// # Errors
+    /// If the user has interrupted the export.
+    pub fn check(&self) -> Result<(), ExportError> {
+        if self.watch.is_interrupted() { Err(ExportError::Interrupted) } else { Ok(()) }
+    }
+}
+
+/// Shows progress and passes on the user's interrupt. Threads call it at least every tenth of a second or so.
+pub trait Watch: Sync {
+    /// `done` of `total` leaves are written.
+    fn progress(&self, done: u64, total: u64);
+
+    /// Whether the user has interrupted the export.
+    fn is_interrupted(&self) -> bool;
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Number of leaves.
+    pub leaves: u64,
+    /// Number of files.
+    pub files: u64,
+    /// Size of all files together.
+    pub bytes: u64,
+    /// What else the user should know, one line each.
+    pub notes: Vec<String>,
+}
