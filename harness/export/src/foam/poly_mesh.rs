@@ -194,6 +194,7 @@ fn write_boundary(
 ) -> Result<(), ExportError> {
     let style = Style { is_ascii: true, ..model.options.foam.style };
     let mut text = lists::header(style, "polyBoundaryMesh", "boundary", "");
+    let _ = writeln!(text, "{}\n(", counts.patches.len() + counts.faces_between.len());
     let mut start = counts.faces_internal;
     let mut entry = |name: String, kind: &str, faces: u64, more: &str| {
         let _ = writeln!(
