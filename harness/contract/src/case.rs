@@ -17,6 +17,8 @@ pub use geometries::Facet;
 pub struct Case {
     /// Name of the case file without its extension.
     pub name: String,
+    /// The STL file; none of a generated body, or of one in memory.
+    pub geometry: Option<PathBuf>,
     /// The body, in the user's units.
     pub facets: Vec<Facet>,
     /// The body on the lattice.
@@ -123,7 +125,8 @@ impl Case {
         let file: CaseFile = toml::from_str(&text).map_err(|e| wrong(explain(&e)))?;
         let facets = facets(path, &file)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Self::build(name, &file, facets).map_err(wrong)
+        let geometry = file.geometry.as_ref().map(|stl| beside(path, stl));
+        Ok(Self { geometry, ..Self::build(name, &file, facets).map_err(wrong)? })
     }
 
     /// A case from the text of a case file without geometry, and from a body in memory.
@@ -160,6 +163,7 @@ impl Case {
         }
         let case = Self {
             name,
+            geometry: None,
             facets_lattice: on_lattice(&root, &facets)?,
             facets,
             root,
@@ -215,12 +219,17 @@ impl Case {
     }
 }
 
+/// A path relative to the case file.
+fn beside(case: &Path, path: &Path) -> PathBuf {
+    case.parent().unwrap_or(Path::new("")).join(path)
+}
+
 /// The body, read from a file or generated.
 fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
     let wrong = |why: String| CaseError::Content { path: case.to_owned(), why };
     match (&file.geometry, &file.generator) {
         (Some(stl), None) => {
-            let path = case.parent().unwrap_or(Path::new("")).join(stl);
+            let path = beside(case, stl);
             stl::read(&path)
                 .map(|body| body.facets)
                 .map_err(|source| CaseError::Stl { path, source })

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::ExportError;
+use crate::foam;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
@@ -39,6 +40,11 @@ pub const FORMATS: &[Format] = &[
         purpose: "a forest for p8est_load of p4est, deal.II, t8code and ForestClaw",
         write: p8est::write,
     },
+    Format {
+        ending: "/polyMesh",
+        purpose: "polyhedra for OpenFOAM, a directory: CASE/constant/polyMesh",
+        write: foam::write,
+    },
 ];
 
 /// The format of a file with this name.
@@ -47,6 +53,8 @@ pub const FORMATS: &[Format] = &[
 /// If no format has such names.
 pub fn of(path: &Path) -> Result<&'static Format, ExportError> {
     let name = path.to_string_lossy();
+    // A shell completes the name of a directory with a slash.
+    let name = name.trim_end_matches('/');
     // A dot that begins the name is no extension.
     let stem = |format: &Format| name.strip_suffix(format.ending).unwrap_or_default();
     let fits = |format: &&Format| !matches!(stem(format).chars().last(), None | Some('/'));
@@ -67,7 +75,12 @@ mod tests {
     fn the_name_of_the_file_decides() {
         assert_eq!(of(Path::new("a/mesh.vtu")).unwrap().ending, ".vtu");
         assert_eq!(of(Path::new("mesh.pvtu")).unwrap().ending, ".pvtu");
-        for name in ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".pvtu", "vtu", "mesh.VTU", ""] {
+        for name in ["constant/polyMesh", "case/constant/polyMesh/"] {
+            assert_eq!(of(Path::new(name)).unwrap().ending, "/polyMesh");
+        }
+        for name in
+            ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".pvtu", "vtu", "mesh.VTU", "polyMesh", ""]
+        {
             let error = of(Path::new(name)).unwrap_err().to_string();
             assert!(error.contains(".vtu, .pvtu, .p8est"), "{name}: {error}");
         }

@@ -3,11 +3,13 @@
 //!
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`vtu`]: cells for VTK, in one file or several;
+//! - [`foam`]: meshes for OpenFOAM;
 //! - [`pieces`]: leaves in pieces of limited size; [`ordered`]: computed on threads, written in order.
 
 #![deny(missing_docs)]
 
 pub mod error;
+pub mod foam;
 pub mod format;
 pub mod mesh;
 pub mod near_body;

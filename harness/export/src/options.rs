@@ -2,6 +2,8 @@
 
 use std::num::NonZero;
 
+use contract::case::Case;
+
 use crate::error::ExportError;
 
 /// Options of every export.
@@ -11,6 +13,59 @@ pub struct Options<'a> {
     pub jobs: NonZero<usize>,
     /// Whoever waits for the export.
     pub watch: &'a dyn Watch,
+    /// What only meshes for OpenFOAM need.
+    pub foam: Foam<'a>,
+}
+
+/// Options of meshes for OpenFOAM.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Foam<'a> {
+    /// How numbers are written.
+    pub style: Style,
+    /// The regions that are exported.
+    pub regions: Regions,
+    /// Processor directories in place of one mesh.
+    pub processors: Option<Processors>,
+    /// The case of the mesh, whose solids become patches.
+    pub case: Option<&'a Case>,
+}
+
+/// How numbers are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Style {
+    /// Text in place of binary numbers.
+    pub is_ascii: bool,
+    /// Width of labels.
+    pub label: Label,
+}
+
+/// Width of the numbers of cells, faces and points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Label {
+    /// 32 bits, OpenFOAM's default.
+    #[default]
+    Bits32,
+    /// 64 bits.
+    Bits64,
+}
+
+/// What becomes of cells that faces do not connect with the largest region.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Regions {
+    /// They are exported.
+    #[default]
+    All,
+    /// They are left out. Most solvers accept only one region.
+    Largest,
+}
+
+/// How cells are distributed to processors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Processors {
+    /// As many intervals of the Morton curve, with equally many cells.
+    Equal(u32),
+    /// By the rank that wrote the leaf.
+    Ranks,
 }
 
 impl Options<'_> {
@@ -33,7 +88,7 @@ pub trait Watch: Sync {
 }
 
 /// What was written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// Number of leaves.
     pub leaves: u64,
@@ -41,4 +96,6 @@ pub struct Summary {
     pub files: u64,
     /// Size of all files together.
     pub bytes: u64,
+    /// What else the user should know, one line each.
+    pub notes: Vec<String>,
 }

@@ -1,5 +1,6 @@
 //! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
+use super::foam::FoamArguments;
 use super::selection::SelectionArguments;
 use clap::Args;
 use export::error::ExportError;
@@ -28,17 +29,21 @@ pub struct Arguments {
     /// Which cells are written.
     #[command(flatten)]
     selection: SelectionArguments,
+    /// What meshes for OpenFOAM need.
+    #[command(flatten)]
+    foam: FoamArguments,
 }
 
 fn after_help() -> String {
-    let formats = FORMATS.iter().map(|f| format!("  {:<8}{}\n", f.ending, f.purpose));
+    let formats = FORMATS.iter().map(|f| format!("  {:<12}{}\n", f.ending, f.purpose));
     format!(
         "Formats:\n{}\n\
          Examples:\n  \
          harness export mesh mesh.vtu                           the whole mesh\n  \
          harness export mesh slice.vtu --slice z=0              the cells at a plane, read without the others\n  \
          harness export mesh nose.vtu --clip -1,-1,-1,0,1,1     the cells in a box\n  \
-         harness export mesh far.pvtu --level-max 7             coarse cells only\n\n\
+         harness export mesh far.pvtu --level-max 7             coarse cells only\n  \
+         harness export mesh case/constant/polyMesh             an OpenFOAM mesh\n\n\
          Exit codes: 0 success; 2 invalid input, an unknown format, or a selection without cells; 130 interrupted, after \
          which no file remains.",
         formats.collect::<String>()
@@ -48,11 +53,12 @@ fn after_help() -> String {
 /// Writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
     match write(arguments) {
-        Ok(Summary { leaves, files, bytes }) => {
+        Ok(Summary { leaves, files, bytes, notes }) => {
             let file = arguments.file.display();
             let per_cell = bytes as f64 / leaves as f64;
             let files = if files == 1 { String::new() } else { format!(" in {files} files") };
             println!("{file}: {leaves} cells, {bytes} bytes{files} ({per_cell:.1} per cell)");
+            notes.iter().for_each(|note| println!("  {note}"));
             EXIT_HOLDS
         }
         Err(error) => {
@@ -66,13 +72,15 @@ pub fn run(arguments: &Arguments) -> u8 {
 }
 
 fn write(arguments: &Arguments) -> Result<Summary, ExportError> {
-    let Arguments { mesh, file, jobs, selection } = arguments;
+    let Arguments { mesh, file, jobs, selection, foam } = arguments;
     let format = format::of(file)?;
+    let case = foam.case(format.ending).map_err(ExportError::Request)?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh).map_err(ExportError::Request)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
     let progress = Progress::new();
-    let written = (format.write)(&mesh, &selection, file, &Options { jobs, watch: &progress });
+    let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
+    let written = (format.write)(&mesh, &selection, file, &options);
     progress.0.finish_and_clear();
     written
 }

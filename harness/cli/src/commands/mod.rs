@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `programs`, `selection`, `session` and `values` are shared.
+//! The commands, one file each with its arguments; `files`, `foam`, `programs`, `selection`, `session` and `values` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -6,6 +6,7 @@ pub mod completions;
 pub mod diff;
 pub mod export;
 mod files;
+mod foam;
 pub mod gate;
 pub mod geometry;
 pub mod import;

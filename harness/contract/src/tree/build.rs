@@ -93,7 +93,7 @@ impl Builder {
 }
 
 /// Number of common ancestors of two level-19 cells, themselves excluded.
-fn shared_levels(a: u64, b: u64) -> usize {
+pub fn shared_levels(a: u64, b: u64) -> usize {
     match (a ^ b).checked_ilog2() {
         Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
         None => usize::from(LEVEL_MAX),
@@ -101,6 +101,6 @@ fn shared_levels(a: u64, b: u64) -> usize {
 }
 
 /// The digit of the child that contains this cell, among the children of its ancestor at `level`.
-fn digit(key: u64, level: usize) -> usize {
+pub fn digit(key: u64, level: usize) -> usize {
     (key >> (3 * (usize::from(LEVEL_MAX) - 1 - level)) & 7) as usize
 }

@@ -13,7 +13,7 @@ mod region;
 mod store;
 mod walk;
 
-pub use build::{Builder, Refusal};
+pub use build::{Builder, Refusal, digit, shared_levels};
 pub use neighbourhood::{Neighbourhood, OFFSETS};
 pub use region::{Coarsest, Region};
 use store::Store;

@@ -54,7 +54,7 @@ pub fn write_file(
         options.check()?;
         Ok(bytes)
     })?;
-    Ok(Summary { leaves: leaves(&pieces), files: 1, bytes })
+    Ok(Summary { leaves: leaves(&pieces), files: 1, bytes, notes: Vec::new() })
 }
 
 /// Encodes pieces on threads and hands them to `take` in order.

@@ -62,7 +62,12 @@ pub fn write_files(
     })?;
     options.check()?;
     bytes += names.publish(place, &whole, &written)?;
-    Ok(Summary { leaves: leaves(&pieces), files: written.len() as u64 + 1, bytes })
+    Ok(Summary {
+        leaves: leaves(&pieces),
+        files: written.len() as u64 + 1,
+        bytes,
+        notes: Vec::new(),
+    })
 }
 
 /// The names of all files.

@@ -170,6 +170,7 @@ impl DistributedMesh {
         let m = &self.set.manifest;
         Case {
             name: self.name.clone(),
+            geometry: None,
             facets: Vec::new(),
             facets_lattice: Vec::new(),
             root: m.root,

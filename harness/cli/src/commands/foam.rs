@@ -1,0 +1,91 @@
+//! The options of `harness export` that only meshes for OpenFOAM have.
+
+use clap::Args;
+use contract::case::Case;
+use export::options::{Foam, Label, Processors, Regions, Style};
+use run::engine::paths::Paths;
+use std::path::Path;
+
+/// Options of meshes for OpenFOAM.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "OpenFOAM (CASE/constant/polyMesh)")]
+pub struct FoamArguments {
+    /// Write text; default: binary
+    #[arg(long)]
+    ascii: bool,
+    /// Bits of a label, 32 or 64 [default: 32]
+    #[arg(long, value_name = "BITS", value_parser = label)]
+    label: Option<Label>,
+    /// Regions of cells that no face connects: all, or the largest one only [default: all]
+    #[arg(long, value_name = "all|largest", value_parser = regions)]
+    regions: Option<Regions>,
+    /// Write directories processor0 to processorN-1 instead: N equal intervals of the Morton curve, or `ranks` of the mesher
+    #[arg(long, value_name = "N|ranks", value_parser = processors)]
+    processors: Option<Processors>,
+    /// The case that was meshed, whose named solids become patches: name in geometries/catalogue.toml or path of a case file
+    #[arg(long, value_name = "CASE")]
+    case: Option<String>,
+}
+
+impl FoamArguments {
+    /// Reads the case, if one is given.
+    ///
+    /// # Errors
+    /// If the case cannot be read, or if an option has no effect on the format with this ending.
+    pub fn case(&self, ending: &str) -> Result<Option<Case>, String> {
+        let Self { ascii, label, regions, processors, case } = self;
+        let given = [
+            ("--ascii", *ascii),
+            ("--label", label.is_some()),
+            ("--regions", regions.is_some()),
+            ("--processors", processors.is_some()),
+            ("--case", case.is_some()),
+        ];
+        if let Some((name, _)) = given.iter().find(|(_, is_given)| *is_given)
+            && ending != "/polyMesh"
+        {
+            return Err(format!(
+                "{name} has no effect on {ending}: omit it, or write CASE/constant/polyMesh"
+            ));
+        }
+        let read = |name: &String| {
+            let path = Paths::find().catalogue.case_file(name, Path::new(""))?;
+            Case::read(&path).map_err(|error| error.to_string())
+        };
+        case.as_ref().map(read).transpose()
+    }
+
+    /// The options, with the case that they name.
+    pub fn options<'a>(&self, case: Option<&'a Case>) -> Foam<'a> {
+        Foam {
+            style: Style { is_ascii: self.ascii, label: self.label.unwrap_or_default() },
+            regions: self.regions.unwrap_or_default(),
+            processors: self.processors,
+            case,
+        }
+    }
+}
+
+fn label(bits: &str) -> Result<Label, String> {
+    match bits {
+        "32" => Ok(Label::Bits32),
+        "64" => Ok(Label::Bits64),
+        _ => Err("labels have 32 or 64 bits".to_owned()),
+    }
+}
+
+fn regions(regions: &str) -> Result<Regions, String> {
+    match regions {
+        "all" => Ok(Regions::All),
+        "largest" => Ok(Regions::Largest),
+        _ => Err("choose all or largest".to_owned()),
+    }
+}
+
+fn processors(processors: &str) -> Result<Processors, String> {
+    match processors.parse() {
+        Ok(count) if count > 0 => Ok(Processors::Equal(count)),
+        _ if processors == "ranks" => Ok(Processors::Ranks),
+        _ => Err("give a positive number, or ranks".to_owned()),
+    }
+}

@@ -1,0 +1,137 @@
+//! The patches of a mesh: the root's sides, the body or its solids, and the cut.
+
+use std::path::Path;
+
+use check::geometry::solids;
+use check::leak::clearance::Clearance;
+use contract::case::Case;
+use contract::octant::UNITS_PER_CELL;
+
+use super::faces::Square;
+use super::tree::Content;
+
+/// Patches of the root's sides.
+pub const SIDES: [&str; 6] = ["xMin", "xMax", "yMin", "yMax", "zMin", "zMax"];
+/// Patch of the faces beyond which there is no leaf, of a body without named solids.
+const BODY: &str = "body";
+/// Patch of the faces beyond which there is a leaf that is not exported.
+const CUT: &str = "cut";
+
+/// The patches: [`SIDES`], the solids of the body, and, if leaves were left out, the cut.
+#[derive(Debug)]
+pub struct Patches<'a> {
+    /// The names, unique.
+    pub names: Vec<String>,
+    has_cut: bool,
+    /// Patch of each facet, if there are several.
+    of_facet: Vec<usize>,
+    facets: Option<Clearance<'a>>,
+    /// Centre of the last face of the body, and an upper bound on its distance to the facets.
+    last: ([f64; 3], f64),
+}
+
+impl<'a> Patches<'a> {
+    /// The patches of a mesh. Without a case, its body is one patch.
+    ///
+    /// # Errors
+    /// If the case's geometry can no longer be read.
+    pub fn new(case: Option<&'a Case>, has_cut: bool) -> Result<Self, String> {
+        let mut patches = Self {
+            names: SIDES.map(str::to_owned).to_vec(),
+            has_cut,
+            of_facet: Vec::new(),
+            facets: None,
+            last: ([0.0; 3], f64::INFINITY),
+        };
+        if let Some((case, path)) = case.and_then(|case| Some((case, case.geometry.as_ref()?))) {
+            patches.add_solids(case, path)?;
+        }
+        if patches.names.len() == SIDES.len() {
+            patches.names.push(BODY.to_owned());
+        }
+        patches.names.extend(has_cut.then(|| CUT.to_owned()));
+        Ok(patches)
+    }
+
+    fn add_solids(&mut self, case: &'a Case, path: &Path) -> Result<(), String> {
+        let solids = solids::read(path, case.facets.len());
+        for solid in solids.map_err(|error| format!("{}: {error}", path.display()))? {
+            let name = patch_name(solid.name.as_deref().unwrap_or_default());
+            let known = self.names.iter().position(|known| *known == name);
+            let patch = known.unwrap_or(self.names.len());
+            if known.is_none() && solid.facets > 0 {
+                self.names.push(name);
+            }
+            self.of_facet.extend(std::iter::repeat_n(patch, solid.facets));
+        }
+        if self.names.len() > SIDES.len() + 1 {
+            self.facets = Some(Clearance::new(&case.facets_lattice));
+        }
+        Ok(())
+    }
+
+    /// The type of a patch.
+    pub fn type_of(&self, patch: usize) -> &'static str {
+        let is_body = patch >= SIDES.len() && !(self.has_cut && patch + 1 == self.names.len());
+        if is_body { "wall" } else { "patch" }
+    }
+
+    /// The patch of a face that no cell is across.
+    pub fn of(&mut self, square: &Square) -> usize {
+        match square.across {
+            Content::OUTSIDE => 2 * usize::from(square.axis) + usize::from(square.is_high),
+            Content::CUT => self.names.len() - 1,
+            _ => self.of_body(square),
+        }
+    }
+
+    /// The patch of the solid with the facet nearest to the centre of a face.
+    fn of_body(&mut self, square: &Square) -> usize {
+        let Some(facets) = &self.facets else { return SIDES.len() };
+        let [low, _, high, _] = square.corners();
+        let units = UNITS_PER_CELL as f64 / 2.0;
+        let centre = [0, 1, 2].map(|a| (f64::from(low[a]) + f64::from(high[a])) * units);
+        let (before, distance) = self.last;
+        let moved = (0..3).map(|a| (centre[a] - before[a]).powi(2)).sum::<f64>().sqrt();
+        let distance = facets.at(centre, distance + moved);
+        self.last = (centre, distance);
+        // Half a lattice unit more, for rounding.
+        let nearest = facets.facets_within(centre, distance + 0.5);
+        self.of_facet[nearest[0].0 as usize]
+    }
+}
+
+/// The name of a solid as a patch: characters that OpenFOAM's words may not have become underscores.
+fn patch_name(solid: &str) -> String {
+    let allowed = |c: char| c.is_alphanumeric() || "_-.+:".contains(c);
+    let name: String = solid.chars().map(|c| if allowed(c) { c } else { '_' }).collect();
+    let is_taken = SIDES.contains(&&*name) || name == CUT || name.starts_with("procBoundary");
+    match name.as_str() {
+        "" => BODY.to_owned(),
+        _ if is_taken || !name.starts_with(|c: char| c.is_alphabetic() || c == '_') => {
+            format!("{BODY}_{name}")
+        }
+        _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_solids_become_words() {
+        for (solid, patch) in [
+            ("wing", "wing"),
+            ("", "body"),
+            ("left wing (v2)", "left_wing__v2_"),
+            ("a;b\"c{d}", "a_b_c_d_"),
+            ("xMin", "body_xMin"),
+            ("cut", "body_cut"),
+            ("procBoundary0to1", "body_procBoundary0to1"),
+            ("2nd", "body_2nd"),
+        ] {
+            assert_eq!(patch_name(solid), patch);
+        }
+    }
+}

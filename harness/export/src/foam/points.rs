@@ -1,0 +1,123 @@
+//! A set of lattice points, numbered.
+//!
+//! A point belongs to the coarsest grid that has it. Four by four by four points of a grid are a brick: one bit per point
+//! that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 2 bytes, and finding its
+//! number is one look into a table that is small enough to stay in the cache.
+
+use contract::octant::LEVEL_MAX;
+use rustc_hash::FxHashMap;
+
+/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
+pub type Point = [u32; 3];
+
+/// The set.
+#[derive(Debug, Default)]
+pub struct Points {
+    /// Index of each brick.
+    index: FxHashMap<u64, u32>,
+    bricks: Vec<Brick>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Brick {
+    key: u64,
+    mask: u64,
+    /// Number of the first point.
+    first: u64,
+}
+
+/// Bits of each coordinate of a brick.
+const BITS: u32 = 18;
+
+/// The brick of a point, and its bit there.
+fn place(point: Point) -> (u64, u32) {
+    let [x, y, z] = point;
+    let zeros = (x | y | z).trailing_zeros().min(u32::from(LEVEL_MAX));
+    let at = |c: u32| u64::from(c >> zeros >> 2);
+    let bit = |c: u32| c >> zeros & 3;
+    let key = at(x) | at(y) << BITS | at(z) << (2 * BITS) | u64::from(zeros) << (3 * BITS);
+    (key, bit(x) | bit(y) << 2 | bit(z) << 4)
+}
+
+/// The inverse of [`place`].
+fn point(key: u64, bit: u32) -> Point {
+    let zeros = (key >> (3 * BITS)) as u32;
+    std::array::from_fn(|a| {
+        let at = key >> (BITS * a as u32) & ((1 << BITS) - 1);
+        ((at as u32) << 2 | bit >> (2 * a) & 3) << zeros
+    })
+}
+
+impl Points {
+    /// Adds a point. Numbers are valid after [`Self::number`].
+    pub fn insert(&mut self, point: Point) {
+        let (key, bit) = place(point);
+        let next = self.bricks.len() as u32;
+        let index = *self.index.entry(key).or_insert(next);
+        if index == next {
+            self.bricks.push(Brick { key, mask: 0, first: 0 });
+        }
+        self.bricks[index as usize].mask |= 1 << bit;
+    }
+
+    /// Numbers the points: bricks in the order of their first points, within a brick x fastest.
+    pub fn number(&mut self) {
+        let mut first = 0;
+        for brick in &mut self.bricks {
+            brick.first = first;
+            first += u64::from(brick.mask.count_ones());
+        }
+    }
+
+    /// Number of points.
+    pub fn count(&self) -> u64 {
+        self.bricks.last().map_or(0, |last| last.first + u64::from(last.mask.count_ones()))
+    }
+
+    /// The number of a point; `None` if it is not in the set.
+    pub fn find(&self, point: Point) -> Option<u64> {
+        let (key, bit) = place(point);
+        let brick = self.bricks[*self.index.get(&key)? as usize];
+        let before = brick.mask & ((1 << bit) - 1);
+        (brick.mask >> bit & 1 == 1).then(|| brick.first + u64::from(before.count_ones()))
+    }
+
+    /// The points in the order of their numbers.
+    pub fn iter(&self) -> impl Iterator<Item = Point> + '_ {
+        self.bricks.iter().flat_map(|brick| {
+            (0..64).filter(|bit| brick.mask >> bit & 1 == 1).map(|bit| point(brick.key, bit))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::octant::CELLS_PER_EDGE;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn points_have_distinct_numbers_in_the_order_of_iteration(
+            seeds in prop::collection::vec((any::<[u32; 3]>(), 0u32..20), 0..200), near in any::<bool>()
+        ) {
+            let edge = CELLS_PER_EDGE + 1;
+            let aligned = |(p, zeros): &(Point, u32)| p.map(|c| {
+                (c % if near { 9 } else { edge }) >> zeros << zeros
+            });
+            let expected: BTreeSet<Point> = seeds.iter().map(aligned).chain([[0; 3], [CELLS_PER_EDGE; 3]]).collect();
+            let mut points = Points::default();
+            seeds.iter().map(aligned).for_each(|p| points.insert(p));
+            [[0; 3], [CELLS_PER_EDGE; 3]].into_iter().for_each(|p| points.insert(p));
+            points.number();
+            prop_assert_eq!(points.count(), expected.len() as u64);
+            for (number, point) in points.iter().enumerate() {
+                prop_assert_eq!(points.find(point), Some(number as u64));
+            }
+            prop_assert_eq!(points.iter().collect::<BTreeSet<_>>(), expected.clone());
+            let absent = [1, 2, 3].map(|c| c + CELLS_PER_EDGE / 2);
+            prop_assert_eq!(points.find(absent).is_some(), expected.contains(&absent));
+        }
+    }
+}

@@ -1,0 +1,153 @@
+"""OpenFOAM accepts the meshes of `harness export`, and solves on them. Run with: python -m unittest discover harness/oracles
+
+Needs target/debug/{harness,reference}, which `cargo test --workspace` builds, and OpenFOAM (ci/peers snappy)."""
+
+import os
+import pathlib
+import random
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).parent.parent.parent
+PROGRAMS = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug"
+TEMPLATE = ROOT / "harness/solvers/openfoam/case"
+ENVIRONMENT = {
+    "WM_PROJECT_DIR": "/usr/share/openfoam",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+} | os.environ
+# Every word of `checkMesh` about topology, for all of which it writes OK.
+TOPOLOGY = [
+    "Boundary definition", "Cell to face addressing", "Point usage", "Upper triangular ordering", "Face vertices",
+    "Topological cell zip-up check", "Face-face connectivity",
+]
+
+
+def call(directory, *command):
+    """The output of a command, which must succeed."""
+    done = subprocess.run([str(c) for c in command], cwd=directory, env=ENVIRONMENT, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise AssertionError(f"{command} failed in {directory}:\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+    return done.stdout
+
+
+@unittest.skipUnless(
+    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
+    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
+)
+@unittest.skipUnless(shutil.which("checkMesh"), "OpenFOAM is not installed: run ci/peers snappy")
+class FoamTest(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.at = pathlib.Path(temporary.name)
+        shutil.copytree(TEMPLATE, self.at / "case")
+
+    def export(self, *options):
+        call(self.at, PROGRAMS / "harness", "export", self.at / "mesh", "case/constant/polyMesh", *options)
+
+    def mesh(self, text):
+        (self.at / "case.toml").write_text(text)
+        call(self.at, PROGRAMS / "reference", "case.toml", "--out", "mesh")
+
+    def check_mesh(self, ranks=1):
+        """The output of checkMesh, which must find all topology in order."""
+        (self.at / "case/system/decomposeParDict").write_text(
+            (TEMPLATE / "system/decomposeParDict").read_text().replace("RANKS", str(ranks))
+        )
+        parallel = ["mpirun", "-n", ranks] if ranks > 1 else []
+        options = ["-allTopology"] + ["-parallel"] * (ranks > 1)
+        output = call(self.at / "case", *parallel, "checkMesh", *options)
+        for test in TOPOLOGY:
+            self.assertIn(f"{test} OK.", output)
+        return output
+
+    def test_meshes_of_random_cases_are_in_order(self):
+        """Bodies and spacings vary, with both kinds of crossing leaves and all sides that can be kept; boxes are finer or coarser
+        than the surface and overlap."""
+        choice = random.Random(1)
+        cases = [(keep, crossing) for keep in ("all", "outside", "inside") for crossing in ("true", "false")]
+        for i, (keep, crossing) in enumerate(2 * cases):
+            bodies = [("sphere", 320), ("torus", 400), ("boxes_overlapping", 200), ("uav", 2000)]
+            # No cell lies inside the thin parts of the aircraft.
+            body, facets = choice.choice(bodies[:3] if keep == "inside" else bodies)
+            boxes = ""
+            for _ in range(choice.randrange(3)):
+                low = [choice.uniform(-1, 0.5) for _ in range(3)]
+                high = [c + choice.uniform(0.1, 0.8) for c in low]
+                boxes += f"[[box]]\nmin = {low}\nmax = {high}\nspacing = {choice.uniform(0.05, 0.3)}\n"
+            text = f'keep = "{keep}"\nkeep_crossing = {crossing}\nspacing_min = {choice.uniform(0.03, 0.1)}\n'
+            text += f"layer_cells_min = {choice.randrange(1, 4)}\nroot_scale = 3.0\n{boxes}"
+            text += f'[generator]\nshape = "{body}"\nfacets = {facets}\n'
+            with self.subTest(case=text):
+                shutil.rmtree(self.at / "mesh", ignore_errors=True)
+                shutil.rmtree(self.at / "case/constant/polyMesh", ignore_errors=True)
+                self.mesh(text)
+                self.export(*(["--ascii"] if i % 2 else []))
+                output = self.check_mesh()
+                self.assertIn("\nMesh OK.", output)
+                levels = (self.at / "case/constant/polyMesh/cellLevel").read_bytes()
+                cells = re.search(rb"\n(\d+)\n\(", levels)[1].decode()
+                self.assertRegex(output, rf"\n    cells: +{cells}\n")
+
+    def test_trees_without_balance_are_in_order(self):
+        """Neighbours differ by any number of levels, and half of the octants are missing. Their cells are too skew for the checks
+        of the geometry, whose result does not count."""
+        for seed in range(4):
+            choice, words = random.Random(seed), []
+
+            def refine(corner, level):
+                if level < 5 and choice.random() < 0.55 or level == 0:
+                    half = 1 << (18 - level)
+                    for digit in range(8):
+                        refine([c + half * (digit >> a & 1) for a, c in enumerate(corner)], level + 1)
+                elif choice.random() < 0.6:
+                    morton = sum((corner[a] >> bit & 1) << (3 * bit + a) for bit in range(19) for a in range(3))
+                    words.append(morton << 7 | level << 2)
+
+            refine([0, 0, 0], 0)
+            np.save(self.at / "words.npy", np.array(words, "<u8"))
+            for name in ("mesh", "case/constant/polyMesh"):
+                shutil.rmtree(self.at / name, ignore_errors=True)
+            call(self.at, PROGRAMS / "harness", "import", "words.npy", "--out", "mesh")
+            self.export("--label", "64")
+            output = call_any(self.at / "case", "checkMesh", "-allTopology")
+            for test in TOPOLOGY:
+                self.assertIn(f"{test} OK.", output)
+
+    def test_processors_agree_with_each_other_and_with_the_serial_solver(self):
+        sphere = (ROOT / "geometries/sphere-small.toml").read_text()
+        self.mesh("keep_crossing = false\n" + sphere)
+        self.export("--case", self.at / "case.toml")
+        self.export("--processors", "3")
+        for processor in range(3):
+            shutil.copytree(TEMPLATE / "0", self.at / f"case/processor{processor}/0")
+        self.assertIn("\nMesh OK.", self.check_mesh(ranks=3))
+        solver = [("laplacianFoam", "T"), ("potentialFoam", "Phi")]
+        for program, name in solver:
+            outputs = [
+                call(self.at / "case", program),
+                call(self.at / "case", "mpirun", "-n", 3, program, "-parallel"),
+            ]
+            residual = rf"Solving for {name}, Initial residual = ([-+.e\d]+)"
+            serial, parallel = ([float(r) for r in re.findall(residual, output)] for output in outputs)
+            self.assertEqual(len(serial), 6)
+            np.testing.assert_allclose(serial[:4], parallel[:4], rtol=1e-2)
+            # The explicit correction converges, which it does only if geometry and interpolation are right.
+            self.assertLess(serial[-1], 1e-4)
+
+
+def call_any(directory, *command):
+    """The output of a command, which may fail."""
+    done = subprocess.run([str(c) for c in command], cwd=directory, env=ENVIRONMENT, capture_output=True, text=True)
+    return done.stdout
+
+
+if __name__ == "__main__":
+    unittest.main()
