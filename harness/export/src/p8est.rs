@@ -72,7 +72,7 @@ pub fn write(
         out.flush().map_err(named)?;
         Ok(start.len() as u64 + total * RECORD_BYTES as u64)
     })?;
-    Ok(Summary { leaves: counts.leaves, files: 1, bytes })
+    Ok(Summary { leaves: counts.leaves, files: 1, bytes, notes: Vec::new() })
 }
 
 /// An octant of the forest, its data, and the part of the mesh in which it, or the next leaf, is.

@@ -8,7 +8,6 @@ use bench::track::{Series, analyse, link, summary};
 use clap::Args;
 use report::track::{export, page};
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::fs;
 use std::path::PathBuf;
 
 /// `harness track`.

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use check::geometry::solids;
 use check::leak::clearance::Clearance;
 use contract::case::Case;
 use contract::octant::UNITS_PER_CELL;
+use contract::stl;
 
 use super::faces::Square;
 use super::tree::Content;
@@ -54,8 +54,8 @@ impl<'a> Patches<'a> {
     }
 
     fn add_solids(&mut self, case: &'a Case, path: &Path) -> Result<(), String> {
-        let solids = solids::read(path, case.facets.len());
-        for solid in solids.map_err(|error| format!("{}: {error}", path.display()))? {
+        let body = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
+        for solid in body.solids {
             let name = patch_name(solid.name.as_deref().unwrap_or_default());
             let known = self.names.iter().position(|known| *known == name);
             let patch = known.unwrap_or(self.names.len());
