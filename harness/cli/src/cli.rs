@@ -42,6 +42,8 @@ pub enum Command {
     Leak(Box<commands::leak::Arguments>),
     /// Write a leaf-set directory as a VTK unstructured grid for ParaView or pyvista
     Export(commands::export::Arguments),
+    /// Draw a slice of a mesh, or a view in three dimensions
+    Picture(Box<commands::picture::Arguments>),
     /// Make a leaf-set directory from a mesh in another program's format
     Import(commands::import::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides

@@ -25,6 +25,7 @@ fn main() -> ExitCode {
         Command::Leak(arguments) => commands::leak::run(&arguments),
         Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Picture(arguments) => commands::picture::run(&arguments),
         Command::Import(arguments) => commands::import::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Why(arguments) => commands::why::run(&arguments),

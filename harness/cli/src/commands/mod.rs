@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `programs`, `session` and `values` are shared.
+//! The commands, one file each with its arguments; `files`, `meshed`, `programs`, `selection`, `session` and `values` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -11,9 +11,13 @@ pub mod geometry;
 pub mod import;
 pub mod leak;
 pub mod man;
+mod meshed;
+mod paper;
+pub mod picture;
 pub mod planted;
 mod programs;
 pub mod report;
+mod selection;
 pub mod selftest;
 mod session;
 pub mod shrink;
