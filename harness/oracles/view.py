@@ -20,7 +20,9 @@ except (ImportError, OSError) as error:
     protocol.missing(error)
 
 SQUARE = np.dtype([("corner", "<u2", 2), ("level", "u1"), ("colour", "u1")])
-SIZE = (1600, 1100)
+SIZE = (1600, 1000)
+# Rows of the legend.
+ROWS = 20
 
 
 def decoded(text, dtype):
@@ -38,7 +40,9 @@ def slice_of(scene, cut):
     points[..., cut["axis"]] = cut["at"]
     for corner, (u, v) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
         points[:, corner, axes] = low + side[:, None] * (u, v)
+    # Squares end at the window.
     points = (points - centre) / edge
+    points[..., axes] = points[..., axes].clip(-0.5, 0.5)
     return points, squares["colour"], squares["level"] <= cut["level_outlined"]
 
 
@@ -61,11 +65,18 @@ def body_of(scene, palette):
 
 
 def add_legend(plotter, scene):
-    entries = [[name, np.array(colour) / 255] for name, colour in scene["legend"]]
-    if entries:
-        height = min(0.9, 0.055 * len(entries))
-        plotter.add_legend(entries, bcolor=None, face="rectangle", loc="upper left", size=(0.16, height))
-    plotter.add_text(scene["quantity"], position=(20, 20), font_size=14, color="black")
+    """The quantity and the names of its values in the upper left corner, each on its colour."""
+    def line(text, row, column, fill=None):
+        light = fill is None or np.dot(fill, (0.3, 0.6, 0.1)) > 128
+        position = (20 + 100 * column, SIZE[1] - 60 - 46 * row)
+        actor = plotter.add_text(text, position=position, font_size=15, color="black" if light else "white")
+        if fill is not None:
+            actor.prop.background_color = [c / 255 for c in fill]
+            actor.prop.background_opacity = 1.0
+
+    line(scene["quantity"], 0, 0)
+    for i, (name, fill) in enumerate(scene["legend"]):
+        line(f" {name} ", 1 + i % ROWS, i // ROWS, fill)
 
 
 def main(scene_path, out):
@@ -87,7 +98,7 @@ def main(scene_path, out):
     azimuth, elevation = -2.2, 0.55
     eye = [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
     plotter.camera.focal_point = (0, 0, 0)
-    plotter.camera.position = 2.5 * np.array(eye)
+    plotter.camera.position = 1.95 * np.array(eye)
     plotter.camera.up = (0, 0, 1)
     plotter.camera.view_angle = 30
     plotter.reset_camera_clipping_range()

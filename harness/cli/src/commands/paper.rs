@@ -1,7 +1,7 @@
 //! `harness picture --paper`: the pictures of the paper, made of one case.
 
 use super::meshed::{Failure, MeshArguments, Meshed, input};
-use super::picture::{command, write_view};
+use super::picture::{command, unread, write_view};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
 use report::picture::format::{Format, put, write};
@@ -70,13 +70,13 @@ fn draw_member(
 ) -> Result<Drawn, Failure> {
     let failed = |error: &dyn std::fmt::Display| input(format!("{}: {error}", member.name));
     let case = meshed.case.as_ref().expect("a case was meshed");
-    let mesh = Mesh::open(&meshed.dir).map_err(|error| failed(&error))?;
+    let mesh = Mesh::open(&meshed.dir).map_err(unread)?;
     let (selection, zoom, level_max) = request(member.part, case);
     let (body, colour) = (Some(&case.facets[..]), member.colour);
     let request = Request { selection, body, colour, zoom, level_max, command: command() };
     let file = |extension: &str| out.join(format!("{}.{extension}", member.name));
     if matches!(member.part, Part::View | Part::ViewOfBody) {
-        let mut scene = Scene::collect(&mesh, &request).map_err(|error| failed(&error))?;
+        let mut scene = Scene::collect(&mesh, &request).map_err(unread)?;
         if member.part == Part::ViewOfBody {
             scene = scene.of_body();
         }
@@ -93,9 +93,8 @@ fn draw_member(
             Err(other) => Err(other),
         };
     }
-    let collect = |format: Format| {
-        Picture::collect(&mesh, &request, &format.detail()).map_err(|error| failed(&error))
-    };
+    let collect =
+        |format: Format| Picture::collect(&mesh, &request, &format.detail()).map_err(unread);
     let tex = tikz(&collect(Format::Tikz)?);
     put(&file("tex"), tex.as_bytes()).map_err(|error| failed(&error))?;
     let picture = collect(Format::Svg)?;

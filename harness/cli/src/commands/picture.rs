@@ -5,6 +5,7 @@ use super::paper;
 use super::selection::SelectionArguments;
 use clap::{Args, ValueEnum};
 use contract::octant::LEVEL_MAX;
+use export::error::ExportError;
 use export::mesh::Mesh;
 use report::picture::colour;
 use report::picture::format::{Format, put, write};
@@ -12,7 +13,7 @@ use report::picture::scene::{Scene, html};
 use report::picture::{Picture, Request};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use run::engine::paths::Paths;
-use run::verify::report::{EXIT_HOLDS, EXIT_MISSING};
+use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING};
 use run::view;
 use std::path::{Path, PathBuf};
 
@@ -117,14 +118,13 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
         None => SERIAL.clone(),
     };
     let meshed = source.open(&layout, *ungraded)?;
-    let mesh = Mesh::open(&meshed.dir).map_err(|error| input(error.to_string()))?;
+    let mesh = Mesh::open(&meshed.dir).map_err(unread)?;
     let request = request(arguments, &meshed, &mesh)?;
     if arguments.view || format == Format::Html {
-        let scene = Scene::collect(&mesh, &request).map_err(|error| input(error.to_string()))?;
+        let scene = Scene::collect(&mesh, &request).map_err(unread)?;
         write_view(&scene, out, &Paths::find(), source)?;
     } else {
-        let picture = Picture::collect(&mesh, &request, &format.detail());
-        let picture = picture.map_err(|error| input(error.to_string()))?;
+        let picture = Picture::collect(&mesh, &request, &format.detail()).map_err(unread)?;
         write(&picture, format, out).map_err(|error| input(error.to_string()))?;
         println!("{}", picture.title());
     }
@@ -133,6 +133,14 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
         println!("the geometry is not drawn: name its case with --case");
     }
     Ok(())
+}
+
+/// A mesh of which no picture could be made.
+pub fn unread(error: ExportError) -> Failure {
+    match error {
+        ExportError::Interrupted => (EXIT_INTERRUPTED, error.to_string()),
+        _ => input(error.to_string()),
+    }
 }
 
 /// The format of the file, if that can be made of a slice or a view, whichever is requested.

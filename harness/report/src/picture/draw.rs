@@ -90,7 +90,7 @@ fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
     sheet.text(&title, (x, y), Anchor::Start);
     x += width(&title) + 40.0;
     let line = picture.section.as_ref().map(|_| "geometry");
-    let names = entries.iter().map(|(name, fill)| (*name, Some(hex(*fill))));
+    let names = entries.iter().map(|(name, fill)| (*name, Some(*fill)));
     for (name, fill) in names.chain(line.map(|name| (name, None))) {
         let entry = SYMBOL + 14.0 + width(name) + 30.0;
         if x + entry > right {
@@ -98,7 +98,8 @@ fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
         }
         match fill {
             Some(fill) => {
-                sheet.rectangles(&[[x, y - 18.0, SYMBOL, 36.0]], &fill, Some(outline(&fill)));
+                let symbol = [x, y - 18.0, SYMBOL, 36.0];
+                sheet.rectangles(&[symbol], &hex(fill), Some(&outline(fill)));
             }
             None => sheet.segments(&[[(x, y), (x + SYMBOL, y)]], INK, SECTION.0),
         }
@@ -108,10 +109,10 @@ fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
     y + ROW / 2.0
 }
 
-/// The colour of outlines around a fill.
-fn outline(fill: &str) -> &'static str {
-    let channel = |i: usize| u32::from_str_radix(&fill[i..i + 2], 16).unwrap_or(0);
-    if channel(1) + 2 * channel(3) + channel(5) > 360 { "#333333" } else { "#C8C8C8" }
+/// The colour of outlines around a fill: the same hue, so that small cells look like those of the legend.
+fn outline(fill: [u8; 3]) -> String {
+    let is_light = fill.iter().map(|&c| u32::from(c)).sum::<u32>() > 360;
+    hex(fill.map(|c| if is_light { c / 2 } else { c / 2 + 105 }))
 }
 
 fn squares(page: &Page, sheet: &mut dyn Sheet) {
@@ -126,7 +127,8 @@ fn squares(page: &Page, sheet: &mut dyn Sheet) {
                 squares.squares.iter().filter(shown).filter_map(|s| page.rectangle(s)).collect();
             if !rectangles.is_empty() {
                 let fill = hex(entry.fill);
-                sheet.rectangles(&rectangles, &fill, outlined.then(|| outline(&fill)));
+                let outline = outlined.then(|| outline(entry.fill));
+                sheet.rectangles(&rectangles, &fill, outline.as_deref());
             }
         }
     }

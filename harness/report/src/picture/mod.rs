@@ -12,12 +12,16 @@ pub mod set;
 mod sheet;
 pub mod squares;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod tikz;
 
 use crate::section::{Planar, Window};
+use check::geometry::distance::{cross, dot, sub};
 use colour::{Colour, Entry, short};
 use contract::case::Facet;
 use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::manifest::Sides;
 use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
 use export::error::ExportError;
 use export::mesh::Mesh;
@@ -43,6 +47,17 @@ pub struct Request<'a> {
     pub level_max: u8,
     /// Command that makes the picture, which its data name.
     pub command: String,
+}
+
+impl Request<'_> {
+    /// Returns an error if the mesh does not have what colours show.
+    fn check(&self, mesh: &Mesh) -> Result<(), ExportError> {
+        if self.colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
+            let why = "the sides of this mesh are unknown: choose another colour";
+            return Err(ExportError::Request(why.to_owned()));
+        }
+        Ok(())
+    }
 }
 
 /// The data of a picture of a slice.
@@ -72,22 +87,50 @@ pub const VECTOR: Detail =
 /// Squares of a TikZ picture, which TeX sets in a few seconds.
 pub const TEX: Detail = Detail { squares_max: 10_000, outlined_max: 6_000, level_max: LEVEL_MAX };
 
-/// The plane through the middle of the body, normal to its shortest extent; without a body, through the root's centre and
-/// normal to z.
+/// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, through the
+/// root's centre and normal to z.
 pub fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
     let extent = extent(root, body);
     let length = |a: usize| extent[1][a] - extent[0][a];
     // Of equal extents the last one, so that a cube is seen from above.
     let axis = (0..3).rev().min_by(|&a, &b| length(a).total_cmp(&length(b))).expect("three axes");
-    through_centre(root, body, axis)
+    halfway(root, body, axis)
 }
 
-/// The plane normal to an axis through the middle of the body, or through the root's centre.
-pub fn through_centre(root: &Root, body: Option<&[Facet]>, axis: usize) -> Slice {
+/// The plane normal to an axis that halves the area of the body, or passes through the root's centre.
+///
+/// A plane through the middle of the bounding box would miss the wings of an aircraft with a tail.
+pub fn halfway(root: &Root, body: Option<&[Facet]>, axis: usize) -> Slice {
     let [low, high] = extent(root, body);
-    let within = |v: f64| v.clamp(root.origin[axis], root.origin[axis] + root.edge);
-    Slice::new(root, axis, within((low[axis] + high[axis]) / 2.0))
-        .expect("a coordinate in the root")
+    let middle = body.and_then(|facets| median(facets, axis));
+    let middle = middle.unwrap_or((low[axis] + high[axis]) / 2.0);
+    // A thousandth of the extent is not visible, and a short coordinate can be entered again.
+    let step = 10f64.powf((high[axis] - low[axis]).log10().floor() - 3.0);
+    let middle = if step > 0.0 { (middle / step).round() * step } else { middle };
+    let within = middle.clamp(root.origin[axis], root.origin[axis] + root.edge);
+    Slice::new(root, axis, within).expect("a coordinate in the root")
+}
+
+/// The median of the facets' centroids along an axis, weighted with their areas; `None` without area.
+fn median(facets: &[Facet], axis: usize) -> Option<f64> {
+    let weighed = |facet: &Facet| {
+        let [a, b, c] = facet.map(|v| v.map(f64::from));
+        let normal = cross(sub(b, a), sub(c, a));
+        ((a[axis] + b[axis] + c[axis]) / 3.0, dot(normal, normal).sqrt())
+    };
+    let mut facets: Vec<(f64, f64)> = facets.iter().map(weighed).collect();
+    facets.sort_unstable_by(|p, q| p.0.total_cmp(&q.0));
+    let total: f64 = facets.iter().map(|f| f.1).sum();
+    // The mean of the lower and the upper median, up to rounding.
+    let reaching = |part: f64| {
+        let mut sum = 0.0;
+        let reaches = |f: &&(f64, f64)| {
+            sum += f.1;
+            sum >= part * total
+        };
+        facets.iter().find(reaches).map(|f| f.0)
+    };
+    (total > 0.0).then_some((reaching(0.5 - 1e-9)? + reaching(0.5 + 1e-9)?) / 2.0)
 }
 
 /// The bounding box of the body, or the root.
@@ -119,6 +162,7 @@ impl Picture {
     /// If the mesh cannot be read, or the picture would be empty.
     pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, ExportError> {
         let root = mesh.manifest.root;
+        request.check(mesh)?;
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
         let axes = plane_axes(slice.axis);
         let clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
@@ -133,7 +177,7 @@ impl Picture {
         let selection =
             Selection { slice: Some(slice), clip: Some(reach), ..request.selection.clone() };
         let root_edge = root.edge * draw::scale(&window);
-        let detail = Detail { level_max: detail.level_max.min(request.level_max), ..*detail };
+        let detail = detail.to_level(request.level_max);
         let squares = Squares::collect(mesh, &selection, request.colour, root_edge, &detail)?;
         if squares.squares.is_empty() {
             let why =

@@ -4,7 +4,7 @@
 use super::colour::{Entry, short};
 use super::squares::{Detail, Squares};
 use super::surface::{Surface, ranks_at};
-use super::{Colour, Request, middle, through_centre, zoomed};
+use super::{Colour, Request, halfway, middle, zoomed};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use contract::lattice::{Root, UNITS_PER_EDGE};
@@ -23,7 +23,7 @@ const DETAIL: Detail =
 /// Edge of the window in units of a page, which determines the smallest square that is not merged.
 const PAGE: f64 = 1600.0;
 /// Edge of the window in longest extents of the body.
-const WINDOW: f64 = 2.0;
+const WINDOW: f64 = 1.6;
 
 /// A view. Arrays are little-endian, in Base64.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -83,6 +83,7 @@ impl Scene {
     /// # Errors
     /// If the mesh cannot be read.
     pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, ExportError> {
+        request.check(mesh)?;
         let root = mesh.manifest.root;
         let first = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
         let clip = request.selection.clip.unwrap_or_else(|| window(&root, request));
@@ -90,15 +91,14 @@ impl Scene {
         let edge = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
         let centre: [f64; 3] = std::array::from_fn(|a| (low[a] + high[a]) / 2.0);
         let others = (0..3).filter(|&a| a != first.axis);
-        let planes =
-            [first].into_iter().chain(others.map(|a| through_centre(&root, request.body, a)));
+        let planes = [first].into_iter().chain(others.map(|a| halfway(&root, request.body, a)));
         let mut slices = Vec::new();
         for slice in planes {
             let mut reach = clip;
             (reach[0][slice.axis], reach[1][slice.axis]) = (0, UNITS_PER_EDGE);
             let (slice, clip) = (Some(slice), Some(reach));
             let selection = Selection { slice, clip, ..request.selection.clone() };
-            let detail = Detail { level_max: DETAIL.level_max.min(request.level_max), ..DETAIL };
+            let detail = DETAIL.to_level(request.level_max);
             let page = root.edge / edge * PAGE;
             slices
                 .push((slice, Squares::collect(mesh, &selection, request.colour, page, &detail)?));

@@ -7,7 +7,7 @@
 use super::colour::Colour;
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
-use contract::octant::UNITS_PER_CELL;
+use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
 use export::selection::{Selection, Slice};
 use maud::{Markup, PreEscaped, html};
 
@@ -19,6 +19,8 @@ const LEVELS_ABOVE_SURFACE: u8 = 5;
 const CLOSE_UP_CELLS: i64 = 48;
 /// Edge of the window around the body, in its longest extents.
 const AROUND: f64 = 1.5;
+/// Edge of the window around the base mesh, in longest extents of the body.
+const AROUND_BASE_MESH: f64 = 4.0;
 
 /// A mesh of the case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +40,7 @@ pub enum Made {
 pub enum Part {
     /// All of the slice.
     Root,
-    /// All of the slice, with leaves merged to the level of the base mesh.
+    /// The wider surroundings of the body, with leaves merged to the level of the base mesh.
     BaseMesh,
     /// The surroundings of the body.
     Body,
@@ -187,20 +189,16 @@ pub const MEMBERS: [Member; 16] = [
 
 /// Leaves, window and deepest level of a slice: selection, zoom and level, as a request has them.
 pub fn request(part: Part, case: &Case) -> (Selection, f64, u8) {
-    let all = Selection::default();
-    let deepest = contract::octant::LEVEL_MAX;
+    let [low, high] = super::extent(&case.root, Some(&case.facets));
+    let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::MIN_POSITIVE, f64::max);
+    let window = |extents: f64| (case.root.edge / (extents * longest)).max(1.0);
+    let level_base = case.level_surface.saturating_sub(LEVELS_ABOVE_SURFACE).max(2);
     match part {
-        Part::Root => (all, 1.0, deepest),
-        Part::BaseMesh => {
-            (all, 1.0, case.level_surface.saturating_sub(LEVELS_ABOVE_SURFACE).max(2))
-        }
-        Part::Body => {
-            let [low, high] = super::extent(&case.root, Some(&case.facets));
-            let longest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
-            (all, (case.root.edge / (AROUND * longest)).max(1.0), deepest)
-        }
-        Part::View | Part::ViewOfBody => (all, 1.0, deepest),
-        Part::CloseUp => (close_up(case), 1.0, deepest),
+        Part::Root | Part::View => (Selection::default(), 1.0, LEVEL_MAX),
+        Part::BaseMesh => (Selection::default(), window(AROUND_BASE_MESH), level_base),
+        Part::Body => (Selection::default(), window(AROUND), LEVEL_MAX),
+        Part::ViewOfBody => (Selection::default(), window(1.1), LEVEL_MAX),
+        Part::CloseUp => (close_up(case), 1.0, LEVEL_MAX),
     }
 }
 
@@ -252,7 +250,7 @@ fn caption(member: &Member, drawn: &Drawn) -> Markup {
         (member.caption) " "
         @match drawn {
             Drawn::Slice(_) => { a href=(format!("{name}.svg")) { "SVG" } ", " a href=(format!("{name}.tex")) { "TikZ" } ", " a href=(format!("{name}.csv")) { "data" } }
-            Drawn::View(_) => { a href=(format!("{name}.html")) { "turn it" } }
+            Drawn::View(_) => { a href=(format!("{name}.html")) { "turn it in a browser" } }
         }
         "."
     }

@@ -10,11 +10,15 @@ use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use export::error::ExportError;
 use export::mesh::{Leaf, Mesh};
 use export::selection::Selection;
+use run::engine::interrupt;
 
 /// Edge of the smallest square, in units of the page.
 const EDGE_MIN: f64 = 1.0;
 /// Edge of the smallest square with an outline, in units of the page.
 const EDGE_OUTLINED: f64 = 3.5;
+
+/// Leaves between two checks for an interrupt.
+const LEAVES_PER_CHECK: u64 = 1 << 16;
 
 /// A square in a plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +54,13 @@ pub struct Detail {
     pub outlined_max: usize,
     /// Deepest level of a square.
     pub level_max: u8,
+}
+
+impl Detail {
+    /// The same detail with leaves merged to this level, whose level is then shown.
+    pub fn to_level(self, level: u8) -> Self {
+        Self { level_max: self.level_max.min(level), ..self }
+    }
 }
 
 /// The squares of a plane in Morton order.
@@ -88,12 +99,17 @@ impl Squares {
         let axes = plane_axes(selection.slice.expect("a picture has a slice").axis);
         let deepest = |edge: f64| (root_edge / edge).log2().floor().clamp(0.0, 19.0) as u8;
         let level_drawn = deepest(EDGE_MIN).min(detail.level_max);
-        let mut found = Self { squares: Vec::new(), level_outlined: 0, level_drawn, leaves: 0 };
+        let level_outlined = deepest(EDGE_OUTLINED).min(level_drawn);
+        let mut found = Self { squares: Vec::new(), level_outlined, level_drawn, leaves: 0 };
         mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
-            found.add(square(&leaf, axes, colour));
-            Ok::<(), ExportError>(())
+            let octant = leaf.octant.ancestor(leaf.octant.level.min(detail.level_max));
+            found.add(square(&Leaf { octant, ..leaf }, axes, colour));
+            match found.leaves % LEAVES_PER_CHECK == 0 && interrupt::requested() {
+                true => Err(ExportError::Interrupted),
+                false => Ok(()),
+            }
         })?;
-        found.outline(deepest(EDGE_OUTLINED), detail.outlined_max);
+        found.outline(detail.outlined_max);
         found.merge_siblings();
         while found.squares.len() > detail.squares_max && found.level_drawn > 0 {
             found.level_drawn -= 1;
@@ -102,6 +118,7 @@ impl Squares {
                 found.leaves -= square.leaves;
                 found.add(square);
             }
+            found.outline(detail.outlined_max);
             found.merge_siblings();
         }
         Ok(found)
@@ -121,8 +138,8 @@ impl Squares {
         }
     }
 
-    /// Determines the deepest level with outlines.
-    fn outline(&mut self, level_max: u8, count_max: usize) {
+    /// Reduces the level with outlines until they are few enough.
+    fn outline(&mut self, count_max: usize) {
         let mut counts = [0; LEVEL_MAX as usize + 1];
         self.squares.iter().for_each(|s| counts[usize::from(s.level)] += 1);
         let mut sum = 0;
@@ -130,8 +147,7 @@ impl Squares {
             sum += counts[usize::from(*level)];
             sum <= count_max
         };
-        let level_max = level_max.min(self.level_drawn);
-        self.level_outlined = (0..=level_max).take_while(fits).last().unwrap_or(0);
+        self.level_outlined = (0..=self.level_outlined).take_while(fits).last().unwrap_or(0);
     }
 
     /// Merges squares without outlines wherever four siblings have the same value.

@@ -5,8 +5,9 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word;
 use export::error::ExportError;
-use export::mesh::{Leaf, Mesh};
+use export::mesh::{Block, Leaf, Mesh};
 use export::selection::Selection;
+use run::engine::interrupt;
 use std::collections::HashMap;
 
 /// Greatest number of triangles of a view.
@@ -102,7 +103,10 @@ pub fn ranks_at(mesh: &Mesh, points: &[[f64; 3]]) -> Result<Vec<Option<u32>>, Ex
     order.sort_unstable();
     let mut ranks = vec![None; points.len()];
     let mut next = order.as_slice();
-    for keys in mesh.blocks(LEAVES_PER_BLOCK)? {
+    for Block { keys, .. } in mesh.blocks(&Selection::default(), LEAVES_PER_BLOCK)? {
+        if interrupt::requested() {
+            return Err(ExportError::Interrupted);
+        }
         next = &next[next.partition_point(|&(key, _)| key < keys.start)..];
         if next.first().is_none_or(|&(key, _)| key >= keys.end) {
             continue;

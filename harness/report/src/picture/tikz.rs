@@ -69,12 +69,9 @@ fn tenth(value: f64) -> f64 {
 impl Sheet for Tikz {
     fn rectangles(&mut self, rectangles: &[[f64; 4]], fill: &str, outline: Option<&str>) {
         let fill = self.colour(fill);
-        let command = match outline {
-            Some(outline) => {
-                format!("\\filldraw[fill={fill}, draw={}, line width=0.2pt]", self.colour(outline))
-            }
-            None => format!("\\fill[{fill}]"),
-        };
+        // A line of the same colour closes the seams between paths, which viewers show.
+        let (draw, width) = outline.map_or((fill.clone(), 0.1), |o| (self.colour(o), 0.2));
+        let command = format!("\\filldraw[fill={fill}, draw={draw}, line width={width}pt]");
         self.path(&command, rectangles, |r| {
             let [x, y, width, height] = r.map(tenth);
             format!("({x},{y}) rectangle +({width},{height})")
