@@ -44,6 +44,8 @@ pub enum Command {
     Export(commands::export::Arguments),
     /// Measure the surface that a mesh hands over to a near-body mesher, its gap to the wall, and its distribution to ranks
     NearBody(commands::near_body::Arguments),
+    /// Draw a slice of a mesh, or a view in three dimensions
+    Picture(Box<commands::picture::Arguments>),
     /// Make a leaf-set directory from a mesh in another program's format
     Import(commands::import::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides

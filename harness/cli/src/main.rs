@@ -29,6 +29,7 @@ fn main() -> ExitCode {
         Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::NearBody(arguments) => commands::near_body::run(&arguments),
+        Command::Picture(arguments) => commands::picture::run(&arguments),
         Command::Import(arguments) => commands::import::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Why(arguments) => commands::why::run(&arguments),

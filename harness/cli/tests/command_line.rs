@@ -5,7 +5,7 @@ use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 17] = [
     "verify",
     "selftest",
     "gate",
@@ -16,6 +16,7 @@ const COMMANDS: [&str; 16] = [
     "shrink",
     "audit",
     "leak",
+    "picture",
     "export",
     "import",
     "diff",

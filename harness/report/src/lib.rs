@@ -5,7 +5,8 @@
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
-//! - [`leak`]: the path of a leak for VTK, and a slice through its narrowest place.
+//! - [`leak`]: the path of a leak for VTK, and a slice through its narrowest place;
+//! - [`picture`]: pictures of meshes.
 
 pub mod benchmark;
 pub mod figure;
@@ -14,6 +15,8 @@ pub mod json;
 pub mod leak;
 pub mod markdown;
 pub mod page;
+pub mod picture;
+mod section;
 pub mod targets;
 pub mod track;
 pub mod verification;

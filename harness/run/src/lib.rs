@@ -13,3 +13,4 @@ pub mod oracle;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 pub mod verify;
+pub mod view;

@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `foam`, `programs`, `selection`, `session` and `values` are shared.
+//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `session` and `values` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -13,6 +13,9 @@ pub mod import;
 pub mod leak;
 pub mod man;
 pub mod near_body;
+mod meshed;
+mod paper;
+pub mod picture;
 pub mod planted;
 mod programs;
 pub mod report;

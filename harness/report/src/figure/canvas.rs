@@ -126,13 +126,27 @@ impl Canvas {
 
     /// Rectangles of one colour as one element: lower corner and size of each.
     pub fn fill(&mut self, rectangles: &[[f64; 4]], colour: &str) {
-        let path = |&[x, y, width, height]: &[f64; 4]| {
-            let [x, y, width, height] = [x, y, width, height].map(round);
-            format!("M{x} {y}h{width}v{height}h-{width}z")
-        };
-        let path: String = rectangles.iter().map(path).collect();
+        let path = rectangle_path(rectangles);
         // Without smoothing, neighbours have no seam between them.
         self.put(html! { path d=(path) fill=(colour) shape-rendering="crispEdges" {} });
+    }
+
+    /// Outlined rectangles of one colour as one element: lower corner and size of each.
+    pub fn outlined(&mut self, rectangles: &[[f64; 4]], fill: &str, stroke: &str) {
+        let path = rectangle_path(rectangles);
+        self.put(html! { path d=(path) fill=(fill) stroke=(stroke) stroke-width="0.7" {} });
+    }
+
+    /// Segments as one element, with round ends.
+    pub fn segments(&mut self, segments: &[[(f64, f64); 2]], colour: &str, width: f64) {
+        let path = |[p, q]: &[(f64, f64); 2]| {
+            let [x0, y0, x1, y1] = [p.0, p.1, q.0, q.1].map(round);
+            format!("M{x0} {y0}L{x1} {y1}")
+        };
+        let path: String = segments.iter().map(path).collect();
+        self.put(html! {
+            path d=(path) fill="none" stroke=(colour) stroke-width=(width) stroke-linecap="round" {}
+        });
     }
 
     /// Outlined polygons as one element.
@@ -162,6 +176,14 @@ impl Canvas {
 fn round(value: f64) -> f64 {
     // Adding zero turns -0 into 0.
     (value * 10.0).round() / 10.0 + 0.0
+}
+
+fn rectangle_path(rectangles: &[[f64; 4]]) -> String {
+    let path = |rectangle: &[f64; 4]| {
+        let [x, y, width, height] = rectangle.map(round);
+        format!("M{x} {y}h{width}v{height}h-{width}z")
+    };
+    rectangles.iter().map(path).collect()
 }
 
 fn coordinates(points: &[(f64, f64)]) -> String {

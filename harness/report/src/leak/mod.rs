@@ -2,4 +2,3 @@
 
 pub mod picture;
 pub mod polyline;
-mod section;

@@ -1,9 +1,9 @@
 //! A slice through the narrowest place of a leak as SVG: the plane that contains the direction of the path and a point
 //! of the rim. It shows the leaves, the section of the facets, the largest ball that passes and the path.
 
-use super::section::{Planar, Window};
 use crate::figure::canvas::{Anchor, Canvas, DOTTED, FAINT, INK, SIZE, WIDTH, width};
 use crate::figure::palette::{colour, hex};
+use crate::section::{Planar, Window};
 use crate::write::replace;
 use check::geometry::distance::{cross, dot, sub};
 use check::geometry::meaning::number;
@@ -38,8 +38,8 @@ pub fn svg(case: &Case, words: &[u64], passage: &Passage) -> String {
     draw_leaves(&mut canvas, &window, case, words);
     draw_facets(&mut canvas, &window, case);
     draw_passage(&mut canvas, &window, passage);
-    let (left, top) = on_page(&window, [-window.half, window.half]);
-    let (right, bottom) = on_page(&window, [window.half, -window.half]);
+    let (left, top) = on_page(&window, [-window.half[0], window.half[1]]);
+    let (right, bottom) = on_page(&window, [window.half[0], -window.half[1]]);
     canvas.frame((left, top), (right, bottom));
     draw_legend(&mut canvas);
     draw_scale(&mut canvas, &window, passage);
@@ -58,7 +58,7 @@ fn window(passage: &Passage) -> Window {
         axes.into_iter().find_map(|axis| perpendicular(axis, along)).expect("two axes differ")
     });
     let half = (HALF.0 * narrowest.width).max(HALF.1 * passage.spacing.spacing);
-    Window { centre: narrowest.at, axes: [along, across], half }
+    Window { centre: narrowest.at, axes: [along, across], half: [half; 2] }
 }
 
 /// The unit vector perpendicular to `along` in the plane of both; `None` if they are nearly parallel.
@@ -70,13 +70,14 @@ fn perpendicular(v: [f64; 3], along: [f64; 3]) -> Option<[f64; 3]> {
 
 fn on_page(window: &Window, p: Planar) -> (f64, f64) {
     let edge = f64::from(WIDTH) - 2.0 * SIDES;
-    let scale = edge / (2.0 * window.half);
-    (SIDES + (p[0] + window.half) * scale, MARGIN.0 + (window.half - p[1]) * scale)
+    let [half, _] = window.half;
+    let scale = edge / (2.0 * half);
+    (SIDES + (p[0] + half) * scale, MARGIN.0 + (half - p[1]) * scale)
 }
 
 fn draw_leaves(canvas: &mut Canvas, window: &Window, case: &Case, words: &[u64]) {
     let (mut crossing, mut free) = (Vec::new(), Vec::new());
-    let reach = window.half * 2f64.sqrt();
+    let reach = window.half[0] * 2f64.sqrt();
     for &w in words {
         let (low, high) = word::octant(w).bounds();
         let (low, high) = (case.root.to_user(low), case.root.to_user(high));
@@ -142,7 +143,7 @@ fn draw_legend(canvas: &mut Canvas) {
 /// A bar as long as a cell of the base tree and one as long as the width, and the place and orientation of the plane.
 fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
     let narrowest = &passage.narrowest;
-    let (left, bottom) = on_page(window, [-window.half, -window.half]);
+    let (left, bottom) = on_page(window, window.half.map(|h| -h));
     let length = |l: f64| on_page(window, [l, 0.0]).0 - on_page(window, [0.0, 0.0]).0;
     let bars = [
         (format!("width {}", number(narrowest.width)), narrowest.width, hex(colour(1)), None),

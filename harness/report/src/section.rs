@@ -1,19 +1,19 @@
-//! Sections of boxes and facets with a square window in a plane.
+//! Sections of boxes and facets with a rectangular window in a plane.
 
 type Point = [f64; 3];
 
 /// A point in a plane's coordinates.
 pub type Planar = [f64; 2];
 
-/// A square in a plane.
+/// A rectangle in a plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     /// Its centre.
     pub centre: Point,
     /// Unit vectors in the plane, perpendicular to each other.
     pub axes: [Point; 2],
-    /// Half of its edge.
-    pub half: f64,
+    /// Half of its edge along each axis.
+    pub half: [f64; 2],
 }
 
 impl Window {
@@ -24,8 +24,8 @@ impl Window {
 
     /// The polygon in which the plane cuts a box, within the window; empty if it misses the window.
     pub fn of_box(&self, low: Point, high: Point) -> Vec<Planar> {
-        let h = self.half;
-        let mut polygon = vec![[-h, -h], [h, -h], [h, h], [-h, h]];
+        let [h, v] = self.half;
+        let mut polygon = vec![[-h, -v], [h, -v], [h, v], [-h, v]];
         for a in 0..3 {
             let along =
                 |p: Planar| self.centre[a] + p[0] * self.axes[0][a] + p[1] * self.axes[1][a];
@@ -59,7 +59,7 @@ impl Window {
         for a in 0..2 {
             for sign in [-1.0, 1.0] {
                 // Inside where `inside` is not negative.
-                let inside = |p: Planar| self.half - sign * p[a];
+                let inside = |p: Planar| self.half[a] - sign * p[a];
                 let (first, last) = (inside(from), inside(to));
                 if first < 0.0 && last < 0.0 {
                     return None;
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     const WINDOW: Window =
-        Window { centre: [0.5; 3], axes: [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]], half: 2.0 };
+        Window { centre: [0.5; 3], axes: [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]], half: [2.0; 2] };
 
     fn area(polygon: &[Planar]) -> f64 {
         let next = |i: usize| polygon[(i + 1) % polygon.len()];

@@ -1,0 +1,222 @@
+//! `harness picture`: draws a slice of a mesh, a view in three dimensions, or the pictures of the paper.
+
+use super::meshed::{Failure, MeshArguments, Meshed, failed, input};
+use super::paper;
+use super::selection::SelectionArguments;
+use clap::{Args, ValueEnum};
+use contract::octant::LEVEL_MAX;
+use export::error::ExportError;
+use export::mesh::Mesh;
+use report::picture::colour;
+use report::picture::format::{Format, put, write};
+use report::picture::scene::{Scene, html};
+use report::picture::{Picture, Request};
+use run::engine::layout::{Layout, Ranks, SERIAL};
+use run::engine::paths::Paths;
+use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING};
+use run::view;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+A slice is drawn at page width with the section of the geometry, axes, a legend and a scale; cells too small to be seen \
+are merged, and their greatest value counts. Its data are written beside it as .csv. A view shows the geometry and three \
+slices, which a mouse turns in any browser without network (.html), or the first slice (.png, with pyvista). An existing \
+file is replaced.
+
+Examples:
+  harness picture uav-small --out uav.svg                             mesh a case and draw its middle
+  harness picture body.toml --out nose.png --slice y=0 --zoom 8       closer, in another plane
+  harness picture mesh --case body.toml --out mesh.tex --colour side  a mesh on disk; without --case, no geometry is drawn
+  harness picture uav-small --out ranks.html --ranks 16 --colour rank the partition in three dimensions
+  harness picture uav-medium --paper --out pictures                   every step of the algorithm, and a page of them
+
+Exit codes: 0 success; 2 invalid input or an unknown format; 3 the mesher, or pyvista for a .png view, is missing; \
+130 interrupted.";
+
+/// `harness picture`.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// The mesh.
+    #[command(flatten)]
+    source: MeshArguments,
+    /// The picture: .svg, .png, .pdf, .tex or .tikz for a slice, .html or .png for a view; with --paper a directory
+    #[arg(long, value_name = "FILE|DIR")]
+    out: PathBuf,
+    /// What colours show
+    #[arg(long, value_enum, default_value = "level")]
+    colour: Colour,
+    /// Magnification: edges of the root per edge of the picture, which is centred on the geometry
+    #[arg(long, value_name = "X", default_value = "1", value_parser = zoom, conflicts_with = "clip")]
+    zoom: f64,
+    /// Draw a view in three dimensions as .png
+    #[arg(long)]
+    view: bool,
+    /// Simulated ranks that mesh a case
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    ranks: Option<u16>,
+    /// Draw the base tree of a case
+    #[arg(long)]
+    ungraded: bool,
+    /// Draw the pictures of the paper for a case, and a page of them
+    #[arg(long, conflicts_with_all = ["view", "ranks", "ungraded", "zoom", "colour", "clip", "slice", "level_max", "side", "rank", "case"])]
+    paper: bool,
+    /// Which cells are drawn.
+    #[command(flatten)]
+    selection: SelectionArguments,
+}
+
+/// The quantity that colours show.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Colour {
+    /// Level of a cell
+    Level,
+    /// Rank that made a cell
+    Rank,
+    /// Outside, inside or crossing
+    Side,
+    /// Edge of a cell
+    Spacing,
+}
+
+impl From<Colour> for colour::Colour {
+    fn from(colour: Colour) -> Self {
+        match colour {
+            Colour::Level => Self::Level,
+            Colour::Rank => Self::Rank,
+            Colour::Side => Self::Side,
+            Colour::Spacing => Self::Spacing,
+        }
+    }
+}
+
+/// Draws; returns the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    let drawn = match arguments.paper {
+        true => paper::draw(&arguments.source, &arguments.out),
+        false => draw(arguments),
+    };
+    match drawn {
+        Ok(()) => EXIT_HOLDS,
+        Err((code, why)) => {
+            eprintln!("harness: {why}");
+            code
+        }
+    }
+}
+
+fn draw(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { source, out, ranks, ungraded, .. } = arguments;
+    let format = requested(arguments).map_err(input)?;
+    if Path::new(&source.mesh).is_dir() && (ranks.is_some() || *ungraded) {
+        let why =
+            "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
+        return Err(input(why.to_owned()));
+    }
+    let layout = match *ranks {
+        Some(ranks) => Layout::on(Ranks::Simulated { ranks: ranks.into(), seed: 1 }),
+        None => SERIAL.clone(),
+    };
+    let meshed = source.open(&layout, *ungraded)?;
+    let mesh = Mesh::open(&meshed.dir).map_err(unread)?;
+    let request = request(arguments, &meshed, &mesh)?;
+    if arguments.view || format == Format::Html {
+        let scene = Scene::collect(&mesh, &request).map_err(unread)?;
+        write_view(&scene, out, &Paths::find(), source)?;
+    } else {
+        let picture = Picture::collect(&mesh, &request, &format.detail()).map_err(unread)?;
+        write(&picture, format, out).map_err(|error| input(error.to_string()))?;
+        println!("{}", picture.title());
+    }
+    println!("{}", out.display());
+    if meshed.case.is_none() {
+        println!("the geometry is not drawn: name its case with --case");
+    }
+    Ok(())
+}
+
+/// A mesh of which no picture could be made.
+pub fn unread(error: ExportError) -> Failure {
+    match error {
+        ExportError::Interrupted => (EXIT_INTERRUPTED, error.to_string()),
+        _ => input(error.to_string()),
+    }
+}
+
+/// The format of the file, if that can be made of a slice or a view, whichever is requested.
+fn requested(arguments: &Arguments) -> Result<Format, String> {
+    let Arguments { out, view, .. } = arguments;
+    let format = Format::of(out)?;
+    if *view && !matches!(format, Format::Png | Format::Html) {
+        return Err(format!("{}: a view must be .html or .png", out.display()));
+    }
+    let directory = out.parent().filter(|d| !d.as_os_str().is_empty());
+    match directory.filter(|d| !d.is_dir()) {
+        Some(missing) => Err(format!("{} is not a directory: create it", missing.display())),
+        None => Ok(format),
+    }
+}
+
+fn request<'a>(
+    arguments: &Arguments,
+    meshed: &'a Meshed,
+    mesh: &Mesh,
+) -> Result<Request<'a>, Failure> {
+    Ok(Request {
+        selection: arguments.selection.of(mesh).map_err(input)?,
+        body: meshed.case.as_ref().map(|case| &case.facets[..]),
+        colour: arguments.colour.into(),
+        zoom: arguments.zoom,
+        level_max: LEVEL_MAX,
+        command: command(),
+    })
+}
+
+/// Writes a view as HTML or, with pyvista, as PNG.
+pub fn write_view(
+    scene: &Scene,
+    out: &Path,
+    paths: &Paths,
+    source: &MeshArguments,
+) -> Result<(), Failure> {
+    let bytes = match Format::of(out) {
+        Ok(Format::Png) => {
+            let json = report::json::pretty(scene);
+            view::png(&json, paths, source.engine.limit()).map_err(|f| failed(&f)).map_err(
+                |(code, why)| match code {
+                    EXIT_MISSING => (code, format!("{why}; a view as .html needs no Python")),
+                    _ => (code, why),
+                },
+            )?
+        }
+        _ => html(scene).into_bytes(),
+    };
+    put(out, &bytes).map_err(|error| input(error.to_string()))
+}
+
+/// The command line, as it can be entered again.
+pub fn command() -> String {
+    let words = std::env::args().skip(1).map(|word| {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_=.,/+:".contains(c);
+        if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    });
+    ["harness".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ")
+}
+
+fn zoom(text: &str) -> Result<f64, String> {
+    let zoom = text.parse().ok().filter(|zoom: &f64| (1.0..=1e6).contains(zoom));
+    zoom.ok_or_else(|| "give a number from 1 to 1e6".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zoom_is_at_least_one() {
+        assert_eq!(zoom("2.5"), Ok(2.5));
+        for wrong in ["0.5", "-1", "nan", "inf", ""] {
+            assert!(zoom(wrong).is_err(), "{wrong}");
+        }
+    }
+}

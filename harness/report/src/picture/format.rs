@@ -1,0 +1,87 @@
+//! The formats of pictures, by the name of the file.
+
+use super::squares::Detail;
+use super::{Picture, TEX, VECTOR, csv, svg, tikz};
+use contract::files::write_atomically;
+use std::io;
+use std::path::Path;
+
+/// A format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// A slice as SVG.
+    Svg,
+    /// A slice as PNG, or a view.
+    Png,
+    /// A slice as PDF.
+    Pdf,
+    /// A slice as PGF/TikZ.
+    Tikz,
+    /// A view as HTML.
+    Html,
+}
+
+impl Format {
+    /// The format that a file name states.
+    ///
+    /// # Errors
+    /// One sentence, if it states none.
+    pub fn of(path: &Path) -> Result<Self, String> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        match extension.to_ascii_lowercase().as_str() {
+            "svg" => Ok(Self::Svg),
+            "png" => Ok(Self::Png),
+            "pdf" => Ok(Self::Pdf),
+            "tex" | "tikz" => Ok(Self::Tikz),
+            "html" => Ok(Self::Html),
+            _ => Err(format!(
+                "{}: the file name of a picture must end in .svg, .png, .pdf, .tex, .tikz or .html",
+                path.display()
+            )),
+        }
+    }
+
+    /// How many squares the format can show.
+    pub fn detail(self) -> Detail {
+        if self == Self::Tikz { TEX } else { VECTOR }
+    }
+
+    /// The slice in this format.
+    ///
+    /// # Errors
+    /// One sentence, if slices do not have this format, or if it was not compiled.
+    pub fn draw(self, picture: &Picture) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Svg => Ok(svg(picture).into_bytes()),
+            Self::Tikz => Ok(tikz(picture).into_bytes()),
+            #[cfg(feature = "figures")]
+            Self::Png => crate::figure::raster::png(&svg(picture)),
+            #[cfg(feature = "figures")]
+            Self::Pdf => crate::figure::raster::pdf(&svg(picture)),
+            #[cfg(not(feature = "figures"))]
+            Self::Png | Self::Pdf => {
+                Err("PNG and PDF need a harness with the feature figures: choose .svg".to_owned())
+            }
+            Self::Html => Err("a slice is no view: choose .svg".to_owned()),
+        }
+    }
+}
+
+/// Writes a slice, and its data beside it as CSV.
+///
+/// # Errors
+/// If a file cannot be written or the format is not available; the message names the file.
+pub fn write(picture: &Picture, format: Format, path: &Path) -> io::Result<()> {
+    let drawn = format.draw(picture).map_err(io::Error::other)?;
+    put(path, &drawn)?;
+    put(&path.with_extension("csv"), csv(picture).as_bytes())
+}
+
+/// Writes a file, which is either complete or absent.
+///
+/// # Errors
+/// If it cannot be written; the message names it.
+pub fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let named = |e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", path.display()));
+    write_atomically(path, |out| out.write_all(bytes)).map_err(named)
+}

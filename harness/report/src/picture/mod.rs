@@ -1,0 +1,233 @@
+//! Pictures of meshes: slices as SVG, PNG, PDF and PGF/TikZ, and views in three dimensions as HTML and PNG.
+//!
+//! [`Picture`] is the data of a slice: the squares in which a plane cuts leaves, the segments in which it cuts facets, and the
+//! window. Reading takes time in proportion to the slice, and no picture has more squares than its format can show.
+
+pub mod colour;
+mod csv;
+mod draw;
+pub mod format;
+pub mod scene;
+pub mod set;
+mod sheet;
+pub mod squares;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod tikz;
+
+use crate::section::{Planar, Window};
+use check::geometry::distance::{cross, dot, sub};
+use colour::{Colour, Entry, short};
+use contract::case::Facet;
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::manifest::Sides;
+use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
+use export::error::ExportError;
+use export::mesh::Mesh;
+use export::selection::{Selection, Slice};
+use squares::{Detail, Squares, plane_axes};
+
+pub use csv::csv;
+pub use draw::svg;
+pub use tikz::tikz;
+
+/// What a picture shows.
+#[derive(Clone, Debug)]
+pub struct Request<'a> {
+    /// The leaves. Without a slice, that of [`middle`] is taken; the window is that of the clip box, if there is one.
+    pub selection: Selection,
+    /// The body whose section is drawn, if it is known.
+    pub body: Option<&'a [Facet]>,
+    /// The quantity that colours show.
+    pub colour: Colour,
+    /// Edge of the root in edges of the window, which is centred on the body. Without effect on a clip box.
+    pub zoom: f64,
+    /// Leaves deeper than this are merged into their ancestors: the base mesh of a partition, for example.
+    pub level_max: u8,
+    /// Command that makes the picture, which its data name.
+    pub command: String,
+}
+
+impl Request<'_> {
+    /// Returns an error if the mesh does not have what colours show.
+    fn check(&self, mesh: &Mesh) -> Result<(), ExportError> {
+        if self.colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
+            let why = "the sides of this mesh are unknown: choose another colour";
+            return Err(ExportError::Request(why.to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// The data of a picture of a slice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// The root of the mesh.
+    pub root: Root,
+    /// The plane.
+    pub slice: Slice,
+    /// The quantity that colours show.
+    pub colour: Colour,
+    /// Lower left and upper right corner in the plane, in the user's units.
+    pub window: [Planar; 2],
+    /// The squares.
+    pub squares: Squares,
+    /// The colours of their values.
+    pub key: Vec<Entry>,
+    /// The segments in which the plane cuts the body, in the user's units; `None` if the body is not known.
+    pub section: Option<Vec<[Planar; 2]>>,
+    /// Command that makes the picture.
+    pub command: String,
+}
+
+/// Squares of a vector graphic: about two megabytes.
+pub const VECTOR: Detail =
+    Detail { squares_max: 60_000, outlined_max: 30_000, level_max: LEVEL_MAX };
+/// Squares of a TikZ picture, which TeX sets in a few seconds.
+pub const TEX: Detail = Detail { squares_max: 10_000, outlined_max: 6_000, level_max: LEVEL_MAX };
+
+/// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, through the
+/// root's centre and normal to z.
+pub fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
+    let extent = extent(root, body);
+    let length = |a: usize| extent[1][a] - extent[0][a];
+    // Of equal extents the last one, so that a cube is seen from above.
+    let axis = (0..3).rev().min_by(|&a, &b| length(a).total_cmp(&length(b))).expect("three axes");
+    halfway(root, body, axis)
+}
+
+/// The plane normal to an axis that halves the area of the body, or passes through the root's centre.
+///
+/// A plane through the middle of the bounding box would miss the wings of an aircraft with a tail.
+pub fn halfway(root: &Root, body: Option<&[Facet]>, axis: usize) -> Slice {
+    let [low, high] = extent(root, body);
+    let middle = body.and_then(|facets| median(facets, axis));
+    let middle = middle.unwrap_or((low[axis] + high[axis]) / 2.0);
+    // A thousandth of the extent is not visible, and a short coordinate can be entered again.
+    let step = 10f64.powf((high[axis] - low[axis]).log10().floor() - 3.0);
+    let middle = if step > 0.0 { (middle / step).round() * step } else { middle };
+    let within = middle.clamp(root.origin[axis], root.origin[axis] + root.edge);
+    Slice::new(root, axis, within).expect("a coordinate in the root")
+}
+
+/// The median of the facets' centroids along an axis, weighted with their areas; `None` without area.
+fn median(facets: &[Facet], axis: usize) -> Option<f64> {
+    let weighed = |facet: &Facet| {
+        let [a, b, c] = facet.map(|v| v.map(f64::from));
+        let normal = cross(sub(b, a), sub(c, a));
+        ((a[axis] + b[axis] + c[axis]) / 3.0, dot(normal, normal).sqrt())
+    };
+    let mut facets: Vec<(f64, f64)> = facets.iter().map(weighed).collect();
+    facets.sort_unstable_by(|p, q| p.0.total_cmp(&q.0));
+    let total: f64 = facets.iter().map(|f| f.1).sum();
+    // The mean of the lower and the upper median, up to rounding.
+    let reaching = |part: f64| {
+        let mut sum = 0.0;
+        let reaches = |f: &&(f64, f64)| {
+            sum += f.1;
+            sum >= part * total
+        };
+        facets.iter().find(reaches).map(|f| f.0)
+    };
+    (total > 0.0).then_some((reaching(0.5 - 1e-9)? + reaching(0.5 + 1e-9)?) / 2.0)
+}
+
+/// The bounding box of the body, or the root.
+pub fn extent(root: &Root, body: Option<&[Facet]>) -> [[f64; 3]; 2] {
+    let Some(facets) = body.filter(|facets| !facets.is_empty()) else {
+        return [root.origin, root.origin.map(|c| c + root.edge)];
+    };
+    let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    facets.iter().flatten().fold(empty, |[low, high], at| {
+        let at = at.map(f64::from);
+        [std::array::from_fn(|a| low[a].min(at[a])), std::array::from_fn(|a| high[a].max(at[a]))]
+    })
+}
+
+/// The cube of the window, moved into the root, on the lattice.
+pub fn zoomed(root: &Root, body: Option<&[Facet]>, zoom: f64) -> [[i64; 3]; 2] {
+    let [low, high] = extent(root, body);
+    let edge = ((UNITS_PER_EDGE as f64 / zoom) as i64).clamp(UNITS_PER_CELL, UNITS_PER_EDGE);
+    let centre = std::array::from_fn(|a| (low[a] + high[a]) / 2.0);
+    let centre = root.quantise_clamped(centre);
+    let corner = centre.map(|c| (c - edge / 2).clamp(0, UNITS_PER_EDGE - edge));
+    [corner, corner.map(|c| c + edge)]
+}
+
+impl Picture {
+    /// Reads what the picture shows.
+    ///
+    /// # Errors
+    /// If the mesh cannot be read, or the picture would be empty.
+    pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, ExportError> {
+        let root = mesh.manifest.root;
+        request.check(mesh)?;
+        let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
+        let axes = plane_axes(slice.axis);
+        let clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
+        let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
+        if (0..2).any(|i| window[0][i] >= window[1][i]) {
+            let why = "the clip box has no area in the plane of the slice: give a larger one";
+            return Err(ExportError::Request(why.to_owned()));
+        }
+        // The window may end within the root, but the slice need not be in the box.
+        let mut reach = clip;
+        (reach[0][slice.axis], reach[1][slice.axis]) = (0, UNITS_PER_EDGE);
+        let selection =
+            Selection { slice: Some(slice), clip: Some(reach), ..request.selection.clone() };
+        let root_edge = root.edge * draw::scale(&window);
+        let detail = detail.to_level(request.level_max);
+        let squares = Squares::collect(mesh, &selection, request.colour, root_edge, &detail)?;
+        if squares.squares.is_empty() {
+            let why =
+                "no leaf of the selection is in the slice: give another --slice or a larger --clip";
+            return Err(ExportError::Request(why.to_owned()));
+        }
+        let values = squares.squares.iter().map(|s| s.value).collect();
+        let key = request.colour.key(&values, &root);
+        let section = request.body.map(|facets| section(&root, slice, &window, facets));
+        let (colour, command) = (request.colour, request.command.clone());
+        Ok(Self { root, slice, colour, window, squares, key, section, command })
+    }
+
+    /// One sentence on what the picture shows.
+    pub fn title(&self) -> String {
+        let Self { slice, squares, colour, .. } = self;
+        let at = self.root.to_user([slice.at; 3])[slice.axis];
+        let axis = ["x", "y", "z"][slice.axis];
+        format!("Slice {axis} = {} of a mesh, {} cells by {colour}", short(at), squares.leaves)
+    }
+
+    /// Whether a square of the picture has more than one leaf that the leaf's own square could show.
+    pub fn is_merged(&self) -> bool {
+        let merged = |s: &squares::Square| s.level == self.squares.level_drawn && s.leaves > 1;
+        self.squares.squares.iter().any(merged)
+    }
+
+    /// The corners of a square in the plane, in the user's units.
+    fn corners(&self, square: &squares::Square) -> [Planar; 2] {
+        let axes = plane_axes(self.slice.axis);
+        let at = |cells: u32, axis: usize| {
+            self.root.to_user([i64::from(cells) * UNITS_PER_CELL; 3])[axis]
+        };
+        let low = [0, 1].map(|i| at(square.corner[i], axes[i]));
+        [low, [0, 1].map(|i| at(square.corner[i] + square.edge(), axes[i]))]
+    }
+}
+
+/// The segments in which the plane cuts the facets. The plane is moved into the layer of leaves that it cuts, so that
+/// facets in the plane of a leaf's face do not vanish or appear twice.
+fn section(root: &Root, slice: Slice, window: &[Planar; 2], facets: &[Facet]) -> Vec<[Planar; 2]> {
+    let axes = plane_axes(slice.axis);
+    let layer = i64::from(slice.layer()) * UNITS_PER_CELL;
+    let at = if slice.at == layer { layer + UNITS_PER_CELL / 2 } else { slice.at };
+    let mut centre = root.to_user([at; 3]);
+    axes.iter().zip(0..2).for_each(|(&a, i)| centre[a] = (window[0][i] + window[1][i]) / 2.0);
+    let unit = |a: usize| std::array::from_fn(|b| f64::from(u8::from(a == b)));
+    let half = [0, 1].map(|i| (window[1][i] - window[0][i]) / 2.0);
+    let plane = Window { centre, axes: axes.map(unit), half };
+    let to_user = |p: Planar| [0, 1].map(|i| p[i] + centre[axes[i]]);
+    let cut = |facet: &Facet| plane.of_facet(facet.map(|v| v.map(f64::from)));
+    facets.iter().filter_map(cut).map(|ends| ends.map(to_user)).collect()
+}
