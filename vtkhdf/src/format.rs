@@ -33,6 +33,10 @@ pub(crate) const PAGE_BITS: u8 = 24;
 /// The filter zlib.
 pub(crate) const FILTER_DEFLATE: u16 = 1;
 
+/// Fill value messages: the value is zero, and space is allocated early, or chunk by chunk.
+pub(crate) const ALLOCATED_EARLY: [u8; 2] = [3, 0b1001];
+pub(crate) const ALLOCATED_BY_CHUNK: [u8; 2] = [3, 0b1011];
+
 /// The type of an array's elements. All are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -90,6 +94,38 @@ pub enum Value {
     Ints(Vec<i64>),
     /// An array.
     Doubles(Vec<f64>),
+}
+
+/// A group: attributes, and members by name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Group {
+    /// Attributes by name.
+    pub attributes: Vec<(String, Value)>,
+    /// Members by name.
+    pub members: Vec<(String, Member)>,
+}
+
+impl Group {
+    /// The attribute with a name.
+    pub fn attribute(&self, name: &str) -> Option<&Value> {
+        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
+    }
+
+    /// The member with a name.
+    pub fn member(&self, name: &str) -> Option<&Member> {
+        self.members.iter().find(|(n, _)| n == name).map(|(_, member)| member)
+    }
+}
+
+/// A member of a group.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Member {
+    /// A group.
+    Group(Group),
+    /// A small array, stored in the object header.
+    Small(Value),
+    /// A long array.
+    Chunked(Chunked),
 }
 
 /// Where some bytes of a file are.

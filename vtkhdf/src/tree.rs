@@ -6,8 +6,8 @@
 //! last, which is set for split nodes, and `Mask` one bit per node, which is set for leaves that are not in the mesh. Bits
 //! are packed from the most significant one. Cell data have an element for every node.
 
-use crate::format::{Chunked, Kind, Value};
-use crate::write::{Deflater, Group, Member, Writer};
+use crate::format::{Chunked, Group, Kind, Member, Value};
+use crate::write::{Deflater, Writer};
 use std::io::{self, Seek, Write};
 use std::ops::Range;
 
@@ -23,6 +23,8 @@ pub const CELL_DATA: &str = "CellData";
 pub const SIDE: &str = "side";
 /// The cell data of ranks.
 pub const RANK: &str = "rank";
+/// The attribute with the edge of the root, which VTK does not read: the difference of two coordinates may have lost digits.
+pub const EDGE: &str = "RootEdge";
 /// The coordinates of the root along x, y and z.
 pub const COORDINATES: [&str; 3] = ["XCoordinates", "YCoordinates", "ZCoordinates"];
 
@@ -156,9 +158,8 @@ impl Window {
             self.ranks.as_ref().map(|ranks| ranks.iter().flat_map(|r| r.to_le_bytes()).collect());
         let bytes = [&self.split, &self.deleted, &self.sides].into_iter().chain(&ranks);
         // Arrays shorter than a window have one shorter chunk.
-        let chunk = |(array, bytes): (&Chunked, &Vec<u8>)| {
-            deflater.compress(&bytes[..array.chunk_bytes()])
-        };
+        let chunk =
+            |(array, bytes): (&Chunked, &Vec<u8>)| deflater.compress(&bytes[..array.chunk_bytes()]);
         arrays.iter().zip(bytes).map(chunk).collect()
     }
 }
@@ -235,26 +236,24 @@ impl<W: Write + Seek> TreeWriter<W> {
             members.push((name, Member::Small(Value::Doubles(vec![low, low + shape.edge]))));
         }
         // Without a mask, no leaf is missing.
-        let is_zero = |member: &Member| {
-            matches!(member, Member::Chunked(array) if array.chunks.iter().all(Option::is_none))
-        };
+        let is_zero = |member: &Member| matches!(member, Member::Chunked(array) if array.chunks.iter().all(Option::is_none));
         members.retain(|(name, member)| *name != "Mask" || !is_zero(member));
         let mut data = vec![(SIDE.to_owned(), next())];
         data.extend(arrays.next().map(|ranks| (RANK.to_owned(), Member::Chunked(ranks))));
         members.push((CELL_DATA, Member::Group(Group { members: data, ..Group::default() })));
+        let attributes = [
+            ("Version", Value::Ints(vec![2, 8])),
+            ("Type", Value::Text(TYPE.to_owned())),
+            ("BranchFactor", Value::Number(2)),
+            ("Dimensions", Value::Ints32(vec![2; 3])),
+            (EDGE, Value::Doubles(vec![shape.edge])),
+        ];
         let group = Group {
-            attributes: vec![
-                ("Version", Value::Ints(vec![2, 8])),
-                ("Type", Value::Text(TYPE.to_owned())),
-                ("BranchFactor", Value::Number(2)),
-                ("Dimensions", Value::Ints32(vec![2; 3])),
-            ],
+            attributes: attributes.map(|(name, value)| (name.to_owned(), value)).into(),
             members: members.into_iter().map(|(name, m)| (name.to_owned(), m)).collect(),
         };
-        let root = Group {
-            members: vec![(GROUP.to_owned(), Member::Group(group))],
-            ..Group::default()
-        };
+        let root =
+            Group { members: vec![(GROUP.to_owned(), Member::Group(group))], ..Group::default() };
         out.finish(&root)
     }
 }

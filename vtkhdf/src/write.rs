@@ -2,31 +2,12 @@
 
 use crate::checksum::lookup3;
 use crate::format::{
-    Chunked, Extent, FILTER_DEFLATE, INDEX_FIXED_ARRAY, Kind, LAYOUT_CHUNKED, LAYOUT_COMPACT,
-    LAYOUT_VERSION, PAGE_BITS, SIGNATURE, SUPERBLOCK_BYTES, UNDEFINED, Value, message,
+    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, Extent, FILTER_DEFLATE, Group, INDEX_FIXED_ARRAY,
+    Kind, LAYOUT_CHUNKED, LAYOUT_COMPACT, LAYOUT_VERSION, Member, PAGE_BITS, SIGNATURE,
+    SUPERBLOCK_BYTES, UNDEFINED, Value, message,
 };
 use flate2::{Compress, Compression, FlushCompress, Status};
 use std::io::{self, Seek, SeekFrom, Write};
-
-/// A group: attributes, and members by name.
-#[derive(Debug, Default)]
-pub struct Group {
-    /// Attributes by name.
-    pub attributes: Vec<(&'static str, Value)>,
-    /// Members by name.
-    pub members: Vec<(String, Member)>,
-}
-
-/// A member of a group.
-#[derive(Debug)]
-pub enum Member {
-    /// A group.
-    Group(Group),
-    /// A small array, stored in the object header.
-    Small(Value),
-    /// A long array.
-    Chunked(Chunked),
-}
 
 /// A file that is being written.
 #[derive(Debug)]
@@ -111,8 +92,7 @@ impl<W: Write + Seek> Writer<W> {
         let mut header = Header::default();
         header.message(message::DATASPACE, &dataspace(value));
         header.message(message::DATATYPE, &datatype(value));
-        // Allocated early, fill value written if set.
-        header.message(message::FILL_VALUE, &[3, 0b1001]);
+        header.message(message::FILL_VALUE, &ALLOCATED_EARLY);
         let size = (data.len() as u16).to_le_bytes();
         let layout = [&[LAYOUT_VERSION, LAYOUT_COMPACT], &size[..], &data].concat();
         header.message(message::LAYOUT, &layout);
@@ -124,8 +104,7 @@ impl<W: Write + Seek> Writer<W> {
         let mut header = Header::default();
         header.message(message::DATASPACE, &simple(array.len));
         header.message(message::DATATYPE, &array.kind.encode());
-        // Allocated chunk by chunk, fill value written if set.
-        header.message(message::FILL_VALUE, &[3, 0b1011]);
+        header.message(message::FILL_VALUE, &ALLOCATED_BY_CHUNK);
         let dims = [array.chunk_len, array.kind.bytes() as u32];
         let bytes = array.dim_bytes();
         let mut layout = vec![LAYOUT_VERSION, LAYOUT_CHUNKED, 0, 2, bytes as u8];
@@ -153,7 +132,8 @@ impl<W: Write + Seek> Writer<W> {
         let mut table = b"FADB\x00\x01".to_vec();
         table.extend(header_at.to_le_bytes());
         for chunk in &array.chunks {
-            let Extent { address, bytes } = chunk.unwrap_or(Extent { address: UNDEFINED, bytes: 0 });
+            let Extent { address, bytes } =
+                chunk.unwrap_or(Extent { address: UNDEFINED, bytes: 0 });
             table.extend(address.to_le_bytes());
             table.extend(&bytes.to_le_bytes()[..size_bytes]);
             // All filters were applied.
@@ -228,8 +208,9 @@ fn bytes(value: &Value) -> Vec<u8> {
     }
 }
 
-/// Level of compression.
-const LEVEL: u32 = 1;
+/// Level of compression. On a tree of 1e9 leaves, levels 1 to 6 take 2.8, 3.1, 3.7, 4.1, 4.7, 6.8 s of CPU time for 107, 64, 57, 49,
+/// 46, 40 MB.
+const LEVEL: u32 = 4;
 
 /// Compresses chunks.
 #[derive(Debug)]
