@@ -110,7 +110,7 @@ fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer, with_ranks: bool) ->
             let (pairs, after) = rest.split_at(count.div_ceil(2) as usize);
             let codes = pairs.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]);
             for (group, code) in (*first..first + count).zip(codes) {
-                filled.put(group, decode(code), from as i32);
+                filled.put(group, decode(code), [from as i32; 8]);
             }
             words = after;
         }

@@ -115,7 +115,7 @@ impl Window {
 
     /// Sets those nodes of a group that are in the window.
     #[inline]
-    pub fn put(&mut self, group: u64, siblings: Siblings, rank: i32) {
+    pub fn put(&mut self, group: u64, siblings: Siblings, sibling_ranks: [i32; 8]) {
         // The first sibling is the second node of a byte.
         let first = first_node(group);
         let byte = (first / 8).wrapping_sub(self.first / 8) as usize;
@@ -142,7 +142,7 @@ impl Window {
             }
         }
         if let Some(ranks) = &mut self.ranks {
-            for i in 0..8 {
+            for (i, rank) in (0..).zip(sibling_ranks) {
                 let at = (first + i).wrapping_sub(self.first) as usize;
                 if let Some(node) = ranks.get_mut(at) {
                     *node = rank;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::ExportError;
+use crate::htg;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
@@ -34,6 +35,11 @@ pub const FORMATS: &[Format] = &[
         purpose: "the same in files of some million cells each, which many processes can read",
         write: vtu::write_files,
     },
+    Format {
+        ending: ".vtkhdf",
+        purpose: "the tree, a hyper-tree grid of 0.05 bytes per cell, for ParaView and VTK; other leaves are masked",
+        write: htg::write,
+    },
 ];
 
 /// The format of a file with this name.
@@ -64,7 +70,7 @@ mod tests {
         assert_eq!(of(Path::new("mesh.pvtu")).unwrap().ending, ".pvtu");
         for name in ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".pvtu", "vtu", "mesh.VTU", ""] {
             let error = of(Path::new(name)).unwrap_err().to_string();
-            assert!(error.contains(".vtu, .pvtu"), "{name}: {error}");
+            assert!(error.contains(".vtu, .pvtu, .vtkhdf"), "{name}: {error}");
         }
     }
 }

@@ -2,6 +2,7 @@
 //! and only those parts of the files are read that a [`selection::Selection`] needs.
 //!
 //! - [`format`](mod@format): the table of formats by file name;
+//! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
 //! - [`pieces`]: leaves in pieces of limited size; [`ordered`]: computed on threads, written in order.
 
@@ -9,6 +10,7 @@
 
 pub mod error;
 pub mod format;
+pub mod htg;
 pub mod mesh;
 pub mod options;
 pub mod ordered;
