@@ -60,7 +60,15 @@ pub fn finish(
         Some(out) if comm.rank() == 0 => {
             let (rules, summary) = (&mesh.rules, &mesh.sides.summary);
             let is_base = mesh.is_base;
-            out.manifest(&Manifest::new(&out.output, rules, is_base, &counts, summary, &digests, &parts))
+            out.manifest(&Manifest::new(
+                &out.output,
+                rules,
+                is_base,
+                &counts,
+                summary,
+                &digests,
+                &parts,
+            ))
         }
         _ => Ok(()),
     };
