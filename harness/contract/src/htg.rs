@@ -8,12 +8,16 @@
 //! Reading verifies the whole structure: every node has a parent, every side exists, and masked nodes are leaves. Damage to the file itself
 //! shows in its checksums.
 
+mod bytes;
+mod cursor;
+mod index;
 mod level;
 
 use crate::lattice::Root;
 use crate::octant::LEVEL_MAX;
 use crate::word;
 use level::LevelReader;
+
 use std::path::{Path, PathBuf};
 use vtkhdf::format::{Chunked, Group, Kind, Member, ReadError, Value};
 use vtkhdf::read::File;
@@ -22,6 +26,8 @@ use vtkhdf::tree::{CELL_DATA, COORDINATES, EDGE, GROUP, TYPE};
 /// Number of words that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
 
+pub use cursor::Cursor;
+pub use index::Index;
 /// The cell data with the sides.
 pub use vtkhdf::tree::SIDE;
 
@@ -130,6 +136,15 @@ impl TreeFile {
         }
     }
 
+    /// Counts the nodes, so that the leaves of any octant can be read with a [`Cursor`].
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn index(&self) -> Result<Index> {
+        let total = self.nodes.iter().sum();
+        Index::new(&self.file, total, &self.split, self.masked.as_ref())
+    }
+
     fn level(&self, level: usize) -> LevelReader<'_> {
         let begin = self.nodes[..level].iter().sum();
         let is_last = level + 1 == self.nodes.len();
@@ -140,13 +155,13 @@ impl TreeFile {
 }
 
 /// A walk in Morton order.
-struct Walk<'a> {
+struct Walk<'a, 'r> {
     levels: Vec<LevelReader<'a>>,
     words: Vec<u64>,
-    run: &'a mut dyn FnMut(&[u64]) -> bool,
+    run: &'r mut dyn FnMut(&[u64]) -> bool,
 }
 
-impl Walk<'_> {
+impl Walk<'_, '_> {
     /// Visits some siblings, or the root alone, and what is below; returns false if `run` did. The first has the Morton code `key`.
     fn siblings(&mut self, level: usize, key: u64, count: u32) -> Result<bool> {
         let siblings = self.levels[level].next(count)?;

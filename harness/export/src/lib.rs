@@ -14,6 +14,7 @@ pub mod htg;
 pub mod mesh;
 pub mod options;
 pub mod ordered;
+mod part;
 pub mod pieces;
 pub mod selection;
 pub mod vtu;

@@ -1,5 +1,7 @@
 //! The nodes of one level, read from begin to end.
 
+use super::bytes::Bytes;
+use super::index::Index;
 use super::{Result, nodes};
 use std::ops::Range;
 use vtkhdf::format::Chunked;
@@ -16,6 +18,7 @@ pub(super) struct Siblings {
 
 /// A reader of one level.
 pub(super) struct LevelReader<'a> {
+    begin: u64,
     next: u64,
     end: u64,
     split: Option<Bytes<'a>>,
@@ -33,12 +36,54 @@ impl<'a> LevelReader<'a> {
         sides: Option<&'a Chunked>,
     ) -> Self {
         let bytes = |array: Option<&'a Chunked>| array.map(|array| Bytes::new(file, array));
-        let Range { start: next, end } = range;
-        Self { next, end, split: bytes(split), masked: bytes(masked), sides: bytes(sides) }
+        let Range { start: begin, end } = range;
+        Self {
+            begin,
+            next: begin,
+            end,
+            split: bytes(split),
+            masked: bytes(masked),
+            sides: bytes(sides),
+        }
     }
 
     pub(super) fn is_at_end(&self) -> bool {
         self.next == self.end
+    }
+
+    /// The first node.
+    pub(super) fn begin(&self) -> u64 {
+        self.begin
+    }
+
+    /// Continues with a node.
+    pub(super) fn seek(&mut self, node: u64) {
+        self.next = node;
+    }
+
+    /// Whether a node is split.
+    pub(super) fn is_split(&mut self, node: u64) -> Result<bool> {
+        if node >= self.end {
+            return nodes(format!("node {} has no children", node - 1));
+        }
+        self.split.as_mut().map_or(Ok(false), |bytes| Ok(bytes.bits(node, 1)? == 1))
+    }
+
+    /// The numbers of split nodes and of masked ones before a node of this level, or before its end.
+    pub(super) fn bits_before(&mut self, node: u64, index: &Index) -> Result<[u64; 2]> {
+        if node > self.end {
+            return nodes(format!("node {} has no children", node - 1));
+        }
+        let begin = self.begin;
+        let count = |bytes: &mut Option<Bytes>, counts: &[u64]| -> Result<u64> {
+            match bytes {
+                Some(bytes) => {
+                    Ok(bytes.ones_before(node, counts)? - bytes.ones_before(begin, counts)?)
+                }
+                None => Ok(0),
+            }
+        };
+        Ok([count(&mut self.split, &index.split)?, count(&mut self.masked, &index.masked)?])
     }
 
     /// The next nodes.
@@ -68,47 +113,5 @@ impl<'a> LevelReader<'a> {
             }
         }
         Ok(Siblings { split, masked, sides })
-    }
-}
-
-/// The bytes of an array, for ascending positions.
-struct Bytes<'a> {
-    file: &'a File,
-    array: &'a Chunked,
-    /// The chunk in memory, and the position of its first byte.
-    chunk: Vec<u8>,
-    start: u64,
-}
-
-impl<'a> Bytes<'a> {
-    fn new(file: &'a File, array: &'a Chunked) -> Self {
-        Self { file, array, chunk: Vec::new(), start: 0 }
-    }
-
-    /// The byte at a position, which is in the array.
-    #[inline]
-    fn at(&mut self, position: u64) -> Result<u8> {
-        if let Some(&byte) = self.chunk.get(position.wrapping_sub(self.start) as usize) {
-            return Ok(byte);
-        }
-        self.load(position)
-    }
-
-    fn load(&mut self, position: u64) -> Result<u8> {
-        let chunk_len = u64::from(self.array.chunk_len);
-        let index = position / chunk_len;
-        self.file.read_chunk(self.array, index as usize, &mut self.chunk)?;
-        self.start = index * chunk_len;
-        Ok(self.chunk[(position - self.start) as usize])
-    }
-
-    /// Up to eight bits from a position on, which the file has from the most significant one; the first becomes the lowest.
-    fn bits(&mut self, first: u64, count: u32) -> Result<u8> {
-        let high = self.at(first / 8)?;
-        let last = first + u64::from(count) - 1;
-        let low = if last / 8 > first / 8 { self.at(last / 8)? } else { 0 };
-        let pair = u16::from_be_bytes([high, low]) << (first % 8);
-        let bits = ((pair >> 8) as u8).reverse_bits();
-        Ok(bits & ((1u16 << count) - 1) as u8)
     }
 }
