@@ -91,7 +91,7 @@ proptest! {
         let (_dir, mesh) = on_disk(dealt);
         let slice = Slice::new(&ROOT, axis, ROOT.origin[axis] + at * ROOT.edge);
         let cut = Selection { slice, ..Selection::default() };
-        for selection in [Selection::default(), cut] {
+        for selection in [Selection::default(), cut.clone()] {
             let expected = leaves(&mesh, &selection);
             let Some((dir, tree)) = as_tree(&mesh, &selection) else {
                 prop_assert!(expected.is_empty());
