@@ -8,6 +8,7 @@ use mesher::error::Error;
 use mesher::ingest::Source;
 use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Partitioner, Weights};
+use mesher::write::Output;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
@@ -21,9 +22,15 @@ use std::process::exit;
 pub struct Args {
     /// Case file (.toml), or STL file together with --spacing-min
     input: PathBuf,
-    /// Write the leaf set to this directory, which must be empty or not exist; default: write nothing
+    /// Write the mesh to this directory, which must be empty or not exist; default: write nothing
     #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    out: Option<PathBuf>,
+    /// Files to write, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "words", requires = "out")]
+    write: Vec<Files>,
+    /// Add the rank that owns each cell to the tree, as cell data
+    #[arg(long, requires = "out")]
+    cell_ranks: bool,
     /// Also write the report to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -59,6 +66,15 @@ pub struct Args {
     pub quiet: bool,
     #[command(flatten)]
     body: Body,
+}
+
+/// Files of a mesh, besides the manifest.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Files {
+    /// Leaf words: a NumPy array per rank, 8 bytes per cell
+    Words,
+    /// The tree with sides, for VTK and ParaView: mesh.vtkhdf, a hyper-tree grid of about 0.05 bytes per cell
+    Htg,
 }
 
 /// The case, if the input is an STL file.
@@ -211,6 +227,14 @@ fn print_and_exit(text: &[u8]) -> ! {
         let _ = io::stdout().write_all(text);
     }
     exit(0)
+}
+
+/// The files to write; none without --out.
+pub fn output(args: &Args) -> Option<Output> {
+    let has = |files| args.write.contains(&files);
+    let (words, tree) = (has(Files::Words), has(Files::Htg));
+    let out = args.out.clone();
+    out.map(|directory| Output { directory, words, tree, cell_ranks: args.cell_ranks })
 }
 
 /// The case that the command line describes.

@@ -18,13 +18,13 @@ pub struct Totals {
     pub parts: Vec<[u64; 3]>,
 }
 
-/// Streams the leaves that this rank owns into the digest, and into its file if a directory is given. Collective.
+/// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Collective.
 pub fn emit(
     mesh: &Mesh,
     out: Option<&OutDir>,
     comm: &dyn Comm,
 ) -> Result<(Counts, Written), Error> {
-    let work = || match out {
+    let work = || match out.filter(|out| out.output.words) {
         None => {
             let mut written = Written::default();
             let counts = mesh.leaves().emit(|words| {
@@ -60,7 +60,15 @@ pub fn finish(
         Some(out) if comm.rank() == 0 => {
             let (rules, summary) = (&mesh.rules, &mesh.sides.summary);
             let is_base = mesh.is_base;
-            out.manifest(&Manifest::new(rules, is_base, &counts, summary, &digests, &parts))
+            out.manifest(&Manifest::new(
+                &out.output,
+                rules,
+                is_base,
+                &counts,
+                summary,
+                &digests,
+                &parts,
+            ))
         }
         _ => Ok(()),
     };

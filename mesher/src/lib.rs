@@ -19,6 +19,7 @@ pub mod error;
 pub mod exposed;
 pub mod facet;
 pub mod grade;
+pub mod htg;
 pub mod ingest;
 pub mod kept;
 pub mod lattice;
@@ -63,9 +64,8 @@ pub fn mesh(
     comm: &dyn Comm,
     record: &mut Recorder,
 ) -> Result<Report, Error> {
-    let path = options.out.as_ref();
-    let open = |p| if comm.rank() == 0 { OutDir::create(p) } else { Ok(OutDir::open(p)) };
-    let out = agree(comm, path.map(|p| open(p)).transpose())?;
+    let open = |o| if comm.rank() == 0 { OutDir::create(o) } else { Ok(OutDir::open(o)) };
+    let out = agree(comm, options.out.as_ref().map(open).transpose())?;
     let result = mesh_into(out.as_ref(), case, options, comm, record);
     if let (Err(_), Some(out)) = (&result, &out) {
         // All ranks remove their own files before rank 0 removes the directory.
@@ -90,9 +90,13 @@ fn mesh_into(
     let mut counters = Counters::default();
     let mesh = make(case, options, comm, record, &mut counters)?;
 
-    // 9. Leaves: streamed in Morton order into the digest, and to disk if a directory is given.
+    // 9. Leaves: streamed in Morton order into the digest, and to disk on request; and the tree, level by level.
     let (counts, written) = record.phase("leaves", comm, || leaves::emit(&mesh, out, comm))?;
     debug_check(options, comm, || check::leaves(&mesh, &counts, &written, comm));
+
+    if let Some(out) = out.filter(|out| out.output.tree) {
+        record.phase("tree file", comm, || htg::write(&mesh, out, out.output.cell_ranks, comm))?;
+    }
 
     // 10. Finish: sums over the ranks, and the manifest.
     let totals =

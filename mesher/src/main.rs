@@ -162,7 +162,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
             level_base: args.level_base.0,
         },
         ungraded: args.ungraded,
-        out: args.out.clone(),
+        out: cli::output(args),
         check: args.check,
         weight_exposed: args.weight_exposed,
     };

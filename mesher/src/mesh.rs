@@ -7,7 +7,7 @@ use crate::partition::ownership::Ownership;
 use crate::sides::Sides;
 use crate::stream::Leaves;
 use crate::tree::PerLevel;
-use std::path::PathBuf;
+use crate::write::Output;
 
 /// Options that have no effect on the mesh, but for `ungraded`.
 #[derive(Clone, Debug)]
@@ -16,8 +16,8 @@ pub struct Options {
     pub division: Division,
     /// Stop after sides: the mesh is the base tree T0, with all its leaves.
     pub ungraded: bool,
-    /// Directory to write the mesh to.
-    pub out: Option<PathBuf>,
+    /// What to write, and where.
+    pub out: Option<Output>,
     /// Check invariants after each phase, which debug builds do in any case.
     pub check: bool,
     /// Count the [exposed faces](crate::exposed), each of which weighs as much as this many leaves in the last repartition.

@@ -1,9 +1,9 @@
-//! Mesh output: one `.npy` file of leaf words per rank, and the manifest.
+//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the manifest.
 //!
 //! Invariants of the output directory:
 //! - a file that has its final name is complete: it is written under a temporary name in the same
 //!   directory, synchronised and renamed ([`Draft`]);
-//! - the manifest is written last, so all parts that it names exist;
+//! - the manifest is written last, so all files that it names exist;
 //! - after an error, none of the mesh's files remains.
 
 mod draft;
@@ -21,11 +21,28 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
+use vtkhdf::tree::{Shape, TreeWriter};
 
 pub use draft::Draft;
 
 /// File name of the manifest.
 pub const MANIFEST: &str = "mesh.json";
+
+/// File name of the tree.
+pub const TREE: &str = "mesh.vtkhdf";
+
+/// What to write, and where.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// The directory.
+    pub directory: PathBuf,
+    /// Whether to write leaf words, a part per rank.
+    pub words: bool,
+    /// Whether to write the tree.
+    pub tree: bool,
+    /// Whether the tree has the rank that owns each cell.
+    pub cell_ranks: bool,
+}
 
 /// File name of a rank's part.
 pub fn part_name(rank: usize) -> String {
@@ -35,6 +52,8 @@ pub fn part_name(rank: usize) -> String {
 /// The directory that a mesh is written to.
 #[derive(Debug)]
 pub struct OutDir {
+    /// The files that it gets.
+    pub output: Output,
     path: PathBuf,
     /// Whether it was created for this mesh and is therefore removed after an error.
     is_new: bool,
@@ -52,7 +71,9 @@ impl OutDir {
     ///
     /// # Errors
     /// If the directory cannot be created or written to, or is not empty.
-    pub fn create(path: &Path) -> Result<Self, Error> {
+    pub fn create(files: &Output) -> Result<Self, Error> {
+        let path = &files.directory;
+        let new = |is_new| Self { output: files.clone(), path: path.clone(), is_new };
         match std::fs::read_dir(path) {
             Ok(mut entries) => {
                 if entries.next().is_some() {
@@ -60,19 +81,19 @@ impl OutDir {
                 }
                 // Fails now rather than after the meshing, if the directory cannot be written to.
                 NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), is_new: false })
+                Ok(new(false))
             }
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 std::fs::create_dir(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), is_new: true })
+                Ok(new(true))
             }
             Err(e) => Err(output(path, &e)),
         }
     }
 
     /// The directory that another rank has created.
-    pub fn open(path: &Path) -> Self {
-        Self { path: path.to_owned(), is_new: false }
+    pub fn open(output: &Output) -> Self {
+        Self { output: output.clone(), path: output.directory.clone(), is_new: false }
     }
 
     /// Begins this rank's part.
@@ -90,18 +111,35 @@ impl OutDir {
         Ok(Part { path, file, digests: Digests::default(), leaves: 0 })
     }
 
+    /// Begins the file of the tree. On one rank only.
+    ///
+    /// # Errors
+    /// If the file cannot be created.
+    pub fn tree(&self, shape: Shape, with_ranks: bool) -> Result<TreeFile, Error> {
+        let path = self.path.join(TREE);
+        let begin = || {
+            let file = BufWriter::with_capacity(1 << 20, Draft::create(&path)?);
+            TreeWriter::new(file, shape, with_ranks)
+        };
+        let file = begin().map_err(|e| output(&path, &e))?;
+        Ok(TreeFile { path, file })
+    }
+
     /// Removes the mesh's files after an error on any rank.
     pub fn discard(&self, rank: usize) {
         let _ = std::fs::remove_file(self.path.join(part_name(rank)));
         if rank == 0 {
-            let _ = std::fs::remove_file(self.path.join(MANIFEST));
+            for name in [TREE, MANIFEST] {
+                let _ = std::fs::remove_file(self.path.join(name));
+            }
         }
         if self.is_new {
             // Parts of other ranks may remain.
             for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
                 let name = entry.file_name();
                 let name = name.to_string_lossy();
-                if name.starts_with("leaves-") || name.starts_with(".tmp") || name == MANIFEST {
+                let is_mine = name.starts_with("leaves-") || name.starts_with(".tmp");
+                if is_mine || name == TREE || name == MANIFEST {
                     let _ = std::fs::remove_file(entry.path());
                 }
             }
@@ -119,6 +157,33 @@ impl OutDir {
             File::open(&self.path)?.sync_all()
         };
         write().map_err(|e| output(&self.path, &e))
+    }
+}
+
+/// The file of the tree while it is being written.
+pub struct TreeFile {
+    path: PathBuf,
+    file: TreeWriter<BufWriter<Draft>>,
+}
+
+impl TreeFile {
+    /// Writes the compressed chunks of a window.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn add(&mut self, window: u64, chunks: &[Option<Vec<u8>>]) -> Result<(), Error> {
+        let added = self.file.add(window, chunks.iter().map(Option::as_deref));
+        added.map_err(|e| output(&self.path, &e))
+    }
+
+    /// Completes the file and gives it its final name.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(self) -> Result<(), Error> {
+        let Self { path, file } = self;
+        let close = || -> io::Result<()> { file.finish()?.into_inner()?.publish() };
+        close().map_err(|e| output(&path, &e))
     }
 }
 
@@ -211,6 +276,8 @@ pub struct Manifest {
     digest: String,
     octant_digests: Vec<String>,
     parts: Vec<PartEntry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hyper_tree_grid: Option<&'static str>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -283,8 +350,9 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
 }
 
 impl Manifest {
-    /// The manifest of a mesh with these leaves, digests and parts.
+    /// The manifest of a mesh with these leaves, digests and parts; parts and tree are named as far as `output` has them.
     pub fn new(
+        output: &Output,
         rules: &Rules,
         base: bool,
         counts: &Counts,
@@ -336,7 +404,8 @@ impl Manifest {
             },
             digest: hex(digests.whole()),
             octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
-            parts: parts.iter().enumerate().map(entry).collect(),
+            parts: parts.iter().enumerate().filter(|_| output.words).map(entry).collect(),
+            hyper_tree_grid: output.tree.then_some(TREE),
         }
     }
 }
@@ -349,7 +418,9 @@ mod tests {
     fn parts_of_any_length_are_read_back() {
         let root = tempfile::tempdir().unwrap();
         for n in [0usize, 1, 9, 10, 4097, 1_000_000] {
-            let out = OutDir::create(&root.path().join(n.to_string())).unwrap();
+            let directory = root.path().join(n.to_string());
+            let files = Output { directory, words: true, tree: false, cell_ranks: false };
+            let out = OutDir::create(&files).unwrap();
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
             let mut part = out.part(3).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());

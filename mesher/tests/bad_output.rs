@@ -59,9 +59,12 @@ fn a_write_that_fails_in_the_middle_leaves_no_files() {
     let body = "body.stl --root-scale 2 --keep all --out mesh";
     // The shell makes its children ignore the signal, so that the write fails. A block has 512 bytes: in the
     // first run only the manifest is larger than 16 blocks, in the second only the parts are larger than 100.
-    for (blocks, spacing) in [(16, "0.5"), (100, "0.01")] {
+    // The tree is written before the manifest; both are larger than 4 blocks.
+    for (blocks, spacing, write) in
+        [(16, "0.5", "words"), (100, "0.01", "words"), (4, "0.01", "htg")]
+    {
         for comm in ["solo", "sim:3:5"] {
-            let args = format!("{body} --spacing-min {spacing} --comm {comm}");
+            let args = format!("{body} --spacing-min {spacing} --write {write} --comm {comm}");
             let finished = in_shell(
                 &workspace,
                 &["sh"],

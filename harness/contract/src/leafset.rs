@@ -1,4 +1,4 @@
-//! Leaf-set directories: the manifest `mesh.json` and the part files that it names.
+//! Leaf-set directories: the manifest `mesh.json` and the part files that it names, or the tree in one file, or both.
 //!
 //! Reading fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an
 //! array of words, or a part file that the manifest does not name. The checks establish whether the contents
@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use crate::digest::Digest;
 use crate::files::{self, write_atomically};
-use crate::manifest::{self, Manifest, Part, Tally};
+use crate::htg::{SIDE, TreeError, TreeFile};
+use crate::manifest::{self, Manifest, Part, Sides, Tally};
 use crate::npy::{self, NpyError, PartFile};
 
 /// A mesh in memory.
@@ -30,6 +31,25 @@ pub struct LeafDir {
     pub manifest: Manifest,
     /// The part files, in the manifest's order.
     pub parts: Vec<PartFile>,
+}
+
+/// The leaves of a directory.
+#[derive(Debug)]
+pub enum Leaves {
+    /// Its parts.
+    Words(LeafDir),
+    /// The tree, if there are no parts.
+    Tree(Box<TreeFile>, Box<Manifest>),
+}
+
+impl Leaves {
+    /// The manifest.
+    pub fn manifest(&self) -> &Manifest {
+        match self {
+            Self::Words(set) => &set.manifest,
+            Self::Tree(_, manifest) => manifest,
+        }
+    }
 }
 
 /// Why a directory is not a leaf set.
@@ -59,6 +79,17 @@ pub enum ReadError {
         /// The cause.
         source: NpyError,
     },
+    /// The tree is missing or damaged.
+    #[error("{path}: the tree {source}")]
+    Tree {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: TreeError,
+    },
+    /// The directory has a tree but no parts, and they are needed.
+    #[error("{0}: has the tree but no leaf words, which this needs: make them with harness import")]
+    NoWords(PathBuf),
     /// A part file that the manifest does not name.
     #[error("{0}: a part file that the manifest does not name")]
     PartExtra(PathBuf),
@@ -69,10 +100,22 @@ pub enum ReadError {
 /// # Errors
 /// If the directory is not a leaf set.
 pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
-    let LeafDir { manifest, parts } = open(dir)?;
-    let read = |part: &PartFile| part.read_all().map_err(|e| ReadError::part(part, e));
-    let parts = parts.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    Ok(LeafSet::new(manifest, parts))
+    match open_any(dir)? {
+        Leaves::Words(LeafDir { manifest, parts }) => {
+            let read = |part: &PartFile| part.read_all().map_err(|e| ReadError::part(part, e));
+            let parts = parts.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+            Ok(LeafSet::new(manifest, parts))
+        }
+        Leaves::Tree(tree, manifest) => {
+            let mut words = Vec::new();
+            tree.words(&mut |run| {
+                words.extend_from_slice(run);
+                true
+            })
+            .map_err(|source| ReadError::tree(&tree, source))?;
+            Ok(LeafSet::new(*manifest, vec![words]))
+        }
+    }
 }
 
 /// Reads the arrays of leaves in a directory without a manifest, in the order of their names.
@@ -103,21 +146,60 @@ impl ReadError {
     pub fn part(part: &PartFile, error: std::io::Error) -> Self {
         Self::Part { path: part.path().to_owned(), source: error.into() }
     }
+
+    /// A tree that was opened, but cannot be read.
+    pub fn tree(tree: &TreeFile, source: TreeError) -> Self {
+        Self::Tree { path: tree.path().to_owned(), source }
+    }
 }
 
-/// Opens a leaf-set directory without reading leaves.
+/// Opens the parts of a leaf-set directory without reading leaves.
+///
+/// # Errors
+/// If the directory is not a leaf set, or has the tree alone.
+pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
+    match open_any(dir)? {
+        Leaves::Words(words) => Ok(words),
+        Leaves::Tree(..) => Err(ReadError::NoWords(dir.to_owned())),
+    }
+}
+
+/// Opens the tree of a leaf-set directory without reading leaves; `None` if there is none.
+///
+/// # Errors
+/// If the file is not the tree of a mesh with this root.
+pub fn open_tree(dir: &Path, manifest: &Manifest) -> Result<Option<TreeFile>, ReadError> {
+    let Some(name) = &manifest.hyper_tree_grid else { return Ok(None) };
+    let path = dir.join(name);
+    let sides = (manifest.sides == Sides::Known).then_some(SIDE);
+    let tree = TreeFile::open(&path, sides).and_then(|tree| match tree.root == manifest.root {
+        true => Ok(tree),
+        false => Err(TreeError::Layout(format!(
+            "its root is {:?}, but that of the manifest {:?}",
+            tree.root, manifest.root
+        ))),
+    });
+    tree.map(Some).map_err(|source| ReadError::Tree { path, source })
+}
+
+/// Opens a leaf-set directory without reading leaves: its parts or, if it has none, its tree.
 ///
 /// # Errors
 /// If the directory is not a leaf set.
-pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
+pub fn open_any(dir: &Path) -> Result<Leaves, ReadError> {
     let manifest = read_manifest(dir)?;
+    if manifest.parts.is_empty()
+        && let Some(tree) = open_tree(dir, &manifest)?
+    {
+        return Ok(Leaves::Tree(Box::new(tree), Box::new(manifest)));
+    }
     let mut parts = Vec::new();
     for part in &manifest.parts {
         let path = dir.join(&part.file);
         parts.push(PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?);
     }
     refuse_extra_parts(dir, &manifest)?;
-    Ok(LeafDir { manifest, parts })
+    Ok(Leaves::Words(LeafDir { manifest, parts }))
 }
 
 /// Reads only the manifest.
@@ -138,9 +220,9 @@ pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
         return wrong(format!("it has {} octant digests, not 512", manifest.octant_digests.len()));
     }
     // A path instead of a file name could refer to the leaves of another mesh.
-    if let Some(part) = manifest.parts.iter().find(|p| Path::new(&p.file).components().count() != 1)
-    {
-        return wrong(format!("part {:?} is not a plain file name", part.file));
+    let mut names = manifest.parts.iter().map(|p| &p.file).chain(&manifest.hyper_tree_grid);
+    if let Some(name) = names.find(|name| Path::new(name).components().count() != 1) {
+        return wrong(format!("{name:?} is not a plain file name"));
     }
     Ok(manifest)
 }

@@ -1,7 +1,7 @@
 //! The formats that the programs exchange, implemented independently of them, and the algebra of octants and trees.
 //!
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
-//!   [`leafset`], [`import`] (meshes of other programs), [`files`] (atomic writes);
+//!   [`leafset`], [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`];
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
 //!   [`triangle`] (exact facet-octant test).
@@ -10,6 +10,7 @@ pub mod case;
 pub mod catalogue;
 pub mod digest;
 pub mod files;
+pub mod htg;
 pub mod import;
 pub mod lattice;
 pub mod leafset;

@@ -195,6 +195,9 @@ pub struct Manifest {
     pub octant_digests: Vec<Digest>,
     /// The part files.
     pub parts: Vec<Part>,
+    /// Name of the file with the tree, a hyper-tree grid in VTKHDF; `None` if there is none. It has all leaves, and may be without parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hyper_tree_grid: Option<String>,
 }
 
 impl Manifest {
@@ -222,6 +225,7 @@ impl Manifest {
             digest,
             octant_digests: octants,
             parts: Vec::new(),
+            hyper_tree_grid: None,
         }
     }
 

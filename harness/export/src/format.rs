@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::error::ExportError;
 use crate::foam;
+use crate::htg;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
@@ -44,6 +45,11 @@ pub const FORMATS: &[Format] = &[
         ending: "/polyMesh",
         purpose: "polyhedra for OpenFOAM, a directory: CASE/constant/polyMesh",
         write: foam::write,
+    },
+    Format {
+        ending: ".vtkhdf",
+        purpose: "the tree, a hyper-tree grid of 0.05 bytes per cell, for ParaView and VTK; other leaves are masked",
+        write: htg::write,
     },
 ];
 

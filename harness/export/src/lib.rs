@@ -2,6 +2,7 @@
 //! and only those parts of the files are read that a [`selection::Selection`] needs.
 //!
 //! - [`format`](mod@format): the table of formats by file name;
+//! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
 //! - [`foam`]: meshes for OpenFOAM;
 //! - [`pieces`]: leaves in pieces of limited size; [`ordered`]: computed on threads, written in order.
@@ -11,11 +12,13 @@
 pub mod error;
 pub mod foam;
 pub mod format;
+pub mod htg;
 pub mod mesh;
 pub mod near_body;
 pub mod options;
 pub mod ordered;
 pub mod p8est;
+mod part;
 pub mod pieces;
 pub mod selection;
 pub mod vtu;

@@ -7,13 +7,13 @@
 use std::ops::Range;
 use std::path::Path;
 
-use contract::leafset::{self, LeafDir, ReadError};
+use contract::leafset::{self, LeafDir, Leaves};
 use contract::manifest::Manifest;
-use contract::npy::PartFile;
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END, Side};
 
 use crate::error::ExportError;
+use crate::part::{Part, Readers};
 use crate::selection::Selection;
 
 /// Number of words that are read at once: few enough that a slice reads little besides its own leaves.
@@ -46,25 +46,31 @@ pub struct Block {
 pub struct Mesh {
     /// Its manifest.
     pub manifest: Manifest,
-    parts: Vec<PartFile>,
+    parts: Vec<Part>,
 }
 
 /// Leaves of an octant in one part: an interval of indices.
 type Interval = (usize, Range<u64>);
 
 impl Mesh {
-    /// Opens a leaf-set directory.
+    /// Opens a leaf-set directory. If it has the tree alone, that is its only part.
     ///
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, ExportError> {
-        let LeafDir { manifest, parts } = leafset::open(path)?;
-        Ok(Self { manifest, parts })
+        Ok(match leafset::open_any(path)? {
+            Leaves::Words(LeafDir { manifest, parts }) => {
+                Self { manifest, parts: parts.into_iter().map(Part::Words).collect() }
+            }
+            Leaves::Tree(tree, manifest) => {
+                Self { manifest: *manifest, parts: vec![Part::of_tree(*tree)?] }
+            }
+        })
     }
 
     /// Number of leaves in all parts.
     pub fn len(&self) -> u64 {
-        self.parts.iter().map(PartFile::len).sum()
+        self.parts.iter().map(Part::len).sum()
     }
 
     /// Whether the mesh has no leaves.
@@ -89,13 +95,14 @@ impl Mesh {
     ) -> Result<(), E> {
         let mut intervals = Vec::new();
         let mut before = 0;
+        let mut readers = Readers::new(&self.parts);
         for (part, file) in self.parts.iter().enumerate() {
-            let bound = |key| self.lower_bound(part, 0..file.len(), key);
+            let mut bound = |key| readers.lower_bound(part, 0..file.len(), key);
             let interval = bound(keys.start)?..bound(keys.end)?;
             before += interval.start;
             intervals.extend((!interval.is_empty()).then_some((part, interval)));
         }
-        self.visit_octant(Octant::ROOT, &intervals, before, selection, visit)
+        self.visit_octant(&mut readers, Octant::ROOT, &intervals, before, selection, visit)
     }
 
     /// Number of leaves whose Morton codes are in `keys`.
@@ -103,10 +110,11 @@ impl Mesh {
     /// # Errors
     /// If a part cannot be read.
     pub fn count(&self, keys: Range<u64>) -> Result<u64, ExportError> {
+        let mut readers = Readers::new(&self.parts);
         (0..self.parts.len()).try_fold(0, |sum, part| {
             let all = 0..self.parts[part].len();
-            let start = self.lower_bound(part, all.clone(), keys.start)?;
-            Ok(sum + self.lower_bound(part, start..all.end, keys.end)? - start)
+            let start = readers.lower_bound(part, all.clone(), keys.start)?;
+            Ok(sum + readers.lower_bound(part, start..all.end, keys.end)? - start)
         })
     }
 
@@ -121,6 +129,7 @@ impl Mesh {
         leaves_max: u64,
     ) -> Result<Vec<Block>, ExportError> {
         let mut blocks: Vec<Block> = Vec::new();
+        let mut readers = Readers::new(&self.parts);
         // Leaves that are not selected separate the next block from the last one.
         let mut has_gap = false;
         let all = self.parts.iter().enumerate().map(|(part, file)| (part, 0..file.len())).collect();
@@ -132,7 +141,7 @@ impl Mesh {
                 continue;
             }
             if leaves > leaves_max && octant.level < LEVEL_MAX {
-                let children = self.children(octant, &intervals)?;
+                let children = children(&mut readers, octant, &intervals)?;
                 stack.extend(children.into_iter().rev());
                 continue;
             }
@@ -156,6 +165,7 @@ impl Mesh {
     /// Visits the selected leaves of an octant; `before` leaves of the mesh precede its own.
     fn visit_octant<E: From<ExportError>>(
         &self,
+        readers: &mut Readers,
         octant: Octant,
         intervals: &[Interval],
         mut before: u64,
@@ -169,7 +179,14 @@ impl Mesh {
             [(part, interval)]
                 if interval.end - interval.start <= BLOCK || octant.level == LEVEL_MAX =>
             {
-                self.visit_block(octant, *part, interval.clone(), before, selection, visit)
+                self.visit_block(
+                    readers,
+                    octant,
+                    (*part, interval.clone()),
+                    before,
+                    selection,
+                    visit,
+                )
             }
             _ if octant.level == LEVEL_MAX => {
                 // Two parts have the same leaf.
@@ -177,8 +194,8 @@ impl Mesh {
                 Err(self.order(*part, interval.start).into())
             }
             _ => {
-                for (child, intervals) in self.children(octant, intervals)? {
-                    self.visit_octant(child, &intervals, before, selection, visit)?;
+                for (child, intervals) in children(readers, octant, intervals)? {
+                    self.visit_octant(readers, child, &intervals, before, selection, visit)?;
                     before += count(&intervals);
                 }
                 Ok(())
@@ -189,16 +206,15 @@ impl Mesh {
     /// Visits the selected leaves of one interval, which is read as a whole; `before` leaves of the mesh precede it.
     fn visit_block<E: From<ExportError>>(
         &self,
+        readers: &mut Readers,
         octant: Octant,
-        part: usize,
-        interval: Range<u64>,
+        (part, interval): Interval,
         before: u64,
         selection: &Selection,
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
         let file = &self.parts[part];
-        let mut words = vec![0; (interval.end - interval.start) as usize];
-        file.read_at(interval.start, &mut words).map_err(|e| self.unreadable(part, e))?;
+        let words = readers.words(part, &octant, interval.clone())?;
         // Leaves that ascend and do not overlap begin where the one before ends, or later.
         let mut key_min = word::key_of(octant.corner);
         let key_end = key_min + word::span(octant.level);
@@ -223,46 +239,32 @@ impl Mesh {
         Ok(())
     }
 
-    /// The children of an octant that contain leaves, with their intervals.
-    fn children(
-        &self,
-        octant: Octant,
-        intervals: &[Interval],
-    ) -> Result<Vec<(Octant, Vec<Interval>)>, ExportError> {
-        let mut children: Vec<(Octant, Vec<Interval>)> = Vec::new();
-        let mut starts: Vec<u64> = intervals.iter().map(|(_, i)| i.start).collect();
-        for child in (0..8).map(|d| octant.child(d)) {
-            let key_end = word::key_of(child.corner) + word::span(child.level);
-            let mut parts = Vec::new();
-            for (start, (part, interval)) in starts.iter_mut().zip(intervals) {
-                let end = self.lower_bound(*part, *start..interval.end, key_end)?;
-                parts.extend((*start < end).then_some((*part, *start..end)));
-                *start = end;
-            }
-            if !parts.is_empty() {
-                children.push((child, parts));
-            }
-        }
-        Ok(children)
-    }
-
-    /// Index of the first leaf in a range of a part whose Morton code is at least `key`.
-    fn lower_bound(&self, part: usize, range: Range<u64>, key: u64) -> Result<u64, ExportError> {
-        // The code one past the last one does not fit in a word.
-        if key >= KEY_END {
-            return Ok(range.end);
-        }
-        let bound = self.parts[part].lower_bound(range, key << 7);
-        bound.map_err(|e| self.unreadable(part, e))
-    }
-
-    fn unreadable(&self, part: usize, error: std::io::Error) -> ExportError {
-        ReadError::part(&self.parts[part], error).into()
-    }
-
     fn order(&self, part: usize, index: u64) -> ExportError {
         ExportError::Order { part: self.parts[part].path().to_owned(), index }
     }
+}
+
+/// The children of an octant that contain leaves, with their intervals.
+fn children(
+    readers: &mut Readers,
+    octant: Octant,
+    intervals: &[Interval],
+) -> Result<Vec<(Octant, Vec<Interval>)>, ExportError> {
+    let mut children: Vec<(Octant, Vec<Interval>)> = Vec::new();
+    let mut starts: Vec<u64> = intervals.iter().map(|(_, i)| i.start).collect();
+    for child in (0..8).map(|d| octant.child(d)) {
+        let key_end = word::key_of(child.corner) + word::span(child.level);
+        let mut parts = Vec::new();
+        for (start, (part, interval)) in starts.iter_mut().zip(intervals) {
+            let end = readers.lower_bound(*part, *start..interval.end, key_end)?;
+            parts.extend((*start < end).then_some((*part, *start..end)));
+            *start = end;
+        }
+        if !parts.is_empty() {
+            children.push((child, parts));
+        }
+    }
+    Ok(children)
 }
 
 /// Number of leaves in these intervals.

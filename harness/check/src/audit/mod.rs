@@ -1,6 +1,6 @@
 //! All checks that need only a leaf-set directory, for meshes of any size.
 //!
-//! One pass over the part files, which are merged while they are read, computes the tally, checks the order and
+//! One pass over the part files, which are merged while they are read, or over the tree if there are none, computes the tally, checks the order and
 //! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
 //! variety of a mesh and not with its size; an option limits it. Without promises, the checks are those of the
 //! definition; they use the requirements in the manifest, without T0, facets or another mesh, and the head of each names
@@ -13,7 +13,8 @@ use std::time::Instant;
 use crate::checks::{self, CheckResult, Terms};
 use crate::promises::Promises;
 use contract::case::Case;
-use contract::leafset;
+use contract::digest::Digest;
+use contract::leafset::{self, Leaves, ReadError};
 use contract::manifest::{Keep, Manifest, Tree as Kind};
 use contract::tree::Tree;
 
@@ -90,6 +91,9 @@ impl fmt::Display for AuditReport {
 /// Name of the check that the tree does not exceed the memory limit.
 pub const CAPACITY: &str = "capacity";
 
+/// Name of the check that the tree has the leaves of the parts.
+pub const TREE: &str = "tree file";
+
 /// What a mesh is required to be.
 #[derive(Clone, Copy, Debug)]
 pub enum Requirements<'a> {
@@ -113,12 +117,16 @@ pub fn audit_against(
     let start = Instant::now();
     let mut report =
         AuditReport { checks: Vec::new(), leaves: 0, nodes: 0, time_read_s: 0.0, time_wall_s: 0.0 };
-    let pass = leafset::open(dir).and_then(|set| Pass::over(&set, options).map(|pass| (set, pass)));
+    let pass =
+        leafset::open_any(dir).and_then(|set| Pass::over(&set, options).map(|pass| (set, pass)));
     report.time_read_s = start.elapsed().as_secs_f64();
     match pass {
         Ok((set, pass)) => {
             (report.leaves, report.nodes) = (pass.tally.leaves, pass.nodes() as u64);
-            report.checks = checks(&set.manifest, pass, requirements);
+            report.checks = checks(set.manifest(), pass, requirements);
+            if let (Leaves::Words(set), Some(_)) = (&set, &set.manifest().hyper_tree_grid) {
+                report.checks.push(tree_file(dir, &set.manifest));
+            }
         }
         Err(e) => report.checks.push(CheckResult::unreadable(&e)),
     }
@@ -126,10 +134,35 @@ pub fn audit_against(
     report
 }
 
+/// Compares the tree of a mesh that also has parts with the manifest.
+fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
+    let mut result = CheckResult::new(TREE);
+    let mut digest = Digest::default();
+    let read = leafset::open_tree(dir, manifest).and_then(|tree| {
+        let Some(tree) = tree else { return Ok(()) };
+        let read = tree.words(&mut |run| {
+            result.examined += run.len() as u64;
+            run.iter().for_each(|&word| digest.add(word));
+            true
+        });
+        read.map_err(|error| ReadError::tree(&tree, error))
+    });
+    match read {
+        Err(error) => result.report(error.to_string()),
+        Ok(()) if digest != manifest.digest => result.report(format!(
+            "the leaves of the tree have the digest {digest}, but those of the manifest {}",
+            manifest.digest
+        )),
+        Ok(()) => {}
+    }
+    result
+}
+
 fn checks(manifest: &Manifest, pass: Pass, requirements: Requirements) -> Vec<CheckResult> {
     let leaves = pass.tally.leaves;
     let mut files = CheckResult::new(checks::FILES);
-    files.examined = manifest.parts.len() as u64;
+    let tree = manifest.hyper_tree_grid.is_some();
+    files.examined = manifest.parts.len() as u64 + u64::from(tree);
     let mut claims = checks::manifest::check_leaves(manifest, &pass.tally, &pass.parts);
     if let Requirements::Promises(_, Some(case)) = requirements {
         checks::manifest::check_terms(manifest, &Terms::of_case(case), &mut claims);

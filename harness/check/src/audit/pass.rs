@@ -4,7 +4,7 @@ use super::{AuditOptions, CAPACITY};
 use crate::checks::{CheckResult, linear};
 use contract::digest::{Digest, mix};
 use contract::lattice::Root;
-use contract::leafset::{LeafDir, ReadError};
+use contract::leafset::{Leaves, ReadError};
 use contract::manifest::{Tally, octant_index};
 use contract::tree::{Builder, Tree};
 
@@ -23,18 +23,24 @@ impl Pass {
     /// Reads all leaves.
     ///
     /// # Errors
-    /// If a part cannot be read.
-    pub(super) fn over(set: &LeafDir, options: &AuditOptions) -> Result<Self, ReadError> {
-        let mut state = State::new(set);
+    /// If a part or the tree cannot be read.
+    pub(super) fn over(leaves: &Leaves, options: &AuditOptions) -> Result<Self, ReadError> {
+        let mut state = State::new(leaves);
         let mut fits = true;
-        super::merge::merge(&set.parts, &mut |part, run| {
+        let mut add = |part: usize, run: &[u64]| {
             state.add(part, run);
             // Counts and digests continue without the tree.
             fits &= state.builder.nodes() <= options.nodes_max;
             state.building = fits;
             true
-        })
-        .map_err(|(part, error)| ReadError::part(&set.parts[part], error))?;
+        };
+        match leaves {
+            Leaves::Words(set) => super::merge::merge(&set.parts, &mut add)
+                .map_err(|(part, error)| ReadError::part(&set.parts[part], error))?,
+            Leaves::Tree(tree, _) => {
+                tree.words(&mut |run| add(0, run)).map_err(|error| ReadError::tree(tree, error))?
+            }
+        }
         Ok(state.finish(fits, options))
     }
 
@@ -43,8 +49,9 @@ impl Pass {
     }
 }
 
-struct State<'a> {
-    set: &'a LeafDir,
+struct State {
+    /// Names of the parts, or of the tree.
+    files: Vec<String>,
     root: Root,
     /// Number of leaves by the low seven bits of their words, which are level and side.
     by_code: [u64; 128],
@@ -59,15 +66,20 @@ struct State<'a> {
     linear: CheckResult,
 }
 
-impl<'a> State<'a> {
-    fn new(set: &'a LeafDir) -> Self {
+impl State {
+    fn new(leaves: &Leaves) -> Self {
+        let manifest = leaves.manifest();
+        let files: Vec<String> = match leaves {
+            Leaves::Words(_) => manifest.parts.iter().map(|part| part.file.clone()).collect(),
+            Leaves::Tree(..) => manifest.hyper_tree_grid.iter().cloned().collect(),
+        };
         Self {
-            set,
-            root: set.manifest.root,
+            root: manifest.root,
             by_code: [0; 128],
             octants: vec![Digest::default(); contract::manifest::OCTANTS],
-            parts: vec![(0, Digest::default()); set.parts.len()],
-            last_of_part: vec![None; set.parts.len()],
+            parts: vec![(0, Digest::default()); files.len()],
+            last_of_part: vec![None; files.len()],
+            files,
             last: 0,
             builder: Builder::default(),
             building: true,
@@ -81,7 +93,7 @@ impl<'a> State<'a> {
         let mut before = self.last_of_part[part];
         for &w in run {
             if let Some(before) = before.filter(|&b| b >= w) {
-                let file = &self.set.manifest.parts[part].file;
+                let file = &self.files[part];
                 linear::unsorted(file, before, w, &self.root, &mut self.linear);
             }
             before = Some(w);

@@ -1,6 +1,6 @@
 //! `harness audit`: checks a mesh by itself, or against promises on a case.
 
-use super::import::{Failure, Source};
+use super::import::{Failure, Imported, Source};
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, Requirements, audit_against};
 use clap::Args;
@@ -88,8 +88,11 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
 /// The leaf set of a mesh without a manifest, in a temporary directory.
 fn imported(mesh: &Path, source: &Source, case: Option<&Case>) -> Result<TempDir, Failure> {
     let io = |error: std::io::Error| (EXIT_INPUT, error.to_string());
-    let set = source.read(mesh, case)?;
     let place = tempfile::tempdir().map_err(io)?;
-    set.create(place.path()).map_err(io)?;
+    match source.read(mesh, case)? {
+        Imported::Words(set) => set.create(place.path()),
+        Imported::Tree(tree) => tree.link(place.path()),
+    }
+    .map_err(io)?;
     Ok(place)
 }

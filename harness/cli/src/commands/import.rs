@@ -3,14 +3,16 @@
 use super::values::root;
 use clap::Args;
 use contract::case::Case;
+use contract::import::htg::ImportedTree;
 use contract::import::{self, Format, Position, Request};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::manifest::Sides;
+use contract::manifest::{Manifest, Sides};
 use contract::word::{self, KEY_END};
 use run::engine::paths::Paths;
 use run::import::Refusal;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -90,10 +92,18 @@ impl Source {
     ///
     /// # Errors
     /// If it is not a usable mesh, or if Python or VTK is missing.
-    pub fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<LeafSet, Failure> {
+    pub fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
         let input = |error: import::ImportError| (EXIT_INPUT, error.of_file(mesh).to_string());
         let root = self.root.or(case.map(|case| case.root));
         let format = self.format.map_or_else(|| import::guess(mesh), Ok).map_err(input)?;
+        let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
+        if format == Format::Vtk {
+            let sides = self.sides.as_deref();
+            let tree = ImportedTree::open(mesh, sides, root, case, program.clone());
+            if let Some(tree) = tree.map_err(input)? {
+                return Ok(Imported::Tree(tree));
+            }
+        }
         let request = Request { sides: self.sides.clone(), root, position: self.position };
         let limit = Duration::from_secs(self.timeout);
         let cells = run::import::read(mesh, format, &request, &Paths::find(), limit);
@@ -102,7 +112,6 @@ impl Source {
             Refusal::Missing(why) => (EXIT_MISSING, why),
             Refusal::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
         })?;
-        let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
         let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
         if root.is_none() && cells.root.is_none() {
             let Root { origin: [x, y, z], edge } = set.manifest.root;
@@ -110,7 +119,31 @@ impl Source {
                 "harness: the root {x},{y},{z},{edge} is the least that holds the cells; --root gives another"
             );
         }
-        Ok(set)
+        Ok(Imported::Words(Box::new(set)))
+    }
+}
+
+/// A mesh that was read.
+pub enum Imported {
+    /// Its leaves are in memory.
+    Words(Box<LeafSet>),
+    /// Its leaves are in a tree of any size.
+    Tree(ImportedTree),
+}
+
+impl Imported {
+    fn manifest(&self) -> &Manifest {
+        match self {
+            Self::Words(set) => &set.manifest,
+            Self::Tree(tree) => &tree.manifest,
+        }
+    }
+
+    fn create(&self, dir: &Path) -> io::Result<()> {
+        match self {
+            Self::Words(set) => set.create(dir),
+            Self::Tree(tree) => tree.create(dir),
+        }
     }
 }
 
@@ -123,7 +156,7 @@ pub fn run(Arguments { mesh, out, source }: &Arguments) -> u8 {
     });
     match imported {
         Ok(set) => {
-            println!("{}: {}", out.display(), summary(&set));
+            println!("{}: {}", out.display(), summary(set.manifest()));
             EXIT_HOLDS
         }
         Err((code, why)) => {
@@ -134,19 +167,20 @@ pub fn run(Arguments { mesh, out, source }: &Arguments) -> u8 {
 }
 
 /// Number of cells, levels, sides, and the part of the root that they fill.
-fn summary(set: &LeafSet) -> String {
-    let levels: Vec<usize> =
-        (0..).zip(set.manifest.leaves_by_level).filter(|&(_, n)| n > 0).map(|(l, _)| l).collect();
-    let filled: u128 = set.words.iter().map(|&w| u128::from(word::span(word::level(w)))).sum();
-    let sides = match set.manifest.sides {
+fn summary(manifest: &Manifest) -> String {
+    let by_level: Vec<(u8, u64)> =
+        (0..).zip(manifest.leaves_by_level).filter(|&(_, n)| n > 0).collect();
+    let filled: u128 =
+        by_level.iter().map(|&(level, n)| u128::from(n) * u128::from(word::span(level))).sum();
+    let sides = match manifest.sides {
         Sides::Known => "sides known",
         Sides::Unknown => "sides unknown",
     };
     format!(
         "{} cells of levels {} to {}, {sides}; they fill {:.6} % of the root",
-        set.words.len(),
-        levels.first().unwrap_or(&0),
-        levels.last().unwrap_or(&0),
+        manifest.leaves,
+        by_level.first().map_or(0, |(level, _)| *level),
+        by_level.last().map_or(0, |(level, _)| *level),
         100.0 * filled as f64 / KEY_END as f64
     )
 }

@@ -2,6 +2,7 @@
 //!
 //! - one module per format, which returns the cells of a file as cubes: [`words`](mod@words), [`npy`], [`text`], [`p4est`],
 //!   [`discretize`], [`foam`]. VTK's formats are read by VTK itself, which the crate `run` starts;
+//! - [`htg`]: the trees that this repository writes in VTKHDF, of any size;
 //! - [`cells`]: cubes as leaf words, verified cell by cell; [`root`]: the root, if the file states none;
 //! - [`leaf_set()`]: the mesh with its manifest.
 //!
@@ -10,6 +11,7 @@
 pub mod cells;
 pub mod discretize;
 pub mod foam;
+pub mod htg;
 mod leaf_set;
 pub mod npy;
 pub mod p4est;

@@ -79,7 +79,8 @@ impl DistributedMesh {
         })
         .map_err(|(_, error)| error)?;
         written?;
-        let manifest = Manifest { parts: writer.finish()?, ..given.manifest };
+        let parts = writer.finish()?;
+        let manifest = Manifest { parts, hyper_tree_grid: None, ..given.manifest };
         manifest.write(&dir)?;
         let set = leafset::open(&dir).map_err(unreadable)?;
         Ok(Self { name: source.name.clone(), dir, set, base, leaves, interval })

@@ -1,0 +1,117 @@
+//! The nodes of one level, read from begin to end.
+
+use super::bytes::Bytes;
+use super::index::Index;
+use super::{Result, nodes};
+use std::ops::Range;
+use vtkhdf::format::Chunked;
+use vtkhdf::read::File;
+
+/// Up to eight siblings, a bit for each from the lowest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Siblings {
+    pub(super) split: u8,
+    pub(super) masked: u8,
+    /// Sides of those that are neither split nor masked.
+    pub(super) sides: [u8; 8],
+}
+
+/// A reader of one level.
+pub(super) struct LevelReader<'a> {
+    begin: u64,
+    next: u64,
+    end: u64,
+    split: Option<Bytes<'a>>,
+    masked: Option<Bytes<'a>>,
+    sides: Option<Bytes<'a>>,
+}
+
+impl<'a> LevelReader<'a> {
+    /// A reader of these nodes; without an array, its bits and bytes are zero.
+    pub(super) fn new(
+        file: &'a File,
+        range: Range<u64>,
+        split: Option<&'a Chunked>,
+        masked: Option<&'a Chunked>,
+        sides: Option<&'a Chunked>,
+    ) -> Self {
+        let bytes = |array: Option<&'a Chunked>| array.map(|array| Bytes::new(file, array));
+        let Range { start: begin, end } = range;
+        Self {
+            begin,
+            next: begin,
+            end,
+            split: bytes(split),
+            masked: bytes(masked),
+            sides: bytes(sides),
+        }
+    }
+
+    pub(super) fn is_at_end(&self) -> bool {
+        self.next == self.end
+    }
+
+    /// The first node.
+    pub(super) fn begin(&self) -> u64 {
+        self.begin
+    }
+
+    /// Continues with a node.
+    pub(super) fn seek(&mut self, node: u64) {
+        self.next = node;
+    }
+
+    /// Whether a node is split.
+    pub(super) fn is_split(&mut self, node: u64) -> Result<bool> {
+        if node >= self.end {
+            return nodes(format!("node {} has no children", node - 1));
+        }
+        self.split.as_mut().map_or(Ok(false), |bytes| Ok(bytes.bits(node, 1)? == 1))
+    }
+
+    /// The numbers of split nodes and of masked ones before a node of this level, or before its end.
+    pub(super) fn bits_before(&mut self, node: u64, index: &Index) -> Result<[u64; 2]> {
+        if node > self.end {
+            return nodes(format!("node {} has no children", node - 1));
+        }
+        let begin = self.begin;
+        let count = |bytes: &mut Option<Bytes>, counts: &[u64]| -> Result<u64> {
+            match bytes {
+                Some(bytes) => {
+                    Ok(bytes.ones_before(node, counts)? - bytes.ones_before(begin, counts)?)
+                }
+                None => Ok(0),
+            }
+        };
+        Ok([count(&mut self.split, &index.split)?, count(&mut self.masked, &index.masked)?])
+    }
+
+    /// The next nodes.
+    pub(super) fn next(&mut self, count: u32) -> Result<Siblings> {
+        let first = self.next;
+        self.next += u64::from(count);
+        if self.next > self.end {
+            return nodes(format!("node {} has no children", first - 1));
+        }
+        let bits = |bytes: &mut Option<Bytes>| match bytes {
+            Some(bytes) => bytes.bits(first, count),
+            None => Ok(0),
+        };
+        let (split, masked) = (bits(&mut self.split)?, bits(&mut self.masked)?);
+        if split & masked != 0 {
+            return nodes(format!("a node from {first} on is masked and split"));
+        }
+        let mut sides = [0; 8];
+        let exist = ((1u16 << count) - 1) as u8;
+        if let Some(bytes) = self.sides.as_mut().filter(|_| split | masked != exist) {
+            let leaves = !(split | masked) & exist;
+            for (i, side) in sides.iter_mut().enumerate().filter(|(i, _)| leaves >> i & 1 == 1) {
+                *side = bytes.at(first + i as u64)?;
+                if *side > 2 {
+                    return nodes(format!("node {} has the side {side}", first + i as u64));
+                }
+            }
+        }
+        Ok(Siblings { split, masked, sides })
+    }
+}

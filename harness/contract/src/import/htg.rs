@@ -1,0 +1,112 @@
+//! Hyper-tree grids as this repository writes them, of any size: leaves are never in memory all at once. VTK reads other
+//! hyper-tree grids.
+
+use super::ImportError;
+use crate::case::Case;
+use crate::digest::Digest;
+use crate::files::write_atomically;
+use crate::htg::{TreeError, TreeFile};
+use crate::lattice::Root;
+use crate::manifest::{self, Manifest, Part, Sides, Tally, Tree};
+use crate::npy;
+use std::fs;
+use std::io::{self, Write};
+use std::os::unix::fs::symlink;
+use std::path::Path;
+
+/// Name of the tree in a directory.
+const TREE: &str = "mesh.vtkhdf";
+
+/// A tree, and the manifest of its leaves.
+#[derive(Debug)]
+pub struct ImportedTree {
+    tree: TreeFile,
+    /// The manifest, without parts.
+    pub manifest: Manifest,
+}
+
+impl ImportedTree {
+    /// Opens a file and counts its leaves; `None` if VTK has to read it, or if its root is not the one that is given. With
+    /// `sides`, the name of cell data, leaves have sides. The manifest is that of [`leaf_set`](super::leaf_set()).
+    ///
+    /// # Errors
+    /// If the file is damaged or has no such cell data.
+    pub fn open(
+        path: &Path,
+        sides: Option<&str>,
+        root: Option<Root>,
+        case: Option<&Case>,
+        program: String,
+    ) -> Result<Option<Self>, ImportError> {
+        let content = |error: TreeError| ImportError::content(error.to_string());
+        let tree = match TreeFile::open(path, sides) {
+            Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
+            Err(error) if !error.is_of_another_layout() => return Err(content(error)),
+            _ => return Ok(None),
+        };
+        let mut tally = Tally::default();
+        tree.words(&mut |run| {
+            run.iter().for_each(|&word| tally.add(word));
+            true
+        })
+        .map_err(content)?;
+        tally.finish();
+        let any = Manifest::without_leaves(Tree::Final, tree.root, program.clone());
+        let finest = tally.by_level.iter().rposition(|&leaves| leaves > 0).unwrap_or(0);
+        let mut manifest = match case {
+            Some(case) => case.manifest(Tree::Final, program),
+            None => Manifest { level_surface: finest as u8, ..any },
+        };
+        manifest.set_tally(tally);
+        manifest.root = tree.root;
+        manifest.sides = if sides.is_some() { Sides::Known } else { Sides::Unknown };
+        Ok(Some(Self { tree, manifest }))
+    }
+
+    /// Writes the leaf words as a new directory, or into one that is empty, in one part.
+    ///
+    /// # Errors
+    /// If the directory is not empty or a file cannot be written; the message names it.
+    pub fn create(&self, dir: &Path) -> io::Result<()> {
+        let named =
+            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", dir.display()));
+        fs::create_dir_all(dir).map_err(named)?;
+        if fs::read_dir(dir).map_err(named)?.next().is_some() {
+            return Err(named(io::Error::other("the directory is not empty: choose another")));
+        }
+        let Manifest { leaves, digest, .. } = self.manifest;
+        let mut found = Digest::default();
+        let name = manifest::part_name(0);
+        let fill = |out: &mut dyn Write| {
+            out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
+            let mut written = Ok(());
+            let read = self.tree.words(&mut |run| {
+                run.iter().for_each(|&word| found.add(word));
+                let bytes: Vec<u8> = run.iter().flat_map(|word| word.to_le_bytes()).collect();
+                written = out.write_all(&bytes);
+                written.is_ok()
+            });
+            written?;
+            match read {
+                Ok(()) if found == digest => Ok(()),
+                Ok(()) => Err(io::Error::other("the file changed while it was read")),
+                Err(error) => Err(io::Error::other(error)),
+            }
+        };
+        write_atomically(&dir.join(&name), fill).map_err(named)?;
+        let parts = vec![Part { file: name, leaves, digest }];
+        let manifest = Manifest { parts, ..self.manifest.clone() };
+        let text = manifest.text();
+        write_atomically(&dir.join(manifest::FILE), |out| out.write_all(text.as_bytes()))
+            .map_err(named)
+    }
+
+    /// Makes an empty directory a leaf set that has the tree alone, by a link to its file.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn link(&self, dir: &Path) -> io::Result<()> {
+        symlink(fs::canonicalize(self.tree.path())?, dir.join(TREE))?;
+        Manifest { hyper_tree_grid: Some(TREE.to_owned()), ..self.manifest.clone() }.write(dir)
+    }
+}

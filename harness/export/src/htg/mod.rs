@@ -1,0 +1,88 @@
+//! Selected leaves as a hyper-tree grid in VTKHDF: the whole tree in one file, a twentieth of a byte per leaf. Leaves that are not
+//! selected are masked.
+//!
+//! The file has the nodes level by level, and the leaves come in Morton order. So a first pass over the leaves counts the nodes of each level;
+//! then the place of every node is known, and a second pass fills windows of nodes at all levels at once. A window is
+//! written as soon as it is full, so that only a few per level are in memory.
+
+mod siblings;
+mod windows;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use contract::files;
+use contract::manifest::Sides;
+use vtkhdf::tree::{Shape, TreeWriter};
+
+use crate::error::ExportError;
+use crate::mesh::{Leaf, Mesh};
+use crate::options::{Options, Summary};
+use crate::selection::Selection;
+use siblings::{Family, Open};
+use windows::Windows;
+
+/// Leaves between two reports of progress.
+const REPORT: u64 = 1 << 16;
+
+/// Writes the file. With more than one part, cells have the part's index as `rank`.
+///
+/// # Errors
+/// If no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
+pub fn write(
+    mesh: &Mesh,
+    selection: &Selection,
+    path: &Path,
+    options: &Options<'_>,
+) -> Result<Summary, ExportError> {
+    let mut nodes = vec![1u64];
+    let leaves = families(mesh, selection, 0, options, &mut |family| {
+        let level = usize::from(family.level);
+        nodes.resize(nodes.len().max(level + 1), 0);
+        nodes[level] += if level > 0 { 8 } else { 0 };
+        Ok(())
+    })?;
+    if leaves == 0 {
+        return Err(ExportError::Request("no leaf is selected".to_owned()));
+    }
+    let root = mesh.manifest.root;
+    let shape = Shape { origin: root.origin, edge: root.edge, nodes };
+    let with_ranks = mesh.parts() > 1;
+    let named = |error| ExportError::write(path, error);
+    let bytes = files::fill_atomically(path, named, |file: &mut File| {
+        let out = BufWriter::with_capacity(1 << 20, file);
+        let out = TreeWriter::new(out, shape.clone(), with_ranks).map_err(named)?;
+        let mut windows = Windows::new(out, shape, with_ranks);
+        families(mesh, selection, leaves, options, &mut |family| {
+            windows.put(&family).map_err(named)
+        })?;
+        let file = windows.finish().map_err(named)?;
+        let file = file.into_inner().map_err(|error| named(error.into_error()))?;
+        Ok::<_, ExportError>(file.metadata().map_err(named)?.len())
+    })?;
+    Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
+}
+
+/// Visits the selected leaves and passes on all siblings, those of each level in Morton order; returns the number of leaves. `total` is that
+/// number in the second pass.
+fn families(
+    mesh: &Mesh,
+    selection: &Selection,
+    total: u64,
+    options: &Options<'_>,
+    take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
+) -> Result<u64, ExportError> {
+    let with_sides = mesh.manifest.sides == Sides::Known;
+    let (mut open, mut leaves) = (Open::default(), 0);
+    mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
+        if leaves % REPORT == 0 {
+            options.check()?;
+            options.watch.progress(leaves.min(total), total.max(1));
+        }
+        leaves += 1;
+        open.push(&leaf, with_sides, take)
+    })?;
+    open.finish(take)?;
+    Ok(leaves)
+}

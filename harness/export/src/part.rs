@@ -1,0 +1,106 @@
+//! The parts of a mesh on disk: files of sorted leaf words, or the tree.
+
+use std::ops::Range;
+use std::path::Path;
+
+use contract::htg::{Cursor, Index, TreeFile};
+use contract::leafset::ReadError;
+use contract::npy::PartFile;
+use contract::octant::Octant;
+use contract::word::{self, KEY_END};
+
+use crate::error::ExportError;
+
+/// A part.
+#[derive(Debug)]
+pub(crate) enum Part {
+    /// A file of leaf words.
+    Words(PartFile),
+    /// The whole tree.
+    Tree(Box<(TreeFile, Index)>),
+}
+
+impl Part {
+    /// The tree as a part.
+    pub(crate) fn of_tree(tree: TreeFile) -> Result<Self, ExportError> {
+        let index = tree.index().map_err(|error| ReadError::tree(&tree, error))?;
+        Ok(Self::Tree(Box::new((tree, index))))
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        match self {
+            Self::Words(file) => file.path(),
+            Self::Tree(tree) => tree.0.path(),
+        }
+    }
+
+    /// Number of leaves.
+    pub(crate) fn len(&self) -> u64 {
+        match self {
+            Self::Words(file) => file.len(),
+            Self::Tree(tree) => tree.1.leaves,
+        }
+    }
+}
+
+/// One reader for each part. Each thread has readers of its own, because those of trees have buffers.
+pub(crate) struct Readers<'a>(Vec<Reader<'a>>);
+
+enum Reader<'a> {
+    Words(&'a PartFile),
+    Tree(&'a TreeFile, Cursor<'a>),
+}
+
+impl<'a> Readers<'a> {
+    pub(crate) fn new(parts: &'a [Part]) -> Self {
+        let reader = |part: &'a Part| match part {
+            Part::Words(file) => Reader::Words(file),
+            Part::Tree(tree) => Reader::Tree(&tree.0, Cursor::new(&tree.0, &tree.1)),
+        };
+        Self(parts.iter().map(reader).collect())
+    }
+
+    /// Index of the first leaf in a range of a part whose Morton code is at least `key`.
+    pub(crate) fn lower_bound(
+        &mut self,
+        part: usize,
+        range: Range<u64>,
+        key: u64,
+    ) -> Result<u64, ExportError> {
+        // The code one past the last one does not fit in a word.
+        if key >= KEY_END {
+            return Ok(range.end);
+        }
+        match &mut self.0[part] {
+            Reader::Words(file) => {
+                Ok(file.lower_bound(range, key << 7).map_err(|e| ReadError::part(file, e))?)
+            }
+            Reader::Tree(tree, cursor) => {
+                let before = cursor.leaves_before(key).map_err(|e| ReadError::tree(tree, e))?;
+                Ok(before.clamp(range.start, range.end))
+            }
+        }
+    }
+
+    /// The words of an octant's leaves, which are at these indices.
+    pub(crate) fn words(
+        &mut self,
+        part: usize,
+        octant: &Octant,
+        interval: Range<u64>,
+    ) -> Result<Vec<u64>, ExportError> {
+        let mut words = Vec::new();
+        match &mut self.0[part] {
+            Reader::Words(file) => {
+                words.resize((interval.end - interval.start) as usize, 0);
+                let read = file.read_at(interval.start, &mut words);
+                read.map_err(|error| ReadError::part(file, error))?;
+            }
+            Reader::Tree(tree, cursor) => {
+                let read = cursor.words(word::key_of(octant.corner), octant.level, &mut words);
+                read.map_err(|error| ReadError::tree(tree, error))?;
+            }
+        }
+        Ok(words)
+    }
+}

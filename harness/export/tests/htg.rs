@@ -1,0 +1,160 @@
+//! A mesh as a tree has the leaves of its words, whether they are read in order, by octant or by selection; and a tree of
+//! any content is read or refused, without a panic.
+#![allow(missing_docs)]
+
+use contract::htg::{Cursor, SIDE, TreeError, TreeFile};
+use contract::lattice::Root;
+use contract::leafset::LeafSet;
+use contract::manifest::{Manifest, Tree};
+use contract::testing::random_words;
+use contract::word::{self, Leaf as WordLeaf};
+use export::error::ExportError;
+use export::mesh::{Leaf, Mesh};
+use export::options::{Options, Watch};
+use export::selection::{Selection, Slice};
+use proptest::prelude::*;
+use std::fs;
+use std::num::NonZero;
+use std::path::Path;
+use tempfile::TempDir;
+use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window};
+use vtkhdf::write::Deflater;
+
+const ROOT: Root = Root { origin: [0.1, -1.0, 1e6], edge: 0.3 };
+
+struct Quiet;
+
+impl Watch for Quiet {
+    fn progress(&self, _: u64, _: u64) {}
+
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// A mesh of these parts on disk.
+fn on_disk(parts: Vec<Vec<u64>>) -> (TempDir, Mesh) {
+    let empty = Manifest::without_leaves(Tree::Final, ROOT, "test".to_owned());
+    let set = LeafSet::new(empty, Vec::new()).with_parts(parts);
+    let dir = tempfile::tempdir().unwrap();
+    set.write(dir.path()).unwrap();
+    let mesh = Mesh::open(dir.path()).unwrap();
+    (dir, mesh)
+}
+
+/// The mesh of a tree alone: the file, and the manifest of the words that it should have.
+fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("mesh.vtkhdf");
+    let options = Options { jobs: NonZero::<usize>::MIN, watch: &Quiet };
+    match export::htg::write(mesh, selection, &path, &options) {
+        Err(ExportError::Request(_)) => return None,
+        written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),
+    }
+    let manifest = Manifest {
+        parts: Vec::new(),
+        hyper_tree_grid: Some("mesh.vtkhdf".to_owned()),
+        ..mesh.manifest.clone()
+    };
+    manifest.write(dir.path()).unwrap();
+    let mesh = Mesh::open(dir.path()).unwrap();
+    Some((dir, mesh))
+}
+
+/// Words and indices of the selected leaves.
+fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
+    let mut leaves = Vec::new();
+    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, index, .. }| {
+        leaves.push((word::encode(&WordLeaf { octant, side }), index));
+        Ok::<(), ExportError>(())
+    })
+    .unwrap();
+    leaves
+}
+
+fn words(tree: &TreeFile) -> Result<Vec<u64>, TreeError> {
+    let mut words = Vec::new();
+    tree.words(&mut |run| {
+        words.extend_from_slice(run);
+        true
+    })?;
+    Ok(words)
+}
+
+proptest! {
+    #[test]
+    fn the_tree_has_the_leaves_of_the_words(
+        all in random_words(5), parts in 1usize..3, axis in 0usize..3, at in 0.0f64..1.0, max in 0u64..60
+    ) {
+        let mut dealt = vec![Vec::new(); parts];
+        all.iter().enumerate().for_each(|(i, &w)| dealt[i / 11 % parts].push(w));
+        let (_dir, mesh) = on_disk(dealt);
+        let slice = Slice::new(&ROOT, axis, ROOT.origin[axis] + at * ROOT.edge);
+        let cut = Selection { slice, ..Selection::default() };
+        for selection in [Selection::default(), cut.clone()] {
+            let expected = leaves(&mesh, &selection);
+            let Some((dir, tree)) = as_tree(&mesh, &selection) else {
+                prop_assert!(expected.is_empty());
+                continue;
+            };
+            // A file of part of a mesh counts only that part.
+            let expected: Vec<u64> = expected.into_iter().map(|(word, _)| word).collect();
+            let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), Some(SIDE)).unwrap();
+            prop_assert_eq!(file.root, ROOT);
+            prop_assert_eq!(&words(&file).unwrap(), &expected);
+            prop_assert_eq!(tree.len(), expected.len() as u64);
+            if selection == Selection::default() {
+                prop_assert_eq!(leaves(&tree, &cut), leaves(&mesh, &cut));
+                let blocks = |mesh: &Mesh| mesh.blocks(&selection, max + 1).unwrap();
+                prop_assert_eq!(blocks(&tree), blocks(&mesh));
+            }
+        }
+    }
+
+    /// Whatever the nodes are, they are refused or leaves of an oct-tree.
+    #[test]
+    fn a_tree_of_any_nodes_is_read_or_refused(
+        groups in prop::collection::vec(any::<[u8; 4]>(), 1..6),
+        levels in prop::collection::vec(1u64..4, 1..4),
+        sparse in any::<bool>(),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mesh.vtkhdf");
+        let nodes = [1].into_iter().chain(levels.iter().map(|n| 8 * n)).collect();
+        write(&path, Shape { origin: ROOT.origin, edge: ROOT.edge, nodes }, &groups, sparse);
+        let Ok(tree) = TreeFile::open(&path, Some(SIDE)) else { return Ok(()) };
+        let streamed = words(&tree);
+        if let Ok(index) = tree.index() {
+            let mut cursor = Cursor::new(&tree, &index);
+            for key in [0, 1 << 54, 5 << 51, (1 << 57) - 1] {
+                let _ = cursor.leaves_before(key);
+                let mut found = Vec::new();
+                let _ = cursor.words(key, 2, &mut found);
+            }
+            let mut found = Vec::new();
+            if let (Ok(()), Ok(streamed)) = (cursor.words(0, 0, &mut found), &streamed) {
+                prop_assert_eq!(&found, streamed);
+            }
+        }
+        for pair in streamed.unwrap_or_default().windows(2) {
+            prop_assert!(word::fault(pair[0]).is_none());
+            prop_assert!(word::key(pair[0]) + word::span(word::level(pair[0])) <= word::key(pair[1]));
+        }
+    }
+}
+
+/// Writes a tree with these siblings, in one window; the root is split.
+fn write(path: &Path, shape: Shape, groups: &[[u8; 4]], sparse: bool) {
+    let mut window = Window::new(0, false);
+    window.put_root(Siblings { split: 1, ..Siblings::default() }, 0);
+    for (number, &[split, deleted, crossing, inside]) in (0..).zip(groups) {
+        let only = |bits: u8, other: u8| if sparse { bits & !other } else { bits };
+        let (split, deleted) = (only(split, 0xf5), only(deleted, split | 0xf0));
+        let inside = only(inside, crossing);
+        window.put(number, Siblings { split, deleted, crossing, inside }, [0; 8]);
+    }
+    let chunks = window.compress(&shape, &mut Deflater::default());
+    let mut out = TreeWriter::new(fs::File::create(path).unwrap(), shape, false).unwrap();
+    out.add(0, chunks.iter().map(Option::as_deref)).unwrap();
+    out.finish().unwrap();
+}

@@ -1,0 +1,181 @@
+//! The nodes that a rank owns, eight siblings at a time, in the order of the file.
+
+use super::numbering::{Interval, Numbering};
+use crate::brick::{byte, children};
+use crate::brickset::{BrickSet, ChildBricks, Cursor};
+use crate::lattice::Keep;
+use crate::mesh::Mesh;
+use crate::octant::Level;
+use crate::tree::LEVELS;
+use vtkhdf::tree::Siblings;
+
+/// Siblings with their numbers, in ascending order: those of the bricks that this rank owns.
+pub(super) struct OwnSiblings<'a> {
+    mesh: &'a Mesh,
+    numbering: &'a Numbering,
+    level: Level,
+    bricks: ChildBricks<'a>,
+    path: Path<'a>,
+    at: Interval,
+    /// The interval of the last brick.
+    interval: Option<usize>,
+    brick: Brick,
+    /// Groups of siblings of the current brick that remain.
+    left: u8,
+    /// The number of the next siblings.
+    next: u64,
+}
+
+impl<'a> OwnSiblings<'a> {
+    pub(super) fn new(mesh: &'a Mesh, numbering: &'a Numbering) -> Self {
+        static NONE: BrickSet = BrickSet::EMPTY;
+        Self {
+            mesh,
+            numbering,
+            level: 0,
+            bricks: NONE.child_bricks(),
+            path: Path::new(mesh, 0),
+            at: Interval::default(),
+            interval: None,
+            brick: Brick::default(),
+            left: 0,
+            next: 0,
+        }
+    }
+
+    /// The next siblings, if their number is less than `end`.
+    #[inline]
+    pub(super) fn next_before(&mut self, end: u64) -> Option<(u64, Siblings)> {
+        while self.left == 0 {
+            self.advance()?;
+        }
+        if self.next >= end {
+            return None;
+        }
+        let j = u64::from(self.left.trailing_zeros());
+        self.left &= self.left - 1;
+        self.next += 1;
+        Some((self.next - 1, self.brick.siblings(self.mesh, j)))
+    }
+
+    /// Goes to the next brick; none after the last.
+    fn advance(&mut self) -> Option<()> {
+        let Some(b) = self.bricks.next() else {
+            if self.level as usize + 1 == LEVELS {
+                return None;
+            }
+            self.bricks = self.mesh.split[self.level as usize].child_bricks();
+            self.level += 1;
+            self.path = Path::new(self.mesh, self.level);
+            (self.at, self.interval) = (Interval::default(), None);
+            return Some(());
+        };
+        if self.mesh.ownership.owns(self.level, b.key) {
+            let (interval, first) = self.numbering.first(&mut self.at, self.level, b.key);
+            if self.interval != Some(interval) {
+                (self.interval, self.next) = (Some(interval), first);
+            }
+            self.brick = self.path.load(self.level, b.key);
+            self.left = crate::brick::parents(b.bits);
+        }
+        Some(())
+    }
+}
+
+/// The root.
+pub(super) fn root(mesh: &Mesh) -> Siblings {
+    let root = Path::new(mesh, 0).load(0, 0).siblings(mesh, 0);
+    // The seven other octants of the brick do not exist.
+    let [split, deleted, crossing, inside] =
+        [root.split, root.deleted, root.crossing, root.inside].map(|bits| bits & 1);
+    Siblings { split, deleted, crossing, inside }
+}
+
+/// A brick, with the sides that its octants inherit from the leaves of T0 that contain them.
+#[derive(Clone, Copy, Default)]
+struct Brick {
+    split: u64,
+    crossing: u64,
+    inside: u64,
+    deleted: u64,
+}
+
+impl Brick {
+    /// Siblings that exist: byte `j` of the brick.
+    #[inline]
+    fn siblings(&self, mesh: &Mesh, j: u64) -> Siblings {
+        let Self { split, crossing, inside, deleted } = *self;
+        let mut gone = 0;
+        if !mesh.is_base {
+            gone = deleted;
+            if !mesh.rules.keep_crossing {
+                gone |= crossing;
+            }
+        }
+        let kept = !split & !gone;
+        Siblings {
+            split: byte(split, j),
+            deleted: byte(gone & !split, j),
+            crossing: byte(crossing & kept, j),
+            inside: byte(inside & kept & !crossing, j),
+        }
+    }
+}
+
+/// The bricks that contain the current one, of all coarser levels, and readers of the sets.
+struct Path<'a> {
+    levels: Vec<PathLevel<'a>>,
+    keep: Keep,
+}
+
+struct PathLevel<'a> {
+    split: Cursor<'a>,
+    crossing: Cursor<'a>,
+    inside: Cursor<'a>,
+    deleted: Cursor<'a>,
+    key: Option<u64>,
+    brick: Brick,
+}
+
+impl<'a> Path<'a> {
+    /// A path to bricks of level `deepest`.
+    fn new(mesh: &'a Mesh, deepest: Level) -> Self {
+        let level = |l: usize| PathLevel {
+            split: mesh.split[l].cursor(),
+            crossing: mesh.crossing[l].cursor(),
+            inside: mesh.sides.inside[l].cursor(),
+            deleted: mesh.sides.deleted[l].cursor(),
+            key: None,
+            brick: Brick::default(),
+        };
+        Self { levels: (0..=deepest as usize).map(level).collect(), keep: mesh.sides.keep }
+    }
+
+    /// Reads a brick. Keys must not descend.
+    fn load(&mut self, l: Level, key: u64) -> Brick {
+        if self.levels[l as usize].key == Some(key) {
+            return self.levels[l as usize].brick;
+        }
+        let (mut crossing, mut inside) = (0, 0);
+        if l > 0 {
+            let above = self.load(l - 1, key >> 3);
+            let below = |sides: u64| children(byte(sides & above.split, key & 7));
+            (crossing, inside) = (below(above.crossing), below(above.inside));
+        }
+        let keep = self.keep;
+        let level = &mut self.levels[l as usize];
+        level.key = Some(key);
+        level.brick = Brick {
+            split: level.split.get(key),
+            crossing: level.crossing.get(key) | crossing,
+            inside: match keep {
+                // Deleted leaves have no side in the file.
+                Keep::Outside => 0,
+                Keep::Inside => u64::MAX,
+                Keep::All => level.inside.get(key) | inside,
+            },
+            deleted: level.deleted.get(key),
+        };
+        level.brick
+    }
+}

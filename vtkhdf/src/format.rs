@@ -1,0 +1,208 @@
+//! What the writer and the reader know of HDF5: signatures, codes of messages, and types of elements.
+
+use std::fmt;
+
+/// The first bytes of every file.
+pub const SIGNATURE: [u8; 8] = *b"\x89HDF\r\n\x1a\n";
+/// Bytes of the superblock, version 3.
+pub(crate) const SUPERBLOCK_BYTES: usize = 48;
+/// The address of what is not stored.
+pub(crate) const UNDEFINED: u64 = u64::MAX;
+
+/// Codes of messages in object headers.
+pub(crate) mod message {
+    pub(crate) const DATASPACE: u8 = 1;
+    pub(crate) const LINK_INFO: u8 = 2;
+    pub(crate) const DATATYPE: u8 = 3;
+    pub(crate) const FILL_VALUE: u8 = 5;
+    pub(crate) const LINK: u8 = 6;
+    pub(crate) const LAYOUT: u8 = 8;
+    pub(crate) const GROUP_INFO: u8 = 10;
+    pub(crate) const FILTERS: u8 = 11;
+    pub(crate) const ATTRIBUTE: u8 = 12;
+}
+
+/// Layouts of arrays: in the object header, or in chunks.
+pub(crate) const LAYOUT_VERSION: u8 = 4;
+pub(crate) const LAYOUT_COMPACT: u8 = 0;
+pub(crate) const LAYOUT_CHUNKED: u8 = 2;
+/// The index of chunks is a *fixed array*: a table of as many entries as chunks.
+pub(crate) const INDEX_FIXED_ARRAY: u8 = 3;
+/// Base-2 logarithm of the entries from which on the table would have pages: more than any file of ours has.
+pub(crate) const PAGE_BITS: u8 = 24;
+/// The filter zlib.
+pub(crate) const FILTER_DEFLATE: u16 = 1;
+
+/// Fill value messages: the value is zero, and space is allocated early, or chunk by chunk.
+pub(crate) const ALLOCATED_EARLY: [u8; 2] = [3, 0b1001];
+pub(crate) const ALLOCATED_BY_CHUNK: [u8; 2] = [3, 0b1011];
+
+/// The type of an array's elements. All are little-endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// u8.
+    Byte,
+    /// i32.
+    Int32,
+    /// i64.
+    Int64,
+    /// f64.
+    Double,
+}
+
+impl Kind {
+    /// All types.
+    pub(crate) const ALL: [Self; 4] = [Self::Byte, Self::Int32, Self::Int64, Self::Double];
+
+    /// Bytes of an element.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Byte => 1,
+            Self::Int32 => 4,
+            Self::Int64 | Self::Double => 8,
+        }
+    }
+
+    /// The datatype message.
+    pub(crate) fn encode(self) -> Vec<u8> {
+        let bytes = self.bytes() as u8;
+        let mut code = match self {
+            Self::Byte => vec![0x10, 0, 0, 0],
+            Self::Int32 | Self::Int64 => vec![0x10, 0x08, 0, 0],
+            // An implied leading bit of the mantissa; the sign is bit 63.
+            Self::Double => vec![0x11, 0x20, 63, 0],
+        };
+        code.extend([bytes, 0, 0, 0, 0, 0, 8 * bytes, 0]);
+        if self == Self::Double {
+            // Exponent at bit 52 with 11 bits, mantissa at bit 0 with 52 bits, bias 1023.
+            code.extend([52, 11, 0, 52, 0xff, 0x03, 0, 0]);
+        }
+        code
+    }
+}
+
+/// Elements of a small array, or of an attribute.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// One text, in ASCII.
+    Text(String),
+    /// One number.
+    Number(i64),
+    /// An array.
+    Ints32(Vec<i32>),
+    /// An array.
+    Ints(Vec<i64>),
+    /// An array.
+    Doubles(Vec<f64>),
+}
+
+/// A group: attributes, and members by name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Group {
+    /// Attributes by name.
+    pub attributes: Vec<(String, Value)>,
+    /// Members by name.
+    pub members: Vec<(String, Member)>,
+}
+
+impl Group {
+    /// The attribute with a name.
+    pub fn attribute(&self, name: &str) -> Option<&Value> {
+        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
+    }
+
+    /// The member with a name.
+    pub fn member(&self, name: &str) -> Option<&Member> {
+        self.members.iter().find(|(n, _)| n == name).map(|(_, member)| member)
+    }
+}
+
+/// A member of a group.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Member {
+    /// A group.
+    Group(Group),
+    /// A small array, stored in the object header.
+    Small(Value),
+    /// A long array.
+    Chunked(Chunked),
+}
+
+/// Where some bytes of a file are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Position of the first byte.
+    pub address: u64,
+    /// Number of bytes.
+    pub bytes: u64,
+}
+
+/// A one-dimensional array in compressed chunks of equal length.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chunked {
+    /// Type of the elements.
+    pub kind: Kind,
+    /// Number of elements.
+    pub len: u64,
+    /// Elements of a chunk; the last one is padded.
+    pub chunk_len: u32,
+    /// The compressed chunks. One that is not stored has zeros only.
+    pub chunks: Vec<Option<Extent>>,
+}
+
+impl Chunked {
+    /// An array of zeros.
+    ///
+    /// # Panics
+    /// If the array or a chunk has no elements.
+    pub fn new(kind: Kind, len: u64, chunk_len: u32) -> Self {
+        // The library refuses chunks that are longer than the array.
+        let chunk_len = u64::from(chunk_len).min(len) as u32;
+        let chunks = len.div_ceil(u64::from(chunk_len)) as usize;
+        Self { kind, len, chunk_len, chunks: vec![None; chunks] }
+    }
+
+    /// Bytes of a chunk before compression.
+    pub fn chunk_bytes(&self) -> usize {
+        self.chunk_len as usize * self.kind.bytes()
+    }
+
+    /// Bytes that encode a chunk's length and an element's size: as few as suffice for both, which the library verifies.
+    pub(crate) fn dim_bytes(&self) -> usize {
+        1 + self.chunk_len.max(self.kind.bytes() as u32).ilog2() as usize / 8
+    }
+
+    /// Bytes that encode the compressed size of a chunk in the table: the library's rule.
+    pub(crate) fn size_bytes(&self) -> usize {
+        1 + (self.chunk_bytes().ilog2() as usize + 8) / 8
+    }
+}
+
+/// Why a file was not read: the predicate of a sentence whose subject is the file.
+#[derive(Debug)]
+pub enum ReadError {
+    /// It cannot be read.
+    Io(std::io::Error),
+    /// It is valid, as far as it was read, and has something that this reader does not know.
+    Unknown(String),
+    /// It is damaged.
+    Damaged(String),
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(e) => write!(f, "cannot be read: {e}"),
+            Self::Unknown(what) => write!(f, "has {what}, which only the HDF5 library reads"),
+            Self::Damaged(what) => write!(f, "is damaged: {what}"),
+        }
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+impl From<std::io::Error> for ReadError {
+    fn from(e: std::io::Error) -> Self {
+        Self::Io(e)
+    }
+}

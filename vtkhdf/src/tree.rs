@@ -1,0 +1,259 @@
+//! A hyper-tree grid of one oct-tree in VTKHDF: names and shapes of the arrays, and windows of nodes, of which each is one chunk
+//! of every array.
+//!
+//! Nodes are the octants of the tree, leaves or not, level by level, and in Morton order within a level: node 0 is the root, and
+//! the children of the split nodes follow in their order, eight at a time. `Descriptors` has one bit per node of all levels but the
+//! last, which is set for split nodes, and `Mask` one bit per node, which is set for leaves that are not in the mesh. Bits
+//! are packed from the most significant one. Cell data have an element for every node.
+
+use crate::format::{Chunked, Group, Kind, Member, Value};
+use crate::write::{Deflater, Writer};
+use std::io::{self, Seek, Write};
+use std::ops::Range;
+
+/// Nodes of a window.
+pub const WINDOW: u64 = 1 << 18;
+/// The group of the file.
+pub const GROUP: &str = "VTKHDF";
+/// Its attribute `Type`.
+pub const TYPE: &str = "HyperTreeGrid";
+/// Its group of cell data.
+pub const CELL_DATA: &str = "CellData";
+/// The cell data of sides: 0 outside, 1 inside, 2 crossing; 0 for nodes that are no leaves of the mesh.
+pub const SIDE: &str = "side";
+/// The cell data of ranks.
+pub const RANK: &str = "rank";
+/// The attribute with the edge of the root, which VTK does not read: the difference of two coordinates may have lost digits.
+pub const EDGE: &str = "RootEdge";
+/// The coordinates of the root along x, y and z.
+pub const COORDINATES: [&str; 3] = ["XCoordinates", "YCoordinates", "ZCoordinates"];
+
+/// The root and the nodes of a tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Minimum corner of the root.
+    pub origin: [f64; 3],
+    /// Edge of the root.
+    pub edge: f64,
+    /// Number of nodes by level, of the levels that have any.
+    pub nodes: Vec<u64>,
+}
+
+impl Shape {
+    /// Number of nodes of all levels.
+    pub fn nodes_total(&self) -> u64 {
+        self.nodes.iter().sum()
+    }
+
+    /// Number of nodes with a bit in `Descriptors`.
+    pub fn nodes_described(&self) -> u64 {
+        // VTK reads no empty array: a root that is a leaf has a bit, too.
+        (self.nodes_total() - self.nodes.last().copied().unwrap_or(0)).max(1)
+    }
+
+    /// Number of windows.
+    pub fn windows(&self) -> u64 {
+        self.nodes_total().div_ceil(WINDOW)
+    }
+}
+
+/// Eight siblings: a bit for each, from the lowest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Siblings {
+    /// Split nodes.
+    pub split: u8,
+    /// Leaves that are not in the mesh.
+    pub deleted: u8,
+    /// Leaves that the surface crosses.
+    pub crossing: u8,
+    /// Leaves inside.
+    pub inside: u8,
+}
+
+/// Node number of the first of some siblings, counted in groups of eight from the root's children on.
+pub fn first_node(group: u64) -> u64 {
+    1 + 8 * group
+}
+
+/// The groups of siblings with a node in a window; the first and the last may have others outside of it. The root is in no group.
+pub fn groups(window: u64) -> Range<u64> {
+    (window * WINDOW / 8).saturating_sub(1)..(window + 1) * WINDOW / 8
+}
+
+/// The nodes of a window, to be filled in any order.
+#[derive(Debug)]
+pub struct Window {
+    first: u64,
+    split: Vec<u8>,
+    deleted: Vec<u8>,
+    sides: Vec<u8>,
+    ranks: Option<Vec<i32>>,
+}
+
+impl Window {
+    /// The window with a number, all zero; `with_ranks` if its nodes have ranks.
+    pub fn new(index: u64, with_ranks: bool) -> Self {
+        let bits = || vec![0; WINDOW as usize / 8];
+        Self {
+            first: index * WINDOW,
+            split: bits(),
+            deleted: bits(),
+            sides: vec![0; WINDOW as usize],
+            ranks: with_ranks.then(|| vec![0; WINDOW as usize]),
+        }
+    }
+
+    /// Sets the root, which is in the first window.
+    pub fn put_root(&mut self, root: Siblings, rank: i32) {
+        self.split[0] |= (root.split & 1) << 7;
+        self.deleted[0] |= (root.deleted & 1) << 7;
+        self.sides[0] = (root.crossing & 1) << 1 | root.inside & 1;
+        if let Some(ranks) = &mut self.ranks {
+            ranks[0] = rank;
+        }
+    }
+
+    /// Sets those nodes of a group that are in the window.
+    #[inline]
+    pub fn put(&mut self, group: u64, siblings: Siblings, sibling_ranks: [i32; 8]) {
+        // The first sibling is the second node of a byte.
+        let first = first_node(group);
+        let byte = (first / 8).wrapping_sub(self.first / 8) as usize;
+        for (bits, new) in
+            [(&mut self.split, siblings.split), (&mut self.deleted, siblings.deleted)]
+        {
+            if new != 0 {
+                let new = new.reverse_bits();
+                if let Some(bits) = bits.get_mut(byte) {
+                    *bits |= new >> 1;
+                }
+                if let Some(bits) = bits.get_mut(byte.wrapping_add(1)) {
+                    *bits |= new << 7;
+                }
+            }
+        }
+        if siblings.crossing | siblings.inside != 0 {
+            for i in 0..8 {
+                let side = (siblings.crossing >> i & 1) << 1 | siblings.inside >> i & 1;
+                let at = (first + i).wrapping_sub(self.first) as usize;
+                if let Some(node) = self.sides.get_mut(at) {
+                    *node = side;
+                }
+            }
+        }
+        if let Some(ranks) = &mut self.ranks {
+            for (i, rank) in (0..).zip(sibling_ranks) {
+                let at = (first + i).wrapping_sub(self.first) as usize;
+                if let Some(node) = ranks.get_mut(at) {
+                    *node = rank;
+                }
+            }
+        }
+    }
+
+    /// The compressed chunks of all arrays, in the order in which [`TreeWriter::add`] takes them; none for one that is zero.
+    pub fn compress(&self, shape: &Shape, deflater: &mut Deflater) -> Vec<Option<Vec<u8>>> {
+        let arrays = arrays(shape, self.ranks.is_some());
+        let ranks: Option<Vec<u8>> =
+            self.ranks.as_ref().map(|ranks| ranks.iter().flat_map(|r| r.to_le_bytes()).collect());
+        let bytes = [&self.split, &self.deleted, &self.sides].into_iter().chain(&ranks);
+        // Arrays shorter than a window have one shorter chunk.
+        let chunk =
+            |(array, bytes): (&Chunked, &Vec<u8>)| deflater.compress(&bytes[..array.chunk_bytes()]);
+        arrays.iter().zip(bytes).map(chunk).collect()
+    }
+}
+
+/// The arrays that have a chunk per window: split, deleted, side, and rank if there are ranks.
+fn arrays(shape: &Shape, with_ranks: bool) -> Vec<Chunked> {
+    let (nodes, described) = (shape.nodes_total(), shape.nodes_described());
+    let bits = |nodes: u64| Chunked::new(Kind::Byte, nodes.div_ceil(8), WINDOW as u32 / 8);
+    let data = |kind| Chunked::new(kind, nodes, WINDOW as u32);
+    let mut arrays = vec![bits(described), bits(nodes), data(Kind::Byte)];
+    arrays.extend(with_ranks.then(|| data(Kind::Int32)));
+    arrays
+}
+
+/// A file that is being written.
+#[derive(Debug)]
+pub struct TreeWriter<W> {
+    out: Writer<W>,
+    shape: Shape,
+    arrays: Vec<Chunked>,
+}
+
+impl<W: Write + Seek> TreeWriter<W> {
+    /// Begins the file of a tree at the start of `out`.
+    ///
+    /// # Errors
+    /// As `out` has.
+    pub fn new(out: W, shape: Shape, with_ranks: bool) -> io::Result<Self> {
+        let arrays = arrays(&shape, with_ranks);
+        Ok(Self { out: Writer::new(out)?, shape, arrays })
+    }
+
+    /// Writes the chunks of a window, which [`Window::compress`] has made.
+    ///
+    /// # Errors
+    /// As `out` has.
+    pub fn add<'c>(
+        &mut self,
+        window: u64,
+        chunks: impl IntoIterator<Item = Option<&'c [u8]>>,
+    ) -> io::Result<()> {
+        for (array, chunk) in self.arrays.iter_mut().zip(chunks) {
+            // Descriptors end before the last windows.
+            if let (Some(slot), Some(chunk)) = (array.chunks.get_mut(window as usize), chunk) {
+                *slot = Some(self.out.append(chunk)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Completes the file, and returns `out`.
+    ///
+    /// # Errors
+    /// As `out` has.
+    pub fn finish(self) -> io::Result<W> {
+        let Self { out, shape, arrays } = self;
+        let mut arrays = arrays.into_iter();
+        let mut next = || Member::Chunked(arrays.next().expect("three arrays or more"));
+        let one = |number: u64| Member::Small(Value::Ints(vec![number as i64]));
+        let levels = shape.nodes.len() as u64;
+        let by_level = shape.nodes.iter().map(|&n| n as i64).collect();
+        let mut members = vec![
+            ("TreeIds", one(0)),
+            ("NumberOfTrees", one(1)),
+            ("NumberOfDepths", one(levels)),
+            ("DepthPerTree", one(levels)),
+            ("NumberOfCellsPerTreeDepth", Member::Small(Value::Ints(by_level))),
+            ("NumberOfCells", one(shape.nodes_total())),
+            ("DescriptorsSize", one(shape.nodes_described())),
+            ("Descriptors", next()),
+            ("Mask", next()),
+        ];
+        for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
+            members.push((name, Member::Small(Value::Doubles(vec![low, low + shape.edge]))));
+        }
+        // Without a mask, no leaf is missing.
+        let is_zero = |member: &Member| matches!(member, Member::Chunked(array) if array.chunks.iter().all(Option::is_none));
+        members.retain(|(name, member)| *name != "Mask" || !is_zero(member));
+        let mut data = vec![(SIDE.to_owned(), next())];
+        data.extend(arrays.next().map(|ranks| (RANK.to_owned(), Member::Chunked(ranks))));
+        members.push((CELL_DATA, Member::Group(Group { members: data, ..Group::default() })));
+        let attributes = [
+            ("Version", Value::Ints(vec![2, 8])),
+            ("Type", Value::Text(TYPE.to_owned())),
+            ("BranchFactor", Value::Number(2)),
+            ("Dimensions", Value::Ints32(vec![2; 3])),
+            (EDGE, Value::Doubles(vec![shape.edge])),
+        ];
+        let group = Group {
+            attributes: attributes.map(|(name, value)| (name.to_owned(), value)).into(),
+            members: members.into_iter().map(|(name, m)| (name.to_owned(), m)).collect(),
+        };
+        let root =
+            Group { members: vec![(GROUP.to_owned(), Member::Group(group))], ..Group::default() };
+        out.finish(&root)
+    }
+}
