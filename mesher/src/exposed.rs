@@ -40,8 +40,9 @@ pub fn faces(mesh: &Mesh, comm: &dyn Comm) -> Vec<InBrick> {
         for (set, direction) in arrived.iter().zip(DIRECTIONS) {
             search.same_and_finer(l, set, direction);
         }
-        // A layer of two cells holds all leaves that touch a crossing leaf, which is a source.
-        if rules.layer_cells_min < 2 {
+        // All leaves that touch a crossing leaf of the surface level are in its layer, if that has two cells. Deeper ones may have been split
+        // after their level was swept.
+        if l > rules.level_surface || rules.layer_cells_min < 2 {
             let quarters = search.quarters(l, &arrived);
             let (quarters, _) = mesh.ownership.redistribute(l - 1, quarters, comm);
             quarters.iter().for_each(|set| search.coarser(l - 1, set));
