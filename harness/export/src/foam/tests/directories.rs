@@ -146,7 +146,7 @@ fn what_exists_is_not_replaced_and_what_fails_leaves_nothing() {
     parallel.foam.processors = Some(Processors::Equal(65));
     assert!(refused(&parallel, &everything).contains("64 cells are too few for 65 processors"));
     let none = Selection { level_max: Some(1), ..Selection::default() };
-    assert!(refused(&options(ASCII), &none).contains("no leaf is selected"));
+    assert!(refused(&options(ASCII), &none).contains("no leaf satisfies all conditions"));
     assert!(!case.exists());
 
     write(&mesh, &everything, &case.join("constant/polyMesh"), &options(ASCII)).unwrap();
