@@ -87,6 +87,17 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         ("part.pvtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies all conditions"),
         ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
         ("part.vtu", &["--rank", "2"], "the mesh has 2 ranks, counted from 0"),
+        ("part.vtu", &["--ascii"], "--ascii has no effect on .vtu"),
+        ("part.vtu", &["--case", "cube-small"], "--case has no effect on .vtu"),
+        ("polyMesh", &[], "one that ends in .vtu, .pvtu, /polyMesh"),
+        ("case/polyMesh", &["--processors", "2"], "choose a path CASE/constant/polyMesh"),
+        ("case/constant/polyMesh", &["--processors", "149"], "148 cells are too few"),
+        (
+            "case/constant/polyMesh",
+            &["--side", "inside", "--level-max", "0"],
+            "no leaf satisfies all conditions",
+        ),
+        ("case/constant/polyMesh", &["--case", "cube-small"], "another root"),
     ] {
         let (code, output, error) = export(&place, file, options);
         assert_eq!((code, output.as_str(), error.matches('\n').count()), (2, "", 1), "{error}");
@@ -112,4 +123,25 @@ fn a_pvtu_replaces_only_files_of_an_earlier_export() {
     assert!(error.contains("all_pieces/notes.txt: was not written by harness export"), "{error}");
     assert_eq!(names(&pieces), ["all_0000.vtu", "notes.txt"]);
     assert!(fs::read(&all).unwrap() == before);
+}
+
+#[test]
+fn a_poly_mesh_is_a_directory_of_a_case_or_one_per_processor() {
+    let place = mesh();
+    let (code, output, error) = export(&place, "case/constant/polyMesh", &["--label", "64"]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    assert!(output.starts_with("case/constant/polyMesh: 148 cells, "), "{output}");
+    assert!(output.contains("faces of each patch: xMin "), "{output}");
+    let files = ["boundary", "cellLevel", "faces", "neighbour", "owner", "points", "rank", "side"];
+    assert_eq!(names(&place.path().join("case/constant/polyMesh")), files);
+    let (code, output, _) = export(&place, "case/constant/polyMesh/", &["--processors", "ranks"]);
+    assert_eq!(code, 0);
+    assert!(output.contains("2 processors of 49 to 99 cells, "), "{output}");
+    for processor in ["processor0", "processor1"] {
+        assert_eq!(
+            names(&place.path().join("case").join(processor).join("constant/polyMesh")),
+            files
+        );
+    }
+    assert_eq!(names(place.path()), ["case", "mesh"]);
 }

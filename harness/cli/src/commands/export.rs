@@ -21,7 +21,7 @@ use std::time::Duration;
 pub struct Arguments {
     /// The mesh: a leaf-set directory of any size
     mesh: PathBuf,
-    /// The file to write; its name decides the format. An existing file is replaced
+    /// The file to write; its name decides the format. An existing file is replaced, an existing polyMesh is not
     file: PathBuf,
     /// Number of threads [default: all cores]
     #[arg(long, value_name = "N")]

@@ -136,7 +136,13 @@ fn read<'a>(
         Ok(())
     })?;
     if words.is_empty() {
-        return Err(ExportError::Request("no leaf is selected: select others".to_owned()));
+        return Err(ExportError::Request(
+            match mesh.is_empty() {
+                true => "the mesh has no leaves",
+                false => "no leaf satisfies all conditions of the selection: remove one of them",
+            }
+            .to_owned(),
+        ));
     }
     Ok(Model {
         tree: builder.finish(),
