@@ -4,9 +4,12 @@
 
 FILE is a legacy .vtk file, .vtu, .pvtu, .htg, or VTKHDF with an unstructured grid or a hyper-tree grid; its first bytes
 decide. CELLS.npy becomes a structured array with one row per cell, x, y, z and edge: the minimum corner and the edge, in
-float64. With NAME, the field `side` holds the cell array of that name. Standard output is one line of JSON: the root
-cube, {"origin": [x, y, z], "edge": e}, if the file states one, otherwise null. A hyper-tree grid of 2^k trees along
-each axis states it; masked leaves are left out.
+float64. With NAME, the field `side` holds the cell array of that name. Standard output is one line of JSON:
+
+    {"root": {"origin": [x, y, z], "edge": e} | null, "has_sides": bool, "digest": "..." | null}
+
+A hyper-tree grid of 2^k trees along each axis states its root; masked leaves are left out. Files of `harness export` state their
+root and the digest of their leaves. Without NAME, their sides are those of the array `side`.
 
 Exit codes: 0 success; 2 the file cannot be read or has cells that are not axis-aligned cubes, which the last line on standard
 error explains; 3 VTK cannot be imported.
@@ -16,6 +19,7 @@ import json
 import os
 import resource
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import protocol
@@ -120,6 +124,45 @@ def of_unstructured(grid):
     return corners, edges
 
 
+def of_export(path, grid, edges):
+    """Root and digest that a file of `harness export` states; None for other files."""
+    root, digest = fields(path, grid)
+    arrays = ("level", "spacing", "id", "rank")
+    if digest is None and (root is None or not all(grid.GetCellData().HasArray(name) for name in arrays)):
+        return None, None
+    if root is None or digest is None:
+        raise Refused("was written by harness export, but lacks its root or its digest: it is damaged")
+    # The digest is that of corners, edges and sides, from which the other arrays follow.
+    level, spacing, index, _ = (cell_array(grid, name) for name in arrays)
+    with np.errstate(all="ignore"):
+        agrees = (np.abs(spacing / edges - 1) <= TOLERANCE) & (np.abs(root[3] / edges / 2.0**level - 1) <= TOLERANCE)
+    agrees[1:] &= index[1:] > index[:-1]
+    if not agrees.all():
+        raise Refused(f"has cell {np.flatnonzero(~agrees)[0]}, whose level, spacing or id contradicts its vertices: it is damaged")
+    return {"origin": root[:3], "edge": root[3]}, digest
+
+
+def fields(path, grid):
+    """The fields `root` and `digest` of the file, or None. For a .pvtu, VTK returns the fields of a part."""
+    root, digest = grid.GetFieldData().GetArray("root"), grid.GetFieldData().GetAbstractArray("digest")
+    root = vtk_to_numpy(root).ravel().tolist() if root is not None else None
+    digest = digest.GetValue(0) if digest is not None and digest.IsA("vtkStringArray") and digest.GetSize() else None
+    with open(path, "rb") as file:
+        if b'type="PUnstructuredGrid"' in file.read(4096):
+            arrays = {array.get("Name"): array for array in ElementTree.parse(path).iterfind("*/FieldData/DataArray")}
+            root, digest = arrays.get("root"), arrays.get("digest")
+            try:
+                root = [float(number) for number in root.text.split()] if root is not None else None
+                # VTK reads text as the codes of its characters and a zero.
+                digest = bytes(map(int, digest.text.split())).decode() if digest is not None else "\0"
+                if not digest.endswith("\0"):
+                    raise ValueError
+            except (ValueError, AttributeError):
+                raise Refused("has a root or a digest that is not of numbers: it is damaged") from None
+            digest = digest[:-1] or None
+    return root if root is not None and len(root) == 4 else None, digest
+
+
 def cubes(vertices):
     """Minimum corners, mean edges, and whether each cell is a cube, from the coordinates of vertices: [axis][vertex, cell]."""
     lows, highs = ([bound(axis, axis=0) for axis in vertices] for bound in (np.min, np.max))
@@ -203,8 +246,13 @@ def main():
         data = read(path)
         if data is not None and data.IsA("vtkHyperTreeGrid"):
             corners, edges, nodes, root = of_hyper_trees(data)
+            digest = None
         elif data is not None and data.IsA("vtkUnstructuredGrid"):
-            (corners, edges), nodes, root = of_unstructured(data), slice(None), None
+            (corners, edges), nodes = of_unstructured(data), slice(None)
+            root, digest = of_export(path, data, edges)
+            if digest is not None and data.GetCellData().HasArray("side"):
+                name = name or "side"
+                digest = digest if name == "side" else None
         else:
             raise Refused(f"holds {data.GetClassName() if data else 'nothing'}: unstructured and hyper-tree grids are supported")
         sides = cell_array(data, name)[nodes] if name else None
@@ -221,7 +269,7 @@ def main():
     if name:
         cells["side"] = sides
     np.save(out, cells)
-    print(json.dumps(root))
+    print(json.dumps({"root": root, "has_sides": bool(name), "digest": digest}))
 
 
 if __name__ == "__main__":

@@ -195,14 +195,28 @@ class ImportTest(unittest.TestCase):
     def test_an_exported_mesh_is_imported_with_its_digest(self):
         case = (ROOT / "geometries/cube-small.toml").read_text()
         for keep in ("outside", "inside", "all"):
-            case_file, mesh, file = self.at / f"{keep}.toml", self.at / keep, self.at / f"{keep}.vtu"
+            case_file, mesh = self.at / f"{keep}.toml", self.at / keep
             case_file.write_text(f'keep = "{keep}"\n' + case)
             self.assertEqual(run("reference", case_file, "--out", mesh)[0], 0)
-            self.assertEqual(run("harness", "export", mesh, file)[0], 0)
             expected = json.loads((mesh / "mesh.json").read_text())
-            _, manifest = self.imported(file, "--sides", "side", "--case", case_file)
-            for key in ("digest", "root", "leaves_by_level", "leaves_by_side", "level_surface", "keep"):
-                self.assertEqual(manifest[key], expected[key], key)
+            for suffix, *options in [("vtu", "--sides", "side", "--case", case_file), ("vtu",), ("pvtu",)]:
+                file = self.at / f"{keep}.{suffix}"
+                self.assertEqual(run("harness", "export", mesh, file)[0], 0)
+                _, manifest = self.imported(file, *options)
+                keys = ["digest", "root", "leaves_by_level", "leaves_by_side", "level_surface"]
+                for key in keys + ["keep"] * bool(options):
+                    self.assertEqual(manifest[key], expected[key], key)
+
+    def test_part_of_a_mesh_is_imported_with_the_root_of_the_whole(self):
+        mesh = self.at / "whole"
+        self.assertEqual(run("reference", ROOT / "geometries/cube-small.toml", "--out", mesh)[0], 0)
+        whole = np.load(mesh / "leaves-00000.npy")
+        for suffix in ("vtu", "pvtu"):
+            file = self.at / f"part.{suffix}"
+            self.assertEqual(run("harness", "export", mesh, file, "--side", "outside", "--level-max", "4")[0], 0)
+            words, manifest = self.imported(file)
+            np.testing.assert_array_equal(words, whole[(whole & 3 == 0) & ((whole >> 2 & 31) <= 4)])
+            self.assertEqual(manifest["root"], json.loads((mesh / "mesh.json").read_text())["root"])
 
     def test_an_audit_of_a_file_needs_no_manifest(self):
         path = self.at / "mesh.vtu"

@@ -5,7 +5,9 @@ Needs target/debug/{harness,reference}, which `cargo test --workspace` builds.""
 import json
 import os
 import pathlib
+import re
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -79,6 +81,97 @@ class VtuTest(unittest.TestCase):
         volume, whole, sides = self.check("outside", "mesh.vtu")
         self.assertFalse((sides == 1).any())
         self.assertLess(volume, whole)
+
+
+@unittest.skipUnless(
+    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
+    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
+)
+class DamagedVtuTest(unittest.TestCase):
+    """Every damage to a file is noticed when it is read: the file is refused, or the digest differs."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.place = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.place.cleanup)
+        cls.at = pathlib.Path(cls.place.name)
+        for program, *arguments in [
+            ("reference", ROOT / "geometries/cube-small.toml", "--out", cls.at / "mesh"),
+            ("harness", "export", cls.at / "mesh", cls.at / "all.vtu"),
+            ("harness", "export", cls.at / "mesh", cls.at / "all.pvtu"),
+        ]:
+            subprocess.run([PROGRAMS / program, *arguments], check=True, capture_output=True)
+        cls.digest = json.loads((cls.at / "mesh/mesh.json").read_text())["digest"]
+
+    def imported(self, path):
+        """Exit code of an import, and the digest that it found."""
+        with tempfile.TemporaryDirectory() as directory:
+            out = pathlib.Path(directory) / "mesh"
+            command = [PROGRAMS / "harness", "import", path, "--format", "vtk", "--out", out]
+            environment = os.environ | {"HARNESS_PYTHON": sys.executable}
+            run = subprocess.run(command, capture_output=True, text=True, env=environment)
+            if run.returncode == 0:
+                return 0, json.loads((out / "mesh.json").read_text())["digest"]
+            self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
+            return run.returncode, None
+
+    def check(self, opened, damaged, changes):
+        """Imports `opened` after each change of the content of `damaged`."""
+        content = damaged.read_bytes()
+        self.assertEqual(self.imported(opened), (0, self.digest))
+        try:
+            for what, changed in changes(content):
+                with self.subTest(what):
+                    self.assertNotEqual(changed, content)
+                    damaged.write_bytes(changed)
+                    code, digest = self.imported(opened)
+                    self.assertTrue(code == 2 or code == 0 and digest != self.digest, (code, digest))
+        finally:
+            damaged.write_bytes(content)
+
+    @staticmethod
+    def flipped(content, position, bits=1):
+        return content[:position] + bytes([content[position] ^ bits]) + content[position + 1 :]
+
+    def changes_of_xml(self, content):
+        end = content.find(b"<AppendedData")
+        xml = content[: end if end >= 0 else None]
+        # The last character of every value, and of the root and the digest. VTK ignores the name of the array of points.
+        # Neither VTK nor the harness uses what describes a field of a .pvtu.
+        pattern = rb'(?:NumberOf\w+|Name|type|offset|Source)="(?!Points)(\w[^"]*)"'
+        fields = xml.find(b"</FieldData>") if end < 0 else 0
+        values = [m.end(1) - 1 for m in re.finditer(pattern, xml) if m.start() > fields or m[0].startswith(b"Name")]
+        values += [match.end(1) - 1 for match in re.finditer(rb">([-0-9. e]+\d) ?0?</DataArray>", xml)]
+        for position in values:
+            yield f"{content[max(0, position - 40) : position + 1]}", self.flipped(content, position)
+
+    def changes_of_data(self, content):
+        start = content.index(b"\n   _") + 5
+        offsets = [start + int(text) for text in re.findall(rb'offset="(\d+)"', content[:start])]
+        ends = offsets[1:] + [content.rindex(b"\n  </AppendedData>")]
+        for begin, end in zip(offsets, ends):
+            # The number of blocks, the size of the last one, and compressed data.
+            for position in (begin, begin + 16, (begin + 32 + end) // 2, end - 1):
+                # A single bit may be one that zlib does not use.
+                yield f"byte {position - begin} of the array at {begin - start}", self.flipped(content, position, 255)
+        for part in (0.01, 0.1, 0.5, 0.9, 0.999):
+            yield f"{part} of the file", content[: int(part * len(content))]
+
+    def test_the_xml_of_a_file(self):
+        self.check(self.at / "all.vtu", self.at / "all.vtu", self.changes_of_xml)
+
+    def test_the_data_of_a_file(self):
+        self.check(self.at / "all.vtu", self.at / "all.vtu", self.changes_of_data)
+
+    def test_the_file_that_names_the_others(self):
+        self.check(self.at / "all.pvtu", self.at / "all.pvtu", self.changes_of_xml)
+
+    def test_one_of_several_files(self):
+        piece = self.at / "all_pieces/all_0000.vtu"
+        self.check(self.at / "all.pvtu", piece, lambda content: list(self.changes_of_data(content))[::7])
+        moved = piece.rename(self.at / "moved.vtu")
+        self.assertEqual(self.imported(self.at / "all.pvtu")[0], 2)
+        moved.rename(piece)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ use contract::testing::{leaf_set, words_with_sides};
 use contract::word::Side;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
 /// A mesh at `mesh` in a temporary directory: 49 leaves in one part and 99 in the other; 4 inside leaves of level 1, 16
@@ -144,4 +144,26 @@ fn a_poly_mesh_is_a_directory_of_a_case_or_one_per_processor() {
         );
     }
     assert_eq!(names(place.path()), ["case", "mesh"]);
+}
+
+#[test]
+fn an_interrupted_export_leaves_no_file() {
+    let place = tempfile::tempdir().unwrap();
+    // Several pieces, so that the first is written before the last is encoded.
+    let words = words_with_sides(|o| o.level < 7, |_| Some(Side::Outside));
+    leaf_set(vec![words]).create(&place.path().join("mesh")).unwrap();
+    for file in ["all.vtu", "all.pvtu"] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.current_dir(place.path()).args(["export", "mesh", file, "--jobs", "2"]);
+        let child = command.stderr(Stdio::piped()).spawn().unwrap();
+        while names(place.path()).len() == 1 {
+            std::thread::yield_now();
+        }
+        let interrupt = ["-INT".to_owned(), child.id().to_string()];
+        assert!(Command::new("kill").args(interrupt).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{file}");
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted by the user\n");
+        assert_eq!(names(place.path()), ["mesh"], "{file}");
+    }
 }

@@ -4,9 +4,11 @@
 use crate::engine::failure::{End, Failure};
 use crate::engine::paths::Paths;
 use crate::engine::process::{self, Watch};
+use contract::digest::Digest;
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportError, Request};
 use contract::lattice::Root;
+use serde::Deserialize;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -76,13 +78,21 @@ fn read_vtk(
         .args(&request.sides);
     let watch = Watch::new("vtk", limit, place.path());
     let finished = process::run(&mut command, &watch).map_err(|failure| refusal(&failure))?;
-    let sides = request.sides.as_ref().map(|_| SIDES.to_owned());
-    let cells = import::npy::read(&table, &Request { sides, ..Request::default() })?;
-    let root: Option<Root> = fs::read(&finished.stdout)
+    let Stated { root, has_sides, digest } = fs::read(&finished.stdout)
         .ok()
         .and_then(|text| serde_json::from_slice(&text).ok())
         .ok_or_else(|| ImportError::content("was read, but the script reported no root"))?;
-    Ok(Cells { root, ..cells })
+    let sides = has_sides.then(|| SIDES.to_owned());
+    let cells = import::npy::read(&table, &Request { sides, ..Request::default() })?;
+    Ok(Cells { root, digest, ..cells })
+}
+
+/// What a file states besides its cells.
+#[derive(Deserialize)]
+struct Stated {
+    root: Option<Root>,
+    has_sides: bool,
+    digest: Option<Digest>,
 }
 
 fn refusal(failure: &Failure) -> Refusal {
@@ -128,16 +138,18 @@ mod tests {
 
     #[test]
     fn cells_sides_and_root_come_from_the_script() {
-        let script = writing(r#"{"origin": [1, 2, 3], "edge": 4.0}"#);
+        let stated = r#"{"root": {"origin": [1, 2, 3], "edge": 4.0}, "has_sides": true, "digest": "000000000000000000000000000000ff"}"#;
+        let script = writing(stated);
         let cells = read_with(
             &format!("[ \"$3 $5\" = 'mesh.vtu body' ] || exit 9\n{script}"),
             Some("body"),
         )
         .unwrap();
         assert_eq!((cells.corners[0], cells.edges[0]), ([1.0, 2.0, 3.0], 0.5));
-        assert_eq!(cells.root.unwrap().edge, 4.0);
+        assert_eq!((cells.root.unwrap().edge, cells.digest), (4.0, Some(Digest(255))));
         assert_eq!(cells.sides, Some(vec![contract::word::Side::Crossing]));
-        let cells = read_with(&writing("null"), None).unwrap();
+        let nothing = r#"{"root": null, "has_sides": false, "digest": null}"#;
+        let cells = read_with(&writing(nothing), None).unwrap();
         assert_eq!((cells.root, cells.sides), (None, None));
     }
 

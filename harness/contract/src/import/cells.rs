@@ -6,6 +6,7 @@
 //! number of levels.
 
 use super::{ImportError, TOLERANCE};
+use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word::{self, Leaf, Side};
@@ -23,6 +24,8 @@ pub struct Cells {
     pub sides: Option<Vec<Side>>,
     /// The root cube that the file states.
     pub root: Option<Root>,
+    /// The digest that the file states for the leaves of its root with their sides.
+    pub digest: Option<Digest>,
 }
 
 impl Cells {

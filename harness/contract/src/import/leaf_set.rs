@@ -3,6 +3,7 @@
 use super::cells::Cells;
 use super::{ImportError, root};
 use crate::case::Case;
+use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
 use crate::manifest::{Manifest, Sides, Tree};
@@ -14,7 +15,7 @@ use crate::word;
 /// exists, and the surface has the level of the finest cell. All of the root is then expected to be filled.
 ///
 /// # Errors
-/// If the cells are not leaves of an oct-tree with this root.
+/// If the cells are not leaves of an oct-tree with this root, or if these do not have the digest that the file states.
 pub fn leaf_set(
     cells: &Cells,
     given: Option<Root>,
@@ -30,6 +31,10 @@ pub fn leaf_set(
         )));
     }
     let words = cells.words(&root)?;
+    let is_of_digest = |stated: Digest| cells.root != Some(root) || stated == Digest::of(&words);
+    if !cells.digest.is_none_or(is_of_digest) {
+        return Err(ImportError::content("has other leaves than its digest states: it is damaged"));
+    }
     let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
     let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };
     let manifest = match case {
@@ -46,11 +51,27 @@ pub fn leaf_set(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::digest::Digest;
     use crate::import::testing::cells_of;
     use crate::testing::words_of;
 
     const ROOT: Root = Root { origin: [1.0; 3], edge: 0.3 };
+
+    #[test]
+    fn a_mesh_of_another_digest_than_stated_is_refused_unless_it_is_moved() {
+        let words = words_of(|o| o.level < 2);
+        let mut cells = cells_of(&words, &ROOT);
+        cells.root = Some(ROOT);
+        let import = |cells: &Cells, root| leaf_set(cells, root, None, "test".to_owned());
+        for (digest, moved, holds) in [
+            (Digest::of(&words), false, true),
+            (Digest::of(&words[1..]), false, false),
+            (Digest::of(&words[1..]), true, true),
+        ] {
+            cells.digest = Some(digest);
+            let root = moved.then_some(Root { edge: 0.6, ..ROOT });
+            assert_eq!(import(&cells, root).is_ok(), holds);
+        }
+    }
 
     #[test]
     fn an_imported_mesh_has_a_complete_manifest() {

@@ -37,6 +37,8 @@ impl VtuFile {
     /// If the file cannot be written.
     pub fn append(&mut self, piece: &Encoded) -> io::Result<()> {
         self.file.write_all(&piece.bytes)?;
+        // The user's interrupt waits for a flush to end, so none may have much to flush.
+        self.file.sync_data()?;
         self.places.push(Place::new(piece, self.data_bytes));
         self.data_bytes += piece.bytes.len() as u64;
         self.content.digest.merge(piece.digest);

@@ -19,17 +19,15 @@ pub struct Array {
     name: &'static str,
     /// VTK's name of its type.
     kind: &'static str,
-    /// Numbers per point or cell.
-    components: u8,
 }
 
 const fn array(section: &'static str, name: &'static str, kind: &'static str) -> Array {
-    Array { section, name, kind, components: 1 }
+    Array { section, name, kind }
 }
 
 /// The arrays of a piece, in the order in which they are written. The last one is missing if sides are unknown.
 const ARRAYS: [Array; 9] = [
-    Array { components: 3, ..array("Points", "Points", "Float64") },
+    array("Points", "Points", "Float64"),
     array("Cells", "connectivity", "Int64"),
     array("Cells", "offsets", "Int64"),
     array("Cells", "types", "UInt8"),
@@ -136,11 +134,12 @@ impl Content {
             xml += &format!("      <{prefix}{section}{scalars}>\n");
             for (index, array) in self.arrays().iter().enumerate() {
                 if array.section == section {
-                    let Array { name, kind, components, .. } = array;
+                    let Array { name, kind, .. } = array;
+                    let components =
+                        if section == "Points" { " NumberOfComponents=\"3\"" } else { "" };
+                    let attributes = attributes(index);
                     xml += &format!(
-                        "        <{prefix}DataArray type=\"{kind}\" Name=\"{name}\" \
-                         NumberOfComponents=\"{components}\"{}/>\n",
-                        attributes(index)
+                        "        <{prefix}DataArray type=\"{kind}\" Name=\"{name}\"{components}{attributes}/>\n"
                     );
                 }
             }

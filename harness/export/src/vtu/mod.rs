@@ -4,15 +4,17 @@
 //! not depend on the size of the mesh: about 100 MB per thread. A file depends on mesh and selection alone, and not on the
 //! number of threads.
 //!
-//! - `header`: the XML, and which arrays exist; `piece`: the arrays; `zlib`: their compression;
+//! - `header`: the XML, and which arrays exist; `piece`: the arrays; `points`: their numbers; `zlib`: their compression;
 //! - `file`: one `.vtu` file; `parallel`: the files of a `.pvtu`.
 
 mod file;
 mod header;
 mod parallel;
 mod piece;
+mod points;
 mod zlib;
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use contract::digest::Digest;
@@ -27,12 +29,12 @@ use crate::pieces::{Piece, pieces};
 use crate::selection::Selection;
 use file::VtuFile;
 use header::Content;
-use piece::Encoded;
+use piece::{Encoded, Encoder};
 
 pub use parallel::write_files;
 
 /// Maximum number of leaves in a piece.
-pub const PIECE: u64 = 1 << 18;
+pub const PIECE: u64 = 1 << 19;
 
 /// Writes one `.vtu` file.
 ///
@@ -57,6 +59,10 @@ pub fn write_file(
     Ok(Summary { leaves: leaves(&pieces), files: 1, bytes, notes: Vec::new() })
 }
 
+thread_local! {
+    static ENCODER: RefCell<Encoder> = RefCell::default();
+}
+
 /// Encodes pieces on threads and hands them to `take` in order.
 fn encode(
     mesh: &Mesh,
@@ -68,14 +74,16 @@ fn encode(
     let Content { root, with_sides, .. } = content(mesh);
     let make = |index: usize| {
         options.check()?;
-        let Piece { keys, leaves: count } = &pieces[index];
-        let mut leaves = Vec::with_capacity(*count as usize);
-        mesh.visit(keys.clone(), selection, &mut |leaf| {
-            leaves.push(leaf);
-            Ok::<(), ExportError>(())
-        })?;
-        options.check()?;
-        Ok(piece::encode(&leaves, &root, with_sides))
+        let keys = &pieces[index].keys;
+        ENCODER.with_borrow_mut(|encoder| {
+            encoder.leaves.clear();
+            mesh.visit(keys.clone(), selection, &mut |leaf| {
+                encoder.leaves.push(leaf);
+                Ok::<(), ExportError>(())
+            })?;
+            options.check()?;
+            Ok(encoder.encode(&root, with_sides))
+        })
     };
     let total = leaves(pieces);
     let mut done = 0;

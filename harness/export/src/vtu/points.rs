@@ -1,0 +1,96 @@
+//! The points of a piece: the corners of its leaves without duplicates.
+
+use rustc_hash::FxHashMap;
+
+use crate::mesh::Leaf;
+
+/// Corners of a hexahedron in VTK's order, in cell edges.
+const CORNERS: [[usize; 3]; 8] =
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+/// Greatest depth of the blocks that are numbered as a whole.
+const DEPTH_MAX: u32 = 2;
+
+/// Points and cells of a piece.
+#[derive(Debug, Default)]
+pub struct Points {
+    /// The points in order of their numbers, packed: 20 bits per axis, because coordinates range from 0 to 2^19 inclusive.
+    pub packed: Vec<u64>,
+    /// Eight numbers for each leaf, in VTK's order.
+    pub connectivity: Vec<u32>,
+    numbers: FxHashMap<u64, u32>,
+}
+
+impl Points {
+    /// Replaces the content by that of these leaves, which are in Morton order.
+    pub fn set(&mut self, mut leaves: &[Leaf]) {
+        self.packed.clear();
+        self.connectivity.clear();
+        self.numbers.clear();
+        while !leaves.is_empty() {
+            let depth = (1..=DEPTH_MAX).take_while(|&depth| is_block(leaves, depth)).last();
+            let depth = depth.unwrap_or(0);
+            let (block, others) = leaves.split_at(1 << (3 * depth));
+            self.add(block, depth);
+            leaves = others;
+        }
+    }
+
+    /// Adds all leaves of an octant, `depth` levels below it. Most points are corners of several leaves of a block, and
+    /// are then searched once.
+    fn add(&mut self, block: &[Leaf], depth: u32) {
+        let first = &block[0].octant;
+        let along = (1 << depth) + 1;
+        let mut numbers = [0; ((1 << DEPTH_MAX) + 1usize).pow(3)];
+        for (index, number) in numbers[..along * along * along].iter_mut().enumerate() {
+            let steps = [index % along, index / along % along, index / along / along];
+            let at = [0, 1, 2].map(|a| first.corner[a] + first.edge() * steps[a] as u32);
+            let is_inner = steps.iter().all(|&step| 0 < step && step < along - 1);
+            *number = if is_inner { self.push(packed(at)) } else { self.number(packed(at)) };
+        }
+        let shift = first.edge().trailing_zeros();
+        for Leaf { octant, .. } in block {
+            let [x, y, z] =
+                [0, 1, 2].map(|a| (octant.corner[a] - first.corner[a]) as usize >> shift);
+            let corners =
+                CORNERS.map(|c| numbers[((z + c[2]) * along + y + c[1]) * along + x + c[0]]);
+            self.connectivity.extend(corners);
+        }
+    }
+
+    /// The number of a point, which is a new one if the point is new.
+    fn number(&mut self, packed: u64) -> u32 {
+        let Self { packed: points, numbers, .. } = self;
+        *numbers.entry(packed).or_insert_with(|| {
+            points.push(packed);
+            points.len() as u32 - 1
+        })
+    }
+
+    /// The number of a point that is not searched again.
+    fn push(&mut self, packed: u64) -> u32 {
+        self.packed.push(packed);
+        self.packed.len() as u32 - 1
+    }
+}
+
+/// Whether the first leaves are all leaves of one octant, `depth` levels below it.
+fn is_block(leaves: &[Leaf], depth: u32) -> bool {
+    let (first, count) = (&leaves[0].octant, 1 << (3 * depth));
+    let edge = first.edge() << depth;
+    let is_equal = |leaf: &Leaf| leaf.octant.level == first.level;
+    u32::from(first.level) >= depth
+        && first.corner.iter().all(|c| c & (edge - 1) == 0)
+        && leaves.len() >= count
+        && leaves[count - 1].octant.corner == first.corner.map(|c| c + edge - first.edge())
+        && leaves[..count].iter().all(is_equal)
+}
+
+/// A corner as one number.
+pub fn packed(corner: [u32; 3]) -> u64 {
+    corner.iter().rev().fold(0, |p, &c| p << 20 | u64::from(c))
+}
+
+/// The inverse of [`packed`].
+pub fn unpacked(packed: u64) -> [u32; 3] {
+    [0, 20, 40].map(|shift| (packed >> shift & 0xf_ffff) as u32)
+}
