@@ -59,7 +59,7 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
         println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
     }
     if !cfg!(feature = "figures") {
-        println!("PNG and PDF are left out: build the harness with --features figures");
+        println!("PNG and PDF are left out: the harness was built without its feature figures");
     }
     println!("{} figures; the page is {}", written.figures, written.page.display());
     Ok(())

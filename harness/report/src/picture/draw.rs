@@ -188,8 +188,7 @@ fn below(page: &Page, sheet: &mut dyn Sheet) {
     sheet.segments(&bar, INK, 4.0);
     let label = short(length);
     sheet.text(&label, (right + 16.0, y), Anchor::Start);
-    let at = root.to_user([slice.at; 3])[slice.axis];
-    let plane = format!("{} = {}", ["x", "y", "z"][slice.axis], short(at));
+    let plane = super::plane_name(root, *slice);
     sheet.text(&plane, (right + 16.0 + width(&label) + 60.0, y), Anchor::Start);
     let merged = if page.picture.is_merged() { ", the smallest merged" } else { "" };
     let cells = format!("{} cells in the plane{merged}", squares.leaves);

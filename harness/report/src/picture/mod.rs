@@ -193,10 +193,12 @@ impl Picture {
 
     /// One sentence on what the picture shows.
     pub fn title(&self) -> String {
-        let Self { slice, squares, colour, .. } = self;
-        let at = self.root.to_user([slice.at; 3])[slice.axis];
-        let axis = ["x", "y", "z"][slice.axis];
-        format!("Slice {axis} = {} of a mesh, {} cells by {colour}", short(at), squares.leaves)
+        let Self { root, slice, squares, colour, .. } = self;
+        format!(
+            "Slice {} of a mesh, {} cells by {colour}",
+            plane_name(root, *slice),
+            squares.leaves
+        )
     }
 
     /// Whether a square of the picture has more than one leaf that the leaf's own square could show.
@@ -214,6 +216,15 @@ impl Picture {
         let low = [0, 1].map(|i| at(square.corner[i], axes[i]));
         [low, [0, 1].map(|i| at(square.corner[i] + square.edge(), axes[i]))]
     }
+}
+
+/// A plane as in `z = 0.5`, to the digits that the lattice resolves.
+fn plane_name(root: &Root, slice: Slice) -> String {
+    let at = root.to_user([slice.at; 3])[slice.axis];
+    let resolved = 10f64.powf((root.edge / UNITS_PER_EDGE as f64).log10().ceil());
+    // Adding zero turns -0 into 0.
+    let at = (at / resolved).round() * resolved + 0.0;
+    format!("{} = {}", ["x", "y", "z"][slice.axis], short(at))
 }
 
 /// The segments in which the plane cuts the facets. The plane is moved into the layer of leaves that it cuts, so that

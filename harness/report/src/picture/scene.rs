@@ -1,10 +1,10 @@
 //! A view in three dimensions: slices of the mesh and the surface of the body, as data that `viewer.html` and
 //! `harness/oracles/view.py` draw.
 
-use super::colour::{Entry, short};
+use super::colour::Entry;
 use super::squares::{Detail, Squares};
 use super::surface::{Surface, ranks_at};
-use super::{Colour, Request, halfway, middle, zoomed};
+use super::{Colour, Request, halfway, middle, plane_name, zoomed};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use contract::lattice::{Root, UNITS_PER_EDGE};
@@ -115,7 +115,7 @@ impl Scene {
         let cuts = slices.iter().filter_map(|(slice, squares)| {
             let slice = (*slice)?;
             let at = root.to_user([slice.at; 3])[slice.axis];
-            let name = format!("{} = {}", ["x", "y", "z"][slice.axis], short(at));
+            let name = plane_name(&root, slice);
             let level_outlined = squares.level_outlined;
             let squares = palette.squares(&key, squares);
             Some(Cut { name, axis: slice.axis, at, level_outlined, squares })

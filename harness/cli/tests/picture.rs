@@ -1,0 +1,133 @@
+//! `harness picture` with a scripted mesher, whose mesh is always the base tree of a cube.
+
+use contract::case::Case;
+use contract::leafset::LeafSet;
+use contract::manifest::{Manifest, Tree};
+use contract::testing::base_tree;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Copies the mesh, and keeps its arguments.
+const MESHER: &str = r#"#!/bin/sh
+here="$(dirname "$0")"
+echo "$@" >> "$here/calls"
+grep -e layer_cells_min -e keep_crossing "$1" >> "$here/calls"
+while [ $# -gt 0 ]; do
+    case "$1" in
+    --out) cp -r "$here/mesh" "$2" ;;
+    esac
+    shift
+done
+"#;
+
+const CASE: &str = "spacing_min = 0.25\n[generator]\nshape = \"cube\"\nfacets = 48\n\
+                    [root]\norigin = [-2.0, -2.0, -2.0]\nedge = 4.0\n";
+
+struct Fixture(TempDir);
+
+impl Fixture {
+    fn new() -> Self {
+        let fixture = Self(tempfile::tempdir().unwrap());
+        fs::write(fixture.path("case.toml"), CASE).unwrap();
+        let case = Case::read(&fixture.path("case.toml")).unwrap();
+        let words = base_tree(&case.facets_lattice, case.level_surface);
+        let (half, rest) = words.split_at(words.len() / 2);
+        let empty = Manifest::without_leaves(Tree::Base, case.root, "test".to_owned());
+        let set = LeafSet::new(empty, Vec::new()).with_parts(vec![half.to_vec(), rest.to_vec()]);
+        fs::create_dir(fixture.path("mesh")).unwrap();
+        set.write(&fixture.path("mesh")).unwrap();
+        let mesher = fixture.path("mesher");
+        fs::write(&mesher, MESHER).unwrap();
+        fs::set_permissions(&mesher, fs::Permissions::from_mode(0o755)).unwrap();
+        fixture
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Exit code, and standard output and error, of `harness picture` without Python.
+    fn picture(&self, arguments: &str) -> (i32, String) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.arg("picture").args(arguments.split(' ')).args(["--mesher", "mesher"]);
+        let command = command.current_dir(self.0.path()).env("HARNESS_PYTHON", "/nowhere/python");
+        let output = command.output().unwrap();
+        let text = [output.stdout, output.stderr].concat();
+        (output.status.code().unwrap(), String::from_utf8(text).unwrap())
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+}
+
+#[test]
+fn a_case_is_meshed_on_ranks_and_drawn_with_its_geometry() {
+    let fixture = Fixture::new();
+    let (code, text) = fixture.picture("case.toml --out a.svg --colour rank --ranks 3 --ungraded");
+    assert_eq!(code, 0, "{text}");
+    let calls = fixture.read("calls");
+    assert!(calls.contains("sim:3") && calls.contains("--ungraded"), "{calls}");
+    let svg = fixture.read("a.svg");
+    assert!(svg.contains(">rank<") && svg.contains(">geometry<"), "{svg}");
+    assert!(fixture.read("a.csv").contains("# harness picture case.toml --out a.svg"));
+}
+
+#[test]
+fn a_mesh_on_disk_is_drawn_without_geometry_unless_its_case_is_given() {
+    let fixture = Fixture::new();
+    let (code, text) = fixture.picture("mesh --out a.tex --slice z=0.1 --side crossing");
+    assert!(code == 0 && text.contains("name its case with --case"), "{text}");
+    assert!(!fixture.read("a.tex").contains("geometry"));
+    let (code, text) = fixture.picture("mesh --out a.html --case case.toml --zoom 2");
+    assert!(code == 0 && !text.contains("--case"), "{text}");
+    assert!(fixture.read("a.html").contains("\"triangles\""));
+}
+
+#[test]
+fn impossible_requests_are_one_sentence_and_leave_no_file() {
+    let fixture = Fixture::new();
+    let requests = [
+        ("mesh --out a.vtu", 2, "must end in .svg"),
+        ("mesh --out no/a.svg", 2, "no is not a directory"),
+        ("mesh --out a.svg --view", 2, "must be .html or .png"),
+        ("mesh --out a.svg --ranks 2", 2, "are for a case"),
+        ("mesh --out a.svg --slice z=9", 2, "--slice z=9"),
+        ("mesh --out a.svg --slice z=0 --level-max 0", 2, "no leaf of the selection"),
+        ("mesh --out a.svg --zoom 0", 2, "from 1 to 1e6"),
+        ("nowhere.toml --out a.svg", 2, "nowhere.toml"),
+        ("case.toml --out a.svg --case case.toml", 2, "is not a leaf-set directory"),
+        ("mesh --out a.png --view", 3, "/nowhere/python"),
+    ];
+    for (arguments, expected, why) in requests {
+        let (code, text) = fixture.picture(arguments);
+        assert!(code == expected && text.contains(why), "{arguments}: {code} {text}");
+        let created = |name: &str| fixture.path(name).exists();
+        assert!(!["a.svg", "a.csv", "a.png", "a.vtu"].into_iter().any(created), "{arguments}");
+    }
+}
+
+#[test]
+fn the_set_has_every_picture_its_data_and_a_page_without_network() {
+    let fixture = Fixture::new();
+    let (code, text) = fixture.picture("case.toml --paper --out set");
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("16 pictures") && text.contains("/nowhere/python"), "{text}");
+    let calls = fixture.read("calls");
+    for wanted in ["layer_cells_min = 10", "keep_crossing = false", "sim:16", "--ungraded"] {
+        assert!(calls.contains(wanted), "{wanted} is missing in {calls}");
+    }
+    let count = |extension: &str| {
+        let files = fs::read_dir(fixture.path("set")).unwrap().flatten().map(|f| f.path());
+        files.filter(|path| path.extension().is_some_and(|e| e == extension)).count()
+    };
+    assert_eq!(["svg", "tex", "csv", "html"].map(count), [13, 13, 13, 3 + 1]);
+    let page = fixture.read("set/index.html");
+    assert_eq!(page.matches("<figure").count(), 16);
+    assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"));
+    let (code, text) = fixture.picture("case.toml --paper --out set --zoom 2");
+    assert!(code == 2 && text.contains("cannot be used with"), "{text}");
+}
