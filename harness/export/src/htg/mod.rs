@@ -75,9 +75,9 @@ fn families(
     take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
 ) -> Result<u64, ExportError> {
     let with_sides = mesh.manifest.sides == Sides::Known;
-    let (mut open, mut leaves) = (Open::default(), 0);
+    let (mut open, mut leaves) = (Open::default(), 0u64);
     mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
-        if leaves % REPORT == 0 {
+        if leaves.is_multiple_of(REPORT) {
             options.check()?;
             options.watch.progress(leaves.min(total), total.max(1));
         }
