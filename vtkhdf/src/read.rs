@@ -44,11 +44,12 @@ impl File {
         let file = fs::File::open(path)?;
         let bytes = file.metadata()?.len();
         let this = Self { file, bytes, root: 0 };
-        let block = this.bytes_at(Extent { address: 0, bytes: SUPERBLOCK_BYTES as u64 })?;
-        let mut input = Input(&block);
-        if input.take(8)? != SIGNATURE {
-            return damaged("it does not begin as an HDF5 file");
+        let head = this.bytes_at(Extent { address: 0, bytes: bytes.min(8) })?;
+        if head != SIGNATURE {
+            return unknown("another signature than HDF5 files");
         }
+        let block = this.bytes_at(Extent { address: 0, bytes: SUPERBLOCK_BYTES as u64 })?;
+        let mut input = Input(&block[head.len()..]);
         if input.take(4)? != [3, 8, 8, 0] {
             return unknown("a superblock that is not of version 3");
         }

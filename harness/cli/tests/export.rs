@@ -84,6 +84,11 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
             &["--side", "outside", "--level-max", "2"],
             "no leaf satisfies all conditions",
         ),
+        (
+            "part.vtkhdf",
+            &["--side", "outside", "--level-max", "2"],
+            "no leaf satisfies all conditions",
+        ),
         ("part.pvtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies all conditions"),
         ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
         ("part.vtu", &["--rank", "2"], "the mesh has 2 ranks, counted from 0"),
@@ -166,4 +171,43 @@ fn an_interrupted_export_leaves_no_file() {
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted by the user\n");
         assert_eq!(names(place.path()), ["mesh"], "{file}");
     }
+}
+
+/// The tree of a mesh is a mesh itself: it is exported, audited and imported without VTK, and damage is one sentence.
+#[test]
+fn a_tree_is_read_back_without_python_and_damage_is_found() {
+    let place = mesh();
+    let harness = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.current_dir(place.path()).args(arguments).env("HARNESS_PYTHON", "/nowhere/python");
+        let output = command.output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let (code, output, error) = export(&place, "mesh.vtkhdf", &[]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    assert!(output.starts_with("mesh.vtkhdf: 148 cells, "), "{output}");
+    let import = ["import", "mesh.vtkhdf", "--sides", "side", "--out", "again"];
+    let (code, output, error) = harness(&import);
+    assert_eq!((code, error.as_str()), (0, ""));
+    assert!(output.contains("148 cells of levels 1 to 3, sides known; they fill 100"), "{output}");
+    assert_eq!(harness(&["diff", "mesh", "again"]).0, 0);
+    let (code, output, error) = harness(&["audit", "mesh.vtkhdf", "--sides", "side"]);
+    assert_eq!(error, "");
+    assert!(code < 2 && output.contains("manifest   holds, 148 examined"), "{output}");
+    assert_eq!(harness(&import).0, 2, "a directory is not overwritten");
+
+    let file = place.path().join("mesh.vtkhdf");
+    let whole = fs::read(&file).unwrap();
+    let mut flipped = whole.clone();
+    flipped[60] ^= 4;
+    for damaged in [&whole[..whole.len() - 1], &whole[..40], &flipped] {
+        fs::write(&file, damaged).unwrap();
+        for command in [&["audit", "mesh.vtkhdf"][..], &["import", "mesh.vtkhdf", "--out", "new"]] {
+            let (code, output, error) = harness(command);
+            assert_eq!((code, output.as_str(), error.matches('\n').count()), (2, "", 1), "{error}");
+            assert!(error.contains("mesh.vtkhdf: is damaged: "), "{error}");
+        }
+    }
+    assert_eq!(names(place.path()), ["again", "mesh", "mesh.vtkhdf"]);
 }

@@ -222,7 +222,7 @@ fn level_counts(grid: &Group) -> Result<Vec<u64>> {
     };
     let counts: Vec<u64> = counts.iter().map(|&n| u64::try_from(n).unwrap_or(0)).collect();
     let is_tree = counts.first() == Some(&1)
-        && counts.windows(2).all(|w| w[1] > 0 && w[1] % 8 == 0 && w[1] / 8 <= w[0]);
+        && counts.windows(2).all(|w| w[1] > 0 && w[1].is_multiple_of(8) && w[1] / 8 <= w[0]);
     let levels = usize::from(LEVEL_MAX) + 1;
     if is_tree && counts.len() <= levels {
         return Ok(counts);

@@ -37,7 +37,7 @@ pub struct LeafDir {
 #[derive(Debug)]
 pub enum Leaves {
     /// Its parts.
-    Words(LeafDir),
+    Words(Box<LeafDir>),
     /// The tree, if there are no parts.
     Tree(Box<TreeFile>, Box<Manifest>),
 }
@@ -101,7 +101,8 @@ pub enum ReadError {
 /// If the directory is not a leaf set.
 pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
     match open_any(dir)? {
-        Leaves::Words(LeafDir { manifest, parts }) => {
+        Leaves::Words(words) => {
+            let LeafDir { manifest, parts } = *words;
             let read = |part: &PartFile| part.read_all().map_err(|e| ReadError::part(part, e));
             let parts = parts.iter().map(read).collect::<Result<Vec<_>, _>>()?;
             Ok(LeafSet::new(manifest, parts))
@@ -159,7 +160,7 @@ impl ReadError {
 /// If the directory is not a leaf set, or has the tree alone.
 pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
     match open_any(dir)? {
-        Leaves::Words(words) => Ok(words),
+        Leaves::Words(words) => Ok(*words),
         Leaves::Tree(..) => Err(ReadError::NoWords(dir.to_owned())),
     }
 }
@@ -199,7 +200,7 @@ pub fn open_any(dir: &Path) -> Result<Leaves, ReadError> {
         parts.push(PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?);
     }
     refuse_extra_parts(dir, &manifest)?;
-    Ok(Leaves::Words(LeafDir { manifest, parts }))
+    Ok(Leaves::Words(Box::new(LeafDir { manifest, parts })))
 }
 
 /// Reads only the manifest.

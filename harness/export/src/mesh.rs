@@ -59,7 +59,8 @@ impl Mesh {
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, ExportError> {
         Ok(match leafset::open_any(path)? {
-            Leaves::Words(LeafDir { manifest, parts }) => {
+            Leaves::Words(words) => {
+                let LeafDir { manifest, parts } = *words;
                 Self { manifest, parts: parts.into_iter().map(Part::Words).collect() }
             }
             Leaves::Tree(tree, manifest) => {

@@ -40,13 +40,16 @@ pub fn pieces(
         Ok(Block { keys, leaves })
     };
     in_order(blocks.len(), options.jobs, count, add)?;
-    match pieces.is_empty() {
-        false => Ok(pieces),
-        true if mesh.is_empty() => Err(ExportError::Request("the mesh has no leaves".to_owned())),
-        true => Err(ExportError::Request(
-            "no leaf satisfies all conditions of the selection: remove one of them".to_owned(),
-        )),
-    }
+    if pieces.is_empty() { Err(nothing_selected(mesh)) } else { Ok(pieces) }
+}
+
+/// The error of an export without leaves.
+pub(crate) fn nothing_selected(mesh: &Mesh) -> ExportError {
+    let why = match mesh.is_empty() {
+        true => "the mesh has no leaves",
+        false => "no leaf satisfies all conditions of the selection: remove one of them",
+    };
+    ExportError::Request(why.to_owned())
 }
 
 /// Number of selected leaves with these Morton codes.

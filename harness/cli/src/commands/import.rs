@@ -101,7 +101,7 @@ impl Source {
             let sides = self.sides.as_deref();
             let tree = ImportedTree::open(mesh, sides, root, case, program.clone());
             if let Some(tree) = tree.map_err(input)? {
-                return Ok(Imported::Tree(tree));
+                return Ok(Imported::Tree(Box::new(tree)));
             }
         }
         let request = Request { sides: self.sides.clone(), root, position: self.position };
@@ -128,7 +128,7 @@ pub enum Imported {
     /// Its leaves are in memory.
     Words(Box<LeafSet>),
     /// Its leaves are in a tree of any size.
-    Tree(ImportedTree),
+    Tree(Box<ImportedTree>),
 }
 
 impl Imported {

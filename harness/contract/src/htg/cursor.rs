@@ -50,7 +50,7 @@ impl<'a> Cursor<'a> {
         for (reader, next) in self.levels.iter_mut().zip(next).skip(from) {
             reader.seek(next);
         }
-        if key % word::span(from as u8) != 0 {
+        if !key.is_multiple_of(word::span(from as u8)) {
             return Ok(());
         }
         let (levels, words) = (std::mem::take(&mut self.levels), std::mem::take(&mut self.words));
@@ -73,7 +73,7 @@ impl<'a> Cursor<'a> {
             let mut node = reader.begin() + number;
             if is_on_path && !reader.is_split(node)? {
                 descent.leaf = level;
-                let starts_before = key % word::span(level as u8) != 0;
+                let starts_before = !key.is_multiple_of(word::span(level as u8));
                 node += u64::from(starts_before);
             }
             let [split, masked] = reader.bits_before(node, self.index)?;
@@ -84,7 +84,7 @@ impl<'a> Cursor<'a> {
             descent.next.push(node);
             number = 8 * split;
             if level < descent.leaf && level < usize::from(LEVEL_MAX) {
-                number += key / word::span(level as u8 + 1) & 7;
+                number += (key / word::span(level as u8 + 1)) & 7;
             }
         }
         Ok(descent)

@@ -38,7 +38,7 @@ impl Index {
 fn counts(file: &File, array: Option<&Chunked>) -> Result<Vec<u64>> {
     let Some(array) = array else { return Ok(Vec::new()) };
     let (mut counts, mut sum, mut chunk) = (vec![0], 0, Vec::new());
-    if array.chunks.len() > 1 && u64::from(array.chunk_len) % STEP != 0 {
+    if array.chunks.len() > 1 && !u64::from(array.chunk_len).is_multiple_of(STEP) {
         return layout(format!("its chunks have {} bytes", array.chunk_len));
     }
     for index in 0..array.chunks.len() {

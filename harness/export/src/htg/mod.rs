@@ -19,6 +19,7 @@ use vtkhdf::tree::{Shape, TreeWriter};
 use crate::error::ExportError;
 use crate::mesh::{Leaf, Mesh};
 use crate::options::{Options, Summary};
+use crate::pieces::nothing_selected;
 use crate::selection::Selection;
 use siblings::{Family, Open};
 use windows::Windows;
@@ -44,7 +45,7 @@ pub fn write(
         Ok(())
     })?;
     if leaves == 0 {
-        return Err(ExportError::Request("no leaf is selected".to_owned()));
+        return Err(nothing_selected(mesh));
     }
     let root = mesh.manifest.root;
     let shape = Shape { origin: root.origin, edge: root.edge, nodes };
@@ -74,9 +75,9 @@ fn families(
     take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
 ) -> Result<u64, ExportError> {
     let with_sides = mesh.manifest.sides == Sides::Known;
-    let (mut open, mut leaves) = (Open::default(), 0);
+    let (mut open, mut leaves) = (Open::default(), 0u64);
     mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
-        if leaves % REPORT == 0 {
+        if leaves.is_multiple_of(REPORT) {
             options.check()?;
             options.watch.progress(leaves.min(total), total.max(1));
         }

@@ -83,5 +83,5 @@ impl Open {
 
 /// Which of its siblings contains a level-19 cell, among octants of this level; 0 for the root.
 fn digit(key: u64, level: u8) -> usize {
-    if level == 0 { 0 } else { (key / word::span(level) & 7) as usize }
+    if level == 0 { 0 } else { ((key / word::span(level)) & 7) as usize }
 }
