@@ -48,9 +48,14 @@ pub fn widest(
         field.adopt(&route, least);
         let refined = refine::widest(&mut field.cubes, &clearance, ends, wanted, stop)?;
         let Some(refined) = refined else { continue };
+        // Further attempts at places that are all equally wide would prove little.
+        let is_last = best.is_some() && !refined.is_proven;
         let path = Path::through(&field.cubes, &refined.cubes, &clearance, (&start, goal.as_ref()));
         if best.as_ref().is_none_or(|best| path.throat().clearance > best.throat().clearance) {
             best = Some(path);
+        }
+        if is_last {
+            break;
         }
     }
     let path = best.expect("free leaves join the ends");

@@ -20,20 +20,20 @@ use super::search::{self, Goal, Graph, Interrupted};
 /// of at least 1 - 1.5 t times the least radius.
 const TOLERANCES: [f64; 3] = [0.3, 0.06, 0.015];
 
-/// Tolerances near its narrowest place.
-const TOLERANCES_NEAR: [f64; 2] = [0.005, 0.0015];
+/// Tolerances near its narrowest place, each in smaller surroundings than the one before.
+const TOLERANCES_NEAR: [f64; 3] = [0.02, 0.006, 0.002];
 
 /// No path is wider than the path returned by more than this factor, apart from what is reported.
 pub const PROVEN: f64 = 1.0 / (1.0 - 2.0 * TOLERANCES[2]);
 
-/// Places of a path at which it is widened.
+/// Places of a path at which it is widened, at most.
 const PLACES_MAX: usize = 100;
 
 /// Cubes are split if they are on a path that has at most this times the least length in narrow cubes.
-const SLACK: f64 = 1.5;
+const SLACK: f64 = 1.2;
 
-/// Cubes that are made at most; then the width is known less exactly.
-const CUBES_MAX: usize = 1 << 20;
+/// After so many more cubes, the width of the whole path is not proven further.
+const CUBES_MAX: usize = 1 << 14;
 
 /// The cubes of a path, each of which shares part of a face with the next.
 #[derive(Clone, Debug)]
@@ -42,6 +42,8 @@ pub struct Refined {
     pub cubes: Vec<u32>,
     /// No ball with a greater radius passes through the adopted leaves.
     pub radius: f64,
+    /// Whether no path is wider by more than [`PROVEN`].
+    pub is_proven: bool,
 }
 
 /// Between which points a path leads; without an end, to the far field.
@@ -59,28 +61,39 @@ pub fn widest(
     wanted: f64,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Refined>, Interrupted> {
-    let everywhere = Place { centre: ends.0, reach: f64::INFINITY, clearance_around: 0.0 };
-    let Some(mut refined) = to_tolerances((cubes, clearance), ends, &TOLERANCES, everywhere, wanted, stop)?
-    else {
-        return Ok(None);
-    };
-    let mut known: Vec<Point> = Vec::new();
+    /// Tolerances before those near a place.
+    const GAPS: [f64; 3] = [TOLERANCES[1], TOLERANCES_NEAR[0], TOLERANCES_NEAR[1]];
+    /// Away from the narrowest place of a hole, the clearance grows with the square of the distance; this is the distance in
+    /// clearances at which it exceeds a gap of 1.
+    const REACH: f64 = 2.0;
+    let everywhere = Place { centre: ends.0, reach: f64::INFINITY, ends: None };
+    let found = to_tolerances((cubes, clearance), ends, &TOLERANCES, everywhere, wanted, stop)?;
+    let Some(mut refined) = found else { return Ok(None) };
+    // Centres of places and the number of tolerances reached there.
+    let mut known: Vec<(Point, usize)> = Vec::new();
     for _ in 0..PLACES_MAX {
         let path = &refined.cubes;
-        let throat = path.iter().copied().min_by(|&a, &b| cubes.clearance(a).total_cmp(&cubes.clearance(b)));
-        let throat = throat.expect("a path has cubes");
-        let (centre, least) = (cubes.position(throat), cubes.clearance(throat));
-        // Away from the throat of a hole, the clearance grows with the square of the distance.
-        let reach = 3.0 * TOLERANCES[2].sqrt() * least;
-        if known.iter().any(|&at| length(at, centre) < reach / 2.0) || cubes.count() > CUBES_MAX {
-            break;
-        }
-        known.push(centre);
-        let place = Place { centre, reach, clearance_around: least };
-        match to_tolerances((cubes, clearance), ends, &TOLERANCES_NEAR, place, least, stop)? {
-            Some(path) => refined.cubes = path.cubes,
-            None => break,
-        }
+        let order = |&a: &usize, &b: &usize| {
+            cubes.clearance(path[a]).total_cmp(&cubes.clearance(path[b]))
+        };
+        let throat = (0..path.len()).min_by(order).expect("a path has cubes");
+        let (centre, least) = (cubes.position(path[throat]), cubes.clearance(path[throat]));
+        let reach = |stage: usize| REACH * GAPS[stage].sqrt() * least;
+        let is_known = |&&(at, stage): &&(Point, usize)| length(at, centre) < reach(stage - 1) / 2.0;
+        let stage = known.iter().filter(is_known).map(|known| known.1).max().unwrap_or(0);
+        let Some(&tolerance) = TOLERANCES_NEAR.get(stage) else { break };
+        known.push((centre, stage + 1));
+        let mut place = Place { centre, reach: reach(stage), ends: None };
+        let is_outside = |&i: &usize| !place.has(cubes, path[i]);
+        let first = (0..throat).rev().find(is_outside);
+        let last = (throat + 1..path.len()).find(is_outside);
+        let at = |i: usize| cubes.position(path[i]);
+        let ends_near = (first.map_or(ends.0, at), last.map(at).or(ends.1));
+        place.ends = Some([first, last].map(|i| i.map(|i| path[i])));
+        let found = to_tolerances((cubes, clearance), ends_near, &[tolerance], place, least, stop)?;
+        let Some(near) = found else { break };
+        let (first, last) = (first.unwrap_or(0), last.unwrap_or(path.len() - 1));
+        refined.cubes.splice(first..=last, near.cubes);
     }
     Ok(Some(refined))
 }
@@ -94,6 +107,7 @@ fn to_tolerances(
     wanted: f64,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Refined>, Interrupted> {
+    let cubes_max = cubes.count() + CUBES_MAX;
     let mut tolerances = tolerances.iter().copied().peekable();
     let mut tolerance = tolerances.next().expect("at least one tolerance");
     loop {
@@ -104,20 +118,20 @@ fn to_tolerances(
         if radius < wanted {
             return Ok(None);
         }
-        let [radius_least, clearance_least] = [1.0, 1.5].map(|t| radius * (1.0 - t * tolerance));
+        let [radius_least, clearance_least] = [0.25, 2.0].map(|t| radius * (1.0 - t * tolerance));
         let narrow = Narrow { radius: radius_least, clearance: clearance_least, place };
         while let Some(mut split) = narrow.between(cubes, ends, stop)? {
-            let is_full = cubes.count() > CUBES_MAX;
+            let is_full = place.ends.is_none() && cubes.count() > cubes_max;
             if split.is_empty() && !is_full && tolerances.peek().is_some() {
                 tolerance = tolerances.next().expect("there is another");
                 break;
             }
             if split.is_empty() || is_full {
                 let path = narrow.path(cubes, ends, stop)?;
-                split = blocked(cubes, clearance, &path, radius * (1.0 - 2.0 * tolerance));
+                split = blocked(cubes, clearance, &path, radius * (1.0 - 2.2 * tolerance));
                 split.retain(|&cube| place.has(cubes, cube));
                 if split.is_empty() || is_full {
-                    return Ok(Some(Refined { cubes: path, radius }));
+                    return Ok(Some(Refined { cubes: path, radius, is_proven: !is_full }));
                 }
             }
             split.into_iter().for_each(|cube| cubes.split(cube));
@@ -130,8 +144,8 @@ fn to_tolerances(
 struct Place {
     centre: Point,
     reach: f64,
-    /// The path is elsewhere through cubes of at least this clearance.
-    clearance_around: f64,
+    /// The cubes outside of it, before and after, that a path through it joins; without limit, the path may pass all cubes.
+    ends: Option<[Option<u32>; 2]>,
 }
 
 impl Place {
@@ -140,11 +154,16 @@ impl Place {
         length(cubes.position(cube), self.centre) - half_diagonal <= self.reach
     }
 
-    /// The radius of a cube at this place; of others infinity, or -1 if the path may not pass.
+    /// Whether a cube is one of the ends.
+    fn ends_with(&self, cube: u32) -> bool {
+        self.ends.is_some_and(|ends| ends.contains(&Some(cube)))
+    }
+
+    /// The radius of a cube at this place; infinite at its ends, and -1 elsewhere.
     fn radius(&self, cubes: &Cubes, cube: u32) -> f64 {
         match self.has(cubes, cube) {
             true => cubes.radius(cube),
-            false if cubes.clearance(cube) >= self.clearance_around => f64::INFINITY,
+            false if self.ends_with(cube) => f64::INFINITY,
             false => -1.0,
         }
     }
@@ -230,11 +249,12 @@ impl Narrow {
 
     /// The length of a path in a cube that counts: 0 if the cube's centre is wide enough, `None` if no point of it is.
     fn length(&self, cubes: &Cubes, cube: u32) -> Option<f64> {
-        let is_there = self.place.has(cubes, cube);
+        if !self.place.has(cubes, cube) {
+            return self.place.ends_with(cube).then_some(0.0);
+        }
         match cubes.clearance(cube) {
             wide if wide >= self.clearance => Some(0.0),
-            wide if !is_there && wide >= self.place.clearance_around => Some(0.0),
-            _ if is_there && cubes.radius(cube) >= self.radius => Some(2.0 * cubes.half(cube)),
+            _ if cubes.radius(cube) >= self.radius => Some(2.0 * cubes.half(cube)),
             _ => None,
         }
     }
@@ -284,7 +304,11 @@ impl Narrow {
         if let Some(path) = search::shortest(cubes, from, to, self.clearance as f32, clear, stop)? {
             return Ok(path);
         }
-        let path = search::widest(cubes, from, to, |c, _| cubes.clearance(c) as f32, stop)?;
+        let width = |cube, _| match self.place.has(cubes, cube) || self.place.ends_with(cube) {
+            true => cubes.clearance(cube) as f32,
+            false => -1.0,
+        };
+        let path = search::widest(cubes, from, to, width, stop)?;
         Ok(path.expect("the leaves are joined"))
     }
 }
