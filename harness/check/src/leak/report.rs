@@ -53,6 +53,8 @@ pub struct Narrowest {
     pub at: [f64; 3],
     /// Its diameter.
     pub width: f64,
+    /// A larger ball than of this diameter passes nowhere through the free leaves.
+    pub width_max: f64,
     /// The same in cells of the case's surface level.
     pub width_cells: f64,
     /// The direction in which the path passes, a unit vector.
