@@ -12,6 +12,9 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
 
+/// Exit code of a run whose text could not be printed.
+pub const UNPRINTED: i32 = 4;
+
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
@@ -174,22 +177,19 @@ pub fn parse() -> Result<Args, Error> {
         if let Some(&shell) = m.get_one::<Shell>("completions") {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut command(), "mesher", &mut script);
-            print_and_exit(&script);
+            print_and_exit(|| io::stdout().write_all(&script));
         }
         if m.get_flag("man") {
             let mut page = Vec::new();
             let rendered = clap_mangen::Man::new(command()).render(&mut page);
             rendered.expect("memory can be written to");
-            print_and_exit(&page);
+            print_and_exit(|| io::stdout().write_all(&page));
         }
         Args::from_arg_matches_mut(&mut m)
     });
     parsed.map_err(|e| {
         if !e.use_stderr() {
-            if launch::is_first() {
-                e.exit();
-            }
-            exit(e.exit_code());
+            print_and_exit(|| e.print());
         }
         let text = e.to_string();
         let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
@@ -202,12 +202,13 @@ pub fn parse() -> Result<Args, Error> {
     })
 }
 
-fn print_and_exit(text: &[u8]) -> ! {
-    if launch::is_first() {
+fn print_and_exit(print: impl FnOnce() -> io::Result<()>) -> ! {
+    let print = || print().and_then(|()| io::stdout().flush());
+    match launch::is_first().then(print).transpose() {
         // A closed pipe is no reason to fail.
-        let _ = io::stdout().write_all(text);
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
+        _ => exit(0),
     }
-    exit(0)
 }
 
 /// The case that the command line describes.

@@ -41,13 +41,13 @@ pub use mesh::{Mesh, Options};
 
 use case::Case;
 use check::debug_check;
-use comm::{Comm, agree};
+use comm::Comm;
 use error::Error;
 use kept::Kept;
 use partition::base_leaves::cells_heaviest;
 use partition::initial::{self, Partition};
 use partition::repartition::{self, LeafCounts, Sets};
-use record::{Recorder, check_interrupt};
+use record::Recorder;
 use report::{Counters, Report};
 use voxelise::BinnedFacets;
 use write::OutDir;
@@ -62,21 +62,12 @@ pub fn mesh(
     comm: &dyn Comm,
     record: &mut Recorder,
 ) -> Result<Report, Error> {
-    let path = options.out.as_ref();
-    let open = |p| if comm.rank() == 0 { OutDir::create(p) } else { Ok(OutDir::open(p)) };
-    let out = agree(comm, path.map(|p| open(p)).transpose())?;
-    let result = mesh_into(out.as_ref(), case, options, comm, record);
-    if let (Err(_), Some(out)) = (&result, &out) {
-        // All ranks remove their own files before rank 0 removes the directory.
-        if comm.rank() != 0 {
-            out.discard(comm.rank());
-        }
-        comm.barrier();
-        if comm.rank() == 0 {
-            out.discard(0);
-        }
+    let out = options.out.as_ref().map(|path| OutDir::claim(path, comm)).transpose()?;
+    let report = mesh_into(out.as_ref(), case, options, comm, record)?;
+    if let Some(out) = out {
+        out.keep();
     }
-    result
+    Ok(report)
 }
 
 fn mesh_into(
@@ -185,7 +176,6 @@ fn make(
         check::ownership(&ownership, comm);
         check::base_tree(&tree, &rules, &ownership, comm);
     });
-    comm.agree(check_interrupt())?;
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let sides = record.phase("sides", comm, || {
@@ -193,7 +183,6 @@ fn make(
     })?;
     debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
     drop(facets);
-    comm.agree(check_interrupt())?;
     let tree::Tree { split, crossing } = tree;
     let mut mesh = Mesh {
         facets: facets_total,
@@ -206,8 +195,7 @@ fn make(
         is_base: options.ungraded,
     };
     if options.ungraded {
-        comm.agree(check_interrupt())?;
-        return Ok(mesh);
+            return Ok(mesh);
     }
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.
@@ -220,7 +208,6 @@ fn make(
     mesh.split = split;
     counters.add_graded(&work);
     debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
-    comm.agree(check_interrupt())?;
 
     // 8. Repartition after gradation: by the number of leaves.
     if !(is_parallel && division.is_of_curve()) {

@@ -1,28 +1,23 @@
 //! Mesh output: one `.npy` file of leaf words per rank, and the manifest.
 //!
 //! Invariants of the output directory:
-//! - a file that has its final name is complete: it is written under a temporary name in the same
-//!   directory, synchronised and renamed ([`Draft`]);
+//! - one run alone writes to it ([`Claim`]);
+//! - a file that has its final name is complete: it is written under a temporary name, synchronised and renamed ([`Draft`]);
 //! - the manifest is written last, so all parts that it names exist;
-//! - after an error, none of the mesh's files remains.
+//! - after an error or an interrupt, none of the mesh's files remains.
 
-mod draft;
-
-use crate::comm::Comm;
+use crate::comm::{Comm, agree};
 use crate::digest::{Digests, hex};
 use crate::error::Error;
 use crate::lattice::{Enclosed, Keep, Rules};
 use crate::octant::LEVEL_MAX;
 use crate::sides::Summary;
 use crate::stream::Counts;
+use files::{Claim, ClaimError, Draft};
 use npyz::WriterBuilder;
 use serde::Serialize;
-use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
-
-pub use draft::Draft;
 
 /// File name of the manifest.
 pub const MANIFEST: &str = "mesh.json";
@@ -32,12 +27,16 @@ pub fn part_name(rank: usize) -> String {
     format!("leaves-{rank:05}.npy")
 }
 
-/// The directory that a mesh is written to.
+/// The names of all files of a rank. They are removed if the run fails.
+fn names(rank: usize) -> impl Iterator<Item = String> {
+    [part_name(rank)].into_iter()
+}
+
+/// The directory that a mesh is written to. Its files are removed, unless it is [kept](Self::keep).
 #[derive(Debug)]
 pub struct OutDir {
     path: PathBuf,
-    /// Whether it was created for this mesh and is therefore removed after an error.
-    is_new: bool,
+    claim: Claim,
 }
 
 fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
@@ -48,31 +47,26 @@ fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
 }
 
 impl OutDir {
-    /// Creates the directory, or accepts an existing one that is empty. On one rank only.
+    /// Claims the directory for this run: one that does not exist, or an empty one. Collective.
     ///
     /// # Errors
-    /// If the directory cannot be created or written to, or is not empty.
-    pub fn create(path: &Path) -> Result<Self, Error> {
-        match std::fs::read_dir(path) {
-            Ok(mut entries) => {
-                if entries.next().is_some() {
-                    return Err(output(path, &"the directory is not empty"));
-                }
-                // Fails now rather than after the meshing, if the directory cannot be written to.
-                NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), is_new: false })
-            }
-            Err(e) if e.kind() == io::ErrorKind::NotFound => {
-                std::fs::create_dir(path).map_err(|e| output(path, &e))?;
-                Ok(Self { path: path.to_owned(), is_new: true })
-            }
-            Err(e) => Err(output(path, &e)),
-        }
-    }
-
-    /// The directory that another rank has created.
-    pub fn open(path: &Path) -> Self {
-        Self { path: path.to_owned(), is_new: false }
+    /// If the directory cannot be created or written to, is not empty, or another run has claimed it.
+    pub fn claim(path: &Path, comm: &dyn Comm) -> Result<Self, Error> {
+        let all = || (0..comm.size()).flat_map(names);
+        let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
+        let created = agree(comm, created.map_err(|e| match e {
+            ClaimError::Io(e) => output(path, &e),
+            taken => Error::input(format!("{}: {taken}: choose another --out", path.display())),
+        }))?;
+        let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
+        comm.uncounted(&mut || is_new = comm.max(is_new));
+        // A rank that was killed could not remove its files. If it was the first, the others remove them.
+        let mine = [0, comm.rank()].into_iter().flat_map(names);
+        let claim = match created {
+            Some(claim) => Ok(claim),
+            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| output(path, &e)),
+        };
+        Ok(Self { path: path.to_owned(), claim: agree(comm, claim)? })
     }
 
     /// Begins this rank's part.
@@ -80,33 +74,15 @@ impl OutDir {
     /// # Errors
     /// If its file cannot be created.
     pub fn part(&self, rank: usize) -> Result<Part, Error> {
-        let path = self.path.join(part_name(rank));
+        let name = part_name(rank);
         let begin = || -> io::Result<BufWriter<Draft>> {
-            let mut file = BufWriter::with_capacity(1 << 20, Draft::create(&path)?);
+            let mut file = BufWriter::with_capacity(1 << 20, self.claim.draft(&name)?);
             file.write_all(&header(u64::MAX)?)?;
             Ok(file)
         };
         let file = begin().map_err(|e| output(&self.path, &e))?;
+        let path = self.path.join(name);
         Ok(Part { path, file, digests: Digests::default(), leaves: 0 })
-    }
-
-    /// Removes the mesh's files after an error on any rank.
-    pub fn discard(&self, rank: usize) {
-        let _ = std::fs::remove_file(self.path.join(part_name(rank)));
-        if rank == 0 {
-            let _ = std::fs::remove_file(self.path.join(MANIFEST));
-        }
-        if self.is_new {
-            // Parts of other ranks may remain.
-            for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
-                let name = entry.file_name();
-                let name = name.to_string_lossy();
-                if name.starts_with("leaves-") || name.starts_with(".tmp") || name == MANIFEST {
-                    let _ = std::fs::remove_file(entry.path());
-                }
-            }
-            let _ = std::fs::remove_dir(&self.path);
-        }
     }
 
     /// Writes the manifest. On one rank only, after all ranks have finished their parts.
@@ -114,12 +90,23 @@ impl OutDir {
     /// # Errors
     /// If the file cannot be written.
     pub fn manifest(&self, manifest: &Manifest) -> Result<(), Error> {
-        let write = || -> io::Result<()> {
-            Draft::create(&self.path.join(MANIFEST))?.publish_json(manifest)?;
-            File::open(&self.path)?.sync_all()
-        };
-        write().map_err(|e| output(&self.path, &e))
+        let write = |to: &mut dyn Write| write_json(to, manifest);
+        self.claim.commit(write).map_err(|e| output(&self.path, &e))
     }
+
+    /// Keeps the mesh. On all ranks, after the [manifest](Self::manifest).
+    pub fn keep(self) {
+        self.claim.keep();
+    }
+}
+
+/// Writes `value` as JSON with a final newline.
+///
+/// # Errors
+/// If that fails.
+pub fn write_json(mut to: &mut dyn Write, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut to, value)?;
+    to.write_all(b"\n")
 }
 
 /// A rank's part while it is being written.
@@ -344,12 +331,13 @@ impl Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::Solo;
 
     #[test]
     fn parts_of_any_length_are_read_back() {
         let root = tempfile::tempdir().unwrap();
         for n in [0usize, 1, 9, 10, 4097, 1_000_000] {
-            let out = OutDir::create(&root.path().join(n.to_string())).unwrap();
+            let out = OutDir::claim(&root.path().join(n.to_string()), &Solo).unwrap();
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
             let mut part = out.part(3).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());
