@@ -10,6 +10,8 @@ use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::sleep;
+use std::time::Duration;
 
 /// Exit code of an interrupted program.
 pub const INTERRUPTED: i32 = 130;
@@ -18,11 +20,11 @@ const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 
 /// Makes each of the signals remove all unfinished files, print `message` on the standard error and end the process with exit code 130.
 /// If output is complete already, the first signal is ignored, as the process is about to end. Signals that the process was started to
-/// ignore, as `nohup` does, stay ignored.
+/// ignore, as `nohup` does, stay ignored. The process waits for the time `linger` before it ends, unless another signal arrives.
 ///
 /// # Errors
 /// If a handler cannot be installed; its signal then ends the process the default way.
-pub fn install(message: &str) -> io::Result<()> {
+pub fn install(message: &str, linger: Duration) -> io::Result<()> {
     let message: Arc<[u8]> = message.as_bytes().into();
     let is_second = Arc::new(AtomicBool::new(false));
     for signal in SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)) {
@@ -33,6 +35,9 @@ pub fn install(message: &str) -> io::Result<()> {
                 return;
             }
             print(&message);
+            if !is_second {
+                sleep(linger);
+            }
             exit(INTERRUPTED);
         };
         // SAFETY: the action makes system calls and uses atomics; it neither allocates nor locks.

@@ -21,9 +21,13 @@ use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
+use std::time::Duration;
 
 /// Exit code of a bug.
 const BUG: i32 = 70;
+/// Time that an interrupted rank of a job lives on. When one rank has ended, launchers kill the others at once, which must have removed
+/// their files by then.
+const LINGER: Duration = Duration::from_millis(300);
 
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -36,7 +40,8 @@ fn main() {
         (true, true) => "\r\x1b[Kmesher: interrupted\n",
     };
     // Without handlers, signals end the process the default way.
-    let _ = interrupt::install(message);
+    let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
+    let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
     match choose(args.as_ref().map_or(CommChoice::Auto, |a| a.comm)) {
         Ok(CommChoice::Mpi) => run_mpi(&args),
         Ok(CommChoice::Sim { ranks, seed }) => {
@@ -69,6 +74,8 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
 
 #[cfg(feature = "mpi")]
 fn run_mpi(args: &Result<Args, Error>) {
+    #[cfg(target_os = "linux")]
+    launch::end_with_launcher();
     // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
     let comm = interrupt::uninterrupted(mesher::comm::mpi::Mpi::start);
     // A panic that unwinds would leave the other ranks waiting forever.
