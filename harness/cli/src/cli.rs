@@ -40,7 +40,7 @@ pub enum Command {
     Geometry(commands::geometry::Arguments),
     /// Search for an opening through which two places are joined, and the spacing at which it closes or opens
     Leak(Box<commands::leak::Arguments>),
-    /// Write a leaf-set directory as a VTK unstructured grid for ParaView or pyvista
+    /// Write a mesh, or part of it, for ParaView and other programs
     Export(commands::export::Arguments),
     /// Make a leaf-set directory from a mesh in another program's format
     Import(commands::import::Arguments),

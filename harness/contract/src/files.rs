@@ -1,9 +1,10 @@
 //! Files that are either complete or absent.
 
-use std::fs::Permissions;
+use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+use tempfile::TempDir;
 
 /// Writes a file so that no reader and no crash ever leaves a partial one at `path`: `write` fills a temporary
 /// file in the same directory, which is flushed to disk and then renamed. An existing file is replaced.
@@ -14,19 +15,50 @@ pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    fill_atomically(
+        path,
+        |error| error,
+        |file| {
+            let mut buffer = BufWriter::new(file);
+            write(&mut buffer)?;
+            buffer.flush()
+        },
+    )
+}
+
+/// Like [`write_atomically`], for files that are not written from the beginning to the end.
+///
+/// # Errors
+/// If the directory is not writable, through `failed`, or with whatever `fill` returns.
+pub fn fill_atomically<T, E>(
+    path: &Path,
+    failed: impl Fn(io::Error) -> E,
+    fill: impl FnOnce(&mut File) -> Result<T, E>,
+) -> Result<T, E> {
     // The mode of an ordinary new file, which the umask restricts: temporary files are private by default.
     let mut builder = tempfile::Builder::new();
-    let mut file = builder.permissions(Permissions::from_mode(0o666)).tempfile_in(directory)?;
-    let mut buffer = BufWriter::new(file.as_file_mut());
-    write(&mut buffer)?;
-    buffer.flush()?;
-    drop(buffer);
-    file.as_file().sync_all()?;
-    file.persist(path).map(drop).map_err(|error| error.error)
+    let builder = builder.permissions(Permissions::from_mode(0o666));
+    let mut file = builder.tempfile_in(directory_of(path)).map_err(&failed)?;
+    let result = fill(file.as_file_mut())?;
+    file.as_file().sync_all().map_err(&failed)?;
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(result)
+}
+
+/// An empty directory in the same directory as `path`, which is deleted when it is dropped.
+///
+/// # Errors
+/// If the directory is not writable.
+pub fn temporary_directory(path: &Path) -> io::Result<TempDir> {
+    let mut builder = tempfile::Builder::new();
+    builder.permissions(Permissions::from_mode(0o777)).tempdir_in(directory_of(path))
+}
+
+fn directory_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use contract::leafset::ReadError;
 use contract::word::WordError;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a mesh was not exported. The message is one sentence for the user.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +34,17 @@ pub enum ExportError {
     /// A file could not be written.
     #[error("{0}: choose another file")]
     Write(#[from] io::Error),
+    /// The user interrupted the export.
+    #[error("interrupted by the user")]
+    Interrupted,
     /// A request that cannot be fulfilled, as one sentence.
     #[error("{0}")]
     Request(String),
+}
+
+impl ExportError {
+    /// A file or directory could not be written.
+    pub fn write(path: &Path, error: io::Error) -> Self {
+        Self::Write(io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+    }
 }

@@ -1,8 +1,17 @@
 //! Meshes as files of other programs. A [`mesh::Mesh`] on disk is read leaf by leaf, so memory does not grow with the mesh,
 //! and only those parts of the files are read that a [`selection::Selection`] needs.
+//!
+//! - [`format`](mod@format): the table of formats by file name;
+//! - [`vtu`]: cells for VTK, in one file or several;
+//! - [`pieces`]: leaves in pieces of limited size; [`ordered`]: computed on threads, written in order.
 
 #![deny(missing_docs)]
 
 pub mod error;
+pub mod format;
 pub mod mesh;
+pub mod options;
+pub mod ordered;
+pub mod pieces;
 pub mod selection;
+pub mod vtu;

@@ -28,6 +28,17 @@ pub struct Leaf {
     pub side: Side,
     /// Index of its part, which is the rank that wrote it.
     pub part: u32,
+    /// Index among all leaves of the mesh, in Morton order.
+    pub index: u64,
+}
+
+/// A range of Morton codes and the number of leaves in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// The Morton codes.
+    pub keys: Range<u64>,
+    /// The number of leaves.
+    pub leaves: u64,
 }
 
 /// A mesh on disk, opened for reading.
@@ -51,6 +62,21 @@ impl Mesh {
         Ok(Self { manifest, parts })
     }
 
+    /// Number of leaves in all parts.
+    pub fn len(&self) -> u64 {
+        self.parts.iter().map(PartFile::len).sum()
+    }
+
+    /// Whether the mesh has no leaves.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of parts.
+    pub fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
     /// Visits the selected leaves whose Morton codes are in `keys`, in Morton order.
     ///
     /// # Errors
@@ -62,26 +88,35 @@ impl Mesh {
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut intervals = Vec::new();
+        let mut before = 0;
         for (part, file) in self.parts.iter().enumerate() {
             let bound = |key| self.lower_bound(part, 0..file.len(), key);
             let interval = bound(keys.start)?..bound(keys.end)?;
+            before += interval.start;
             intervals.extend((!interval.is_empty()).then_some((part, interval)));
         }
-        self.visit_octant(Octant::ROOT, &intervals, selection, visit)
+        self.visit_octant(Octant::ROOT, &intervals, before, selection, visit)
     }
 
-    /// Ranges of Morton codes, in order, that together contain all leaves: each is an octant of at most `leaves_max`
-    /// leaves, or several neighbouring ones. Leaves are counted before selection.
+    /// Ranges of Morton codes, in order, that together contain all selected leaves: each is an octant of at most
+    /// `leaves_max` leaves, or several neighbouring ones. All their leaves are counted, selected or not.
     ///
     /// # Errors
     /// If a part cannot be read.
-    pub fn blocks(&self, leaves_max: u64) -> Result<Vec<Range<u64>>, ExportError> {
-        let mut blocks: Vec<(Range<u64>, u64)> = Vec::new();
+    pub fn blocks(
+        &self,
+        selection: &Selection,
+        leaves_max: u64,
+    ) -> Result<Vec<Block>, ExportError> {
+        let mut blocks: Vec<Block> = Vec::new();
+        // Leaves that are not selected separate the next block from the last one.
+        let mut has_gap = false;
         let all = self.parts.iter().enumerate().map(|(part, file)| (part, 0..file.len())).collect();
         let mut stack: Vec<(Octant, Vec<Interval>)> = vec![(Octant::ROOT, all)];
         while let Some((octant, intervals)) = stack.pop() {
-            let leaves: u64 = intervals.iter().map(|(_, i)| i.end - i.start).sum();
-            if leaves == 0 {
+            let leaves = count(&intervals);
+            if leaves == 0 || !selection.meets(&octant) {
+                has_gap |= leaves > 0;
                 continue;
             }
             if leaves > leaves_max && octant.level < LEVEL_MAX {
@@ -92,23 +127,26 @@ impl Mesh {
             let start = word::key_of(octant.corner);
             let end = start + word::span(octant.level);
             match blocks.last_mut() {
-                Some((keys, count)) if *count + leaves <= leaves_max => {
-                    keys.end = end;
-                    *count += leaves;
+                Some(last) if last.leaves + leaves <= leaves_max && !has_gap => {
+                    last.keys.end = end;
+                    last.leaves += leaves;
                 }
-                _ => blocks.push((start..end, leaves)),
+                _ => blocks.push(Block { keys: start..end, leaves }),
             }
+            has_gap = false;
         }
-        Ok(blocks.into_iter().map(|(keys, _)| keys).collect())
+        Ok(blocks)
     }
 
     /// The range of all Morton codes.
     pub const ALL: Range<u64> = 0..KEY_END;
 
+    /// Visits the selected leaves of an octant; `before` leaves of the mesh precede its own.
     fn visit_octant<E: From<ExportError>>(
         &self,
         octant: Octant,
         intervals: &[Interval],
+        mut before: u64,
         selection: &Selection,
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -119,7 +157,7 @@ impl Mesh {
             [(part, interval)]
                 if interval.end - interval.start <= BLOCK || octant.level == LEVEL_MAX =>
             {
-                self.visit_block(octant, *part, interval.clone(), selection, visit)
+                self.visit_block(octant, *part, interval.clone(), before, selection, visit)
             }
             _ if octant.level == LEVEL_MAX => {
                 // Two parts have the same leaf.
@@ -128,19 +166,21 @@ impl Mesh {
             }
             _ => {
                 for (child, intervals) in self.children(octant, intervals)? {
-                    self.visit_octant(child, &intervals, selection, visit)?;
+                    self.visit_octant(child, &intervals, before, selection, visit)?;
+                    before += count(&intervals);
                 }
                 Ok(())
             }
         }
     }
 
-    /// Visits the selected leaves of one interval, which is read as a whole.
+    /// Visits the selected leaves of one interval, which is read as a whole; `before` leaves of the mesh precede it.
     fn visit_block<E: From<ExportError>>(
         &self,
         octant: Octant,
         part: usize,
         interval: Range<u64>,
+        before: u64,
         selection: &Selection,
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -161,7 +201,9 @@ impl Mesh {
                 return Err(self.order(part, index).into());
             }
             key_min = end;
-            let leaf = Leaf { octant: leaf.octant, side: leaf.side, part: part as u32 };
+            let part = part as u32;
+            let index_in_mesh = before + (index - interval.start);
+            let leaf = Leaf { octant: leaf.octant, side: leaf.side, part, index: index_in_mesh };
             if selection.has(&leaf) {
                 visit(leaf)?;
             }
@@ -182,7 +224,7 @@ impl Mesh {
             let mut parts = Vec::new();
             for (start, (part, interval)) in starts.iter_mut().zip(intervals) {
                 let end = self.lower_bound(*part, *start..interval.end, key_end)?;
-                parts.extend((*start < end).then(|| (*part, *start..end)));
+                parts.extend((*start < end).then_some((*part, *start..end)));
                 *start = end;
             }
             if !parts.is_empty() {
@@ -209,6 +251,11 @@ impl Mesh {
     fn order(&self, part: usize, index: u64) -> ExportError {
         ExportError::Order { part: self.parts[part].path().to_owned(), index }
     }
+}
+
+/// Number of leaves in these intervals.
+fn count(intervals: &[Interval]) -> u64 {
+    intervals.iter().map(|(_, interval)| interval.end - interval.start).sum()
 }
 
 #[cfg(test)]
@@ -264,12 +311,13 @@ mod tests {
             leaves in random_words(5), parts in 1usize..4, leaves_max in 1u64..100
         ) {
             let (_dir, mesh) = on_disk(&leaves, parts, |i| i / 7);
-            let blocks = mesh.blocks(leaves_max).unwrap();
-            prop_assert!(blocks.windows(2).all(|w| w[0].end <= w[1].start));
+            let blocks = mesh.blocks(&Selection::default(), leaves_max).unwrap();
+            prop_assert!(blocks.windows(2).all(|w| w[0].keys.end <= w[1].keys.start));
             let mut visited = Vec::new();
-            for keys in blocks {
+            for Block { keys, leaves } in blocks {
                 let block = words(&mesh, keys, &Selection::default()).unwrap();
-                prop_assert!(!block.is_empty() && block.len() as u64 <= leaves_max);
+                prop_assert!(!block.is_empty() && leaves <= leaves_max);
+                prop_assert_eq!(block.len() as u64, leaves);
                 visited.extend(block);
             }
             prop_assert_eq!(visited, leaves);
@@ -283,13 +331,19 @@ mod tests {
             let slice = crate::selection::Slice::new(&mesh.manifest.root, axis, at);
             let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
             let mut expected = Vec::new();
+            let mut index = 0;
             mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
+                assert_eq!(leaf.index, index);
+                index += 1;
                 expected.extend(selection.has(&leaf).then(|| {
                     word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
                 }));
                 Ok::<(), ExportError>(())
             }).unwrap();
-            prop_assert_eq!(words(&mesh, Mesh::ALL, &selection).unwrap(), expected);
+            prop_assert_eq!(&words(&mesh, Mesh::ALL, &selection).unwrap(), &expected);
+            let blocks = mesh.blocks(&selection, 20).unwrap();
+            let of_block = |b: &Block| words(&mesh, b.keys.clone(), &selection).unwrap();
+            prop_assert_eq!(blocks.iter().flat_map(of_block).collect::<Vec<_>>(), expected);
         }
     }
 

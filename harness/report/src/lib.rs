@@ -5,7 +5,6 @@
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
-//! - [`vtu`](mod@vtu): meshes for VTK;
 //! - [`leak`]: the path of a leak for VTK, and a slice through its narrowest place.
 
 pub mod benchmark;
@@ -18,5 +17,4 @@ pub mod page;
 pub mod targets;
 pub mod track;
 pub mod verification;
-pub mod vtu;
 pub mod write;

@@ -1,29 +1,104 @@
-//! `harness export`: writes a leaf-set directory as a VTK file.
+//! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
+use super::selection::SelectionArguments;
 use clap::Args;
-use contract::leafset;
-use report::vtu::vtu;
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use export::error::ExportError;
+use export::format::{self, FORMATS};
+use export::mesh::Mesh;
+use export::options::{Options, Summary, Watch};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use run::engine::interrupt;
+use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
+use std::num::NonZero;
 use std::path::PathBuf;
+use std::thread::available_parallelism;
+use std::time::Duration;
 
 /// `harness export`.
 #[derive(Args, Debug)]
+#[command(after_help = after_help())]
 pub struct Arguments {
-    /// The leaf-set directory
+    /// The mesh: a leaf-set directory of any size
     mesh: PathBuf,
-    /// The file to write, .vtu
-    #[arg(value_name = "FILE")]
-    to: PathBuf,
+    /// The file to write; its name decides the format. An existing file is replaced
+    file: PathBuf,
+    /// Number of threads [default: all cores]
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZero<usize>>,
+    /// Which cells are written.
+    #[command(flatten)]
+    selection: SelectionArguments,
 }
 
-/// Reads and writes; returns the exit code.
-pub fn run(Arguments { mesh, to }: &Arguments) -> u8 {
-    let exported = leafset::read(mesh).map_err(|e| e.to_string());
-    match exported.and_then(|mesh| vtu(&mesh, to).map_err(|e| e.to_string())) {
-        Ok(()) => EXIT_HOLDS,
+fn after_help() -> String {
+    let formats = FORMATS.iter().map(|f| format!("  {:<8}{}\n", f.ending, f.purpose));
+    format!(
+        "Formats:\n{}\n\
+         Examples:\n  \
+         harness export mesh mesh.vtu                           the whole mesh\n  \
+         harness export mesh slice.vtu --slice z=0              the cells at a plane, read without the others\n  \
+         harness export mesh nose.vtu --clip -1,-1,-1,0,1,1     the cells in a box\n  \
+         harness export mesh far.pvtu --level-max 7             coarse cells only\n\n\
+         Exit codes: 0 success; 2 invalid input, an unknown format, or a selection without cells; 130 interrupted, after \
+         which no file remains.",
+        formats.collect::<String>()
+    )
+}
+
+/// Writes; returns the exit code.
+pub fn run(arguments: &Arguments) -> u8 {
+    match write(arguments) {
+        Ok(Summary { leaves, files, bytes }) => {
+            let file = arguments.file.display();
+            let per_cell = bytes as f64 / leaves as f64;
+            let files = if files == 1 { String::new() } else { format!(" in {files} files") };
+            println!("{file}: {leaves} cells, {bytes} bytes{files} ({per_cell:.1} per cell)");
+            EXIT_HOLDS
+        }
         Err(error) => {
             eprintln!("harness: {error}");
-            EXIT_INPUT
+            match error {
+                ExportError::Interrupted => EXIT_INTERRUPTED,
+                _ => EXIT_INPUT,
+            }
         }
+    }
+}
+
+fn write(arguments: &Arguments) -> Result<Summary, ExportError> {
+    let Arguments { mesh, file, jobs, selection } = arguments;
+    let format = format::of(file)?;
+    let mesh = Mesh::open(mesh)?;
+    let selection = selection.of(&mesh).map_err(ExportError::Request)?;
+    let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
+    let progress = Progress::new();
+    let written = (format.write)(&mesh, &selection, file, &Options { jobs, watch: &progress });
+    progress.0.finish_and_clear();
+    written
+}
+
+/// A line on standard error, only if that is a terminal.
+struct Progress(ProgressBar);
+
+impl Progress {
+    fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{spinner} [{elapsed}] {wide_bar} {percent} %");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        Self(bar)
+    }
+}
+
+impl Watch for Progress {
+    fn progress(&self, done: u64, total: u64) {
+        self.0.set_length(total);
+        self.0.set_position(done);
+    }
+
+    fn is_interrupted(&self) -> bool {
+        interrupt::requested()
     }
 }

@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `programs`, `session` and `values` are shared.
+//! The commands, one file each with its arguments; `files`, `programs`, `selection`, `session` and `values` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -14,6 +14,7 @@ pub mod man;
 pub mod planted;
 mod programs;
 pub mod report;
+mod selection;
 pub mod selftest;
 mod session;
 pub mod shrink;

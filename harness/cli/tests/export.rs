@@ -1,0 +1,115 @@
+//! `harness export` as a command. `harness/oracles/test_vtu.py` reads its files back.
+
+use contract::testing::{leaf_set, words_with_sides};
+use contract::word::Side;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// A mesh at `mesh` in a temporary directory: 49 leaves in one part and 99 in the other; 4 inside leaves of level 1, 16
+/// crossing ones of level 2 and 128 outside ones of level 3, where x < 2 in a root of edge 8.
+fn mesh() -> TempDir {
+    let split = |o: &contract::octant::Octant| o.level == 0 || o.level < 3 && o.corner[0] == 0;
+    let words = words_with_sides(split, |o| Some(Side::ALL[usize::from(o.level) % 3]));
+    let (first, second) = words.split_at(words.len() / 3);
+    let place = tempfile::tempdir().unwrap();
+    let set = leaf_set(vec![first.to_vec(), second.to_vec()]);
+    set.create(&place.path().join("mesh")).unwrap();
+    place
+}
+
+/// Exit code and output of an export of that mesh to a file beside it.
+fn export(place: &TempDir, file: &str, options: &[&str]) -> (i32, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    let command = command.current_dir(place.path()).args(["export", "mesh", file]).args(options);
+    let output = command.output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+fn names(place: &Path) -> Vec<String> {
+    let name = |entry: fs::DirEntry| entry.file_name().into_string().unwrap();
+    let mut names: Vec<_> = fs::read_dir(place).unwrap().map(|e| name(e.unwrap())).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_file_does_not_depend_on_the_number_of_threads_and_replaces_an_older_one() {
+    let place = mesh();
+    fs::write(place.path().join("mesh.vtu"), "old").unwrap();
+    let contents = ["1", "2", "5"].map(|jobs| {
+        let (code, output, error) = export(&place, "mesh.vtu", &["--jobs", jobs]);
+        assert_eq!((code, error.as_str()), (0, ""));
+        assert!(output.starts_with("mesh.vtu: 148 cells, "), "{output}");
+        fs::read(place.path().join("mesh.vtu")).unwrap()
+    });
+    assert!(contents[0] == contents[1] && contents[1] == contents[2]);
+    assert_eq!(names(place.path()), ["mesh", "mesh.vtu"]);
+}
+
+#[test]
+fn conditions_of_a_selection_must_all_hold() {
+    let place = mesh();
+    for (options, cells) in [
+        (&["--slice", "x=0.3"][..], 64),
+        (&["--slice", "z=8"], 2 + 4 + 16),
+        (&["--clip", "4,0,0,8,8,8"], 4),
+        (&["--clip", "9,9,1.5,3.5,-9,1.2"], 4 + 2),
+        (&["--level-max", "2"], 4 + 16),
+        (&["--side", "outside"], 128),
+        (&["--rank", "0"], 49),
+        (&["--rank", "1", "--jobs", "3"], 99),
+        (&["--slice", "x=0.3", "--clip", "0,0,0,2,1,1"], 1),
+    ] {
+        let (code, output, error) = export(&place, "part.vtu", options);
+        assert_eq!((code, error.as_str()), (0, ""), "{options:?}");
+        assert!(output.starts_with(&format!("part.vtu: {cells} cells, ")), "{options:?}: {output}");
+    }
+}
+
+#[test]
+fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
+    let place = mesh();
+    for (file, options, expected) in [
+        (
+            "mesh.png",
+            &[][..],
+            "mesh.png: no format has such a name: choose one that ends in .vtu, .pvtu",
+        ),
+        ("none/mesh.vtu", &[], "none/mesh.vtu: No such file or directory"),
+        (
+            "part.vtu",
+            &["--side", "outside", "--level-max", "2"],
+            "no leaf satisfies all conditions",
+        ),
+        ("part.pvtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies all conditions"),
+        ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
+        ("part.vtu", &["--rank", "2"], "the mesh has 2 ranks, counted from 0"),
+    ] {
+        let (code, output, error) = export(&place, file, options);
+        assert_eq!((code, output.as_str(), error.matches('\n').count()), (2, "", 1), "{error}");
+        assert!(error.contains(expected), "{error}");
+        assert_eq!(names(place.path()), ["mesh"]);
+    }
+    assert_eq!(export(&place, "part.vtu", &["--level-max", "20"]).0, 2);
+}
+
+#[test]
+fn a_pvtu_replaces_only_files_of_an_earlier_export() {
+    let place = mesh();
+    let [all, pieces] = ["all.pvtu", "all_pieces"].map(|name| place.path().join(name));
+    for options in [&[][..], &["--level-max", "1"]] {
+        assert_eq!(export(&place, "all.pvtu", options).0, 0);
+        assert_eq!(names(place.path()), ["all.pvtu", "all_pieces", "mesh"]);
+        assert_eq!(names(&pieces), ["all_0000.vtu"]);
+    }
+    let before = fs::read(&all).unwrap();
+    fs::write(pieces.join("notes.txt"), "mine").unwrap();
+    let (code, _, error) = export(&place, "all.pvtu", &[]);
+    assert_eq!((code, error.matches('\n').count()), (2, 1), "{error}");
+    assert!(error.contains("all_pieces/notes.txt: was not written by harness export"), "{error}");
+    assert_eq!(names(&pieces), ["all_0000.vtu", "notes.txt"]);
+    assert!(fs::read(&all).unwrap() == before);
+}

@@ -1,0 +1,70 @@
+//! The formats of an export. The name of the file decides.
+
+use std::path::Path;
+
+use crate::error::ExportError;
+use crate::mesh::Mesh;
+use crate::options::{Options, Summary};
+use crate::selection::Selection;
+use crate::vtu;
+
+/// A format of mesh files.
+#[derive(Debug)]
+pub struct Format {
+    /// How names of its files end.
+    pub ending: &'static str,
+    /// What it contains and which programs read it, for the user.
+    pub purpose: &'static str,
+    /// Writes the selected leaves of a mesh.
+    pub write: Write,
+}
+
+/// Writes the selected leaves of a mesh to a path. After an error, nothing exists under a final name.
+pub type Write = fn(&Mesh, &Selection, &Path, &Options<'_>) -> Result<Summary, ExportError>;
+
+/// All formats.
+pub const FORMATS: &[Format] = &[
+    Format {
+        ending: ".vtu",
+        purpose: "cells for ParaView, VisIt and pyvista, in one file",
+        write: vtu::write_file,
+    },
+    Format {
+        ending: ".pvtu",
+        purpose: "the same in files of some million cells each, which many processes can read",
+        write: vtu::write_files,
+    },
+];
+
+/// The format of a file with this name.
+///
+/// # Errors
+/// If no format has such names.
+pub fn of(path: &Path) -> Result<&'static Format, ExportError> {
+    let name = path.to_string_lossy();
+    // A dot that begins the name is no extension.
+    let stem = |format: &Format| name.strip_suffix(format.ending).unwrap_or_default();
+    let fits = |format: &&Format| !matches!(stem(format).chars().last(), None | Some('/'));
+    FORMATS.iter().find(fits).ok_or_else(|| {
+        let endings: Vec<_> = FORMATS.iter().map(|format| format.ending).collect();
+        ExportError::Request(format!(
+            "{name}: no format has such a name: choose one that ends in {}",
+            endings.join(", ")
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_the_file_decides() {
+        assert_eq!(of(Path::new("a/mesh.vtu")).unwrap().ending, ".vtu");
+        assert_eq!(of(Path::new("mesh.pvtu")).unwrap().ending, ".pvtu");
+        for name in ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".pvtu", "vtu", "mesh.VTU", ""] {
+            let error = of(Path::new(name)).unwrap_err().to_string();
+            assert!(error.contains(".vtu, .pvtu"), "{name}: {error}");
+        }
+    }
+}
