@@ -50,6 +50,17 @@ impl From<Errno> for ClaimError {
     }
 }
 
+impl From<ClaimError> for io::Error {
+    fn from(e: ClaimError) -> Self {
+        match e {
+            ClaimError::Io(e) => e,
+            taken => {
+                Self::new(io::ErrorKind::DirectoryNotEmpty, format!("{taken}: choose another"))
+            }
+        }
+    }
+}
+
 /// Suffix of temporary names.
 const DRAFT: &str = ".draft";
 /// How often a directory is created that another run removes at the same time.

@@ -68,6 +68,11 @@ impl Draft {
         Self { place: Place::Claimed { dir, draft, name }, file }
     }
 
+    /// The file, to write or to seek in; what is not a regular file may not allow the latter.
+    pub fn file_mut(&mut self) -> &mut File {
+        &mut self.file
+    }
+
     /// Synchronises the file with the disk and gives it its final name.
     ///
     /// # Errors

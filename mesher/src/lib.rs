@@ -195,7 +195,7 @@ fn make(
         is_base: options.ungraded,
     };
     if options.ungraded {
-            return Ok(mesh);
+        return Ok(mesh);
     }
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.

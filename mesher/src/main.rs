@@ -8,10 +8,10 @@ mod heap;
 mod launch;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
+use files::{Draft, interrupt};
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
 use mesher::partition::Division;
-use files::{Draft, interrupt};
 use mesher::record::Recorder;
 use mesher::report::Report;
 use mesher::write::write_json;

@@ -54,10 +54,13 @@ impl OutDir {
     pub fn claim(path: &Path, comm: &dyn Comm) -> Result<Self, Error> {
         let all = || (0..comm.size()).flat_map(names);
         let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
-        let created = agree(comm, created.map_err(|e| match e {
-            ClaimError::Io(e) => output(path, &e),
-            taken => Error::input(format!("{}: {taken}: choose another --out", path.display())),
-        }))?;
+        let created = agree(
+            comm,
+            created.map_err(|e| match e {
+                ClaimError::Io(e) => output(path, &e),
+                taken => Error::input(format!("{}: {taken}: choose another --out", path.display())),
+            }),
+        )?;
         let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
         comm.uncounted(&mut || is_new = comm.max(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.

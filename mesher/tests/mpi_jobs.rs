@@ -5,9 +5,7 @@
 #[path = "support/process.rs"]
 mod process;
 
-use process::{Workspace, run, start};
-use std::process::Command;
-use std::time::Duration;
+use process::{Workspace, run};
 
 const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"torus\"\nfacets = 640\n
@@ -90,38 +88,4 @@ fn a_full_disk_ends_all_ranks() {
     let before = workspace.contents();
     run(command).refuses_under_launcher(4, &["mesh"]);
     assert!(workspace.contents().keys().eq(before.keys()), "{:?}", workspace.contents().keys());
-}
-
-/// A launcher forwards an interrupt with some delay, and kills ranks that do not end within a second or two.
-/// So a job may have finished, or may have had no time to clean up. But every file with its final name is
-/// complete, and the manifest is written last.
-#[test]
-#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
-fn an_interrupted_job_leaves_no_incomplete_file() {
-    let workspace = Workspace::new();
-    workspace.write("case.toml", CASE.replace("0.05", "0.002"));
-    let mut job = start(workspace.mpirun(2, &["case.toml", "--out", "mesh", "--json", "run.json"]));
-    while !workspace.path().join("mesh").exists() {
-        assert!(!job.is_over(), "the job ended before it wrote");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let sent = Command::new("kill").args(["-s", "INT", &job.id().to_string()]).status();
-    assert!(sent.expect("kill is installed").success());
-    let finished = job.finish();
-    assert!(finished.code != Some(0), "{finished:?}");
-    let complete = |name: &str| {
-        let text = std::fs::read_to_string(workspace.path().join(name)).ok()?;
-        Some(
-            serde_json::from_str::<serde_json::Value>(&text)
-                .expect("a file with its final name is complete"),
-        )
-    };
-    let reported = complete("run.json");
-    let manifest = complete("mesh/mesh.json");
-    assert!(reported.is_none() || manifest.is_some(), "the report must be written after the mesh");
-    for part in manifest.iter().flat_map(|m| m["parts"].as_array().expect("parts")) {
-        let file = workspace.path().join("mesh").join(part["file"].as_str().expect("a name"));
-        let bytes = std::fs::metadata(file).expect("the parts exist before the manifest").len();
-        assert!(bytes > 8 * part["leaves"].as_u64().expect("a number"), "{finished:?}");
-    }
 }

@@ -17,4 +17,3 @@ pub mod page;
 pub mod targets;
 pub mod track;
 pub mod verification;
-pub mod write;

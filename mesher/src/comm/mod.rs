@@ -298,11 +298,8 @@ mod tests {
 
     #[test]
     fn errors_are_unpacked_as_they_were_packed() {
-        for e in [
-            Error::input("häßlich: 'x'"),
-            Error::output("no space"),
-            Error::input("12345678"),
-        ] {
+        for e in [Error::input("häßlich: 'x'"), Error::output("no space"), Error::input("12345678")]
+        {
             assert_eq!(unpack(&pack(&e)), e);
         }
     }
