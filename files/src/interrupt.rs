@@ -27,7 +27,7 @@ const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 pub fn install(message: &str, linger: Duration) -> io::Result<()> {
     let message: Arc<[u8]> = message.as_bytes().into();
     let is_second = Arc::new(AtomicBool::new(false));
-    for signal in SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)) {
+    for signal in signals() {
         let (message, is_second) = (message.clone(), is_second.clone());
         let end = move || {
             let is_second = is_second.swap(true, Ordering::AcqRel);
@@ -44,6 +44,11 @@ pub fn install(message: &str, linger: Duration) -> io::Result<()> {
         unsafe { low_level::register(signal, end)? };
     }
     Ok(())
+}
+
+/// The signals that end a program: those of the three that it was not started to ignore.
+pub fn signals() -> impl Iterator<Item = i32> {
+    SIGNALS.into_iter().filter(|&signal| !is_ignored(signal))
 }
 
 /// Runs `body` without a signal in between on this thread: for steps that create a file and note that it exists.

@@ -187,8 +187,8 @@ fn a_report_is_written_through_whatever_is_no_regular_file() {
     let printed = run(workspace.mesher(&args("/dev/stdout"))).stdout;
     assert!(serde_json::from_str::<serde_json::Value>(&printed).is_ok(), "{printed}");
     let shell = ["sh"];
-    let args = args("/dev/stdout").join(" ");
-    in_shell(&workspace, &shell, "exec > log; echo first", &args, ".").succeeds();
+    let args = "body.stl --spacing-min 0.5 --json /dev/stdout";
+    in_shell(&workspace, &shell, "exec > log; echo first", args, ".").succeeds();
     let log = std::fs::read_to_string(workspace.path().join("log")).expect("the log");
     assert!(log.starts_with("first\n{") && log.contains("octree-mesher-run/1"), "{log}");
 }
@@ -207,9 +207,9 @@ fn a_full_device_is_an_error_of_output() {
         return skip("full devices", "this user may not make devices");
     }
     let body = "body.stl --spacing-min 0.5";
-    let warned = "nothing.stl --spacing-min 0.5 --root 0,0,0,8";
+    let warned = "sheet.stl --spacing-min 0.5 --root 0,0,0,8 --keep inside";
     let sheet = [[[1.0f32, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]];
-    workspace.write("nothing.stl", process::binary_stl(&sheet));
+    workspace.write("sheet.stl", process::binary_stl(&sheet));
     for (args, code) in [
         (format!("{body} > full"), OUTPUT),
         (format!("{body} > null"), 0),

@@ -33,5 +33,6 @@ fn main() -> ExitCode {
         }
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     };
+    interrupt::uninstall();
     ExitCode::from(code)
 }

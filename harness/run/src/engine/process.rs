@@ -11,7 +11,7 @@ use super::interrupt;
 use super::memory::MemorySampler;
 use super::reap::try_reap;
 use super::session;
-use rustix::process::{Signal, kill_process, kill_process_group, setsid};
+use rustix::process::{Signal, setsid};
 use std::fs::{self, File};
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -64,6 +64,9 @@ impl<'a> Watch<'a> {
 /// If the child cannot be started or does not exit with code 0.
 pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     let failure = |end| Failure::new(watch.name, end);
+    if interrupt::requested() {
+        return Err(failure(End::Interrupted));
+    }
     let mut sampler = watch.sample_memory.then(MemorySampler::new);
     let (start, child) = start(command, watch).map_err(|error| {
         let program = Path::new(command.get_program()).display();
@@ -72,6 +75,7 @@ pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     let end = wait(&child, start, watch, sampler.as_mut());
     let time_wall_s = start.elapsed().as_secs_f64();
     kill_session(child.id());
+    interrupt::forget_child(child.id());
     match end {
         Ok(Ok(time_cpu_s)) => Ok(Finished {
             time_wall_s,
@@ -90,7 +94,9 @@ fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child)> {
     // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
     unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
     let start = Instant::now();
-    Ok((start, command.spawn()?))
+    let child = command.spawn()?;
+    interrupt::note_child(child.id());
+    Ok((start, child))
 }
 
 /// The CPU time of a child that exited with code 0, or how it ended otherwise.
@@ -154,12 +160,10 @@ fn last_lines(text: &str) -> String {
     }
 }
 
-/// Sends SIGTERM, on which `mpirun` ends its ranks, and kills the child if it does not end within a few seconds.
+/// Sends SIGTERM to the child and all its descendants, ranks included, and kills those that do not end in time.
 fn end_child(child: &Child) -> io::Result<()> {
-    if let Some(group) = session::pid_of(child.id()) {
-        let _ = kill_process_group(group, Signal::TERM);
-    }
-    let patience = Instant::now() + Duration::from_secs(3);
+    session::signal(child.id(), Signal::TERM);
+    let patience = Instant::now() + interrupt::PATIENCE;
     while Instant::now() < patience {
         if try_reap(child)?.is_some() {
             return Ok(());
@@ -177,13 +181,10 @@ fn end_child(child: &Child) -> io::Result<()> {
 /// so this repeats until none is found.
 fn kill_session(leader: u32) {
     for _ in 0..100 {
-        let members = session::members(leader);
-        if members.is_empty() {
+        if session::members(leader).is_empty() {
             return;
         }
-        for member in members {
-            let _ = kill_process(member, Signal::KILL);
-        }
+        session::signal(leader, Signal::KILL);
         std::thread::sleep(Duration::from_millis(5));
     }
 }
