@@ -1,6 +1,6 @@
 //! The end of a program on SIGINT, SIGTERM and SIGHUP: at once, in whatever it does, and without unfinished files.
 
-use crate::unfinished::abandon_all;
+use crate::unfinished::{abandon_all, complete};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::stdio::stderr;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -19,7 +19,7 @@ pub const INTERRUPTED: i32 = 130;
 const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 
 /// Makes each of the signals remove all unfinished files, print `message` on the standard error and end the process with exit code 130.
-/// If output is complete already, the first signal is ignored, as the process is about to end. Signals that the process was started to
+/// If output is complete or the outcome [decided], the first signal is ignored, as the process is about to end. Signals that the process was started to
 /// ignore, as `nohup` does, stay ignored. The process waits for the time `linger` before it ends, unless another signal arrives.
 ///
 /// # Errors
@@ -65,6 +65,11 @@ pub fn uninterrupted<T>(body: impl FnOnce() -> T) -> T {
     // SAFETY: as above. A panic in `body` ends the process.
     unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), null_mut()) };
     result
+}
+
+/// Notes that the program's outcome is decided: from now on a first signal changes nothing.
+pub fn decided() {
+    complete();
 }
 
 /// Removes all unfinished files: before the process ends because of a bug.

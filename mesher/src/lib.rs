@@ -8,6 +8,7 @@
 
 #![deny(missing_docs)]
 
+pub mod agreement;
 pub mod brick;
 pub mod brickset;
 pub mod case;

@@ -9,6 +9,7 @@ mod launch;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
 use files::{Draft, interrupt};
+use mesher::agreement;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
 use mesher::partition::Division;
@@ -68,6 +69,9 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
                 "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
             )),
         },
+        _ if launch::ranks().is_some_and(|ranks| ranks > 1) => Err(Error::input(
+            "each rank of this job would mesh on its own: leave out --comm, or start the mesher without mpirun",
+        )),
         _ => Ok(asked),
     }
 }
@@ -133,15 +137,21 @@ fn print(report: &Report) -> i32 {
 /// One rank's run; returns the exit code, the same on all ranks.
 fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
-    let args = match args {
-        Ok(args) => args,
-        Err(e) => return fail(e, first),
+    let understood = args.as_ref().map(drop).map_err(Error::clone);
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
+    let words = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
+    let args = match (agreement::on_options(understood, &words, comm), args) {
+        (Ok(()), Ok(args)) => args,
+        (Err(e), _) => return fail(&e, first),
+        (_, Err(e)) => return fail(e, first),
     };
     let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);
     record.report_status("start");
     let result = work(args, comm, &mut record);
+    // Launchers send a signal to the other ranks when the first one ends with an error.
+    interrupt::decided();
     record.report_status("done");
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
@@ -166,6 +176,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     let draft = json.map(|path| Draft::create(path).map_err(|e| json_error(path, e))).transpose();
     let draft = mesher::comm::agree(comm, draft)?;
     let case = mesher::comm::agree(comm, case(args))?;
+    agreement::on_case(&case, comm)?;
     let options = Options {
         division: Division {
             partitioner: args.partitioner,
