@@ -18,7 +18,8 @@ pub const UNPRINTED: i32 = 4;
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
-/// input, 4 output could not be written, 70 a bug, 130 interrupted.
+/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 130
+/// interrupted by SIGINT, SIGTERM or SIGHUP. Unless the code is 0, no file of the mesh remains.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
