@@ -11,6 +11,7 @@ use mesher::partition::{Partitioner, Weights};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
+use std::time::Duration;
 
 /// Exit code of a run whose text could not be printed.
 pub const UNPRINTED: i32 = 4;
@@ -18,8 +19,8 @@ pub const UNPRINTED: i32 = 4;
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
-/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 130
-/// interrupted by SIGINT, SIGTERM or SIGHUP. Unless the code is 0, no file of the mesh remains.
+/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 75 a
+/// rank exceeded --stall-limit, 130 interrupted by SIGINT, SIGTERM or SIGHUP. Unless the code is 0, no file of the mesh remains.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
@@ -55,6 +56,9 @@ pub struct Args {
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
+    /// End the job if ranks of MPI wait for another one for longer than this, and name it; greater than the time of the longest phase
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub stall_limit: Option<Duration>,
     /// Print errors only
     #[arg(long)]
     pub quiet: bool,
@@ -126,6 +130,11 @@ fn level_base(s: &str) -> Result<LevelBase, String> {
         Ok(l) if l <= mesher::octant::LEVEL_MAX => Ok(LevelBase(Some(l))),
         _ => Err("give auto or a level from 0 to 19".into()),
     }
+}
+
+fn seconds(s: &str) -> Result<Duration, String> {
+    let limit = s.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
+    limit.filter(|l| !l.is_zero()).ok_or_else(|| "give a positive number of seconds".into())
 }
 
 fn comm_choice(s: &str) -> Result<CommChoice, String> {

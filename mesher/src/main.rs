@@ -145,6 +145,9 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
         (Err(e), _) => return fail(&e, first),
         (_, Err(e)) => return fail(e, first),
     };
+    if let Some(limit) = args.stall_limit {
+        comm.limit_calls(limit);
+    }
     let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);

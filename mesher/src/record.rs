@@ -37,6 +37,7 @@ impl Recorder {
     /// Runs and times a phase. The times of phases with the same name add up.
     pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
         self.report_status(name);
+        comm.enter(name);
         let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = work();

@@ -207,6 +207,50 @@ fn a_job_whose_launcher_or_rank_is_killed_leaves_no_mesh() {
     }
 }
 
+/// A rank that is stopped keeps the others waiting, in calls of MPI.
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_rank_that_keeps_the_others_waiting_is_named() {
+    let mut random = Random(4);
+    for round in 0..6 {
+        let workspace = Workspace::new();
+        workspace.write("case.toml", LONG);
+        let ranks = 2 + round % 3;
+        let limit = ["--stall-limit", "2", "--quiet"];
+        let mut job = start(workspace.mpirun(ranks, &[&OUTPUT[..], &limit].concat()));
+        wait_for_claim(&mut job, &workspace);
+        std::thread::sleep(Duration::from_micros(300_000 + random.below(1_500_000)));
+        let processes = children(job.id());
+        let stopped = random.below(processes.len() as u64) as usize;
+        signal("STOP", processes[stopped]);
+        let finished = job.finish();
+        signal("CONT", processes[stopped]);
+        let what = format!("round {round}, {ranks} ranks, rank {stopped} stopped: {finished:?}");
+        assert_eq!(finished.code, Some(75), "{what}");
+        let named = format!("rank {stopped} does not answer");
+        assert!(finished.stderr.contains(&named) && finished.stderr.contains("phase "), "{what}");
+        while processes.iter().any(|&id| is_alive(id)) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_all_or_nothing(&workspace, &["case.toml"], &finished);
+    }
+}
+
+/// The limit changes neither the mesh nor the counters.
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_job_within_its_limit_is_as_without_one() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", SHORT);
+    let report = |options: &[&str]| {
+        let args = ["case.toml", "--quiet", "--json", "run.json"];
+        run(workspace.mpirun(3, &[&args[..], options].concat())).succeeds();
+        let report = workspace.json("run.json");
+        (report["digest"].clone(), report["counters"].clone())
+    };
+    assert_eq!(report(&["--stall-limit", "60"]), report(&[]));
+}
+
 #[test]
 fn a_time_limit_ends_a_run() {
     let workspace = Workspace::new();

@@ -19,7 +19,7 @@ use crate::error::Error;
 use cpu_time::ThreadTime;
 use std::cell::Cell;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The messages that a rank has sent to other ranks so far, and the time in its calls.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,6 +69,12 @@ pub trait Comm {
 
     /// Runs `body` without counting or timing its calls: for checks, which must not change the counters.
     fn uncounted(&self, body: &mut dyn FnMut());
+
+    /// Ends the job if a rank keeps the others waiting in a call for longer than `limit`; ranks of one process never do. Collective.
+    fn limit_calls(&self, _limit: Duration) {}
+
+    /// Notes the phase that the rank is in.
+    fn enter(&self, _phase: &'static str) {}
 
     /// Returns after all ranks have called it. Collective.
     fn barrier(&self) {
