@@ -12,11 +12,16 @@ use mesher::write::Output;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
+use std::time::Duration;
+
+/// Exit code of a run whose text could not be printed.
+pub const UNPRINTED: i32 = 4;
 
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
-/// input, 4 output could not be written, 70 a bug, 130 interrupted.
+/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 75 a
+/// rank exceeded --stall-limit, 130 interrupted by SIGINT, SIGTERM or SIGHUP. Unless the code is 0, no file of the mesh remains.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
@@ -61,6 +66,9 @@ pub struct Args {
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
+    /// End the job if ranks of MPI wait for another one for longer than this, and name it; greater than the time of the longest phase
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub stall_limit: Option<Duration>,
     /// Print errors only
     #[arg(long)]
     pub quiet: bool,
@@ -143,6 +151,11 @@ fn level_base(s: &str) -> Result<LevelBase, String> {
     }
 }
 
+fn seconds(s: &str) -> Result<Duration, String> {
+    let limit = s.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
+    limit.filter(|l| !l.is_zero()).ok_or_else(|| "give a positive number of seconds".into())
+}
+
 fn comm_choice(s: &str) -> Result<CommChoice, String> {
     let mut words = s.split(':');
     let choice = match (words.next(), words.next(), words.next()) {
@@ -193,22 +206,19 @@ pub fn parse() -> Result<Args, Error> {
         if let Some(&shell) = m.get_one::<Shell>("completions") {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut command(), "mesher", &mut script);
-            print_and_exit(&script);
+            print_and_exit(|| io::stdout().write_all(&script));
         }
         if m.get_flag("man") {
             let mut page = Vec::new();
             let rendered = clap_mangen::Man::new(command()).render(&mut page);
             rendered.expect("memory can be written to");
-            print_and_exit(&page);
+            print_and_exit(|| io::stdout().write_all(&page));
         }
         Args::from_arg_matches_mut(&mut m)
     });
     parsed.map_err(|e| {
         if !e.use_stderr() {
-            if launch::is_first() {
-                e.exit();
-            }
-            exit(e.exit_code());
+            print_and_exit(|| e.print());
         }
         let text = e.to_string();
         let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
@@ -221,12 +231,13 @@ pub fn parse() -> Result<Args, Error> {
     })
 }
 
-fn print_and_exit(text: &[u8]) -> ! {
-    if launch::is_first() {
+fn print_and_exit(print: impl FnOnce() -> io::Result<()>) -> ! {
+    let print = || print().and_then(|()| io::stdout().flush());
+    match launch::is_first().then(print).transpose() {
         // A closed pipe is no reason to fail.
-        let _ = io::stdout().write_all(text);
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
+        _ => exit(0),
     }
-    exit(0)
 }
 
 /// The files to write; none without --out.

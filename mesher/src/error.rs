@@ -13,9 +13,6 @@ pub enum Error {
     /// Output could not be written.
     #[error("{0}")]
     Output(String),
-    /// The user interrupted the run.
-    #[error("interrupted")]
-    Interrupted,
 }
 
 impl Error {
@@ -34,7 +31,6 @@ impl Error {
         match self {
             Self::Input(_) => 2,
             Self::Output(_) => 4,
-            Self::Interrupted => 130,
         }
     }
 }

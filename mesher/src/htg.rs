@@ -11,7 +11,6 @@ mod siblings;
 use crate::comm::{Comm, MessageBuffer};
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::record::check_interrupt;
 use crate::write::{OutDir, TreeFile};
 use numbering::Numbering;
 use siblings::{OwnSiblings, root};
@@ -48,7 +47,7 @@ pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Re
         }
         let compressed = comm.sparse_all_to_all(chunks);
         let written = file.as_mut().map_or(Ok(()), |file| add(&compressed, file));
-        comm.agree(check_interrupt().and(written))?;
+        comm.agree(written)?;
         begin = windows.end;
     }
     comm.agree(file.map_or(Ok(()), TreeFile::finish))

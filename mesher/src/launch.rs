@@ -22,3 +22,12 @@ pub fn is_first() -> bool {
         .find_map(|v| var(v).ok()?.parse::<usize>().ok())
         .is_none_or(|rank| rank == 0)
 }
+
+/// Makes the end of the launcher an interrupt of this rank: a launcher that is interrupted twice ends at once and leaves its ranks
+/// behind.
+#[cfg(all(feature = "mpi", target_os = "linux"))]
+pub fn end_with_launcher() {
+    use rustix::process::{Signal, set_parent_process_death_signal};
+    // Without it, the ranks end when they next communicate.
+    let _ = set_parent_process_death_signal(Some(Signal::TERM));
+}

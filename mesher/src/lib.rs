@@ -8,6 +8,7 @@
 
 #![deny(missing_docs)]
 
+pub mod agreement;
 pub mod brick;
 pub mod brickset;
 pub mod case;
@@ -43,13 +44,13 @@ pub use mesh::{Mesh, Options};
 
 use case::Case;
 use check::debug_check;
-use comm::{Comm, agree};
+use comm::Comm;
 use error::Error;
 use kept::Kept;
 use partition::base_leaves::cells_heaviest;
 use partition::initial::{self, Partition};
 use partition::repartition::{self, LeafCounts, Sets};
-use record::{Recorder, check_interrupt};
+use record::Recorder;
 use report::{Counters, Report};
 use voxelise::BinnedFacets;
 use write::OutDir;
@@ -64,20 +65,12 @@ pub fn mesh(
     comm: &dyn Comm,
     record: &mut Recorder,
 ) -> Result<Report, Error> {
-    let open = |o| if comm.rank() == 0 { OutDir::create(o) } else { Ok(OutDir::open(o)) };
-    let out = agree(comm, options.out.as_ref().map(open).transpose())?;
-    let result = mesh_into(out.as_ref(), case, options, comm, record);
-    if let (Err(_), Some(out)) = (&result, &out) {
-        // All ranks remove their own files before rank 0 removes the directory.
-        if comm.rank() != 0 {
-            out.discard(comm.rank());
-        }
-        comm.barrier();
-        if comm.rank() == 0 {
-            out.discard(0);
-        }
+    let out = options.out.as_ref().map(|output| OutDir::claim(output, comm)).transpose()?;
+    let report = mesh_into(out.as_ref(), case, options, comm, record)?;
+    if let Some(out) = out {
+        out.keep();
     }
-    result
+    Ok(report)
 }
 
 fn mesh_into(
@@ -190,7 +183,6 @@ fn make(
         check::ownership(&ownership, comm);
         check::base_tree(&tree, &rules, &ownership, comm);
     });
-    comm.agree(check_interrupt())?;
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let sides = record.phase("sides", comm, || {
@@ -198,7 +190,6 @@ fn make(
     })?;
     debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
     drop(facets);
-    comm.agree(check_interrupt())?;
     let tree::Tree { split, crossing } = tree;
     let mut mesh = Mesh {
         facets: facets_total,
@@ -211,7 +202,6 @@ fn make(
         is_base: options.ungraded,
     };
     if options.ungraded {
-        comm.agree(check_interrupt())?;
         return Ok(mesh);
     }
 
@@ -225,7 +215,6 @@ fn make(
     mesh.split = split;
     counters.add_graded(&work);
     debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
-    comm.agree(check_interrupt())?;
 
     // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
     if !(is_parallel && division.is_of_curve()) {

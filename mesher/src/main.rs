@@ -7,32 +7,42 @@ mod cli;
 mod heap;
 mod launch;
 
-use cli::{Args, CommChoice, case, parse};
+use cli::{Args, CommChoice, UNPRINTED, case, parse};
+use files::{Draft, interrupt};
+use mesher::agreement;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
 use mesher::partition::Division;
-use mesher::record::{INTERRUPTED, Recorder};
+use mesher::record::Recorder;
 use mesher::report::Report;
-use mesher::write::Draft;
+use mesher::write::write_json;
 use mesher::{Options, mesh};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::flag;
-use std::io::{IsTerminal, Write};
+use std::fmt::Display;
+use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
 use std::process::exit;
-use std::sync::{Arc, Once};
+use std::sync::Once;
+use std::time::Duration;
 
 /// Exit code of a bug.
 const BUG: i32 = 70;
-/// Exit code of a run that was interrupted twice.
-const STOPPED: i32 = 130;
+/// Time that an interrupted rank of a job lives on. When one rank has ended, launchers kill the others at once, which must have removed
+/// their files by then.
+const LINGER: Duration = Duration::from_millis(300);
 
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     heap::fix_thresholds();
     let args = parse();
-    // Failing to install the handlers only means that interrupts end the process the default way.
-    let _ = remember_interrupts();
+    let message = match (launch::is_first(), stderr().is_terminal()) {
+        (false, _) => "",
+        (true, false) => "mesher: interrupted\n",
+        // The name of the current phase is on the line.
+        (true, true) => "\r\x1b[Kmesher: interrupted\n",
+    };
+    // Without handlers, signals end the process the default way.
+    let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
+    let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
     match choose(args.as_ref().map_or(CommChoice::Auto, |a| a.comm)) {
         Ok(CommChoice::Mpi) => run_mpi(&args),
         Ok(CommChoice::Sim { ranks, seed }) => {
@@ -48,17 +58,6 @@ fn main() {
     }
 }
 
-/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop; a second signal ends the process at once. Signal handlers set a flag, as a
-/// thread that waits for signals would allocate at random times, and allocations are measured.
-fn remember_interrupts() -> std::io::Result<()> {
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
-        // Handlers run in this order, so the first signal finds the flag unset.
-        flag::register_conditional_shutdown(signal, STOPPED, Arc::clone(&INTERRUPTED))?;
-        flag::register(signal, Arc::clone(&INTERRUPTED))?;
-    }
-    Ok(())
-}
-
 /// Resolves `auto` by the launcher's environment.
 fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     match asked {
@@ -70,17 +69,22 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
                 "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
             )),
         },
+        _ if launch::ranks().is_some_and(|ranks| ranks > 1) => Err(Error::input(
+            "each rank of this job would mesh on its own: leave out --comm, or start the mesher without mpirun",
+        )),
         _ => Ok(asked),
     }
 }
 
 #[cfg(feature = "mpi")]
 fn run_mpi(args: &Result<Args, Error>) {
-    let comm = mesher::comm::mpi::Mpi::start();
+    #[cfg(target_os = "linux")]
+    launch::end_with_launcher();
+    // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
+    let comm = interrupt::uninterrupted(mesher::comm::mpi::Mpi::start);
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
     let code = run(args, &comm);
-    // All ranks have the same exit code, as they agree on errors.
     drop(comm);
     exit(code);
 }
@@ -97,8 +101,9 @@ fn abort_on_panic(end: fn() -> !) {
         report(info);
         static NOTICE: Once = Once::new();
         NOTICE.call_once(|| {
-            eprintln!("this is a bug in the mesher: please report it with the case");
+            complain(&"this is a bug in the mesher: please report it with the case");
         });
+        interrupt::abandon();
         end();
     }));
 }
@@ -106,38 +111,57 @@ fn abort_on_panic(end: fn() -> !) {
 /// Prints an error, on one rank of a job; returns the exit code.
 fn fail(e: &Error, prints: bool) -> i32 {
     if prints {
-        eprintln!("mesher: {e}");
+        complain(&format_args!("mesher: {e}"));
     }
     e.exit_code()
+}
+
+/// Prints a line on the standard error; returns whether that was possible.
+fn complain(line: &dyn Display) -> bool {
+    writeln!(stderr(), "{line}").is_ok()
+}
+
+/// Prints warnings and the report; returns the exit code. A closed pipe is no reason to fail.
+fn print(report: &Report) -> i32 {
+    let warns = |w| complain(&format_args!("mesher: warning: {w}"));
+    let is_warned = report.warnings.iter().all(warns);
+    match writeln!(stdout(), "{report}").and_then(|()| stdout().flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            fail(&Error::output(format!("standard output: {e}: free disk space")), true)
+        }
+        _ if is_warned => 0,
+        _ => UNPRINTED,
+    }
 }
 
 /// One rank's run; returns the exit code, the same on all ranks.
 fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
-    let args = match args {
-        Ok(args) => args,
-        Err(e) => return fail(e, first),
+    let understood = args.as_ref().map(drop).map_err(Error::clone);
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
+    let words = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
+    let args = match (agreement::on_options(understood, &words, comm), args) {
+        (Ok(()), Ok(args)) => args,
+        (Err(e), _) => return fail(&e, first),
+        (_, Err(e)) => return fail(e, first),
     };
+    if let Some(limit) = args.stall_limit {
+        comm.limit_calls(limit);
+    }
     let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(status, progress);
     record.report_status("start");
     let result = work(args, comm, &mut record);
+    // Launchers send a signal to the other ranks when the first one ends with an error.
+    interrupt::decided();
     record.report_status("done");
     if progress {
-        eprint!("\r\x1b[K");
+        let _ = write!(stderr(), "\r\x1b[K");
     }
     match result {
-        Ok(report) => {
-            if first && !args.quiet {
-                for warning in &report.warnings {
-                    eprintln!("mesher: warning: {warning}");
-                }
-                // A closed pipe is no reason to fail.
-                let _ = writeln!(std::io::stdout(), "{report}");
-            }
-            0
-        }
+        Ok(report) if first && !args.quiet => print(&report),
+        Ok(_) => 0,
         Err(e) => fail(&e, first),
     }
 }
@@ -155,6 +179,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     let draft = json.map(|path| Draft::create(path).map_err(|e| json_error(path, e))).transpose();
     let draft = mesher::comm::agree(comm, draft)?;
     let case = mesher::comm::agree(comm, case(args))?;
+    agreement::on_case(&case, comm)?;
     let options = Options {
         division: Division {
             partitioner: args.partitioner,
@@ -171,7 +196,10 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         report = report.with_message_matrix(comm);
     }
     let publish = |(path, draft): (&Path, Draft)| {
-        draft.publish_json(&report).map_err(|e| json_error(path, e))
+        let mut out = BufWriter::new(draft);
+        write_json(&mut out, &report)
+            .and_then(|()| out.into_inner()?.publish())
+            .map_err(|e| json_error(path, e))
     };
     comm.agree(json.zip(draft).map_or(Ok(()), publish))?;
     Ok(report)

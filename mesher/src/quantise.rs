@@ -19,6 +19,7 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<(Rules, Ve
         b.union(Bounds { lo: [c(0), c(1), c(2)], hi: [c(3), c(4), c(5)] })
     });
     let rules = case.rules(&bounds)?;
+    rules.check_size(comm.size())?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
     Ok((rules, facets))
 }

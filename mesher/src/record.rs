@@ -1,20 +1,10 @@
 //! Times and messages of each phase on one rank, and the phase that it is in.
 
 use crate::comm::{Comm, Traffic};
-use crate::error::Error;
 use cpu_time::ThreadTime;
+use std::io::Write;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock};
 use std::time::Instant;
-
-/// Set when the user asks the run to stop; read between phases and while leaves are written.
-pub static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
-
-/// An error if the user asked the run to stop.
-pub fn check_interrupt() -> Result<(), Error> {
-    if INTERRUPTED.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
-}
 
 /// One phase on one rank.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +37,7 @@ impl Recorder {
     /// Runs and times a phase. The times of phases with the same name add up.
     pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
         self.report_status(name);
+        comm.enter(name);
         let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = work();
@@ -78,7 +69,7 @@ impl Recorder {
             let _ = std::fs::write(path, format!("{phase}\n"));
         }
         if self.progress {
-            eprint!("\r\x1b[K{phase}");
+            let _ = write!(std::io::stderr(), "\r\x1b[K{phase}");
         }
     }
 

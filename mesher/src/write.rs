@@ -1,29 +1,24 @@
 //! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the manifest.
 //!
 //! Invariants of the output directory:
-//! - a file that has its final name is complete: it is written under a temporary name in the same
-//!   directory, synchronised and renamed ([`Draft`]);
+//! - one run alone writes to it ([`Claim`]);
+//! - a file that has its final name is complete: it is written under a temporary name, synchronised and renamed ([`Draft`]);
 //! - the manifest is written last, so all files that it names exist;
-//! - after an error, none of the mesh's files remains.
+//! - after an error or an interrupt, none of the mesh's files remains.
 
-mod draft;
-
-use crate::comm::Comm;
+use crate::comm::{Comm, agree};
 use crate::digest::{Digests, hex};
 use crate::error::Error;
 use crate::lattice::{Enclosed, Keep, Rules};
 use crate::octant::LEVEL_MAX;
 use crate::sides::Summary;
 use crate::stream::Counts;
+use files::{Claim, ClaimError, Draft};
 use npyz::WriterBuilder;
 use serde::Serialize;
-use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
 use vtkhdf::tree::{Shape, TreeWriter};
-
-pub use draft::Draft;
 
 /// File name of the manifest.
 pub const MANIFEST: &str = "mesh.json";
@@ -49,14 +44,19 @@ pub fn part_name(rank: usize) -> String {
     format!("leaves-{rank:05}.npy")
 }
 
-/// The directory that a mesh is written to.
+/// The names of all files of a rank. They are removed if the run fails.
+fn names(rank: usize) -> impl Iterator<Item = String> {
+    let tree = (rank == 0).then(|| TREE.to_owned());
+    [part_name(rank)].into_iter().chain(tree)
+}
+
+/// The directory that a mesh is written to. Its files are removed, unless it is [kept](Self::keep).
 #[derive(Debug)]
 pub struct OutDir {
     /// The files that it gets.
     pub output: Output,
     path: PathBuf,
-    /// Whether it was created for this mesh and is therefore removed after an error.
-    is_new: bool,
+    claim: Claim,
 }
 
 fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
@@ -67,33 +67,30 @@ fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
 }
 
 impl OutDir {
-    /// Creates the directory, or accepts an existing one that is empty. On one rank only.
+    /// Claims the directory for this run: one that does not exist, or an empty one. Collective.
     ///
     /// # Errors
-    /// If the directory cannot be created or written to, or is not empty.
-    pub fn create(files: &Output) -> Result<Self, Error> {
+    /// If the directory cannot be created or written to, is not empty, or another run has claimed it.
+    pub fn claim(files: &Output, comm: &dyn Comm) -> Result<Self, Error> {
         let path = &files.directory;
-        let new = |is_new| Self { output: files.clone(), path: path.clone(), is_new };
-        match std::fs::read_dir(path) {
-            Ok(mut entries) => {
-                if entries.next().is_some() {
-                    return Err(output(path, &"the directory is not empty"));
-                }
-                // Fails now rather than after the meshing, if the directory cannot be written to.
-                NamedTempFile::new_in(path).map_err(|e| output(path, &e))?;
-                Ok(new(false))
-            }
-            Err(e) if e.kind() == io::ErrorKind::NotFound => {
-                std::fs::create_dir(path).map_err(|e| output(path, &e))?;
-                Ok(new(true))
-            }
-            Err(e) => Err(output(path, &e)),
-        }
-    }
-
-    /// The directory that another rank has created.
-    pub fn open(output: &Output) -> Self {
-        Self { output: output.clone(), path: output.directory.clone(), is_new: false }
+        let all = || (0..comm.size()).flat_map(names);
+        let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
+        let created = agree(
+            comm,
+            created.map_err(|e| match e {
+                ClaimError::Io(e) => output(path, &e),
+                taken => Error::input(format!("{}: {taken}: choose another --out", path.display())),
+            }),
+        )?;
+        let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
+        comm.uncounted(&mut || is_new = comm.max(is_new));
+        // A rank that was killed could not remove its files. If it was the first, the others remove them.
+        let mine = [0, comm.rank()].into_iter().flat_map(names);
+        let claim = match created {
+            Some(claim) => Ok(claim),
+            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| output(path, &e)),
+        };
+        Ok(Self { output: files.clone(), path: path.clone(), claim: agree(comm, claim)? })
     }
 
     /// Begins this rank's part.
@@ -101,13 +98,14 @@ impl OutDir {
     /// # Errors
     /// If its file cannot be created.
     pub fn part(&self, rank: usize) -> Result<Part, Error> {
-        let path = self.path.join(part_name(rank));
+        let name = part_name(rank);
         let begin = || -> io::Result<BufWriter<Draft>> {
-            let mut file = BufWriter::with_capacity(1 << 20, Draft::create(&path)?);
+            let mut file = BufWriter::with_capacity(1 << 20, self.claim.draft(&name)?);
             file.write_all(&header(u64::MAX)?)?;
             Ok(file)
         };
         let file = begin().map_err(|e| output(&self.path, &e))?;
+        let path = self.path.join(name);
         Ok(Part { path, file, digests: Digests::default(), leaves: 0 })
     }
 
@@ -118,33 +116,11 @@ impl OutDir {
     pub fn tree(&self, shape: Shape, with_ranks: bool) -> Result<TreeFile, Error> {
         let path = self.path.join(TREE);
         let begin = || {
-            let file = BufWriter::with_capacity(1 << 20, Draft::create(&path)?);
+            let file = BufWriter::with_capacity(1 << 20, self.claim.draft(TREE)?);
             TreeWriter::new(file, shape, with_ranks)
         };
         let file = begin().map_err(|e| output(&path, &e))?;
         Ok(TreeFile { path, file })
-    }
-
-    /// Removes the mesh's files after an error on any rank.
-    pub fn discard(&self, rank: usize) {
-        let _ = std::fs::remove_file(self.path.join(part_name(rank)));
-        if rank == 0 {
-            for name in [TREE, MANIFEST] {
-                let _ = std::fs::remove_file(self.path.join(name));
-            }
-        }
-        if self.is_new {
-            // Parts of other ranks may remain.
-            for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
-                let name = entry.file_name();
-                let name = name.to_string_lossy();
-                let is_mine = name.starts_with("leaves-") || name.starts_with(".tmp");
-                if is_mine || name == TREE || name == MANIFEST {
-                    let _ = std::fs::remove_file(entry.path());
-                }
-            }
-            let _ = std::fs::remove_dir(&self.path);
-        }
     }
 
     /// Writes the manifest. On one rank only, after all ranks have finished their parts.
@@ -152,12 +128,23 @@ impl OutDir {
     /// # Errors
     /// If the file cannot be written.
     pub fn manifest(&self, manifest: &Manifest) -> Result<(), Error> {
-        let write = || -> io::Result<()> {
-            Draft::create(&self.path.join(MANIFEST))?.publish_json(manifest)?;
-            File::open(&self.path)?.sync_all()
-        };
-        write().map_err(|e| output(&self.path, &e))
+        let write = |to: &mut dyn Write| write_json(to, manifest);
+        self.claim.commit(write).map_err(|e| output(&self.path, &e))
     }
+
+    /// Keeps the mesh. On all ranks, after the [manifest](Self::manifest).
+    pub fn keep(self) {
+        self.claim.keep();
+    }
+}
+
+/// Writes `value` as JSON with a final newline.
+///
+/// # Errors
+/// If that fails.
+pub fn write_json(mut to: &mut dyn Write, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut to, value)?;
+    to.write_all(b"\n")
 }
 
 /// The file of the tree while it is being written.
@@ -413,6 +400,7 @@ impl Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::comm::Solo;
 
     #[test]
     fn parts_of_any_length_are_read_back() {
@@ -420,7 +408,7 @@ mod tests {
         for n in [0usize, 1, 9, 10, 4097, 1_000_000] {
             let directory = root.path().join(n.to_string());
             let files = Output { directory, words: true, tree: false, cell_ranks: false };
-            let out = OutDir::create(&files).unwrap();
+            let out = OutDir::claim(&files, &Solo).unwrap();
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
             let mut part = out.part(3).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());

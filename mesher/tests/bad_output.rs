@@ -5,7 +5,9 @@
 #[path = "support/process.rs"]
 mod process;
 
-use process::{Finished, MESHER, OUTPUT, Workspace, refused, run, skip, tetrahedron};
+use process::{
+    COMMS, Finished, INPUT, MESHER, OUTPUT, Workspace, refused, run, skip, start, tetrahedron,
+};
 use std::process::Command;
 
 #[test]
@@ -21,11 +23,11 @@ fn unwritable_output_is_refused() {
         ("file/mesh", &["file/mesh"][..]),
         ("file", &["file"]),
         ("absent/deep/mesh", &["absent/deep/mesh"]),
-        ("full", &["full", "not empty"]),
         ("/proc/mesh", &["/proc/mesh"]),
     ] {
         refused(&workspace, &to("--out", path), OUTPUT, words);
     }
+    refused(&workspace, &to("--out", "full"), INPUT, &["full", "not empty", "--out"]);
     for path in ["file/run.json", "absent/run.json", "/proc/run.json", "folder"] {
         refused(&workspace, &to("--json", path), OUTPUT, &[path, "--json"]);
     }
@@ -109,6 +111,127 @@ fn full_and_read_only_disks_are_refused() {
             let mount = format!("mount -t tmpfs -o {options} none disk");
             let finished = in_shell(&workspace, &shell, &mount, &args, "disk");
             finished.refuses(OUTPUT, &["disk"]);
+        }
+    }
+}
+
+/// A mesh that takes some seconds.
+const LONG: &str = "spacing_min = 0.002\nroot_scale = 2.0\nkeep = \"all\"\n
+[generator]\nshape = \"sphere\"\nfacets = 5120\n";
+
+#[test]
+fn a_second_run_into_a_directory_is_refused_and_changes_nothing() {
+    for comm in COMMS {
+        let workspace = Workspace::new();
+        workspace.write("body.stl", tetrahedron());
+        workspace.write("case.toml", LONG);
+        let first = start(workspace.mesher(&["case.toml", "--out", "mesh", "--quiet", comm]));
+        while !workspace.path().join("mesh/mesh.json.draft").exists() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let second = ["body.stl", "--spacing-min=0.5", "--out", "mesh", comm];
+        let claimed = run(workspace.mesher(&second));
+        let is_early = !workspace.path().join("mesh/mesh.json").exists();
+        assert!(is_early, "the first run has to take longer");
+        claimed.refuses(INPUT, &["mesh: another run is writing", "--out"]);
+        first.finish().succeeds();
+        let complete = workspace.contents();
+        run(workspace.mesher(&second)).refuses(INPUT, &["mesh", "not empty", "--out"]);
+        assert_eq!(workspace.contents(), complete);
+        assert!(workspace.path().join("mesh/leaves-00000.npy").exists());
+    }
+}
+
+/// Of jobs that start at the same time, one writes its mesh.
+#[test]
+fn of_simultaneous_runs_into_a_directory_one_succeeds() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    for _ in 0..10 {
+        let spacings = ["0.5", "0.3", "0.1", "0.05"];
+        let runs = spacings.map(|spacing| {
+            let args = ["body.stl", "--quiet", "--out", "mesh", "--comm=sim:2:1", "--spacing-min"];
+            start(workspace.mesher(&[&args[..], &[spacing]].concat()))
+        });
+        let codes = runs.map(|run| run.finish().code);
+        assert_eq!(codes.iter().filter(|&&code| code == Some(0)).count(), 1, "{codes:?}");
+        assert_eq!(codes.iter().filter(|&&code| code == Some(INPUT)).count(), 3, "{codes:?}");
+        let manifest = workspace.json("mesh/mesh.json");
+        for part in manifest["parts"].as_array().expect("parts") {
+            let file = workspace.path().join("mesh").join(part["file"].as_str().expect("a name"));
+            let bytes = std::fs::metadata(file).expect("the part exists").len();
+            let words = 8 * part["leaves"].as_u64().expect("a number");
+            assert!((words + 1..words + 256).contains(&bytes), "{bytes} for {words}");
+        }
+        std::fs::remove_dir_all(workspace.path().join("mesh")).expect("the mesh");
+    }
+}
+
+#[test]
+fn a_report_is_written_through_whatever_is_no_regular_file() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    workspace.write("target.json", "old");
+    std::os::unix::fs::symlink("target.json", workspace.path().join("link")).expect("a link");
+    let args = |path| ["body.stl", "--spacing-min=0.5", "--quiet", "--json", path];
+    run(workspace.mesher(&args("link"))).succeeds();
+    assert!(workspace.path().join("link").is_symlink());
+    assert!(workspace.json("target.json")["cells"].as_u64() > Some(0));
+
+    let fifo = workspace.path().join("fifo");
+    assert!(Command::new("mkfifo").arg(&fifo).status().expect("mkfifo is installed").success());
+    let writer = start(workspace.mesher(&args("fifo")));
+    let read = std::fs::read_to_string(&fifo).expect("a FIFO can be read");
+    writer.finish().succeeds();
+    assert!(read.contains("octree-mesher-run/1") && read.ends_with("}\n"), "{read}");
+    assert!(!fifo.is_file());
+
+    // A pipe, and a regular file that has been written to before.
+    let printed = run(workspace.mesher(&args("/dev/stdout"))).stdout;
+    assert!(serde_json::from_str::<serde_json::Value>(&printed).is_ok(), "{printed}");
+    let shell = ["sh"];
+    let args = "body.stl --spacing-min 0.5 --json /dev/stdout";
+    in_shell(&workspace, &shell, "exec > log; echo first", args, ".").succeeds();
+    let log = std::fs::read_to_string(workspace.path().join("log")).expect("the log");
+    assert!(log.starts_with("first\n{") && log.contains("octree-mesher-run/1"), "{log}");
+}
+
+/// Devices are those of this test: it needs the right to make them.
+#[test]
+fn a_full_device_is_an_error_of_output() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    let device = |name: &str, minor: &str| {
+        let path = workspace.path().join(name);
+        let made = Command::new("mknod").arg(&path).args(["c", "1", minor]).output();
+        made.is_ok_and(|o| o.status.success()) && std::fs::File::create(path).is_ok()
+    };
+    if !(device("full", "7") && device("null", "3")) {
+        return skip("full devices", "this user may not make devices");
+    }
+    let body = "body.stl --spacing-min 0.5";
+    let warned = "sheet.stl --spacing-min 0.5 --root 0,0,0,8 --keep inside";
+    let sheet = [[[1.0f32, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]];
+    workspace.write("sheet.stl", process::binary_stl(&sheet));
+    for (args, code) in [
+        (format!("{body} > full"), OUTPUT),
+        (format!("{body} > null"), 0),
+        (format!("{body} --json full > null"), OUTPUT),
+        (format!("{body} --json null > null"), 0),
+        ("--help > full".to_owned(), OUTPUT),
+        ("--man > full".to_owned(), OUTPUT),
+        (format!("{warned} > null 2> full"), OUTPUT),
+        ("absent.stl --spacing-min 0.5 2> full".to_owned(), INPUT),
+        (format!("{body} | true"), 0),
+    ] {
+        let mut command = Command::new("bash");
+        command.args(["-c", &format!("set -o pipefail; '{MESHER}' {args}")]);
+        let finished = run(workspace.enter(command));
+        assert_eq!(finished.code, Some(code), "{args}: {finished:?}");
+        assert!(!finished.stderr.contains("panicked"), "{args}: {finished:?}");
+        for name in ["full", "null"] {
+            let kept = std::fs::metadata(workspace.path().join(name)).expect("the device");
+            assert!(!kept.is_file(), "{args} replaced {name}");
         }
     }
 }

@@ -5,9 +5,8 @@
 #[path = "support/process.rs"]
 mod process;
 
-use process::{Workspace, run, start};
+use process::{Finished, Workspace, run};
 use std::process::Command;
-use std::time::Duration;
 
 const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"torus\"\nfacets = 640\n
@@ -92,36 +91,72 @@ fn a_full_disk_ends_all_ranks() {
     assert!(workspace.contents().keys().eq(before.keys()), "{:?}", workspace.contents().keys());
 }
 
-/// A launcher forwards an interrupt with some delay, and kills ranks that do not end within a second or two.
-/// So a job may have finished, or may have had no time to clean up. But every file with its final name is
-/// complete, and the manifest is written last.
+/// A job whose ranks are started with different words after the program's name.
+fn different(workspace: &Workspace, words: [&[&str]; 2]) -> Finished {
+    let first = [words[0], &[":", "-n", "2", process::MESHER], words[1]].concat();
+    run(workspace.mpirun(1, &first))
+}
+
 #[test]
 #[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
-fn an_interrupted_job_leaves_no_incomplete_file() {
+fn ranks_that_disagree_end_with_the_first_difference() {
     let workspace = Workspace::new();
-    workspace.write("case.toml", CASE.replace("0.05", "0.002"));
-    let mut job = start(workspace.mpirun(2, &["case.toml", "--out", "mesh", "--json", "run.json"]));
-    while !workspace.path().join("mesh").exists() {
-        assert!(!job.is_over(), "the job ended before it wrote");
-        std::thread::sleep(Duration::from_millis(1));
+    workspace.write("a.toml", CASE);
+    workspace.write("b.toml", CASE.replace("0.05", "0.06"));
+    for folder in ["one", "two", "same"] {
+        std::fs::create_dir(workspace.path().join(folder)).expect("a directory");
     }
-    let sent = Command::new("kill").args(["-s", "INT", &job.id().to_string()]).status();
-    assert!(sent.expect("kill is installed").success());
-    let finished = job.finish();
-    assert!(finished.code != Some(0), "{finished:?}");
-    let complete = |name: &str| {
-        let text = std::fs::read_to_string(workspace.path().join(name)).ok()?;
-        Some(
-            serde_json::from_str::<serde_json::Value>(&text)
-                .expect("a file with its final name is complete"),
-        )
+    workspace.write("one/body.stl", process::tetrahedron());
+    workspace.write("same/body.stl", process::tetrahedron());
+    let mut other = process::tetrahedron();
+    // The same length, and another coordinate.
+    *other.last_mut().expect("bytes") ^= 1;
+    other[100] ^= 1;
+    workspace.write("two/body.stl", other);
+    for folder in ["one", "two", "same"] {
+        let case = "geometry = \"body.stl\"\nspacing_min = 0.1\n";
+        workspace.write(&format!("{folder}/body.toml"), case);
+        workspace.write(&format!("{folder}/case.toml"), CASE);
+    }
+    workspace.write("two/case.toml", CASE.replace("0.05", "0.06"));
+    let before = workspace.contents();
+    let refuses = |words: [&[&str]; 2], expected: &[&str]| {
+        different(&workspace, words).refuses_under_launcher(2, expected);
+        assert_eq!(workspace.contents(), before, "{words:?}");
     };
-    let reported = complete("run.json");
-    let manifest = complete("mesh/mesh.json");
-    assert!(reported.is_none() || manifest.is_some(), "the report must be written after the mesh");
-    for part in manifest.iter().flat_map(|m| m["parts"].as_array().expect("parts")) {
-        let file = workspace.path().join("mesh").join(part["file"].as_str().expect("a name"));
-        let bytes = std::fs::metadata(file).expect("the parts exist before the manifest").len();
-        assert!(bytes > 8 * part["leaves"].as_u64().expect("a number"), "{finished:?}");
+    refuses(
+        [&["a.toml", "--out", "x"], &["b.toml", "--out", "x"]],
+        &["rank 1", "b.toml", "a.toml"],
+    );
+    refuses([&["a.toml"], &["a.toml", "--ungraded"]], &["rank 1", "--ungraded", "nothing"]);
+    refuses([&["a.toml", "--json", "x"], &["a.toml"]], &["rank 1", "nothing", "--json"]);
+    refuses([&["a.toml"], &["a.toml", "--nonsense"]], &["--nonsense"]);
+    // The same words in different directories.
+    let elsewhere = |folders: [&str; 2], case: &str| {
+        let [one, two] = folders.map(|f| workspace.path().join(f).display().to_string());
+        let words = ["-n", "1", "-wdir", &one, process::MESHER, case, "--quiet", ":", "-n", "2"];
+        let mut command = Command::new("mpirun");
+        command.args(words).args(["-wdir", &two, process::MESHER, case, "--quiet"]);
+        run(workspace.as_mpi(command))
+    };
+    elsewhere(["one", "two"], "case.toml")
+        .refuses_under_launcher(2, &["rank 1", "spacing_min: 0.06", "spacing_min: 0.05"]);
+    elsewhere(["one", "two"], "body.toml").refuses_under_launcher(2, &["rank 1", "digest"]);
+    elsewhere(["one", "same"], "body.toml").succeeds();
+    run(workspace.mpirun(2, &["a.toml", "--comm", "solo"])).refuses_any_under_launcher(2, "--comm");
+}
+
+#[test]
+fn a_box_beyond_all_memory_is_refused_at_once() {
+    let workspace = Workspace::new();
+    // Level 19 of the whole root: (2^19)^3 cells.
+    let case = "spacing_min = 1\n[root]\norigin = [-4, -4, -4]\nedge = 8\n[generator]\nshape = \"sphere\"\nfacets = 80\n
+        [[box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nspacing = 1\n
+        [[box]]\nmin = [-9, -9, -9]\nmax = [9, 9, 9]\nspacing = 1.6e-5\n";
+    workspace.write("case.toml", case);
+    for comm in process::COMMS {
+        let args = ["case.toml", "--out", "mesh", comm];
+        run(workspace.mesher(&args)).refuses(2, &["1.4e17 cells", "box 1", "spacing"]);
+        assert!(!workspace.path().join("mesh").exists());
     }
 }

@@ -1,6 +1,7 @@
 //! Errors of the user's input and output. Each message is one sentence: the problem, its location
 //! and a remedy.
 use crate::case::Root;
+use files::ClaimError;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -125,11 +126,13 @@ pub enum Error {
         /// The nearest centroid of a leaf of T0 that no facet crosses, if there is such a leaf.
         nearest: Option<[f64; 3]>,
     },
-    /// The output directory is not empty.
-    #[error("output directory {} is not empty: empty it or choose another", path.display())]
-    OutputNotEmpty {
+    /// The output directory is not empty, or another run writes to it.
+    #[error("output directory {}: {taken}; choose another", path.display())]
+    OutputTaken {
         /// The directory.
         path: PathBuf,
+        /// The cause.
+        taken: ClaimError,
     },
     /// A file cannot be written.
     #[error("cannot write {}: {source}; check the path, its permissions and the free space", path.display())]
@@ -154,7 +157,7 @@ impl Error {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::OutputNotEmpty { .. } | Error::Write { .. } => 4,
+            Error::Write { .. } => 4,
             _ => 2,
         }
     }

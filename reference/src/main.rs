@@ -1,17 +1,23 @@
 //! The program `reference`: meshes a case by the paper's serial algorithm.
 use clap::Parser;
+use files::interrupt;
 use reference::write::{self, AmbiguousCount, Which};
 use reference::{Error, Mesh, base_tree, case_file, leaves, mesh};
 use serde::Serialize;
-use std::io::Write;
+use std::fmt::Display;
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The exit code of a bug. Every panic is one.
 const EXIT_BUG: u8 = 70;
+/// The exit code of output that cannot be written.
+const EXIT_OUTPUT: u8 = 4;
 
 /// Mesh a case by the paper's serial algorithm: simple, exact and slow
+///
+/// Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 130 interrupted.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -47,11 +53,23 @@ struct Run {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    // Without handlers, signals end the process the default way.
+    let _ = interrupt::install("error: interrupted\n", Duration::ZERO);
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(e) => {
+            return ExitCode::from(if e.print().is_ok() {
+                e.exit_code() as u8
+            } else {
+                EXIT_OUTPUT
+            });
+        }
+    };
     match std::panic::catch_unwind(|| run(&arguments)) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            eprintln!("error: {error}");
+            // The exit code remains if the standard error is full.
+            let _ = writeln!(std::io::stderr(), "error: {error}");
             ExitCode::from(error.exit_code())
         }
         // The panic handler has already printed the message.
@@ -61,18 +79,16 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let start = Instant::now();
-    if let Some(directory) = &arguments.out {
-        // Meshing may take an hour: refuse an unusable directory before it starts.
-        write::check_vacant(directory)?;
-    }
+    // Meshing may take an hour: refuse an unusable directory before it starts.
+    let claim = arguments.out.as_deref().map(write::claim).transpose()?;
     let case = case_file::read(&arguments.case)?;
     let (which, mesh) = if arguments.ungraded {
         (Which::Base, base_tree(&case)?)
     } else {
         (Which::Final, mesh(&case)?)
     };
-    if let Some(directory) = &arguments.out {
-        write::leaf_set(directory, which, &case, &mesh)?;
+    if let Some((claim, directory)) = claim.zip(arguments.out.as_deref()) {
+        write::leaf_set_into(claim, directory, which, &case, &mesh)?;
     }
     let tally = leaves::Tally::of(&mesh.words);
     let record = Run {
@@ -97,23 +113,34 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
 fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
     if let Some(ambiguous) = &mesh.ambiguous {
         let [x, y, z] = ambiguous.example;
-        eprintln!(
+        complain(&format_args!(
             "warning: the rays of {} components disagree, for example at ({x}, {y}, {z}); \
              look for holes or single sheets there",
             ambiguous.components
-        );
+        ))?;
     }
     let enclosed = &mesh.components.enclosed;
     if let Some([x, y, z]) = enclosed.example {
-        eprintln!(
+        complain(&format_args!(
             "note: enclosed space is deleted, {} components and {} leaves, for example at \
              ({x}, {y}, {z}); `enclosed = \"keep\"` keeps it",
             enclosed.count, enclosed.leaves
-        );
+        ))?;
     }
     let Run { cells, digest, time_wall_s, .. } = record;
-    writeln!(std::io::stdout(), "{cells} cells, digest {digest}, {time_wall_s:.2} s")
-        .map_err(|source| Error::Write { path: PathBuf::from("standard output"), source })
+    match writeln!(std::io::stdout(), "{cells} cells, digest {digest}, {time_wall_s:.2} s") {
+        Err(source) if source.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::Write { path: "standard output".into(), source })
+        }
+        // A closed pipe is no reason to fail.
+        _ => Ok(()),
+    }
+}
+
+/// Prints a line on the standard error.
+fn complain(line: &dyn Display) -> Result<(), Error> {
+    writeln!(std::io::stderr(), "{line}")
+        .map_err(|source| Error::Write { path: "standard error".into(), source })
 }
 
 /// Peak resident memory of this process; `None` if the operating system does not report it.

@@ -5,8 +5,9 @@ use crate::case::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
 use crate::kept::Components;
 use crate::leaves::{Tally, hex};
+use files::{Claim, ClaimError, write_atomically};
 use serde::Serialize;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -119,29 +120,47 @@ impl Manifest {
     }
 }
 
-/// Checks that `directory` does not exist or is empty, so that a leaf set can be written to it.
+/// Claims `directory`, which does not exist or is empty, for a leaf set. Creates its parents.
 ///
 /// # Errors
-/// The directory is not empty or cannot be read.
-pub fn check_vacant(directory: &Path) -> Result<(), Error> {
-    match fs::read_dir(directory).map(|mut entries| entries.next().is_none()) {
-        Ok(true) => Ok(()),
-        Ok(false) => Err(Error::OutputNotEmpty { path: directory.to_owned() }),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(source) => Err(Error::Write { path: directory.to_owned(), source }),
-    }
+/// The directory is not empty, another run writes to it, or it cannot be created.
+pub fn claim(directory: &Path) -> Result<Claim, Error> {
+    let write = |source| Error::Write { path: directory.to_owned(), source };
+    directory.parent().map_or(Ok(()), fs::create_dir_all).map_err(write)?;
+    Claim::create(directory, MANIFEST_FILE, [LEAF_FILE.to_owned()]).map_err(|error| match error {
+        ClaimError::Io(source) => write(source),
+        taken => Error::OutputTaken { path: directory.to_owned(), taken },
+    })
 }
 
 /// Writes a mesh to `directory`, the manifest last: a directory with a manifest is complete.
 ///
 /// # Errors
-/// The directory is not empty, or a file cannot be written.
+/// The directory is not empty, another run writes to it, or a file cannot be written.
 pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Result<(), Error> {
-    check_vacant(directory)?;
-    fs::create_dir_all(directory)
-        .map_err(|source| Error::Write { path: directory.to_owned(), source })?;
-    file(&directory.join(LEAF_FILE), |to| npy(to, &mesh.words))?;
-    json(&directory.join(MANIFEST_FILE), &Manifest::new(which, case, mesh))
+    leaf_set_into(claim(directory)?, directory, which, case, mesh)
+}
+
+/// Writes a mesh to a claimed directory.
+///
+/// # Errors
+/// A file cannot be written. Then none remains.
+pub fn leaf_set_into(
+    claim: Claim,
+    directory: &Path,
+    which: Which,
+    case: &Case,
+    mesh: &Mesh,
+) -> Result<(), Error> {
+    let written = (|| {
+        let mut to = BufWriter::new(claim.draft(LEAF_FILE)?);
+        npy(&mut to, &mesh.words)?;
+        to.into_inner()?.publish()?;
+        claim.commit(|to| json_to(to, &Manifest::new(which, case, mesh)))
+    })();
+    written.map_err(|source| Error::Write { path: directory.to_owned(), source })?;
+    claim.keep();
+    Ok(())
 }
 
 /// Writes `value` to a JSON file.
@@ -149,29 +168,13 @@ pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Res
 /// # Errors
 /// The file cannot be written.
 pub fn json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
-    file(path, |to| {
-        serde_json::to_writer_pretty(&mut *to, value)?;
-        to.write_all(b"\n")
-    })
+    write_atomically(path, |to| json_to(to, value))
+        .map_err(|source| Error::Write { path: path.to_owned(), source })
 }
 
-/// Writes a temporary file in the directory of `path`, synchronises it to disk, and renames it to
-/// `path`.
-fn file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".tmp");
-    let temporary = path.with_file_name(name);
-    let written = (|| {
-        let mut to = BufWriter::new(File::create(&temporary)?);
-        fill(&mut to)?;
-        to.into_inner()?.sync_all()?;
-        fs::rename(&temporary, path)
-    })();
-    written.map_err(|source| {
-        // The first error is the one to report; the removal may fail for the same reason.
-        let _ = fs::remove_file(&temporary);
-        Error::Write { path: path.to_owned(), source }
-    })
+fn json_to(to: &mut dyn Write, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut *to, value)?;
+    to.write_all(b"\n")
 }
 
 /// Writes NumPy's format, version 1.0: a header whose length is a multiple of 64 bytes, then the

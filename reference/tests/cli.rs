@@ -233,7 +233,7 @@ fn output_that_cannot_be_written_exits_with_4() {
         reference(path, &["case.toml", "--out", "empty"]).status.success(),
         "an empty directory is accepted"
     );
-    assert!(assert_fails(path, &["case.toml", "--out", "empty"], 4).contains("not empty"));
+    assert!(assert_fails(path, &["case.toml", "--out", "empty"], 2).contains("not empty"));
     assert!(assert_fails(path, &["case.toml", "--out", "case.toml"], 4).contains("case.toml"));
     assert!(
         assert_fails(path, &["case.toml", "--out", "case.toml/mesh"], 4).contains("cannot write")
@@ -241,4 +241,60 @@ fn output_that_cannot_be_written_exits_with_4() {
     assert!(
         assert_fails(path, &["case.toml", "--json", "no/such/run.json"], 4).contains("run.json")
     );
+}
+
+#[test]
+fn a_record_is_written_through_whatever_is_no_regular_file() {
+    let directory = directory_with_case(CASE);
+    let path = directory.path();
+    std::os::unix::fs::symlink("record", path.join("link")).unwrap();
+    assert!(reference(path, &["case.toml", "--json", "link"]).status.success());
+    assert!(path.join("link").is_symlink() && path.join("record").is_file());
+    let printed = reference(path, &["case.toml", "--json", "/dev/stdout"]).stdout;
+    assert!(String::from_utf8(printed).unwrap().starts_with("{\n  \"schema\""));
+    let made = Command::new("mknod").current_dir(path).args(["null", "c", "1", "3"]).status();
+    if made.unwrap().success() && File::create(path.join("null")).is_ok() {
+        assert!(reference(path, &["case.toml", "--json", "null"]).status.success());
+        assert!(!path.join("null").is_file());
+    }
+}
+
+#[test]
+fn a_full_device_is_an_error_of_output() {
+    let directory = directory_with_case(CASE);
+    for (arguments, code) in
+        [("case.toml > /dev/full", 4), ("--help > /dev/full", 4), ("absent.toml 2> /dev/full", 2)]
+    {
+        let script = format!("'{}' {arguments}", env!("CARGO_BIN_EXE_reference"));
+        let run = Command::new("sh").args(["-c", &script]).current_dir(directory.path()).output();
+        let run = run.unwrap();
+        assert_eq!(run.status.code(), Some(code), "{arguments}: {run:?}");
+        assert!(!String::from_utf8_lossy(&run.stderr).contains("panicked"), "{run:?}");
+    }
+}
+
+#[test]
+fn an_interrupt_at_any_time_leaves_no_files() {
+    let directory = directory_with_case(&CASE.replace("0.125", "0.004").replace("80", "8000"));
+    let path = directory.path();
+    for (delay_ms, signal) in [(0, "INT"), (50, "TERM"), (200, "HUP"), (500, "INT"), (900, "TERM")]
+    {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
+        command.current_dir(path).args(["case.toml", "--out", "mesh", "--json", "run.json"]);
+        let mut run = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+        while !path.join("mesh/mesh.json.draft").exists() {
+            assert!(run.try_wait().unwrap().is_none(), "the run ended too early");
+        }
+        let second = reference(path, &["case.toml", "--out", "mesh"]);
+        assert_eq!(second.status.code(), Some(2), "{second:?}");
+        std::thread::sleep(std::time::Duration::from_millis(delay_ms));
+        let since = std::time::Instant::now();
+        let id = run.id().to_string();
+        assert!(Command::new("kill").args(["-s", signal, &id]).status().unwrap().success());
+        let output = run.wait_with_output().unwrap();
+        assert!(since.elapsed().as_secs() < 1, "{:?}", since.elapsed());
+        assert_eq!(output.status.code(), Some(130), "{output:?}");
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "error: interrupted\n");
+        assert_eq!(fs::read_dir(path).unwrap().count(), 1, "only the case is left");
+    }
 }

@@ -38,5 +38,7 @@ fn main() -> ExitCode {
         }
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     };
-    ExitCode::from(output::finish(code))
+    let code = output::finish(code);
+    interrupt::uninstall();
+    ExitCode::from(code)
 }

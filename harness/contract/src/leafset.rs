@@ -8,10 +8,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::digest::Digest;
-use crate::files::{self, write_atomically};
+use crate::files::{self, named};
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::manifest::{self, Manifest, Part, Sides, Tally};
 use crate::npy::{self, NpyError, PartFile};
+use ::files::Claim;
 
 /// A mesh in memory.
 #[derive(Clone, Debug)]
@@ -268,21 +269,21 @@ impl LeafSet {
     /// # Errors
     /// If the directory is not empty or a file cannot be written; the message names it.
     pub fn create(&self, dir: &Path) -> std::io::Result<()> {
-        let named = |error: std::io::Error| {
-            std::io::Error::new(error.kind(), format!("{}: {error}", dir.display()))
+        let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
+        let write = || {
+            let parts = self.manifest.parts.iter().zip(&self.parts);
+            let names = parts.clone().map(|(part, _)| part.file.clone());
+            let claim = Claim::create(dir, manifest::FILE, names).map_err(std::io::Error::from)?;
+            for (part, words) in parts {
+                let mut out = std::io::BufWriter::new(claim.draft(&part.file)?);
+                npy::write_to(&mut out, words)?;
+                out.into_inner()?.publish()?;
+            }
+            claim.commit(|out| out.write_all(self.manifest.text().as_bytes()))?;
+            claim.keep();
+            Ok(())
         };
-        fs::create_dir_all(dir).map_err(named)?;
-        if fs::read_dir(dir).map_err(named)?.next().is_some() {
-            return Err(named(std::io::Error::other("the directory is not empty: choose another")));
-        }
-        for (part, words) in self.manifest.parts.iter().zip(&self.parts) {
-            let fill = |out: &mut dyn std::io::Write| npy::write_to(out, words);
-            write_atomically(&dir.join(&part.file), fill).map_err(named)?;
-        }
-        write_atomically(&dir.join(manifest::FILE), |out| {
-            out.write_all(self.manifest.text().as_bytes())
-        })
-        .map_err(named)
+        parents.and_then(|()| write()).map_err(|error| named(dir, &error))
     }
 
     /// Writes the mesh into an existing directory, whether or not its manifest is correct.

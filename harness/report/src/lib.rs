@@ -20,4 +20,3 @@ mod section;
 pub mod targets;
 pub mod track;
 pub mod verification;
-pub mod write;

@@ -3,13 +3,20 @@
 //! A sparse all-to-all sends point-to-point messages only to the ranks that need one: of a thousand ranks each sends to dozens. A
 //! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. Messages
 //! are sent in chunks, as MPI counts in i32.
+//!
+//! With a limit for calls, collective calls are non-blocking: a rank that waits looks for questions of others ([`stall`]).
+
+mod stall;
 
 use super::{Comm, Gathered, MessageBuffer, Meter, Traffic, matrix};
 use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
 use mpi::point_to_point::{Message, Status};
+use mpi::request::{Request, Scope};
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
-use std::cell::Cell;
+use stall::Watch;
+use std::cell::{Cell, OnceCell};
+use std::time::Duration;
 
 /// Greatest number of words in a chunk: 1 GiB; few in debug builds, so that tests send several chunks.
 const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
@@ -18,6 +25,8 @@ const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
 
 /// One rank of an MPI job.
 pub struct Mpi {
+    /// Present if calls have a limit.
+    watch: OnceCell<Watch>,
     world: mpi::topology::SimpleCommunicator,
     meter: Meter,
     /// Whether the number of sparse all-to-alls so far is odd.
@@ -34,6 +43,7 @@ impl Mpi {
     pub fn start() -> Self {
         let universe = mpi::initialize().expect("MPI is initialised once");
         Self {
+            watch: OnceCell::new(),
             world: universe.world(),
             meter: Meter::default(),
             odd: Cell::new(false),
@@ -74,7 +84,13 @@ impl Comm for Mpi {
         self.meter.sum(self.size(), mine.len() as u64);
         self.meter.call(|| {
             let mut sums = vec![0; mine.len()];
-            self.world.all_reduce_into(mine, &mut sums[..], SystemOperation::sum());
+            match self.watch.get() {
+                None => self.world.all_reduce_into(mine, &mut sums[..], SystemOperation::sum()),
+                Some(watch) => mpi::request::scope(|scope| {
+                    let (to, sum) = (&mut sums[..], SystemOperation::sum());
+                    complete(watch, self.world.immediate_all_reduce_into(scope, mine, to, sum));
+                }),
+            }
             sums
         })
     }
@@ -94,12 +110,38 @@ impl Comm for Mpi {
     fn sent(&self) -> Vec<matrix::Entry> {
         self.meter.sent(self.rank())
     }
+
+    fn limit_calls(&self, limit: Duration) {
+        self.watch.get_or_init(|| Watch::new(&self.world, limit));
+    }
+
+    fn enter(&self, phase: &'static str) {
+        if let Some(watch) = self.watch.get() {
+            watch.enter(phase);
+        }
+    }
+}
+
+/// Waits for a collective call under a limit.
+fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, request: Request<'a, D, S>) {
+    let mut pending = Some(request);
+    watch.wait(|| {
+        pending = pending.take().and_then(|request| request.test().err());
+        pending.is_none()
+    });
 }
 
 impl Mpi {
     fn all_gather_untimed(&self, mine: &[u64]) -> MessageBuffer {
         let mut counts = vec![0u64; self.size()];
-        self.world.all_gather_into(&(mine.len() as u64), &mut counts[..]);
+        let length = mine.len() as u64;
+        match self.watch.get() {
+            None => self.world.all_gather_into(&length, &mut counts[..]),
+            Some(watch) => mpi::request::scope(|scope| {
+                let all = &mut counts[..];
+                complete(watch, self.world.immediate_all_gather_into(scope, &length, all));
+            }),
+        }
         let longest = counts.iter().copied().max().unwrap_or(0) as usize;
         // MPI counts the sum over the ranks in i32.
         let step = (GATHERED / self.size()).max(1);
@@ -128,7 +170,13 @@ impl Mpi {
         let lengths_all = lengths.iter().map(|&n| n as usize);
         let mut all = MessageBuffer::with_lengths(lengths_all);
         let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
-        self.world.all_gather_varcount_into(mine, &mut target);
+        match self.watch.get() {
+            None => self.world.all_gather_varcount_into(mine, &mut target),
+            Some(watch) => mpi::request::scope(|scope| {
+                let to = &mut target;
+                complete(watch, self.world.immediate_all_gather_varcount_into(scope, mine, to));
+            }),
+        }
         all
     }
 
@@ -157,7 +205,9 @@ impl Mpi {
                 self.meter.send(to, words.len());
             }
             let mut barrier = None;
+            self.watch.get().into_iter().for_each(Watch::start);
             loop {
+                self.watch.get().into_iter().for_each(Watch::poll);
                 while let Some(first) =
                     self.world.any_process().immediate_matched_probe_with_tag(tag)
                 {

@@ -72,6 +72,11 @@ impl Workspace {
     pub fn mpirun_of(&self, ranks: usize, program: &str, args: &[&str]) -> Command {
         let mut command = Command::new(MPIRUN);
         command.args(["-n", &ranks.to_string(), program]).args(args);
+        self.as_mpi(command)
+    }
+
+    /// A command that starts an MPI job in the directory.
+    pub fn as_mpi(&self, command: Command) -> Command {
         let mut command = self.enter(command);
         for v in ["ALLOW_RUN_AS_ROOT", "ALLOW_RUN_AS_ROOT_CONFIRM", "MCA_rmaps_base_oversubscribe"]
         {
@@ -196,6 +201,14 @@ impl Finished {
         let ours: Vec<&str> = self.stderr.lines().filter(|l| l.starts_with("mesher: ")).collect();
         assert_eq!(ours.len(), 1, "one rank must print one sentence: {self:?}");
         self.explains(ours[0], words);
+    }
+
+    /// The same for an error that every rank may print.
+    #[track_caller]
+    pub fn refuses_any_under_launcher(&self, code: i32, word: &str) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        let ours = self.stderr.lines().find(|l| l.starts_with("mesher: ") && l.contains(word));
+        assert!(ours.is_some(), "{word:?} is missing: {self:?}");
     }
 
     #[track_caller]

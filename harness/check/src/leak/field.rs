@@ -90,13 +90,13 @@ impl<'a> Field<'a> {
         let narrow: Vec<u32> = route.iter().copied().filter(is_narrow).collect();
         route.iter().for_each(|&leaf| self.cubes.adopt(leaf));
         let mut seen: HashSet<u32> = narrow.iter().copied().collect();
-        let mut heap: BinaryHeap<_> =
-            narrow.into_iter().map(|leaf| (Reverse(0), leaf)).collect();
+        let mut heap: BinaryHeap<_> = narrow.into_iter().map(|leaf| (Reverse(0), leaf)).collect();
         while let Some((Reverse(distance), leaf)) = heap.pop() {
             let distance = f64::from_bits(distance);
             self.cubes.adopt(leaf);
             self.leaves.neighbours(leaf, &mut |next| {
-                let through = distance + length(self.leaves.position(leaf), self.leaves.position(next));
+                let through =
+                    distance + length(self.leaves.position(leaf), self.leaves.position(next));
                 if through - self.half_diagonal(next) <= REACH * radius && seen.insert(next) {
                     heap.push((Reverse(through.to_bits()), next));
                 }
@@ -120,7 +120,10 @@ impl<'a> Field<'a> {
                 }
             });
             let Some(next) = wider else { break };
-            way.push(super::leaves::shared_face_centre(&self.leaves.octant(leaf), &self.leaves.octant(next)));
+            way.push(super::leaves::shared_face_centre(
+                &self.leaves.octant(leaf),
+                &self.leaves.octant(next),
+            ));
             way.push(self.leaves.position(next));
             leaf = next;
         }
@@ -134,7 +137,8 @@ impl<'a> Field<'a> {
                     let is_inside = there.iter().all(|c| (0.0..=EDGE).contains(c));
                     let clearance = self.clearance.at(there, best + 2.0 * step);
                     let is_wider = clearance > best + PRECISION * step;
-                    let is_free = || self.leaves.is_free(self.leaves.locate(there.map(|c| c as i64)));
+                    let is_free =
+                        || self.leaves.is_free(self.leaves.locate(there.map(|c| c as i64)));
                     (is_inside && is_wider && is_free()).then_some((there, clearance))
                 });
             match wider {

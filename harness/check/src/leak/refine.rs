@@ -73,13 +73,13 @@ pub fn widest(
     let mut known: Vec<(Point, usize)> = Vec::new();
     for _ in 0..PLACES_MAX {
         let path = &refined.cubes;
-        let order = |&a: &usize, &b: &usize| {
-            cubes.clearance(path[a]).total_cmp(&cubes.clearance(path[b]))
-        };
+        let order =
+            |&a: &usize, &b: &usize| cubes.clearance(path[a]).total_cmp(&cubes.clearance(path[b]));
         let throat = (0..path.len()).min_by(order).expect("a path has cubes");
         let (centre, least) = (cubes.position(path[throat]), cubes.clearance(path[throat]));
         let reach = |stage: usize| REACH * GAPS[stage].sqrt() * least;
-        let is_known = |&&(at, stage): &&(Point, usize)| length(at, centre) < reach(stage - 1) / 2.0;
+        let is_known =
+            |&&(at, stage): &&(Point, usize)| length(at, centre) < reach(stage - 1) / 2.0;
         let stage = known.iter().filter(is_known).map(|known| known.1).max().unwrap_or(0);
         let Some(&tolerance) = TOLERANCES_NEAR.get(stage) else { break };
         known.push((centre, stage + 1));
@@ -230,7 +230,8 @@ impl Narrow {
             Goal::Place(cube) => vec![cube],
             Goal::Far => (0..there.len() as u32).filter(|&c| cubes.is_far(c)).collect(),
         };
-        let goals: Vec<u32> = goals.into_iter().filter(|&c| there[c as usize].is_finite()).collect();
+        let goals: Vec<u32> =
+            goals.into_iter().filter(|&c| there[c as usize].is_finite()).collect();
         let least = goals.iter().map(|&c| there[c as usize]).fold(f64::INFINITY, f64::min);
         if least.is_infinite() {
             return Ok(None);
@@ -240,7 +241,8 @@ impl Narrow {
         }
         let back = self.lengths(cubes, goals, SLACK * least);
         let is_between = |&cube: &u32| {
-            let (there, back, own) = (there[cube as usize], back[cube as usize], self.length(cubes, cube));
+            let (there, back, own) =
+                (there[cube as usize], back[cube as usize], self.length(cubes, cube));
             own.is_some_and(|own| own > 0.0 && there + back - own <= SLACK * least)
         };
         let reached = (0..there.len() as u32).filter(|&c| back[c as usize].is_finite());

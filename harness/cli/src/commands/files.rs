@@ -1,5 +1,6 @@
 //! Writing files.
 
+use contract::files::{named, write_atomically};
 use std::path::Path;
 use std::{fs, io};
 
@@ -12,7 +13,7 @@ pub fn put(path: &Path, text: &str) -> io::Result<()> {
         if let Some(directory) = path.parent() {
             fs::create_dir_all(directory)?;
         }
-        fs::write(path, text)
+        write_atomically(path, |out| out.write_all(text.as_bytes()))
     };
-    make().map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+    make().map_err(|error| named(path, &error))
 }

@@ -7,14 +7,13 @@ use check::leak::report::Report;
 use check::leak::{Answer, LeakError, Question, Watch, answer};
 use clap::Args;
 use contract::case::Case;
+use contract::files::{named, write_atomically};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use report::leak::{picture, polyline};
-use report::write::replace;
 use run::base_tree::BaseTrees;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -133,7 +132,8 @@ fn write(arguments: &Arguments, case: &Case, answer: &Answer) -> Result<(), Stri
 
 fn write_json(report: &Report, file: &Path) -> Result<(), String> {
     let json = serde_json::to_string_pretty(report).map_err(|error| error.to_string())? + "\n";
-    replace(file, |out| out.write_all(json.as_bytes())).map_err(|error| error.to_string())
+    let written = write_atomically(file, |out| out.write_all(json.as_bytes()));
+    written.map_err(|error| named(file, &error).to_string())
 }
 
 /// A line on standard error that names the current step, only if that is a terminal.

@@ -3,6 +3,7 @@
 use super::programs::ProgramArguments;
 use clap::Args;
 use contract::catalogue::Size;
+use contract::files::{named, write_atomically};
 use report::verification::json::json;
 use report::verification::junit::junit;
 use report::verification::markdown::markdown;
@@ -13,7 +14,7 @@ use run::verify::options::Options;
 use run::verify::report::{EXIT_INPUT, EXIT_MISSING, Report, exit_first};
 use run::verify::{VerifyError, verify};
 use std::env;
-use std::fs::{self, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -182,6 +183,6 @@ fn write(
 /// # Errors
 /// The file's name and the reason.
 fn put(path: &Path, text: &str) -> io::Result<()> {
-    fs::write(path, text)
-        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+    write_atomically(path, |out| out.write_all(text.as_bytes()))
+        .map_err(|error| named(path, &error))
 }

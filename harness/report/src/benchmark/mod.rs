@@ -16,16 +16,16 @@ pub mod tables;
 use crate::figure::raster;
 use crate::figure::{Body, Figure, csv, heat, svg, tikz};
 use crate::track::figures as trend;
-use crate::write::replace;
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use bench::statistics::change_points::Rules;
 use bench::track::analyse;
 use bench::track::history::Record;
+use contract::files::{named, write_atomically};
 use html::Drawn;
 use lint::{Finding, Verdict};
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The files of a report.
@@ -87,5 +87,5 @@ fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<Drawn<'a
 }
 
 fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    replace(path, |out| out.write_all(content.as_ref()))
+    write_atomically(path, |out| out.write_all(content.as_ref())).map_err(|e| named(path, &e))
 }

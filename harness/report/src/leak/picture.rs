@@ -4,13 +4,13 @@
 use crate::figure::canvas::{Anchor, Canvas, DOTTED, FAINT, INK, SIZE, WIDTH, width};
 use crate::figure::palette::{colour, hex};
 use crate::section::{Planar, Window};
-use crate::write::replace;
 use check::geometry::distance::{cross, dot, sub};
 use check::geometry::meaning::number;
 use check::leak::report::Passage;
 use contract::case::Case;
+use contract::files::{named, write_atomically};
 use contract::word::{self, Side};
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 /// Half of the window's edge, in widths of the narrowest place and in cells; the larger one counts.
@@ -28,7 +28,7 @@ const CROSSING: &str = "#D9D9D9";
 /// If the file cannot be written; the message names it.
 pub fn write(case: &Case, words: &[u64], passage: &Passage, path: &Path) -> io::Result<()> {
     let text = svg(case, words, passage);
-    replace(path, |out| out.write_all(text.as_bytes()))
+    write_atomically(path, |out| out.write_all(text.as_bytes())).map_err(|e| named(path, &e))
 }
 
 /// The slice as an SVG document.

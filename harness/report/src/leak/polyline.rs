@@ -1,7 +1,7 @@
 //! The widest path of a leak as a VTK polyline with the free width at each point.
 
-use crate::write::replace;
 use check::leak::report::Passage;
+use contract::files::{named, write_atomically};
 use std::io;
 use std::path::Path;
 use vtkio::model::{
@@ -38,5 +38,5 @@ pub fn vtp(passage: &Passage, path: &Path) -> io::Result<()> {
         file_path: None,
     };
     let invalid = |error| io::Error::other(format!("{error:?}"));
-    replace(path, |out| line.write_xml(out).map_err(invalid))
+    write_atomically(path, |out| line.write_xml(out).map_err(invalid)).map_err(|e| named(path, &e))
 }

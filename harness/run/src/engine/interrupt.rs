@@ -1,26 +1,126 @@
-//! Ctrl-C and SIGTERM: a flag that every loop that waits or runs programs checks.
+//! Ctrl-C, SIGTERM and SIGHUP: a flag that every loop that waits or runs programs checks, and an end for whatever does not.
 //!
-//! Invariant: a signal makes the harness return in the ordinary way, so that child processes are ended and temporary
-//! directories removed by their owners.
+//! Invariants:
+//! - a first signal lets a command return in the ordinary way, with a partial report, but not for longer than [`GRACE`];
+//! - after that time, or at a second signal, child processes are ended, unfinished files and temporary directories are removed, and
+//!   the harness exits with code 130. Temporary directories are below one that this process has made.
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::flag;
+use super::session;
+use files::interrupt::{self, INTERRUPTED};
+use rustix::process::Signal;
+use signal_hook::low_level::{exit, pipe};
+use std::fs;
+use std::io::{self, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock};
+use std::sync::{LazyLock, Mutex, MutexGuard};
+use std::thread::{self, sleep};
+use std::time::Duration;
 
-static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// Time for a command to return after a first signal.
+pub const GRACE: Duration = Duration::from_millis(900);
+/// Time for child processes to remove their files.
+pub const PATIENCE: Duration = Duration::from_millis(500);
+/// How often a directory is removed to which other threads may still write.
+const ATTEMPTS: usize = 20;
 
-/// Turns Ctrl-C, SIGTERM and SIGHUP into a request to stop. A second signal ends the harness at once.
+static REQUESTED: AtomicBool = AtomicBool::new(false);
+static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
+
+/// What must not outlive the harness.
+#[derive(Default)]
+struct Leftovers {
+    /// Leaders of the sessions of child processes.
+    children: Vec<u32>,
+    /// Directories; those that were removed already may remain in the list.
+    directories: Vec<PathBuf>,
+    /// The directory of all temporary files.
+    temporary: Option<PathBuf>,
+}
+
+fn leftovers() -> MutexGuard<'static, Leftovers> {
+    LEFTOVERS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop. Once per process, before anything makes a temporary file.
 pub fn install() {
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
-        // If a handler cannot be installed, the signal ends the harness without cleaning up; that does not prevent
-        // a run. The order matters: the shutdown is conditional on a flag that the first signal must find unset.
-        let _ = flag::register_conditional_shutdown(signal, 130, Arc::clone(&REQUESTED));
-        let _ = flag::register(signal, Arc::clone(&REQUESTED));
+    // Without handlers, a signal ends the harness without cleaning up; that does not prevent a run.
+    let _ = watch();
+}
+
+fn watch() -> io::Result<()> {
+    let (mut received, sent) = UnixStream::pair()?;
+    let place = tempfile::Builder::new().prefix("harness-").tempdir()?.keep();
+    let _ = tempfile::env::override_temp_dir(&place);
+    leftovers().temporary = Some(place);
+    let wait = move || {
+        let mut byte = [0];
+        if received.read_exact(&mut byte).is_ok() {
+            REQUESTED.store(true, Ordering::SeqCst);
+            // A second signal, or the time limit.
+            let _ = received.set_read_timeout(Some(GRACE));
+            let _ = received.read_exact(&mut byte);
+            end();
+        }
+    };
+    thread::Builder::new().name("signals".into()).spawn(wait)?;
+    for signal in interrupt::signals() {
+        pipe::register(signal, sent.try_clone()?)?;
+    }
+    Ok(())
+}
+
+/// Removes the directory of temporary files, unless a command has kept some, when the harness ends in the ordinary way.
+pub fn uninstall() {
+    if let Some(place) = leftovers().temporary.take() {
+        let _ = fs::remove_dir(place);
     }
 }
 
 /// Whether the user has interrupted the harness.
 pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
+}
+
+/// Notes a child process that leads a session.
+pub(super) fn note_child(id: u32) {
+    leftovers().children.push(id);
+}
+
+/// Forgets a child process that has ended with all its descendants.
+pub(super) fn forget_child(id: u32) {
+    leftovers().children.retain(|&child| child != id);
+}
+
+/// Notes a directory that must not outlive the harness.
+pub(super) fn note_directory(path: &Path) {
+    leftovers().directories.push(path.to_owned());
+}
+
+/// Ends the harness, whatever its other threads do.
+fn end() -> ! {
+    let children = leftovers().children.clone();
+    children.iter().for_each(|&child| session::signal(child, Signal::TERM));
+    let mut waited = Duration::ZERO;
+    let pause = Duration::from_millis(10);
+    while waited < PATIENCE && children.iter().any(|&c| !session::members(c).is_empty()) {
+        sleep(pause);
+        waited += pause;
+    }
+    children.iter().for_each(|&child| session::signal(child, Signal::KILL));
+    interrupt::abandon();
+    let kept = leftovers();
+    kept.directories.iter().chain(&kept.temporary).for_each(|path| remove(path));
+    let _ = writeln!(io::stderr(), "harness: interrupted");
+    exit(INTERRUPTED)
+}
+
+fn remove(directory: &Path) {
+    for _ in 0..ATTEMPTS {
+        match fs::remove_dir_all(directory) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => sleep(Duration::from_millis(5)),
+            _ => return,
+        }
+    }
 }

@@ -3,6 +3,7 @@
 //! Invariant: the shared memory of a run on one machine lies in a directory of its own, so that cleaning up after a
 //! killed run cannot affect another run.
 
+use super::interrupt;
 use super::paths::on_path;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -71,7 +72,9 @@ impl Launcher {
         let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
         let local = is_mpirun && self.words[1..] == ["-n", RANKS];
         let directory = || tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok();
-        local.then(directory).flatten().map(SharedMemory)
+        let made = local.then(directory).flatten()?;
+        interrupt::note_directory(made.path());
+        Some(SharedMemory(made))
     }
 }
 

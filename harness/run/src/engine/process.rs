@@ -13,7 +13,7 @@ use super::memory::MemorySampler;
 use super::output::Output;
 use super::reap::try_reap;
 use super::session;
-use rustix::process::{Signal, kill_process, kill_process_group, setsid};
+use rustix::process::{Signal, setsid};
 use std::fs;
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -66,6 +66,9 @@ impl<'a> Watch<'a> {
 /// If the child cannot be started or does not exit with code 0.
 pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     let failure = |end| Failure::new(watch.name, end);
+    if interrupt::requested() {
+        return Err(failure(End::Interrupted));
+    }
     let mut sampler = watch.sample_memory.then(MemorySampler::new);
     let (start, child, mut outputs) = start(command, watch).map_err(|error| {
         let program = Path::new(command.get_program()).display();
@@ -74,6 +77,7 @@ pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     let end = wait(&child, start, watch, sampler.as_mut(), &mut outputs);
     let time_wall_s = start.elapsed().as_secs_f64();
     kill_session(child.id());
+    interrupt::forget_child(child.id());
     let finished = outputs.into_iter().try_for_each(Output::finish);
     finished.map_err(|error| failure(End::Unusable(format!("has no readable output: {error}"))))?;
     match end {
@@ -94,7 +98,9 @@ fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child, [O
     // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
     unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
     let start = Instant::now();
-    Ok((start, command.spawn()?, outputs))
+    let child = command.spawn()?;
+    interrupt::note_child(child.id());
+    Ok((start, child, outputs))
 }
 
 /// The CPU time of a child that exited with code 0, or how it ended otherwise.
@@ -176,12 +182,10 @@ fn start_of(line: &&str) -> String {
     }
 }
 
-/// Sends SIGTERM, on which `mpirun` ends its ranks, and kills the child if it does not end within a few seconds.
+/// Sends SIGTERM to the child and all its descendants, ranks included, and kills those that do not end in time.
 fn end_child(child: &Child) -> io::Result<()> {
-    if let Some(group) = session::pid_of(child.id()) {
-        let _ = kill_process_group(group, Signal::TERM);
-    }
-    let patience = Instant::now() + Duration::from_secs(3);
+    session::signal(child.id(), Signal::TERM);
+    let patience = Instant::now() + interrupt::PATIENCE;
     while Instant::now() < patience {
         if try_reap(child)?.is_some() {
             return Ok(());
@@ -199,13 +203,10 @@ fn end_child(child: &Child) -> io::Result<()> {
 /// so this repeats until none is found.
 fn kill_session(leader: u32) {
     for _ in 0..100 {
-        let members = session::members(leader);
-        if members.is_empty() {
+        if session::members(leader).is_empty() {
             return;
         }
-        for member in members {
-            let _ = kill_process(member, Signal::KILL);
-        }
+        session::signal(leader, Signal::KILL);
         std::thread::sleep(Duration::from_millis(5));
     }
 }

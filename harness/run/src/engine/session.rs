@@ -1,6 +1,6 @@
 //! The processes of a session, read from `/proc`.
 
-use rustix::process::Pid;
+use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 
 pub(super) fn pid_of(id: u32) -> Option<Pid> {
@@ -18,6 +18,14 @@ pub(super) fn members(leader: u32) -> Vec<Pid> {
         session_and_liveness(&stat) == Some((leader, true))
     });
     of_session.filter_map(pid_of).collect()
+}
+
+/// Sends a signal to every process of a session.
+pub(super) fn signal(leader: u32, signal: Signal) {
+    for member in members(leader) {
+        // It may have ended since then.
+        let _ = kill_process(member, signal);
+    }
 }
 
 /// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.

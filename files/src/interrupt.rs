@@ -1,0 +1,97 @@
+//! The end of a program on SIGINT, SIGTERM and SIGHUP: at once, in whatever it does, and without unfinished files.
+
+use crate::unfinished::{abandon_all, complete};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::stdio::stderr;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::low_level::{self, exit};
+use std::io;
+use std::mem::MaybeUninit;
+use std::ptr::{null, null_mut};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// Exit code of an interrupted program.
+pub const INTERRUPTED: i32 = 130;
+
+const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
+
+/// Makes each of the signals remove all unfinished files, print `message` on the standard error and end the process with exit code 130.
+/// If output is complete or the outcome [decided], the first signal is ignored, as the process is about to end. Signals that the process was started to
+/// ignore, as `nohup` does, stay ignored. The process waits for the time `linger` before it ends, unless another signal arrives.
+///
+/// # Errors
+/// If a handler cannot be installed; its signal then ends the process the default way.
+pub fn install(message: &str, linger: Duration) -> io::Result<()> {
+    let message: Arc<[u8]> = message.as_bytes().into();
+    let is_second = Arc::new(AtomicBool::new(false));
+    for signal in signals() {
+        let (message, is_second) = (message.clone(), is_second.clone());
+        let end = move || {
+            let is_second = is_second.swap(true, Ordering::AcqRel);
+            if abandon_all() && !is_second {
+                return;
+            }
+            print(&message);
+            if !is_second {
+                sleep(linger);
+            }
+            exit(INTERRUPTED);
+        };
+        // SAFETY: the action makes system calls and uses atomics; it neither allocates nor locks.
+        unsafe { low_level::register(signal, end)? };
+    }
+    Ok(())
+}
+
+/// The signals that end a program: those of the three that it was not started to ignore.
+pub fn signals() -> impl Iterator<Item = i32> {
+    SIGNALS.into_iter().filter(|&signal| !is_ignored(signal))
+}
+
+/// Runs `body` without a signal in between on this thread: for steps that create a file and note that it exists.
+pub fn uninterrupted<T>(body: impl FnOnce() -> T) -> T {
+    let mut before = MaybeUninit::uninit();
+    // SAFETY: the sets are initialised by sigemptyset and by the first pthread_sigmask, which cannot fail with these arguments.
+    unsafe {
+        let mut signals = MaybeUninit::uninit();
+        libc::sigemptyset(signals.as_mut_ptr());
+        SIGNALS.iter().for_each(|&s| _ = libc::sigaddset(signals.as_mut_ptr(), s));
+        libc::pthread_sigmask(libc::SIG_BLOCK, signals.as_ptr(), before.as_mut_ptr());
+    }
+    let result = body();
+    // SAFETY: as above. A panic in `body` ends the process.
+    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), null_mut()) };
+    result
+}
+
+/// Notes that the program's outcome is decided: from now on a first signal changes nothing.
+pub fn decided() {
+    complete();
+}
+
+/// Removes all unfinished files: before the process ends because of a bug.
+pub fn abandon() {
+    abandon_all();
+}
+
+fn is_ignored(signal: i32) -> bool {
+    let mut action = MaybeUninit::<libc::sigaction>::zeroed();
+    // SAFETY: the call only writes `action`, for which zeros are valid.
+    unsafe {
+        libc::sigaction(signal, null(), action.as_mut_ptr());
+        action.assume_init().sa_sigaction == libc::SIG_IGN
+    }
+}
+
+/// Prints on the standard error, unless that would wait for a reader.
+fn print(message: &[u8]) {
+    let stderr = stderr();
+    let mut ready = [PollFd::new(&stderr, PollFlags::OUT)];
+    let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
+    if poll(&mut ready, Some(&at_once)).is_ok_and(|n| n == 1) {
+        let _ = rustix::io::write(stderr, message);
+    }
+}

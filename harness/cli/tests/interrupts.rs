@@ -1,0 +1,107 @@
+//! Signals end every command within a second, whatever it does, with exit code 130; no process and no temporary file remains.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Work for minutes.
+const CASE: &str =
+    "spacing_min = 0.001\nroot_scale = 2.0\n[generator]\nshape = \"sphere\"\nfacets = 8000000\n";
+/// A mesher that neither meshes nor ends, and starts another process.
+const STUBBORN: &str = "#!/bin/sh\ntrap '' TERM INT HUP\necho $$ >> \"$PLACE/ids\"\nsleep 600 &\necho $! >> \"$PLACE/ids\"\nwhile :; do sleep 1; done\n";
+/// Time to end: a second, and the time in which a busy machine gets to it.
+const LIMIT: Duration = Duration::from_millis(2500);
+
+struct Fixture(TempDir);
+
+impl Fixture {
+    fn new() -> Self {
+        let fixture = Self(tempfile::tempdir().unwrap());
+        fs::create_dir(fixture.path().join("temporary")).unwrap();
+        fs::write(fixture.path().join("case.toml"), CASE).unwrap();
+        let mesher = fixture.path().join("mesher");
+        fs::write(&mesher, STUBBORN).unwrap();
+        fs::set_permissions(&mesher, fs::Permissions::from_mode(0o755)).unwrap();
+        fixture
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn start(&self, arguments: &[&str]) -> Child {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(arguments).current_dir(self.path());
+        command.env("TMPDIR", self.path().join("temporary")).env("PLACE", self.path());
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    /// The processes that the mesher noted.
+    fn ids(&self) -> Vec<String> {
+        let text = fs::read_to_string(self.path().join("ids")).unwrap_or_default();
+        text.lines().map(str::to_owned).collect()
+    }
+
+    fn interrupt(&self, mut run: Child, signals: &[&str]) {
+        let since = Instant::now();
+        for name in signals {
+            let id = run.id().to_string();
+            assert!(Command::new("kill").args(["-s", name, &id]).status().unwrap().success());
+            sleep(Duration::from_millis(20));
+        }
+        let end = run.wait().unwrap();
+        assert!(since.elapsed() < LIMIT, "{:?} {signals:?}", since.elapsed());
+        assert_eq!(end.code(), Some(130), "{signals:?}");
+        let left: Vec<_> = fs::read_dir(self.path().join("temporary")).unwrap().collect();
+        assert!(left.is_empty(), "{signals:?}: {left:?}");
+        for id in self.ids() {
+            assert!(fs::read_link(format!("/proc/{id}/exe")).is_err(), "process {id} is left");
+        }
+    }
+}
+
+#[test]
+fn a_command_that_computes_ends_at_once() {
+    for signals in [&["INT"][..], &["TERM"], &["HUP"], &["INT", "INT"], &["TERM", "INT"]] {
+        let fixture = Fixture::new();
+        let run = fixture.start(&["geometry", "case.toml"]);
+        sleep(Duration::from_millis(400));
+        fixture.interrupt(run, signals);
+    }
+}
+
+#[test]
+fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
+    for signals in [&["INT"][..], &["TERM"], &["HUP"], &["INT", "INT"], &["TERM", "HUP", "INT"]] {
+        let fixture = Fixture::new();
+        let why = ["why", "case.toml", "--unneeded", "--mesher", "./mesher"];
+        let verify = ["verify", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
+        let bench = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
+        let mut waits = 0;
+        for arguments in [&why[..], &verify, &bench] {
+            let mut run = fixture.start(arguments);
+            let before = fixture.ids().len();
+            while fixture.ids().len() < before + 2 && run.try_wait().unwrap().is_none() {
+                sleep(Duration::from_millis(5));
+            }
+            if let Some(end) = run.try_wait().unwrap() {
+                panic!("{arguments:?}: {end:?}");
+            }
+            waits += 1;
+            fixture.interrupt(run, signals);
+        }
+        assert_eq!(waits, 3);
+    }
+}
+
+#[test]
+fn a_command_that_ends_leaves_no_temporary_directory() {
+    let fixture = Fixture::new();
+    let mut run = fixture.start(&["audit", "absent"]);
+    assert_eq!(run.wait().unwrap().code(), Some(2));
+    assert_eq!(fs::read_dir(fixture.path().join("temporary")).unwrap().count(), 0);
+}
