@@ -213,7 +213,7 @@ fn pad(bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Watch;
+    use crate::options::{Foam, Watch};
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
     use contract::manifest::{Manifest, Tree};
@@ -233,8 +233,11 @@ mod tests {
         }
     }
 
-    const OPTIONS: Options<'static> = Options { jobs: NonZero::<usize>::MIN, watch: &Nobody };
     const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
+
+    fn options() -> Options<'static> {
+        Options { jobs: NonZero::<usize>::MIN, watch: &Nobody, foam: Foam::default() }
+    }
 
     fn mesh_of(parts: Vec<Vec<u64>>) -> Mesh {
         let empty = Manifest::without_leaves(Tree::Final, ROOT, "test".to_owned());
@@ -254,7 +257,7 @@ mod tests {
     fn exported(mesh: &Mesh, selection: &Selection) -> (tempfile::TempDir, Summary) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
-        let summary = write(mesh, selection, &path, &OPTIONS).unwrap();
+        let summary = write(mesh, selection, &path, &options()).unwrap();
         assert_eq!(fs::metadata(path).unwrap().len(), summary.bytes);
         (dir, summary)
     }
@@ -363,7 +366,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
         let refusal =
-            |selection: &Selection| write(&mesh_of(vec![deep.clone()]), selection, &path, &OPTIONS);
+            |selection: &Selection| write(&mesh_of(vec![deep.clone()]), selection, &path, &options());
         let error = refusal(&Selection::default()).unwrap_err().to_string();
         assert!(error.contains("p4est has levels 0 to 18"), "{error}");
         let none = Selection { side: Some(Side::Inside), ..Selection::default() };

@@ -10,7 +10,7 @@ use contract::testing::random_words;
 use contract::word::{self, Leaf as WordLeaf};
 use export::error::ExportError;
 use export::mesh::{Leaf, Mesh};
-use export::options::{Options, Watch};
+use export::options::{Foam, Options, Watch};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
@@ -46,7 +46,7 @@ fn on_disk(parts: Vec<Vec<u64>>) -> (TempDir, Mesh) {
 fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("mesh.vtkhdf");
-    let options = Options { jobs: NonZero::<usize>::MIN, watch: &Quiet };
+    let options = Options { jobs: NonZero::<usize>::MIN, watch: &Quiet, foam: Foam::default() };
     match export::htg::write(mesh, selection, &path, &options) {
         Err(ExportError::Request(_)) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),
