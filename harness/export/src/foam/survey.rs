@@ -116,24 +116,24 @@ pub fn survey(
     let mut polygon = Vec::new();
     visit(model, domain, |cell, _, squares| {
         for &square in squares.iter() {
-            let across = square.across.as_cell();
+            let across = square.across.as_cell().map(|across| (across, domain.number(across)));
+            // The cell across, which owns the face, counts it and adds its points.
+            if !square.is_high && matches!(across, Some((_, Ok(_)))) {
+                continue;
+            }
             if let Some(points) = &mut boundary.points {
                 square.polygon(&model.points, false, &mut polygon);
                 polygon.iter().for_each(|&(point, _)| points.insert(point));
             }
-            match across.map(|across| (across, domain.number(across))) {
-                None => {
-                    boundary.by_patch[patches.of(&square)].push(Face { cell, across: cell, square })
+            let faces = match across {
+                Some((_, Ok(_))) => {
+                    boundary.internal += 1;
+                    continue;
                 }
-                Some((across, Err(processor))) => {
-                    boundary.by_processor.entry(processor).or_default().push(Face {
-                        cell,
-                        across,
-                        square,
-                    });
-                }
-                Some((_, Ok(_))) => boundary.internal += u64::from(square.is_high),
-            }
+                Some((_, Err(processor))) => boundary.by_processor.entry(processor).or_default(),
+                None => &mut boundary.by_patch[patches.of(&square)],
+            };
+            faces.push(Face { cell, across: across.map_or(cell, |(across, _)| across), square });
         }
         Ok(())
     })?;
