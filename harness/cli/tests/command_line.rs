@@ -5,7 +5,7 @@ use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 17] = [
     "verify",
     "selftest",
     "gate",
@@ -17,6 +17,7 @@ const COMMANDS: [&str; 16] = [
     "audit",
     "leak",
     "export",
+    "near-body",
     "import",
     "diff",
     "why",
