@@ -67,8 +67,11 @@ fn quarters(code: u64, axis: usize, upper: bool) -> impl Iterator<Item = u64> {
     (0..8).filter(at_face).map(move |child| code << 3 | child)
 }
 
-/// The words and the count of each rank, and the digest.
-fn counted(case: &Small, run: &Run, weight: Option<u32>) -> (Vec<(Vec<u64>, Option<u64>)>, String) {
+/// The words of a rank, and its count of exposed faces.
+type Counted = (Vec<u64>, Option<u64>);
+
+/// The words and counts of all ranks, and the digest.
+fn counted(case: &Small, run: &Run, weight: Option<u32>) -> (Vec<Counted>, String) {
     let case = case.mesher_case();
     let options = Options { weight_exposed: weight, ..options(run.division, false) };
     let mut ranks = sim::run(run.ranks, run.seed, |comm| {

@@ -18,6 +18,7 @@ const COMMANDS: [&str; 17] = [
     "leak",
     "picture",
     "export",
+    "near-body",
     "import",
     "diff",
     "why",

@@ -36,7 +36,7 @@ fn p4est_loads_a_forest_and_saves_the_same_file() {
             _ => Some(Side::Outside),
         },
     );
-    leaf_set(vec![words.clone()]).write(&mesh).unwrap();
+    leaf_set(vec![words.clone()]).create(&mesh).unwrap();
     harness(&[Path::new("export"), &mesh, &forest]);
     let loaded = Command::new(&program)
         .args([&forest, &saved])

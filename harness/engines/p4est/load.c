@@ -78,7 +78,7 @@ int main(int argc, char **argv)
     p8est_balance_ext(forest, P8EST_CONNECT_FULL, NULL, split);
     sc_MPI_Allreduce(&counts, &sums, 3, sc_MPI_LONG_LONG_INT, sc_MPI_SUM, sc_MPI_COMM_WORLD);
     if (rank == 0)
-        printf("quadrants %lld fillers %lld; balance splits %lld fillers %lld leaves\n", (long long) loaded,
+        printf("%lld quadrants, %lld fillers; balance splits %lld fillers and %lld leaves\n", (long long) loaded,
                (long long) sums.fillers, (long long) sums.fillers_split, (long long) sums.leaves_split);
 
     p8est_destroy(forest);

@@ -281,7 +281,7 @@ mod tests {
                 dealt[if interleaved { i % parts } else { i / size }].push(w);
             }
             let mesh = mesh_of(dealt);
-            let (dir, summary) = exported(&mesh, &Selection::default());
+            let (dir, _) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let set = import(&path, true);
             prop_assert_eq!(set.manifest.digest, mesh.manifest.digest);
