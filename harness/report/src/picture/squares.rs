@@ -108,7 +108,7 @@ impl Squares {
             found.is_merged |= leaf.octant.level > detail.level_max;
             let octant = leaf.octant.ancestor(leaf.octant.level.min(detail.level_max));
             found.add(square(&Leaf { octant, ..leaf }, axes, colour));
-            match found.leaves % LEAVES_PER_CHECK == 0 && interrupt::requested() {
+            match found.leaves.is_multiple_of(LEAVES_PER_CHECK) && interrupt::requested() {
                 true => Err(ExportError::Interrupted),
                 false => Ok(()),
             }
