@@ -1,6 +1,6 @@
 //! The squares in which a plane cuts leaves, as many as a picture can show.
 //!
-//! Leaves narrower than [`EDGE_MIN`] on the page are merged into the octant that is wide enough, and have the greatest of
+//! Leaves narrower than `EDGE_MIN` on the page are merged into the octant that is wide enough, and have the greatest of
 //! their values. The leaves of an octant that a plane cuts are consecutive in Morton order, so merging needs no search, and
 //! memory is bounded by the page, not by the mesh. Squares too small for an outline are merged with their siblings where all
 //! four have the same value, which does not change the picture.
