@@ -128,6 +128,8 @@ fn the_set_has_every_picture_its_data_and_a_page_without_network() {
     let page = fixture.read("set/index.html");
     assert_eq!(page.matches("<figure").count(), 16);
     assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"));
+    let (code, text) = fixture.picture("mesh --paper --out set");
+    assert!(code == 2 && text.contains("meshes a case several times"), "{text}");
     let (code, text) = fixture.picture("case.toml --paper --out set --zoom 2");
     assert!(code == 2 && text.contains("cannot be used with"), "{text}");
 }

@@ -21,6 +21,10 @@ use toml::Value;
 /// # Errors
 /// If the case cannot be meshed or a file cannot be written.
 pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
+    if Path::new(&source.mesh).is_dir() {
+        let why = format!("{} is a directory: --paper meshes a case several times", source.mesh);
+        return Err(input(why));
+    }
     let Programs { engine, paths, .. } = source.engine.find()?;
     let path = paths.catalogue.case_file(&source.mesh, Path::new("")).map_err(input)?;
     let plain = PlainCase::read(&path).map_err(input)?;

@@ -51,8 +51,9 @@ const RANKS_NAMED: usize = 16;
 const SHADES_USED: f64 = 0.8;
 /// Part of white in the lightest shade, which covers most of a picture.
 const LIGHTEST: f64 = 0.5;
-/// Parts of white in the tints of a colour; ranks have as many colours as there are tints of all colours.
-const TINTS: [f64; 3] = [0.25, 0.6, 0.0];
+/// Tints of a colour, as [`tint`] takes them; ranks have as many colours as there are tints of all colours. The second is dark:
+/// a light one of the first colour would look like the fifth.
+const TINTS: [f64; 3] = [0.35, -0.4, 0.15];
 
 impl Colour {
     /// The value of a leaf: its level, rank or code of the side.
@@ -111,8 +112,10 @@ fn of_rank(rank: u32) -> [u8; 3] {
     tint(COLOURS[rank % COLOURS.len()], TINTS[rank / COLOURS.len() % TINTS.len()])
 }
 
-fn tint(colour: [u8; 3], white: f64) -> [u8; 3] {
-    colour.map(|c| (f64::from(c) + (255.0 - f64::from(c)) * white).round() as u8)
+/// A colour with a part of white or, if it is negative, of black.
+fn tint(colour: [u8; 3], part: f64) -> [u8; 3] {
+    let end = if part < 0.0 { 0.0 } else { 255.0 };
+    colour.map(|c| (f64::from(c) + (end - f64::from(c)) * part.abs()).round() as u8)
 }
 
 /// A length with four significant digits.
@@ -132,6 +135,51 @@ mod tests {
         assert_eq!(key[0].name, "2");
         let grey = |e: &Entry| e.fill.iter().map(|&c| u32::from(c)).sum::<u32>();
         assert!(key.windows(2).all(|w| grey(&w[0]) > grey(&w[1])), "{key:?}");
+    }
+
+    /// A colour in CIE Lab, as seen with a matrix of colour vision on linear RGB.
+    fn lab(colour: [u8; 3], vision: &[[f64; 3]; 3]) -> [f64; 3] {
+        let linear = colour.map(|c| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        });
+        let times = |m: &[[f64; 3]; 3], v: [f64; 3]| {
+            m.map(|row| (0..3).map(|i| row[i] * v[i]).sum::<f64>())
+        };
+        let seen = times(vision, linear).map(|c| c.clamp(0.0, 1.0));
+        let xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]];
+        let [x, y, z] = times(&xyz, seen);
+        let [x, y, z] = [x / 0.9505, y, z / 1.089]
+            .map(|v| if v > 0.008856 { v.cbrt() } else { 7.787 * v + 16.0 / 116.0 });
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    #[test]
+    fn sixteen_ranks_are_distinguishable_with_every_colour_vision() {
+        // Normal; protanopia and deuteranopia after Machado, Oliveira and Fernandes (2009).
+        let visions = [
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            [
+                [0.152286, 1.052583, -0.204868],
+                [0.114503, 0.786281, 0.099216],
+                [-0.003882, -0.048116, 1.051998],
+            ],
+            [
+                [0.367322, 0.860646, -0.227968],
+                [0.280085, 0.672501, 0.047413],
+                [-0.011820, 0.042940, 0.968881],
+            ],
+        ];
+        for vision in &visions {
+            let seen: Vec<[f64; 3]> = (0..16).map(|r| lab(of_rank(r), vision)).collect();
+            for (i, a) in seen.iter().enumerate() {
+                for (j, b) in seen[..i].iter().enumerate() {
+                    let difference = (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
+                    // A difference of 2.3 is just noticeable.
+                    assert!(difference > 8.0, "ranks {i} and {j}: {difference}");
+                }
+            }
+        }
     }
 
     #[test]

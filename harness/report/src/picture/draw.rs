@@ -190,7 +190,7 @@ fn below(page: &Page, sheet: &mut dyn Sheet) {
     sheet.text(&label, (right + 16.0, y), Anchor::Start);
     let plane = super::plane_name(root, *slice);
     sheet.text(&plane, (right + 16.0 + width(&label) + 60.0, y), Anchor::Start);
-    let merged = if page.picture.is_merged() { ", the smallest merged" } else { "" };
+    let merged = if squares.is_merged { ", the smallest merged" } else { "" };
     let cells = format!("{} cells in the plane{merged}", squares.leaves);
     sheet.text(&cells, (SIDES.0, y + ROW), Anchor::Start);
 }

@@ -92,9 +92,10 @@ pub const TEX: Detail = Detail { squares_max: 10_000, outlined_max: 6_000, level
 pub fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
     let extent = extent(root, body);
     let length = |a: usize| extent[1][a] - extent[0][a];
-    // Of equal extents the last one, so that a cube is seen from above.
-    let axis = (0..3).rev().min_by(|&a, &b| length(a).total_cmp(&length(b))).expect("three axes");
-    halfway(root, body, axis)
+    // Of equal extents the last one, so that a cube is seen from above. A plane within a flat body has no section.
+    let axes = (0..3).rev().filter(|&a| length(a) > 0.0);
+    let axis = axes.min_by(|&a, &b| length(a).total_cmp(&length(b)));
+    halfway(root, body, axis.unwrap_or(2))
 }
 
 /// The plane normal to an axis that halves the area of the body, or passes through the root's centre.
@@ -199,12 +200,6 @@ impl Picture {
             plane_name(root, *slice),
             squares.leaves
         )
-    }
-
-    /// Whether a square of the picture has more than one leaf that the leaf's own square could show.
-    pub fn is_merged(&self) -> bool {
-        let merged = |s: &squares::Square| s.level == self.squares.level_drawn && s.leaves > 1;
-        self.squares.squares.iter().any(merged)
     }
 
     /// The corners of a square in the plane, in the user's units.

@@ -1,6 +1,6 @@
 //! The squares in which a plane cuts leaves, as many as a picture can show.
 //!
-//! Leaves narrower than [`EDGE_MIN`] on the page are merged into the octant that is wide enough, and have the greatest of
+//! Leaves narrower than `EDGE_MIN` on the page are merged into the octant that is wide enough, and have the greatest of
 //! their values. The leaves of an octant that a plane cuts are consecutive in Morton order, so merging needs no search, and
 //! memory is bounded by the page, not by the mesh. Squares too small for an outline are merged with their siblings where all
 //! four have the same value, which does not change the picture.
@@ -71,7 +71,9 @@ pub struct Squares {
     /// Squares of at most this level have outlines.
     pub level_outlined: u8,
     /// Deepest level of a square; deeper leaves are merged.
-    pub level_drawn: u8,
+    level_drawn: u8,
+    /// Whether leaves were merged.
+    pub is_merged: bool,
     /// Number of leaves that the plane cuts.
     pub leaves: u64,
 }
@@ -100,11 +102,13 @@ impl Squares {
         let deepest = |edge: f64| (root_edge / edge).log2().floor().clamp(0.0, 19.0) as u8;
         let level_drawn = deepest(EDGE_MIN).min(detail.level_max);
         let level_outlined = deepest(EDGE_OUTLINED).min(level_drawn);
-        let mut found = Self { squares: Vec::new(), level_outlined, level_drawn, leaves: 0 };
+        let mut found =
+            Self { squares: Vec::new(), level_outlined, level_drawn, is_merged: false, leaves: 0 };
         mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
+            found.is_merged |= leaf.octant.level > detail.level_max;
             let octant = leaf.octant.ancestor(leaf.octant.level.min(detail.level_max));
             found.add(square(&Leaf { octant, ..leaf }, axes, colour));
-            match found.leaves % LEAVES_PER_CHECK == 0 && interrupt::requested() {
+            match found.leaves.is_multiple_of(LEAVES_PER_CHECK) && interrupt::requested() {
                 true => Err(ExportError::Interrupted),
                 false => Ok(()),
             }
@@ -127,6 +131,7 @@ impl Squares {
     /// Adds the next square in Morton order, merged into the last one if both are too small to be drawn.
     fn add(&mut self, square: Square) {
         self.leaves += square.leaves;
+        self.is_merged |= square.level > self.level_drawn;
         let level = square.level.min(self.level_drawn);
         let square = Square { corner: square.parent_at(level), level, ..square };
         match self.squares.last_mut() {
@@ -164,15 +169,18 @@ impl Squares {
     }
 
     fn parent_of_last(&self, squares: &[Square]) -> Option<Square> {
-        let [a, .., d] = squares.last_chunk::<4>()?;
         let siblings = squares.last_chunk::<4>()?;
-        let level = d.level;
-        let corner =
-            if level > self.level_outlined + 1 { d.parent_at(level - 1) } else { return None };
-        let alike =
-            |s: &Square| s.level == level && s.value == a.value && s.parent_at(level - 1) == corner;
+        let Square { level, value, .. } = siblings[3];
+        if level <= self.level_outlined + 1 {
+            return None;
+        }
+        let (level_parent, corner) = (level - 1, siblings[3].parent_at(level - 1));
+        let alike = |s: &Square| {
+            s.level == level && s.value == value && s.parent_at(level_parent) == corner
+        };
         let leaves = siblings.iter().map(|s| s.leaves).sum();
-        siblings.iter().all(alike).then_some(Square { corner, level: level - 1, leaves, ..*a })
+        let parent = Square { corner, level: level_parent, value, leaves };
+        siblings.iter().all(alike).then_some(parent)
     }
 }
 
