@@ -31,7 +31,7 @@ impl Zlib {
         values: impl Iterator<Item = [u8; N]>,
         out: &mut Vec<u8>,
     ) {
-        const { assert!(BLOCK % N == 0) };
+        const { assert!(BLOCK.is_multiple_of(N)) };
         let (bytes, mut values) = (count * N, values);
         let mut numbers = vec![bytes.div_ceil(BLOCK), BLOCK, bytes % BLOCK];
         let header = out.len();
