@@ -94,3 +94,56 @@ pub fn packed(corner: [u32; 3]) -> u64 {
 pub fn unpacked(packed: u64) -> [u32; 3] {
     [0, 20, 40].map(|shift| (packed >> shift & 0xf_ffff) as u32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::{random_words, words_of};
+    use contract::word;
+    use proptest::prelude::*;
+
+    /// Every vertex of a cell is the point at that corner of its leaf, and no two points coincide.
+    fn check(words: &[u64]) -> Points {
+        let leaf =
+            |&w: &u64| Leaf { octant: word::octant(w), side: word::side(w), part: 0, index: 0 };
+        let leaves: Vec<Leaf> = words.iter().map(leaf).collect();
+        let mut points = Points::default();
+        // What is left of another piece has no effect.
+        points.set(&leaves[leaves.len() / 2..]);
+        points.set(&leaves);
+        assert_eq!(points.connectivity.len(), 8 * leaves.len());
+        for (vertices, Leaf { octant, .. }) in points.connectivity.chunks(8).zip(&leaves) {
+            for (&vertex, c) in vertices.iter().zip(CORNERS) {
+                let corner = [0, 1, 2].map(|a| octant.corner[a] + octant.edge() * c[a] as u32);
+                assert_eq!(unpacked(points.packed[vertex as usize]), corner);
+            }
+        }
+        let mut distinct = points.packed.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!(distinct.len(), points.packed.len());
+        points
+    }
+
+    #[test]
+    fn leaves_of_one_level_have_a_lattice_of_points() {
+        for level in 0..5 {
+            let points = check(&words_of(|o| o.level < level));
+            assert_eq!(points.packed.len(), ((1 << level) + 1usize).pow(3));
+        }
+    }
+
+    #[test]
+    fn blocks_of_different_levels_share_points() {
+        for level in 2..6 {
+            check(&words_of(|o| o.level < 2 || o.level < level && o.corner[0] == 0));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn vertices_are_the_corners_of_leaves(words in random_words(5)) {
+            check(&words);
+        }
+    }
+}

@@ -31,7 +31,7 @@ impl Zlib {
         values: impl Iterator<Item = [u8; N]>,
         out: &mut Vec<u8>,
     ) {
-        const { assert!(BLOCK % N == 0) };
+        const { assert!(BLOCK.is_multiple_of(N)) };
         let (bytes, mut values) = (count * N, values);
         let mut numbers = vec![bytes.div_ceil(BLOCK), BLOCK, bytes % BLOCK];
         let header = out.len();
@@ -55,5 +55,36 @@ impl Zlib {
         let written = written.expect("the bound suffices");
         out.truncate(start + written);
         written
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use libdeflater::Decompressor;
+
+    #[test]
+    fn an_array_is_the_content_of_its_blocks() {
+        let mut zlib = Zlib::default();
+        for count in [0, 1, 5, BLOCK / 8 - 1, BLOCK / 8, BLOCK / 8 + 1, BLOCK / 4] {
+            let values = |i: usize| ((i * i) as u64).to_le_bytes();
+            let mut out = b"before".to_vec();
+            zlib.append(count, (0..count).map(values), &mut out);
+            let mut number = out[6..].chunks(8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
+            let mut next = || number.next().unwrap() as usize;
+            let (blocks, size, last) = (next(), next(), next());
+            assert_eq!((size, last), (BLOCK, 8 * count % BLOCK));
+            let (mut at, mut content) = (6 + 8 * (3 + blocks), Vec::new());
+            for block in 0..blocks {
+                let (compressed, is_last) = (next(), block == blocks - 1);
+                let mut bytes = vec![0; if is_last && last > 0 { last } else { size }];
+                let from = &out[at..at + compressed];
+                assert_eq!(Decompressor::new().zlib_decompress(from, &mut bytes), Ok(bytes.len()));
+                content.extend(bytes);
+                at += compressed;
+            }
+            assert_eq!(at, out.len());
+            assert!(content == (0..count).flat_map(values).collect::<Vec<u8>>());
+        }
     }
 }
