@@ -2,7 +2,7 @@
 
 use super::options::{Need, Options};
 use super::report::Missing;
-use crate::engine::failure::Failure;
+use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, Ranks};
 use crate::engine::options::RunOptions;
 use crate::engine::paths::Paths;
@@ -148,7 +148,11 @@ fn probe_mpi(programs: &Programs, place: &Path) -> Result<Option<String>, String
         ..Layout::on(Ranks::Mpi(PROBE_RANKS))
     };
     let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), PROBE_LIMIT));
-    let ranks = completed.map_err(|failure| format!("on MPI, {failure}"))?.report.ranks;
+    let failed = |failure: Failure| match failure.end {
+        End::Missing(_) => failure.to_string(),
+        _ => format!("on MPI, {failure}"),
+    };
+    let ranks = completed.map_err(failed)?.report.ranks;
     match (engine.writes_report(), ranks) {
         (false, _) => {
             let why =
