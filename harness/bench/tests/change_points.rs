@@ -53,8 +53,12 @@ fn places(values: &[f64]) -> Vec<usize> {
 
 /// Percentage of series with a step.
 fn alarms(series: impl Fn(u64) -> Vec<f64>) -> f64 {
-    let alarms = (0..SERIES).filter(|seed| !places(&series(*seed)).is_empty()).count();
-    100.0 * alarms as f64 / SERIES as f64
+    alarms_of(SERIES, series)
+}
+
+fn alarms_of(count: u64, series: impl Fn(u64) -> Vec<f64>) -> f64 {
+    let alarms = (0..count).filter(|seed| !places(&series(*seed)).is_empty()).count();
+    100.0 * alarms as f64 / count as f64
 }
 
 #[test]
@@ -63,7 +67,9 @@ fn independent_noise_of_any_kind_rarely_has_a_step() {
         assert!(alarms(|seed| independent(count, seed, normal)) <= 1.0, "normal, {count}");
         assert!(alarms(|seed| independent(count, seed, uniform)) <= 1.0, "uniform, {count}");
         assert!(alarms(|seed| independent(count, seed, heavy_tailed)) <= 1.0, "heavy, {count}");
-        assert!(alarms(|seed| independent(count, seed, contaminated)) <= 2.0, "outliers, {count}");
+        // Near the bound, a rate of 200 series is too uncertain.
+        let rate = alarms_of(1000, |seed| independent(count, seed, contaminated));
+        assert!(rate <= 1.0, "outliers, {count}: {rate} %");
     }
 }
 

@@ -164,3 +164,23 @@ fn what_cannot_be_meant_is_invalid_input() {
         );
     }
 }
+
+#[test]
+fn programs_of_one_name_are_not_compared() {
+    let place = tempfile::tempdir().unwrap();
+    let file = |directory: &str| {
+        let path = place.path().join(directory).join("mine.toml");
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, "[run]\nserial = ['mine', '{case}', '{out}']\n").unwrap();
+        path.to_string_lossy().into_owned()
+    };
+    let both = format!("{},{}", file("a"), file("b"));
+    let refused = |arguments: &[&str]| {
+        let output = harness(arguments);
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(refused(&["bench", "--engine", &both]).contains("two programs of one name"));
+    let replaced = refused(&["bench", "--engine", &both, "--mesher", "other"]);
+    assert!(replaced.contains("name one"), "{replaced}");
+}

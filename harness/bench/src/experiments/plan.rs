@@ -330,6 +330,23 @@ mod tests {
     }
 
     #[test]
+    fn programs_take_turns_on_the_same_meshes() {
+        let of = |engine: &str| Overrides {
+            engine: engine.into(),
+            experiments: vec![Experiment::Strong],
+            cases: vec!["cube".into()],
+            cells: vec![1000, 2000],
+            serial: true,
+            ..Overrides::default()
+        };
+        let all = comparison(Preset::Small, &[of("a"), of("b")]);
+        let order: Vec<_> = all.iter().map(|s| (s.engine.as_str(), s.cells)).collect();
+        let expected = [("a", 1000), ("b", 1000), ("a", 2000), ("b", 2000)];
+        assert_eq!(order, expected.map(|(engine, cells)| (engine, Some(cells))));
+        assert!(all[0].has_meshes_of(&all[1]) && !all[1].has_meshes_of(&all[2]));
+    }
+
+    #[test]
     fn without_mpi_serial_runs_replace_the_measured_ones() {
         let no_mpi = Overrides { no_mpi: true, ..Overrides::default() };
         let all = studies(Preset::Small, &no_mpi);

@@ -6,8 +6,12 @@
 //! A boundary at which the slope changes but the value does not is no step.
 //!
 //! On 31 univariate series of the Turing Change Point Dataset (van den Burg and Williams, 2020), with their annotators and a
-//! margin of 5, the mean F1 score of the steps is 0.78; that of finding nothing is 0.66, and E-divisive reaches 0.60. On
-//! simulated series the false alarms are those of the tests in `tests/change_points.rs`.
+//! margin of 5, the mean F1 score of the steps is 0.78; that of finding nothing is 0.66, and E-divisive reaches 0.60. The
+//! penalties were adjusted on the same series. If the penalties of boundaries and of autocorrelation and the least step are chosen
+//! (of 18 combinations) on a random half, the score is 0.79 on that half and 0.78 on the other (in 90 % of 2,000 divisions 0.73 to
+//! 0.83); leaving out one series at a time gives 0.78. On series of another kind, expect less.
+//! On simulated series without steps, the rates of false alarms are bounded by the tests in `tests/change_points.rs`: at most 1 % on
+//! independent noise, with 5 % outliers too (0.1 to 1.0 % of 1,000 series of 15 to 200 values), 5 % on autocorrelated noise and on drifts.
 //!
 //! Permutations are drawn from a seed: the result is reproducible.
 

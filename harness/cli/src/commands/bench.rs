@@ -118,13 +118,13 @@ fn programs(arguments: &Arguments) -> Result<Programs, u8> {
         let engine = Engine::find(name, None, &programs.paths).map_err(wrong)?;
         programs.others.push(engine);
     }
-    // Our mesher chooses the spacings, also for other engines.
-    if arguments.engine.iter().any(|name| name != "reference") {
-        require(programs.mesher.program())?;
-    }
     let engines = engines(arguments, &programs);
     if engines.len() < arguments.engine.len() {
         return Err(wrong("--engine has two programs of one name: rename a file".to_owned()));
+    }
+    // Our mesher chooses the spacings, also for other engines.
+    if arguments.engine.iter().any(|name| name != "reference") {
+        require(programs.mesher.program())?;
     }
     for engine in engines {
         require(engine.program())?;

@@ -2,7 +2,7 @@
 
 use super::options::{Need, Options};
 use super::report::Missing;
-use crate::engine::failure::Failure;
+use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, Ranks};
 use crate::engine::options::RunOptions;
 use crate::engine::paths::Paths;
@@ -153,7 +153,11 @@ fn probe_mpi(programs: &Programs, place: &Path, limit: Duration) -> Result<Optio
         ..Layout::on(Ranks::Mpi(PROBE_RANKS))
     };
     let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), limit));
-    let ranks = completed.map_err(|failure| format!("on MPI, {failure}"))?.report.ranks;
+    let failed = |failure: Failure| match failure.end {
+        End::Missing(_) => failure.to_string(),
+        _ => format!("on MPI, {failure}"),
+    };
+    let ranks = completed.map_err(failed)?.report.ranks;
     match (engine.writes_report(), ranks) {
         (false, _) => {
             let why =
