@@ -78,7 +78,14 @@ impl<'a> Cubes<'a> {
             replace(&mut self.cubes[next as usize].joined, LEAF | leaf, &[cube]);
         }
         let clearance = Cell::new(f64::NAN);
-        self.cubes.push(Cube { centre, half, clearance, bound: f64::INFINITY, children: 0, joined });
+        self.cubes.push(Cube {
+            centre,
+            half,
+            clearance,
+            bound: f64::INFINITY,
+            children: 0,
+            joined,
+        });
         self.whole.insert(leaf, cube);
     }
 

@@ -50,7 +50,8 @@ impl Path {
             }
         }
         let last = spots.len() - 1;
-        let narrowest = (first..=last).min_by(|&i, &j| spots[i].clearance.total_cmp(&spots[j].clearance));
+        let narrowest =
+            (first..=last).min_by(|&i, &j| spots[i].clearance.total_cmp(&spots[j].clearance));
         let narrowest = narrowest.expect("a path has cubes");
         match goal {
             Some(goal) => spots.extend(goal.way.iter().rev().copied().map(spot)),
