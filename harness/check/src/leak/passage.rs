@@ -64,7 +64,7 @@ pub fn widest(
 
 fn described(case: &Case, level: u8, path: &Path, radius: f64, clearance: &Clearance) -> Passage {
     /// Facets at the rim, in parts of the ball's radius, and for small balls in lattice units.
-    const RIM: (f64, f64) = (0.02, 2.0);
+    const RIM: (f64, f64) = (0.06, 2.0);
     let scale = case.root.edge / UNITS_PER_EDGE as f64;
     let user = |at: [f64; 3]| std::array::from_fn(|a| case.root.origin[a] + at[a] * scale);
     let throat = path.throat();

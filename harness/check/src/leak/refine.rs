@@ -79,6 +79,7 @@ pub fn widest(
     let Some(mut refined) = found else { return Ok(None) };
     let done = TOLERANCES_NEAR.iter().take_while(|&&t| t >= refined.tolerance).count();
     // Centres of places and the number of tolerances reached there.
+    let mut best = (0.0, Vec::new());
     let mut known: Vec<(Point, usize)> = Vec::new();
     for _ in 0..PLACES_MAX {
         let path = &refined.cubes;
@@ -93,6 +94,9 @@ pub fn widest(
         let order = |&a: &usize, &b: &usize| spots[a].1.total_cmp(&spots[b].1);
         let throat = (0..path.len()).min_by(order).expect("a path has cubes");
         let (centre, least) = spots[throat];
+        if least > best.0 {
+            best = (least, path.clone());
+        }
         let reach = |stage: usize| REACH[stage] * least;
         let is_known =
             |&&(at, stage): &&(Point, usize)| length(at, centre) < reach(stage - 1) / 2.0;
@@ -121,7 +125,7 @@ pub fn widest(
         let (first, last) = (first.unwrap_or(0), last.unwrap_or(path.len() - 1));
         refined.cubes.splice(first..=last, near.cubes);
     }
-    Ok(Some(refined))
+    Ok(Some(Refined { cubes: best.1, ..refined }))
 }
 
 /// The widest path to the last of some tolerances; only cubes at a place are split.
@@ -146,6 +150,11 @@ fn to_tolerances(
             return Ok(None);
         }
         let [radius_least, clearance_least] = [0.25, 2.0].map(|t| radius * (1.0 - t * tolerance));
+        // A place that was widened before must not become narrower again.
+        let clearance_least = match place.around.is_empty() {
+            true => clearance_least,
+            false => clearance_least.max(0.998 * wanted),
+        };
         let narrow = Narrow { radius: radius_least, clearance: clearance_least, place };
         while let Some(mut split) = narrow.between(cubes, ends, stop)? {
             let is_full = place.around.is_empty()
