@@ -1,4 +1,4 @@
-"""Compares the counts of `harness geometry` with those of trimesh on the geometries in this repository.
+"""Compares the counts of `harness geometry` with those of trimesh and pymeshlab on the geometries in this repository.
 
 Run with: python -m unittest discover harness/oracles. The binary is target/debug/harness or target/release/harness,
 whichever is newer, or the one that the environment variable HARNESS names.
@@ -17,6 +17,11 @@ try:
     import trimesh
 except ImportError:
     trimesh = None
+
+try:
+    import pymeshlab
+except ImportError:
+    pymeshlab = None
 
 REPO = pathlib.Path(__file__).resolve().parents[2]
 
@@ -113,6 +118,22 @@ class GeometryTest(unittest.TestCase):
             with self.subTest(name):
                 if not findings["non_manifold_odd"]["count"] + findings["non_manifold_even"]["count"]:
                     self.assertEqual(diagnosis["shells"]["count"], components(mesh))
+
+    @unittest.skipIf(pymeshlab is None, "pymeshlab is not installed")
+    def test_counts_agree_with_pymeshlab(self):
+        """pymeshlab drops facets with a repeated vertex. It counts an edge with three facets three times, so only whether
+        there are edges with more than two facets is compared."""
+        for path in sorted(REPO.glob("geometries/*.stl")) + sorted(REPO.glob("geometries/fetched/*.stl")):
+            with self.subTest(path.name):
+                _, diagnosis, findings, _, facets, repeats = next(c for c in self.cases if c[0] == path.name)
+                meshes = pymeshlab.MeshSet()
+                meshes.load_new_mesh(str(path))
+                measures = meshes.get_topological_measures()
+                self.assertEqual(facets - repeats, measures["faces_number"])
+                self.assertEqual(findings["openings"]["edges"], measures["boundary_edges"])
+                self.assertEqual(diagnosis["shells"]["count"], measures["connected_components_number"])
+                odd_and_even = (findings[kind]["count"] for kind in ("non_manifold_odd", "non_manifold_even"))
+                self.assertEqual(sum(odd_and_even) > 0, measures["non_two_manifold_edges"] > 0)
 
 
 if __name__ == "__main__":

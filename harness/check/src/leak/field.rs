@@ -7,6 +7,7 @@ use std::collections::{BinaryHeap, HashSet};
 use super::clearance::{Clearance, Point};
 use super::cubes::{Cubes, DIAGONAL, length};
 use super::leaves::Leaves;
+use super::refine::Ends;
 use super::search::{self, Goal, Graph, Interrupted};
 
 /// Places are the free leaves, by number, and after all leaves the cubes. A leaf of which there are cubes is no place.
@@ -16,8 +17,11 @@ pub struct Field<'a> {
     clearance: &'a Clearance<'a>,
     /// The cubes.
     pub cubes: Cubes<'a>,
-    /// Distances from the centres of leaves to the nearest facet, rounded up; NaN where unknown.
+    /// Distances from the centres of leaves to the nearest facet, rounded up; NaN where unknown, and infinite where they exceed
+    /// `wide`.
     distances: Vec<f32>,
+    /// A distance that is presumably not exceeded at the narrowest place of any path.
+    wide: f64,
 }
 
 /// A point where the free width is greatest, and the way there.
@@ -37,53 +41,70 @@ impl Widest {
 }
 
 impl<'a> Field<'a> {
-    /// The field of a base tree.
-    pub fn new(leaves: &'a Leaves<'a>, clearance: &'a Clearance<'a>) -> Self {
-        let cubes = Cubes::new(leaves, clearance);
-        Self { leaves, clearance, cubes, distances: vec![f32::NAN; leaves.len()] }
+    /// The field of a base tree of this level.
+    pub fn new(leaves: &'a Leaves<'a>, level: u8, clearance: &'a Clearance<'a>) -> Self {
+        /// In leaves. A base tree is searched that is two levels finer than the coarsest that joins the ends, and an opening
+        /// wider than 2 sqrt(3) leaves joins them.
+        const WIDE: f64 = 15.0;
+        let (cubes, distances) = (Cubes::new(leaves, clearance), vec![f32::NAN; leaves.len()]);
+        Self { leaves, clearance, cubes, distances, wide: WIDE * EDGE / f64::from(1u32 << level) }
     }
 
-    /// The leaves of a widest path, of those along which the least radius is at least `wanted`, and the least radius;
-    /// `None` if there is no path.
+    /// The leaves of a widest path and its least radius; `None` if no path has a least radius of at least `wanted`.
     ///
     /// # Errors
     /// If `stop` returns true.
     pub fn widest(
         &mut self,
-        (start, goal): (Point, Option<Point>),
+        ends: Ends,
         wanted: f64,
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<(Vec<u32>, f64)>, Interrupted> {
+        let Some(route) = self.route(ends, wanted, stop)? else { return Ok(None) };
+        let count = self.leaves.len() as u32;
+        let radius = |&place: &u32| match place.checked_sub(count) {
+            Some(cube) => self.cubes.radius(cube),
+            None => f64::from(self.distances[place as usize]) + self.half_diagonal(place),
+        };
+        let least = route.iter().map(radius).fold(f64::INFINITY, f64::min);
+        if least.is_infinite() {
+            self.wide = f64::INFINITY;
+            self.distances.fill(f32::NAN);
+            return self.widest(ends, wanted, stop);
+        }
+        let leaf = |place: u32| match place.checked_sub(count) {
+            Some(cube) => self.leaves.locate(self.cubes.position(cube).map(|c| c as i64)),
+            None => place,
+        };
+        let mut leaves: Vec<u32> = route.into_iter().map(leaf).collect();
+        leaves.dedup();
+        Ok(Some((leaves, least)))
+    }
+
+    /// The places of a widest path.
+    fn route(
+        &mut self,
+        (start, goal): Ends,
+        wanted: f64,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<u32>>, Interrupted> {
         let from = self.place(start);
         let to = goal.map_or(Goal::Far, |at| Goal::Place(self.place(at)));
         let mut distances = std::mem::take(&mut self.distances);
-        let mut least = f64::INFINITY;
         let radius = |place, near| {
             let radius = self.radius(place, near, wanted, &mut distances);
             if radius >= wanted { radius as f32 } else { -1.0 }
         };
         let route = search::widest(&*self, from, to, radius, stop);
         self.distances = distances;
-        let Some(mut route) = route? else { return Ok(None) };
-        let count = self.leaves.len() as u32;
-        for place in &mut route {
-            least = least.min(match place.checked_sub(count) {
-                Some(cube) => self.cubes.radius(cube),
-                None => f64::from(self.distances[*place as usize]) + self.half_diagonal(*place),
-            });
-            if let Some(cube) = place.checked_sub(count) {
-                *place = self.leaves.locate(self.cubes.position(cube).map(|c| c as i64));
-            }
-        }
-        route.dedup();
-        Ok(Some((route, least)))
+        route
     }
 
     /// Makes cubes of the leaves of a route, and of all leaves near those in which the route is narrower than twice its
     /// least radius.
     pub fn adopt(&mut self, route: &[u32], radius: f64) {
         /// Radius of the surroundings, in least radii.
-        const REACH: f64 = 3.0;
+        const REACH: f64 = 2.0;
         let is_narrow = |leaf: &u32| {
             self.clearance.at(self.leaves.position(*leaf), f64::INFINITY) < 2.0 * radius
         };
@@ -114,9 +135,8 @@ impl<'a> Field<'a> {
         loop {
             let mut wider = None;
             self.joined(leaf, &mut |next| {
-                let clearance = at(next);
-                if clearance > best {
-                    (best, wider) = (clearance, Some(next));
+                if self.clearance.is_free(self.leaves.position(next), best * (1.0 + PRECISION)) {
+                    (best, wider) = (at(next), Some(next));
                 }
             });
             let Some(next) = wider else { break };
@@ -131,19 +151,18 @@ impl<'a> Field<'a> {
         let mut step = best / 2.0;
         while step > PRECISION * best {
             let here = way[way.len() - 1];
-            let wider = directions()
-                .map(|d| std::array::from_fn(|a| here[a] + step * d[a]))
-                .find_map(|there: Point| {
+            let wider = directions().map(|d| std::array::from_fn(|a| here[a] + step * d[a])).find(
+                |there: &Point| {
+                    let there = *there;
                     let is_inside = there.iter().all(|c| (0.0..=EDGE).contains(c));
-                    let clearance = self.clearance.at(there, best + 2.0 * step);
-                    let is_wider = clearance > best + PRECISION * step;
-                    let is_free =
-                        || self.leaves.is_free(self.leaves.locate(there.map(|c| c as i64)));
-                    (is_inside && is_wider && is_free()).then_some((there, clearance))
-                });
+                    let is_wider = || self.clearance.is_free(there, best + PRECISION * step);
+                    let leaf = || self.leaves.locate(there.map(|c| c as i64));
+                    is_inside && is_wider() && self.leaves.is_free(leaf())
+                },
+            );
             match wider {
-                Some((there, clearance)) => {
-                    best = clearance;
+                Some(there) => {
+                    best = self.clearance.at(there, best + 2.0 * step);
                     way.push(there);
                 }
                 None => step /= 2.0,
@@ -185,7 +204,10 @@ impl<'a> Field<'a> {
         if bound + half_diagonal < wanted {
             return bound + half_diagonal;
         }
-        let distance = (self.clearance.at(at, bound) * ROUNDING) as f32;
+        let distance = match bound > self.wide && self.clearance.is_free(at, self.wide) {
+            true => f32::INFINITY,
+            false => (self.clearance.at(at, bound) * ROUNDING) as f32,
+        };
         distances[place as usize] = distance;
         f64::from(distance) + half_diagonal
     }

@@ -32,7 +32,7 @@ pub fn widest(
     stop: &dyn Fn() -> bool,
 ) -> Result<Passage, Interrupted> {
     let clearance = Clearance::new(&case.facets_lattice);
-    let mut field = Field::new(leaves, &clearance);
+    let mut field = Field::new(leaves, level, &clearance);
     let approach = |at: [i64; 3]| field.approach(at.map(|c| c as f64));
     let (start, goal) = (approach(from), to.map(approach));
     let ends = (start.at(), goal.as_ref().map(|goal| goal.at()));
@@ -49,7 +49,7 @@ pub fn widest(
         let refined = refine::widest(&mut field.cubes, &clearance, ends, wanted, stop)?;
         let Some(refined) = refined else { continue };
         // Further attempts at places that are all equally wide would prove little.
-        let is_last = best.is_some() && !refined.is_proven;
+        let is_last = best.is_some() && !refined.is_proven();
         let path = Path::through(&field.cubes, &refined.cubes, &clearance, (&start, goal.as_ref()));
         if best.as_ref().is_none_or(|best| path.throat().clearance > best.throat().clearance) {
             best = Some(path);
@@ -64,7 +64,7 @@ pub fn widest(
 
 fn described(case: &Case, level: u8, path: &Path, radius: f64, clearance: &Clearance) -> Passage {
     /// Facets at the rim, in parts of the ball's radius, and for small balls in lattice units.
-    const RIM: (f64, f64) = (0.02, 2.0);
+    const RIM: (f64, f64) = (0.06, 2.0);
     let scale = case.root.edge / UNITS_PER_EDGE as f64;
     let user = |at: [f64; 3]| std::array::from_fn(|a| case.root.origin[a] + at[a] * scale);
     let throat = path.throat();

@@ -10,21 +10,22 @@
 //! found to [`PROVEN`]; then only the surroundings of its narrowest place are split further.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashSet};
 
 use super::clearance::{Clearance, Point};
 use super::cubes::{Cubes, DIAGONAL, length};
 use super::search::{self, Goal, Graph, Interrupted};
 
 /// Tolerances of the width of the whole path, each of which is reached before the next. A path of tolerance t has a clearance
-/// of at least 1 - 1.5 t times the least radius.
-const TOLERANCES: [f64; 3] = [0.3, 0.06, 0.015];
+/// of at least 1 - 2.2 t times the least radius.
+const TOLERANCES: [f64; 4] = [0.3, 0.06, 0.015, 0.005];
 
-/// Tolerances near its narrowest place, each in smaller surroundings than the one before.
-const TOLERANCES_NEAR: [f64; 3] = [0.02, 0.006, 0.002];
+/// Tolerances near its narrowest place, each in smaller surroundings than the one before, but the last: it is for long narrow
+/// places, where the path is too far from the middle at the edge of small surroundings.
+const TOLERANCES_NEAR: [f64; 4] = [0.02, 0.006, 0.002, 0.004];
 
 /// No path is wider than the path returned by more than this factor, apart from what is reported.
-pub const PROVEN: f64 = 1.0 / (1.0 - 2.0 * TOLERANCES[2]);
+pub const PROVEN: f64 = 1.0 / (1.0 - 2.2 * TOLERANCES[2]);
 
 /// Places of a path at which it is widened, at most.
 const PLACES_MAX: usize = 100;
@@ -32,8 +33,8 @@ const PLACES_MAX: usize = 100;
 /// Cubes are split if they are on a path that has at most this times the least length in narrow cubes.
 const SLACK: f64 = 1.2;
 
-/// After so many more cubes, the width of the whole path is not proven further.
-const CUBES_MAX: usize = 1 << 14;
+/// After so many more cubes, the width of the whole path is not proven further: up to [`PROVEN`], and to the last tolerance.
+const CUBES_MAX: [usize; 2] = [3 << 13, 1 << 16];
 
 /// The cubes of a path, each of which shares part of a face with the next.
 #[derive(Clone, Debug)]
@@ -42,8 +43,15 @@ pub struct Refined {
     pub cubes: Vec<u32>,
     /// No ball with a greater radius passes through the adopted leaves.
     pub radius: f64,
+    /// The tolerance of the whole path.
+    tolerance: f64,
+}
+
+impl Refined {
     /// Whether no path is wider by more than [`PROVEN`].
-    pub is_proven: bool,
+    pub fn is_proven(&self) -> bool {
+        self.tolerance <= TOLERANCES[2]
+    }
 }
 
 /// Between which points a path leads; without an end, to the far field.
@@ -61,41 +69,63 @@ pub fn widest(
     wanted: f64,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Refined>, Interrupted> {
-    /// Tolerances before those near a place.
-    const GAPS: [f64; 3] = [TOLERANCES[1], TOLERANCES_NEAR[0], TOLERANCES_NEAR[1]];
-    /// Away from the narrowest place of a hole, the clearance grows with the square of the distance; this is the distance in
-    /// clearances at which it exceeds a gap of 1.
-    const REACH: f64 = 2.0;
-    let everywhere = Place { centre: ends.0, reach: f64::INFINITY, ends: None };
-    let found = to_tolerances((cubes, clearance), ends, &TOLERANCES, everywhere, wanted, stop)?;
+    /// Radii of the surroundings in clearances. Away from the narrowest place of a hole, the clearance grows with the square of
+    /// the distance, so these are twice the square root of the tolerance before.
+    const REACH: [f64; 4] = [0.49, 0.28, 0.155, 1.4];
+    /// A place is long if the path is not wider than this factor at this distance, in clearances.
+    const LONG: (f64, f64) = (1.03, 0.5);
+    let everywhere = Place { centre: ends.0, reach: f64::INFINITY, around: HashSet::new() };
+    let found = to_tolerances((cubes, clearance), ends, &TOLERANCES, &everywhere, wanted, stop)?;
     let Some(mut refined) = found else { return Ok(None) };
+    let done = TOLERANCES_NEAR.iter().take_while(|&&t| t >= refined.tolerance).count();
     // Centres of places and the number of tolerances reached there.
+    let mut best = (0.0, Vec::new());
     let mut known: Vec<(Point, usize)> = Vec::new();
     for _ in 0..PLACES_MAX {
         let path = &refined.cubes;
-        let order =
-            |&a: &usize, &b: &usize| cubes.clearance(path[a]).total_cmp(&cubes.clearance(path[b]));
+        let spot = |i: usize| {
+            let own = (cubes.position(path[i]), cubes.clearance(path[i]));
+            let Some(&next) = path.get(i + 1) else { return own };
+            let face = cubes.shared_face_centre(path[i], next);
+            let at_face = clearance.at(face, own.1 + cubes.half(path[i]) * DIAGONAL);
+            if at_face < own.1 { (face, at_face) } else { own }
+        };
+        let spots: Vec<(Point, f64)> = (0..path.len()).map(spot).collect();
+        let order = |&a: &usize, &b: &usize| spots[a].1.total_cmp(&spots[b].1);
         let throat = (0..path.len()).min_by(order).expect("a path has cubes");
-        let (centre, least) = (cubes.position(path[throat]), cubes.clearance(path[throat]));
-        let reach = |stage: usize| REACH * GAPS[stage].sqrt() * least;
+        let (centre, least) = spots[throat];
+        if least > best.0 {
+            best = (least, path.clone());
+        }
+        let reach = |stage: usize| REACH[stage] * least;
         let is_known =
             |&&(at, stage): &&(Point, usize)| length(at, centre) < reach(stage - 1) / 2.0;
-        let stage = known.iter().filter(is_known).map(|known| known.1).max().unwrap_or(0);
+        let stage = known.iter().filter(is_known).map(|known| known.1).max().unwrap_or(done);
         let Some(&tolerance) = TOLERANCES_NEAR.get(stage) else { break };
+        let is_long = |spot: &(Point, f64)| {
+            spot.1 <= LONG.0 * least && length(spot.0, centre) > LONG.1 * least
+        };
+        if stage + 1 == TOLERANCES_NEAR.len() && !spots.iter().any(is_long) {
+            break;
+        }
         known.push((centre, stage + 1));
-        let mut place = Place { centre, reach: reach(stage), ends: None };
-        let is_outside = |&i: &usize| !place.has(cubes, path[i]);
-        let first = (0..throat).rev().find(is_outside);
-        let last = (throat + 1..path.len()).find(is_outside);
+        let next = path.get(throat + 1).map_or(0.0, |&next| cubes.half(next));
+        let largest = DIAGONAL * cubes.half(path[throat]).max(next);
+        let reach = reach(stage) + 3.0 * largest;
+        let mut place = Place { centre, reach, around: HashSet::new() };
+        place.around = path.iter().copied().filter(|&cube| !place.has(cubes, cube)).collect();
+        let is_inside = |i: &usize| !place.around.contains(&path[*i]);
+        let first = (0..path.len()).find(is_inside).and_then(|i| i.checked_sub(1));
+        let last = (0..path.len()).rfind(is_inside).map(|i| i + 1).filter(|&i| i < path.len());
         let at = |i: usize| cubes.position(path[i]);
         let ends_near = (first.map_or(ends.0, at), last.map(at).or(ends.1));
-        place.ends = Some([first, last].map(|i| i.map(|i| path[i])));
-        let found = to_tolerances((cubes, clearance), ends_near, &[tolerance], place, least, stop)?;
+        let found =
+            to_tolerances((cubes, clearance), ends_near, &[tolerance], &place, least, stop)?;
         let Some(near) = found else { break };
         let (first, last) = (first.unwrap_or(0), last.unwrap_or(path.len() - 1));
         refined.cubes.splice(first..=last, near.cubes);
     }
-    Ok(Some(refined))
+    Ok(Some(Refined { cubes: best.1, ..refined }))
 }
 
 /// The widest path to the last of some tolerances; only cubes at a place are split.
@@ -103,13 +133,14 @@ fn to_tolerances(
     (cubes, clearance): (&mut Cubes, &Clearance),
     ends: Ends,
     tolerances: &[f64],
-    place: Place,
+    place: &Place,
     wanted: f64,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Refined>, Interrupted> {
-    let cubes_max = cubes.count() + CUBES_MAX;
+    let count = cubes.count();
     let mut tolerances = tolerances.iter().copied().peekable();
     let mut tolerance = tolerances.next().expect("at least one tolerance");
+    let mut reached = 1.0;
     loop {
         let width = |cube, _| place.radius(cubes, cube) as f32;
         let (from, to) = in_cubes(cubes, ends);
@@ -119,9 +150,18 @@ fn to_tolerances(
             return Ok(None);
         }
         let [radius_least, clearance_least] = [0.25, 2.0].map(|t| radius * (1.0 - t * tolerance));
+        // A place that was widened before must not become narrower again.
+        let clearance_least = match place.around.is_empty() {
+            true => clearance_least,
+            false => clearance_least.max(0.998 * wanted),
+        };
         let narrow = Narrow { radius: radius_least, clearance: clearance_least, place };
         while let Some(mut split) = narrow.between(cubes, ends, stop)? {
-            let is_full = place.ends.is_none() && cubes.count() > cubes_max;
+            let is_full = place.around.is_empty()
+                && cubes.count() - count > CUBES_MAX[usize::from(tolerance < TOLERANCES[2])];
+            if split.is_empty() {
+                reached = tolerance;
+            }
             if split.is_empty() && !is_full && tolerances.peek().is_some() {
                 tolerance = tolerances.next().expect("there is another");
                 break;
@@ -131,7 +171,7 @@ fn to_tolerances(
                 split = blocked(cubes, clearance, &path, radius * (1.0 - 2.2 * tolerance));
                 split.retain(|&cube| place.has(cubes, cube));
                 if split.is_empty() || is_full {
-                    return Ok(Some(Refined { cubes: path, radius, is_proven: !is_full }));
+                    return Ok(Some(Refined { cubes: path, radius, tolerance: reached }));
                 }
             }
             split.into_iter().for_each(|cube| cubes.split(cube));
@@ -139,31 +179,27 @@ fn to_tolerances(
     }
 }
 
-/// Where cubes are split.
-#[derive(Clone, Copy, Debug)]
+/// Where cubes are split: a ball.
+#[derive(Debug)]
 struct Place {
     centre: Point,
+    /// Its radius.
     reach: f64,
-    /// The cubes outside of it, before and after, that a path through it joins; without limit, the path may pass all cubes.
-    ends: Option<[Option<u32>; 2]>,
+    /// Cubes outside of it that the path may pass.
+    around: HashSet<u32>,
 }
 
 impl Place {
+    /// Whether the whole of a cube is in the ball.
     fn has(&self, cubes: &Cubes, cube: u32) -> bool {
-        let half_diagonal = DIAGONAL * cubes.half(cube);
-        length(cubes.position(cube), self.centre) - half_diagonal <= self.reach
+        length(cubes.position(cube), self.centre) + DIAGONAL * cubes.half(cube) <= self.reach
     }
 
-    /// Whether a cube is one of the ends.
-    fn ends_with(&self, cube: u32) -> bool {
-        self.ends.is_some_and(|ends| ends.contains(&Some(cube)))
-    }
-
-    /// The radius of a cube at this place; infinite at its ends, and -1 elsewhere.
+    /// The radius of a cube at this place; infinite around it, or -1 where the path may not pass.
     fn radius(&self, cubes: &Cubes, cube: u32) -> f64 {
         match self.has(cubes, cube) {
             true => cubes.radius(cube),
-            false if self.ends_with(cube) => f64::INFINITY,
+            false if self.around.contains(&cube) => f64::INFINITY,
             false => -1.0,
         }
     }
@@ -206,13 +242,13 @@ fn in_cubes(cubes: &Cubes, (start, goal): Ends) -> (u32, Goal) {
 }
 
 /// What is wanted of cubes: a path through cubes of at least this radius and, if possible, of at least this clearance.
-struct Narrow {
+struct Narrow<'a> {
     radius: f64,
     clearance: f64,
-    place: Place,
+    place: &'a Place,
 }
 
-impl Narrow {
+impl Narrow<'_> {
     /// The cubes to split: none if a path through cubes with the clearance joins the ends. `None` if no path through cubes
     /// with the radius does.
     fn between(
@@ -252,7 +288,7 @@ impl Narrow {
     /// The length of a path in a cube that counts: 0 if the cube's centre is wide enough, `None` if no point of it is.
     fn length(&self, cubes: &Cubes, cube: u32) -> Option<f64> {
         if !self.place.has(cubes, cube) {
-            return self.place.ends_with(cube).then_some(0.0);
+            return self.place.around.contains(&cube).then_some(0.0);
         }
         match cubes.clearance(cube) {
             wide if wide >= self.clearance => Some(0.0),
@@ -306,7 +342,8 @@ impl Narrow {
         if let Some(path) = search::shortest(cubes, from, to, self.clearance as f32, clear, stop)? {
             return Ok(path);
         }
-        let width = |cube, _| match self.place.has(cubes, cube) || self.place.ends_with(cube) {
+        let width = |cube, _| match self.place.has(cubes, cube) || self.place.around.contains(&cube)
+        {
             true => cubes.clearance(cube) as f32,
             false => -1.0,
         };

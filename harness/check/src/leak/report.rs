@@ -61,7 +61,7 @@ pub struct Narrowest {
     pub direction: [f64; 3],
     /// A facet's point that the ball touches.
     pub touches: [f64; 3],
-    /// The facets at the rim, which the ball touches to within 2 % of its radius, by number from 0; nearest first.
+    /// The facets at the rim, which the ball touches to within 6 % of its radius, by number from 0; nearest first.
     pub facets: Vec<u32>,
     /// Index among the points of the path.
     pub index: usize,

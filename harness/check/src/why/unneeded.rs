@@ -5,9 +5,11 @@
 //! splits that are found are exactly those which the mesh has beyond the least mesh, if it has all that the rules require;
 //! `harness audit` and `harness verify` check that it does. An octant within a needless octant is needless, too.
 //!
-//! What is found out about an octant is kept in memory, which therefore grows with the mesh.
+//! What is found out about an octant is kept in memory, which therefore grows with the mesh. A mesh for which the memory that is
+//! available does not suffice is refused.
 
 use std::fmt;
+use std::fs;
 
 use super::Mesh;
 use super::answer::{Place, user_place};
@@ -17,6 +19,9 @@ use serde::Serialize;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-unneeded/1";
+
+/// Memory that the audit takes for each leaf, as measured on meshes of 5 to 50 million cells.
+const BYTES_PER_LEAF: u64 = 60;
 
 /// The result of the audit.
 #[derive(Clone, Debug, Serialize)]
@@ -53,12 +58,14 @@ impl Mesh<'_> {
     /// Audits a whole mesh and lists at most `first` octants.
     ///
     /// # Errors
-    /// One sentence, if the mesh is invalid or its surface is not known.
+    /// One sentence, if the mesh is invalid, its surface is not known, or it is too large for the memory that is available.
     pub fn unneeded(self, first: usize) -> Result<Unneeded, String> {
         if matches!(self.surface, Surface::Unknown) {
             return Err("the mesh has no crossing leaves, so the surface is not known; give its case with --case"
                 .to_owned());
         }
+        let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
+        refuse_too_large(self.leaves.manifest.leaves, &meminfo)?;
         let mesh = self.distrusting();
         let mut found = Unneeded {
             schema: SCHEMA,
@@ -109,6 +116,24 @@ impl Mesh<'_> {
     }
 }
 
+/// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
+fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
+    let kilobytes = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
+    let kilobytes =
+        kilobytes.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    let Some(available) = kilobytes.map(|kilobytes| kilobytes * 1024) else { return Ok(()) };
+    let needed = leaves.saturating_mul(BYTES_PER_LEAF);
+    if needed <= available {
+        return Ok(());
+    }
+    Err(format!(
+        "--unneeded needs about {:.1} GB of memory for {leaves} leaves, and {:.1} GB are available: audit a coarser mesh of the same \
+         case, or use a machine with more memory",
+        needed as f64 / 1e9,
+        available as f64 / 1e9
+    ))
+}
+
 impl fmt::Display for Unneeded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, .. } = self;
@@ -133,5 +158,20 @@ impl fmt::Display for Unneeded {
             }
             None => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_that_exceeds_the_available_memory_is_refused_before_the_audit() {
+        let meminfo = "MemTotal:       24000000 kB\nMemAvailable:    1000000 kB\n";
+        assert_eq!(refuse_too_large(17_000_000, meminfo), Ok(()));
+        let why = refuse_too_large(20_000_000, meminfo).unwrap_err();
+        assert!(why.contains("1.2 GB") && why.contains("1.0 GB are available"), "{why}");
+        assert!(refuse_too_large(u64::MAX, meminfo).is_err());
+        assert_eq!(refuse_too_large(u64::MAX, ""), Ok(()));
     }
 }

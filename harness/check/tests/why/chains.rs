@@ -49,11 +49,11 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
     fn every_split_has_a_chain_and_every_deleted_point_a_rule(
-        text in settings(2..4), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 5),
+        text in settings(2..5), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 6),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 4),
         points in prop::collection::vec(prop::array::uniform3(-8.0f64..8.0), 4),
     ) {

@@ -12,7 +12,7 @@ fn split(words: &mut Vec<u64>, at: usize) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
     fn planted_splits_are_counted_exactly(
