@@ -6,6 +6,7 @@ mod commands;
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
 use run::engine::interrupt;
+use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -34,5 +35,7 @@ fn main() -> ExitCode {
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     };
     interrupt::uninstall();
-    ExitCode::from(code)
+    // A command that fails because its programs were ended has been interrupted.
+    let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
+    ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
 }
