@@ -127,6 +127,18 @@ pub fn write_atomically(
     out.into_inner()?.publish()
 }
 
+/// Finds out early whether a file can be written, without leaving anything: a process that is killed cannot remove its drafts. What is
+/// not a regular file is not opened, as its reader would notice.
+///
+/// # Errors
+/// As [`Draft::create`].
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() && !found.is_dir() => Ok(()),
+        _ => Draft::create(path).map(drop),
+    }
+}
+
 /// Renames a file in a directory, without replacing another.
 pub(crate) fn rename_to_new(dir: BorrowedFd, from: &CStr, to: &CStr) -> io::Result<()> {
     match renameat_with(dir, from, dir, to, RenameFlags::NOREPLACE) {

@@ -13,4 +13,4 @@ pub mod interrupt;
 mod unfinished;
 
 pub use claim::{Claim, ClaimError};
-pub use draft::{Draft, write_atomically};
+pub use draft::{Draft, check_writable, write_atomically};

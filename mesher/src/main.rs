@@ -8,7 +8,7 @@ mod heap;
 mod launch;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
-use files::{Draft, interrupt};
+use files::{check_writable, interrupt, write_atomically};
 use mesher::agreement;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
@@ -18,7 +18,7 @@ use mesher::report::Report;
 use mesher::write::write_json;
 use mesher::{Options, mesh};
 use std::fmt::Display;
-use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stderr, stdout};
+use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
@@ -172,12 +172,15 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
             Error::output(format!("{}: {e}: choose another --status", dir.display()))
         }))?;
     }
-    // Created before meshing, so that a path that cannot be written to ends the run at once.
+    // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
-    let json_error =
-        |path: &Path, e| Error::output(format!("{}: {e}: choose another --json", path.display()));
-    let draft = json.map(|path| Draft::create(path).map_err(|e| json_error(path, e))).transpose();
-    let draft = mesher::comm::agree(comm, draft)?;
+    let on_json = |write: &dyn Fn(&Path) -> std::io::Result<()>| {
+        let named = |path: &Path, e| {
+            Error::output(format!("{}: {e}: choose another --json", path.display()))
+        };
+        comm.agree(json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
+    };
+    on_json(&check_writable)?;
     let case = mesher::comm::agree(comm, case(args))?;
     agreement::on_case(&case, comm)?;
     let options = Options {
@@ -195,12 +198,6 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     if args.message_matrix {
         report = report.with_message_matrix(comm);
     }
-    let publish = |(path, draft): (&Path, Draft)| {
-        let mut out = BufWriter::new(draft);
-        write_json(&mut out, &report)
-            .and_then(|()| out.into_inner()?.publish())
-            .map_err(|e| json_error(path, e))
-    };
-    comm.agree(json.zip(draft).map_or(Ok(()), publish))?;
+    on_json(&|path| write_atomically(path, |to| write_json(to, &report)))?;
     Ok(report)
 }

@@ -9,6 +9,7 @@ mod commands;
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
 use run::engine::interrupt;
+use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -40,5 +41,7 @@ fn main() -> ExitCode {
     };
     let code = output::finish(code);
     interrupt::uninstall();
-    ExitCode::from(code)
+    // A command that fails because its programs were ended has been interrupted.
+    let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
+    ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
 }

@@ -13,8 +13,8 @@ const CASE: &str =
     "spacing_min = 0.001\nroot_scale = 2.0\n[generator]\nshape = \"sphere\"\nfacets = 8000000\n";
 /// A mesher that neither meshes nor ends, and starts another process.
 const STUBBORN: &str = "#!/bin/sh\ntrap '' TERM INT HUP\necho $$ >> \"$PLACE/ids\"\nsleep 600 &\necho $! >> \"$PLACE/ids\"\nwhile :; do sleep 1; done\n";
-/// Time to end: a second, and the time in which a busy machine gets to it.
-const LIMIT: Duration = Duration::from_millis(2500);
+/// Time to end: less than a second, and the time in which a busy machine gets to it. Without signals, every command takes minutes.
+const LIMIT: Duration = Duration::from_secs(5);
 
 struct Fixture(TempDir);
 
@@ -78,11 +78,11 @@ fn a_command_that_computes_ends_at_once() {
 fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
     for signals in [&["INT"][..], &["TERM"], &["HUP"], &["INT", "INT"], &["TERM", "HUP", "INT"]] {
         let fixture = Fixture::new();
+        fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
         let why = ["why", "case.toml", "--unneeded", "--mesher", "./mesher"];
         let verify = ["verify", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
-        let bench = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
-        let mut waits = 0;
-        for arguments in [&why[..], &verify, &bench] {
+        let shrink = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
+        for arguments in [&why[..], &verify, &shrink] {
             let mut run = fixture.start(arguments);
             let before = fixture.ids().len();
             while fixture.ids().len() < before + 2 && run.try_wait().unwrap().is_none() {
@@ -91,10 +91,8 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
             if let Some(end) = run.try_wait().unwrap() {
                 panic!("{arguments:?}: {end:?}");
             }
-            waits += 1;
             fixture.interrupt(run, signals);
         }
-        assert_eq!(waits, 3);
     }
 }
 

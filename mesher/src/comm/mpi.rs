@@ -4,7 +4,7 @@
 //! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. Messages
 //! are sent in chunks, as MPI counts in i32.
 //!
-//! With a limit for calls, collective calls are non-blocking: a rank that waits looks for questions of others ([`stall`]).
+//! With a limit for calls, collective calls are non-blocking: a rank that waits looks for questions of others (`stall`).
 
 mod stall;
 

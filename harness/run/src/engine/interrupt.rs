@@ -19,9 +19,9 @@ use std::thread::{self, sleep};
 use std::time::Duration;
 
 /// Time for a command to return after a first signal.
-pub const GRACE: Duration = Duration::from_millis(900);
+pub const GRACE: Duration = Duration::from_millis(550);
 /// Time for child processes to remove their files.
-pub const PATIENCE: Duration = Duration::from_millis(500);
+pub const PATIENCE: Duration = Duration::from_millis(350);
 /// How often a directory is removed to which other threads may still write.
 const ATTEMPTS: usize = 20;
 
