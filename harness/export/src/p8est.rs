@@ -365,8 +365,9 @@ mod tests {
         let deep = words_of(|o| o.corner == [0; 3] && o.level < 19);
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
-        let refusal =
-            |selection: &Selection| write(&mesh_of(vec![deep.clone()]), selection, &path, &options());
+        let refusal = |selection: &Selection| {
+            write(&mesh_of(vec![deep.clone()]), selection, &path, &options())
+        };
         let error = refusal(&Selection::default()).unwrap_err().to_string();
         assert!(error.contains("p4est has levels 0 to 18"), "{error}");
         let none = Selection { side: Some(Side::Inside), ..Selection::default() };
