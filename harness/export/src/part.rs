@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use contract::htg::{Cursor, Index, TreeFile};
+use contract::htg::{Cursor, Index, TreeError, TreeFile};
 use contract::leafset::ReadError;
 use contract::npy::PartFile;
 use contract::octant::Octant;
@@ -82,7 +82,7 @@ impl<'a> Readers<'a> {
         }
     }
 
-    /// The words of an octant's leaves, which are at these indices.
+    /// The words at these indices, which are leaves of the octant.
     pub(crate) fn words(
         &mut self,
         part: usize,
@@ -97,10 +97,29 @@ impl<'a> Readers<'a> {
                 read.map_err(|error| ReadError::part(file, error))?;
             }
             Reader::Tree(tree, cursor) => {
-                let read = cursor.words(word::key_of(octant.corner), octant.level, &mut words);
+                let read = append(cursor, octant, &interval, &mut words);
                 read.map_err(|error| ReadError::tree(tree, error))?;
             }
         }
         Ok(words)
     }
+}
+
+/// Appends those leaves of an octant whose indices are in the interval.
+fn append(
+    cursor: &mut Cursor,
+    octant: &Octant,
+    interval: &Range<u64>,
+    words: &mut Vec<u64>,
+) -> Result<(), TreeError> {
+    let key = word::key_of(octant.corner);
+    let first = cursor.leaves_before(key)?;
+    let end = cursor.leaves_before(key + word::span(octant.level))?;
+    if first >= interval.end || end <= interval.start {
+        return Ok(());
+    }
+    if interval.start <= first && end <= interval.end {
+        return cursor.words(key, octant.level, words);
+    }
+    (0..8).try_for_each(|digit| append(cursor, &octant.child(digit), interval, words))
 }

@@ -15,6 +15,7 @@ use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
 use std::num::NonZero;
+use std::ops::Range;
 use std::path::Path;
 use tempfile::TempDir;
 use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window};
@@ -63,8 +64,13 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
 
 /// Words and indices of the selected leaves.
 fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
+    leaves_within(mesh, Mesh::ALL, selection)
+}
+
+/// Those with these Morton codes.
+fn leaves_within(mesh: &Mesh, keys: Range<u64>, selection: &Selection) -> Vec<(u64, u64)> {
     let mut leaves = Vec::new();
-    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, index, .. }| {
+    mesh.visit(keys, selection, &mut |Leaf { octant, side, index, .. }| {
         leaves.push((word::encode(&WordLeaf { octant, side }), index));
         Ok::<(), ExportError>(())
     })
@@ -107,6 +113,10 @@ proptest! {
                 prop_assert_eq!(leaves(&tree, &cut), leaves(&mesh, &cut));
                 let blocks = |mesh: &Mesh| mesh.blocks(&selection, max + 1).unwrap();
                 prop_assert_eq!(blocks(&tree), blocks(&mesh));
+                for block in blocks(&mesh) {
+                    let within = |mesh| leaves_within(mesh, block.keys.clone(), &cut);
+                    prop_assert_eq!(within(&tree), within(&mesh));
+                }
             }
         }
     }

@@ -6,7 +6,7 @@ use super::index::Index;
 use super::level::LevelReader;
 use super::{Result, TreeFile, Walk, nodes};
 use crate::octant::LEVEL_MAX;
-use crate::word;
+use crate::word::{self, KEY_END};
 
 /// Reads the leaves of octants. Each one has buffers of its own, so every thread should have its own cursor.
 pub struct Cursor<'a> {
@@ -37,7 +37,8 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If the file is damaged.
     pub fn leaves_before(&mut self, key: u64) -> Result<u64> {
-        Ok(self.descend(key)?.before)
+        // There is no octant at the end of the root.
+        if key >= KEY_END { Ok(self.index.leaves) } else { Ok(self.descend(key)?.before) }
     }
 
     /// Appends the words of the leaves of an octant, given by its Morton code and level; if a coarser leaf begins there, that one.
