@@ -65,7 +65,7 @@ pub struct Narrowest {
     pub facets: Vec<u32>,
     /// Index among the points of the path.
     pub index: usize,
-    /// Whether it is an end of the path instead of an opening: the widest place near the start or the end.
+    /// Whether the path is nowhere narrower than the widest place near one of its ends, to half a percent.
     pub is_end: bool,
 }
 

@@ -35,7 +35,7 @@ impl Inputs {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(100))]
+    #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
     fn a_split_disappears_with_its_sufficient_causes_and_each_reported_one_is_sufficient(
