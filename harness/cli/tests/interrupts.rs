@@ -83,8 +83,8 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
         let verify = ["verify", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
         let shrink = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
         for arguments in [&why[..], &verify, &shrink] {
-            let mut run = fixture.start(arguments);
             let before = fixture.ids().len();
+            let mut run = fixture.start(arguments);
             while fixture.ids().len() < before + 2 && run.try_wait().unwrap().is_none() {
                 sleep(Duration::from_millis(5));
             }
