@@ -1,7 +1,5 @@
 //! The distance from a point or a square to the nearest facet, in lattice units.
 
-use std::cell::Cell;
-
 use contract::lattice::FacetLattice;
 
 use crate::geometry::boxes::{Bounds, Boxes};
@@ -15,15 +13,12 @@ pub type Point = [f64; 3];
 pub struct Clearance<'a> {
     facets: &'a [FacetLattice],
     boxes: Option<Boxes>,
-    /// The nearest facet of the last query, which is often near the next point too.
-    last: Cell<u32>,
 }
 
 impl<'a> Clearance<'a> {
     /// The facets of a case.
     pub fn new(facets: &'a [FacetLattice]) -> Self {
-        let boxes = (!facets.is_empty()).then(|| Boxes::of_all(facets));
-        Self { facets, boxes, last: Cell::new(0) }
+        Self { facets, boxes: (!facets.is_empty()).then(|| Boxes::of_all(facets)) }
     }
 
     /// Distance from a point to the nearest facet; infinite without facets. `bound` is an upper bound that the caller
@@ -31,13 +26,7 @@ impl<'a> Clearance<'a> {
     pub fn at(&self, point: Point, bound: f64) -> f64 {
         // Rounding must not exclude the facet that the bound comes from.
         let mut best = (bound + 1.0) * (bound + 1.0);
-        if !self.facets.is_empty() {
-            best = best.min(distance::from_point(point, &self.triangle(self.last.get())).0);
-        }
-        self.within(point, &mut best, &mut |squared, facet, best| {
-            self.last.set(facet);
-            *best = squared;
-        });
+        self.within(point, &mut best, &mut |squared, _, best| *best = squared.min(*best));
         best.sqrt()
     }
 
@@ -56,17 +45,6 @@ impl<'a> Clearance<'a> {
             &mut |squared, _, best| *best = squared.min(*best),
         );
         best.sqrt()
-    }
-
-    /// Whether no facet is nearer to a point than `radius`. That is known sooner than the distance, above all at a point
-    /// from which many facets are equally far.
-    pub fn is_free(&self, point: Point, radius: f64) -> bool {
-        let (mut limit, mut is_free) = (radius * radius, true);
-        self.within(point, &mut limit, &mut |_, _, limit| {
-            is_free = false;
-            *limit = 0.0;
-        });
-        is_free
     }
 
     /// The facets nearer than `radius`, each with its distance, nearest first.
@@ -159,8 +137,6 @@ mod tests {
             let expected = distances.iter().copied().fold(f64::INFINITY, f64::min);
             prop_assert_eq!(clearance.at(point, f64::INFINITY), expected);
             prop_assert_eq!(clearance.at(point, expected), expected);
-            prop_assert!(clearance.is_free(point, expected * (1.0 - 1e-9)));
-            prop_assert!(!clearance.is_free(point, expected * (1.0 + 1e-9) + 1e-9));
             let within = clearance.facets_within(point, expected * 1.5 + 1.0);
             prop_assert_eq!(within.len(), distances.iter().filter(|&&d| d < expected * 1.5 + 1.0).count());
             prop_assert_eq!(within[0].1, expected);

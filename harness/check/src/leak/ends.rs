@@ -15,9 +15,6 @@ pub enum Target {
     Point([f64; 3]),
 }
 
-/// The start and the end of a path on the lattice; without an end, the path leads to the far field.
-pub type Ends = ([i64; 3], Option<[i64; 3]>);
-
 /// A point on the lattice.
 ///
 /// # Errors
@@ -66,7 +63,11 @@ fn nearest_free_centre(at: [i64; 3], words: &[u64]) -> Option<[i64; 3]> {
 }
 
 /// The ends of a path in one base tree; `None` if an end lies in a crossing leaf of this tree, with the reason.
-pub fn in_tree((from, to): Ends, leaves: &Leaves) -> Result<(u32, Goal), &'static str> {
+pub fn in_tree(
+    from: [i64; 3],
+    to: Option<[i64; 3]>,
+    leaves: &Leaves,
+) -> Result<(u32, Goal), &'static str> {
     let start = leaves.locate(from);
     if !leaves.is_free(start) {
         return Err("facets cross the leaf of the start");

@@ -2,9 +2,8 @@
 //! close or open?
 //!
 //! - [`leaves`]: a base tree with neighbours; [`ends`]: the ends of the path; [`search`]: the path through the leaves;
-//! - [`clearance`]: distances to facets; [`cubes`]: leaves that are split; [`field`]: leaves and cubes as one graph;
-//! - [`refine`]: the width of a narrow place; [`path`]: free widths along a path; [`passage`]: the widest path;
-//! - [`surface`]: whether the facets form a closed surface between the ends;
+//! - [`clearance`]: distances to facets; [`path`]: free widths along a path and its narrowest place;
+//! - [`passage`]: the widest path; [`surface`]: whether the facets form a closed surface between the ends;
 //! - [`report`]: the answer as data; [`text`]: the answer for a terminal.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
@@ -12,13 +11,10 @@
 //! opening wider than 2 sqrt(3) e always joins leaves of edge e: the leaf that contains the centre of the ball is free.
 
 pub mod clearance;
-pub mod cubes;
 pub mod ends;
-pub mod field;
 pub mod leaves;
 pub mod passage;
 pub mod path;
-pub mod refine;
 pub mod report;
 pub mod search;
 pub mod surface;
@@ -190,7 +186,7 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         let leaves = Leaves::new(&tree.words).map_err(LeakError::Input)?;
         let edge = |leaf, _| leaves.octant(leaf).edge() as f32;
         let stop = || self.watch.is_interrupted();
-        let (is_joined, why) = match ends::in_tree((self.from, self.to), &leaves) {
+        let (is_joined, why) = match ends::in_tree(self.from, self.to, &leaves) {
             Ok((start, goal)) => {
                 (search::widest(&leaves, start, goal, edge, &stop)?.is_some(), None)
             }
@@ -256,7 +252,8 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
     fn passage(&self, tree: &Tree) -> Result<Passage, LeakError<E>> {
         self.watch.step("measuring free widths");
         let leaves = Leaves::new(&tree.words).map_err(LeakError::Input)?;
-        let (ends, stop) = ((self.from, self.to), || self.watch.is_interrupted());
+        let ends = ends::in_tree(self.from, self.to, &leaves).expect("the tree joins the ends");
+        let stop = || self.watch.is_interrupted();
         Ok(passage::widest(self.question.case, tree.level, &leaves, ends, &stop)?)
     }
 }

@@ -1,13 +1,14 @@
 //! A path as points with the free width at each, and its narrowest place.
 //!
 //! The free width at a point is the diameter of the largest ball centred there that no facet enters: twice the distance
-//! to the nearest facet.
+//! to the nearest facet. The centres of leaves are not the middle of an opening, so the narrowest point and its
+//! surroundings are replaced by the widest path through a cubic grid. That is repeated with finer grids until the
+//! narrowest point of the path is one of the finest grid: its ball is the largest that passes.
 
 use super::clearance::{Clearance, Point};
-use super::cubes::{Cubes, length};
-use super::field::Widest;
-use super::search::{Graph, nearest_boundary};
-use crate::geometry::distance::sub;
+use super::leaves::{Leaves, shared_face_centre};
+use super::search::{self, Goal, Graph, Interrupted, nearest_boundary};
+use crate::geometry::distance::{dot, sub};
 
 /// A point and its distance to the nearest facet, in lattice units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +17,18 @@ pub struct Spot {
     pub at: Point,
     /// The distance: half the free width.
     pub clearance: f64,
+    /// Step of the grid that the point is from; infinite for a point of a leaf.
+    pub step: f64,
 }
+
+/// Step of the finest grid, in parts of the clearance.
+const PRECISION: f64 = 1e-3;
+
+/// Half of a grid's edge, in steps.
+const STEPS: i32 = 16;
+
+/// Grids that are searched at most.
+const GRIDS_MAX: usize = 150;
 
 /// A path from its first to its last point.
 #[derive(Clone, Debug)]
@@ -25,41 +37,61 @@ pub struct Path {
     pub spots: Vec<Spot>,
     /// Index of the narrowest, the points of the approaches excepted.
     pub narrowest: usize,
-    /// Whether the narrowest place is as wide as the widest near an end, so that there is no opening between the ends.
-    pub is_narrowest_at_end: bool,
+    /// Numbers of points at the start and at the end that only lead away from the facets.
+    approaches: [usize; 2],
+}
+
+/// The leaves of a path.
+#[derive(Clone, Copy, Debug)]
+pub struct Route<'a> {
+    /// The leaves, each of which shares part of a face with the next.
+    pub leaves: &'a [u32],
+    /// Numbers of leaves at the start and at the end that only lead away from the facets.
+    pub approaches: [usize; 2],
+    /// No ball of a greater radius passes.
+    pub radius: f64,
+    /// The narrowest place is found to full precision only if its ball's radius may be at least this.
+    pub wanted: f64,
 }
 
 impl Path {
-    /// The path through the centres of cubes and of the faces that they share. It begins with the approach to the widest
-    /// place near the start and ends with that to the goal, backwards; without a goal it ends on the root's boundary.
+    /// The path through leaves: through their centres and the centres of the shared faces, and through grids where it is
+    /// narrow. A path to the far field ends on the root's boundary.
+    ///
+    /// # Errors
+    /// If `stop` returns true.
     pub fn through(
-        cubes: &Cubes,
-        path: &[u32],
+        leaves: &Leaves,
+        route: &Route,
+        goal: Goal,
         clearance: &Clearance,
-        (start, goal): (&Widest, Option<&Widest>),
-    ) -> Self {
-        /// The width is known to this part.
-        const PRECISION: f64 = 0.005;
-        let spot = |at| Spot { at, clearance: clearance.at(at, f64::INFINITY) };
-        let mut spots: Vec<Spot> = start.way.iter().copied().map(spot).collect();
-        let first = spots.len();
-        for (i, &cube) in path.iter().enumerate() {
-            spots.push(spot(cubes.position(cube)));
-            if let Some(&next) = path.get(i + 1) {
-                spots.push(spot(cubes.shared_face_centre(cube, next)));
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Self, Interrupted> {
+        /// Edge of the first grid, in radii.
+        const EDGE: f64 = 6.0;
+        /// Ratio of the steps of successive grids.
+        const FINER: f64 = 3.0;
+        let mut path = Self {
+            spots: raw(leaves, route.leaves, goal, clearance),
+            narrowest: 0,
+            approaches: route.approaches.map(|count| 2 * count),
+        };
+        for _ in 0..GRIDS_MAX {
+            path.narrowest = path.find_narrowest();
+            let spot = path.throat();
+            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
+            let is_unwanted = spot.clearance + 3f64.sqrt() * spot.step < route.wanted;
+            let is_precise = spot.step <= PRECISION * spot.clearance;
+            if path.is_narrowest_at_end() || is_precise || is_unwanted {
+                break;
+            }
+            let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
+            if !path.widen(step, clearance, stop)? {
+                break;
             }
         }
-        let last = spots.len() - 1;
-        let narrowest =
-            (first..=last).min_by(|&i, &j| spots[i].clearance.total_cmp(&spots[j].clearance));
-        let narrowest = narrowest.expect("a path has cubes");
-        match goal {
-            Some(goal) => spots.extend(goal.way.iter().rev().copied().map(spot)),
-            None => spots.push(spot(nearest_boundary(spots[last].at))),
-        }
-        let at_ends = goal.map_or(start.clearance, |goal| start.clearance.min(goal.clearance));
-        let is_narrowest_at_end = spots[narrowest].clearance >= (1.0 - PRECISION) * at_ends;
-        Self { spots, narrowest, is_narrowest_at_end }
+        path.narrowest = path.find_narrowest();
+        Ok(path)
     }
 
     /// The narrowest place.
@@ -67,16 +99,156 @@ impl Path {
         self.spots[self.narrowest]
     }
 
+    /// Whether the narrowest place is an end of the path and not an opening.
+    pub fn is_narrowest_at_end(&self) -> bool {
+        let (first, last) = self.inner();
+        self.narrowest == first || self.narrowest == last
+    }
+
+    /// The first and the last index without the approaches.
+    fn inner(&self) -> (usize, usize) {
+        (self.approaches[0], self.spots.len() - 1 - self.approaches[1])
+    }
+
     /// The direction of the path at its narrowest place, a unit vector: from where it enters the surroundings to where
     /// it leaves them.
     pub fn direction(&self) -> Point {
-        let throat = self.throat();
-        let is_near = |spot: &Spot| length(spot.at, throat.at) <= throat.clearance / 2.0;
-        let (before, after) = self.spots.split_at(self.narrowest);
-        let from = before.iter().rev().find(|spot| !is_near(spot)).or(before.first());
-        let to = after.iter().find(|spot| !is_near(spot)).or(after.last());
-        let ends = [from, to].map(|spot| spot.map_or(throat.at, |spot| spot.at));
-        let (step, long) = (sub(ends[1], ends[0]), length(ends[0], ends[1]));
-        if long > 0.0 { step.map(|c| c / long) } else { [1.0, 0.0, 0.0] }
+        let (first, last) = self.surroundings(self.throat().clearance / 2.0);
+        let (from, to) = (first.saturating_sub(1), (last + 1).min(self.spots.len() - 1));
+        let step = sub(self.spots[to].at, self.spots[from].at);
+        let length = dot(step, step).sqrt();
+        if length > 0.0 { step.map(|c| c / length) } else { [1.0, 0.0, 0.0] }
+    }
+
+    fn find_narrowest(&self) -> usize {
+        let clearance = |i: &usize| self.spots[*i].clearance;
+        let (first, last) = self.inner();
+        let least = (first..=last).min_by(|i, j| clearance(i).total_cmp(&clearance(j)));
+        least.expect("a path has points")
+    }
+
+    /// The first and the last index of the points around the narrowest one that are in a cube around it.
+    fn surroundings(&self, half: f64) -> (usize, usize) {
+        let centre = self.throat().at;
+        let is_near = |i: &usize| (0..3).all(|a| (self.spots[*i].at[a] - centre[a]).abs() <= half);
+        let (begin, end) = self.inner();
+        let first = (begin..self.narrowest).rev().take_while(is_near).last();
+        let last = (self.narrowest + 1..=end).take_while(is_near).last();
+        (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
+    }
+
+    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. Returns whether
+    /// there is one.
+    fn widen(
+        &mut self,
+        step: f64,
+        clearance: &Clearance,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<bool, Interrupted> {
+        let grid = Grid { centre: self.throat().at, step };
+        let (first, last) = self.surroundings(f64::from(STEPS) * step);
+        let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
+        let mut known = vec![f32::NAN; grid.count()];
+        let mut width = |place: u32, near: u32| {
+            if known[place as usize].is_nan() {
+                let bound = match known[near as usize] {
+                    near if near >= 0.0 => f64::from(near) + 2.0 * step,
+                    _ => f64::INFINITY,
+                };
+                let free = clearance.at(grid.position(place), bound);
+                // Balls at neighbours must overlap, so that no facet is between them.
+                known[place as usize] = if free > step { free as f32 } else { -1.0 };
+            }
+            known[place as usize]
+        };
+        let goal = Goal::Place(to);
+        let Some(route) = search::widest(&grid, from, goal, &mut width, stop)? else {
+            return Ok(false);
+        };
+        // Points near the grid's edge depend on where the path enters it, so they are not final.
+        let coarse = self.spots[first].step.max(self.spots[last].step);
+        let spot = |&place: &u32| Spot {
+            at: grid.position(place),
+            clearance: f64::from(width(place, place)),
+            step: if Grid::is_inner(place) { step } else { coarse },
+        };
+        let widened: Vec<Spot> = route.iter().map(spot).collect();
+        let (begin, end) = self.inner();
+        let replaced = first + usize::from(first == begin)..last + usize::from(last != end);
+        self.spots.splice(replaced, widened);
+        Ok(true)
+    }
+}
+
+fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec<Spot> {
+    let mut points: Vec<Point> = Vec::new();
+    for (i, &leaf) in route.iter().enumerate() {
+        points.push(leaves.position(leaf));
+        if let Some(&next) = route.get(i + 1) {
+            points.push(shared_face_centre(&leaves.octant(leaf), &leaves.octant(next)));
+        }
+    }
+    if goal == Goal::Far {
+        points.push(nearest_boundary(points[points.len() - 1]));
+    }
+    let spot = |at| Spot { at, clearance: clearance.at(at, f64::INFINITY), step: f64::INFINITY };
+    points.into_iter().map(spot).collect()
+}
+
+/// A cubic grid of points, each joined to the 26 around it.
+struct Grid {
+    centre: Point,
+    step: f64,
+}
+
+/// Points of a grid along an edge.
+const SIDE: i32 = 2 * STEPS + 1;
+
+impl Grid {
+    fn nearest(&self, at: Point) -> u32 {
+        let index = |a: usize| {
+            let steps = ((at[a] - self.centre[a]) / self.step).round() as i32;
+            steps.clamp(-STEPS, STEPS) + STEPS
+        };
+        ((index(2) * SIDE + index(1)) * SIDE + index(0)) as u32
+    }
+
+    /// Whether a place is far from the grid's edge.
+    fn is_inner(place: u32) -> bool {
+        Self::indices(place).iter().all(|i| (i - STEPS).abs() <= STEPS * 3 / 4)
+    }
+
+    fn indices(place: u32) -> [i32; 3] {
+        let place = place as i32;
+        [place % SIDE, place / SIDE % SIDE, place / SIDE / SIDE]
+    }
+}
+
+impl Graph for Grid {
+    fn count(&self) -> usize {
+        (SIDE * SIDE * SIDE) as usize
+    }
+
+    fn position(&self, place: u32) -> Point {
+        let indices = Self::indices(place);
+        std::array::from_fn(|a| self.centre[a] + f64::from(indices[a] - STEPS) * self.step)
+    }
+
+    fn is_far(&self, _: u32) -> bool {
+        false
+    }
+
+    fn joined(&self, place: u32, visit: &mut impl FnMut(u32)) {
+        let [x, y, z] = Self::indices(place);
+        let around = |i: i32| (i - 1).max(0)..=(i + 1).min(SIDE - 1);
+        for k in around(z) {
+            for j in around(y) {
+                for i in around(x) {
+                    if (i, j, k) != (x, y, z) {
+                        visit(((k * SIDE + j) * SIDE + i) as u32);
+                    }
+                }
+            }
+        }
     }
 }

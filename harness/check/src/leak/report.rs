@@ -53,19 +53,17 @@ pub struct Narrowest {
     pub at: [f64; 3],
     /// Its diameter.
     pub width: f64,
-    /// A larger ball than of this diameter passes nowhere through the free leaves.
-    pub width_max: f64,
     /// The same in cells of the case's surface level.
     pub width_cells: f64,
     /// The direction in which the path passes, a unit vector.
     pub direction: [f64; 3],
     /// A facet's point that the ball touches.
     pub touches: [f64; 3],
-    /// The facets at the rim, which the ball touches to within 6 % of its radius, by number from 0; nearest first.
+    /// The facets at the rim, which the ball touches to within 2 % of its radius, by number from 0; nearest first.
     pub facets: Vec<u32>,
     /// Index among the points of the path.
     pub index: usize,
-    /// Whether the path is nowhere narrower than the widest place near one of its ends, to half a percent.
+    /// Whether it is an end of the path instead of an opening: the widest place near the start or the end.
     pub is_end: bool,
 }
 

@@ -67,11 +67,6 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let (width, cells) = (number(narrowest.width), number(narrowest.width_cells));
     writeln!(f, "\nThe narrowest place of the widest path (level {})", passage.spacing.level)?;
     writeln!(f, "width     {width} ({cells} cells): diameter of the largest ball that passes")?;
-    writeln!(
-        f,
-        "          no ball wider than {} passes anywhere through free leaves",
-        number(narrowest.width_max)
-    )?;
     writeln!(f, "at        {}", point(&narrowest.at))?;
     writeln!(f, "direction {}", point(&narrowest.direction))?;
     let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
@@ -84,7 +79,7 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     if narrowest.is_end {
         writeln!(
             f,
-            "          The path is nowhere narrower than the widest place near one of its ends, so there is no constriction between them."
+            "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends."
         )?;
     }
     let (points, length) = (&passage.points, number(passage.length));

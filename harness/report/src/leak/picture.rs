@@ -190,7 +190,6 @@ mod tests {
             narrowest: Narrowest {
                 at: [2.0, 4.5, 4.5],
                 width: 1.0,
-                width_max: 1.0,
                 width_cells: 1.0,
                 direction: [1.0, 0.0, 0.0],
                 touches: [2.0, 4.0, 4.5],
