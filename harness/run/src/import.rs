@@ -165,7 +165,8 @@ mod tests {
             sentence("sleep 60"),
             "cannot be read: vtk did not end within 2 s and was killed"
         );
-        assert!(sentence("echo null").starts_with("cannot be read"));
+        let no_table = r#"echo '{"root": null, "has_sides": false, "digest": null}'"#;
+        assert!(sentence(no_table).starts_with("cannot be read"));
         assert!(sentence(&writing("")).contains("no root"));
         let missing = read_with("echo no module >&2; exit 3", None).unwrap_err();
         assert!(matches!(missing, Refusal::Missing(why) if why.contains("no module")));
