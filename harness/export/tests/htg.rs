@@ -88,6 +88,8 @@ fn words(tree: &TreeFile) -> Result<Vec<u64>, TreeError> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
     #[test]
     fn the_tree_has_the_leaves_of_the_words(
         all in random_words(5), parts in 1usize..3, axis in 0usize..3, at in 0.0f64..1.0, max in 0u64..60
