@@ -2,7 +2,7 @@
 //!
 //! The file needs all nodes level by level, while a rank has a part of each level. So the file is made window by window
 //! ([`vtkhdf::tree`]): every rank sends its nodes in a window to the rank that compresses it, and that rank sends the
-//! compressed chunks to rank 0, the only one that writes. In one round each of up to [`WINDOWS_MAX`] ranks
+//! compressed chunks to rank 0, the only one that writes. In one round each of up to `WINDOWS_MAX` ranks
 //! compresses one window, so memory does not grow with the mesh, and the file does not depend on the number of ranks.
 
 mod numbering;

@@ -140,10 +140,13 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let understood = args.as_ref().map(drop).map_err(Error::clone);
     let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
     let words = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
-    let args = match (agreement::on_options(understood, &words, comm), args) {
-        (Ok(()), Ok(args)) => args,
-        (Err(e), _) => return fail(&e, first),
-        (_, Err(e)) => return fail(e, first),
+    let agreed = agreement::on_options(understood, &words, comm);
+    let args = match agreed.and_then(|()| args.as_ref().map_err(Error::clone)) {
+        Ok(args) => args,
+        Err(e) => {
+            interrupt::decided();
+            return fail(&e, first);
+        }
     };
     if let Some(limit) = args.stall_limit {
         comm.limit_calls(limit);

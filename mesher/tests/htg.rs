@@ -11,7 +11,7 @@ use mesher::partition::Partitioner;
 use mesher::record::Recorder;
 use mesher::write::{Output, TREE};
 use mesher::{Options, mesh};
-use process::{INPUT, OUTPUT, Workspace, refused, run};
+use process::{INPUT, Workspace, refused, run};
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
@@ -136,5 +136,5 @@ fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
     fs::create_dir(workspace.path().join("full")).expect("a directory");
     workspace.write("full/kept.txt", "kept");
     let args = ["body.stl", "--spacing-min=0.1", "--write=htg", "--out=full"];
-    refused(&workspace, &args, OUTPUT, &["full", "not empty"]);
+    refused(&workspace, &args, INPUT, &["full", "not empty"]);
 }

@@ -94,7 +94,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         ("part.vtu", &["--rank", "2"], "the mesh has 2 ranks, counted from 0"),
         ("part.vtu", &["--ascii"], "--ascii has no effect on .vtu"),
         ("part.vtu", &["--case", "cube-small"], "--case has no effect on .vtu"),
-        ("polyMesh", &[], "one that ends in .vtu, .pvtu, /polyMesh"),
+        ("polyMesh", &[], "one that ends in .vtu, .pvtu, .p8est, /polyMesh"),
         ("case/polyMesh", &["--processors", "2"], "choose a path CASE/constant/polyMesh"),
         ("case/constant/polyMesh", &["--processors", "149"], "148 cells are too few"),
         (

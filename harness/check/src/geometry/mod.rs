@@ -1,6 +1,6 @@
 //! Diagnosis of a geometry before it is meshed: which of its defects change the mesh's region, and how.
 //!
-//! - [`input`]: the file, its root and the cell's edge length; [`solids`]: the solids of an ASCII file;
+//! - [`input`]: the file, its root and the cell's edge length;
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates;
 //! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search;
