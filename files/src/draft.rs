@@ -177,7 +177,7 @@ fn destination(path: &Path) -> io::Result<Destination> {
     }))
 }
 
-/// The standard output or error, if that is the file: opening `/dev/stdout` anew would overwrite what has been printed.
+/// The standard output or error, if that is the file: opening `/dev/stdout` again would overwrite what has been printed.
 fn standard_stream(file: &Metadata) -> Option<OwnedFd> {
     let (out, err) = (io::stdout(), io::stderr());
     [out.as_fd(), err.as_fd()].into_iter().find_map(|stream| {

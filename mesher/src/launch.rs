@@ -24,7 +24,7 @@ pub fn is_first() -> bool {
 }
 
 /// Makes the end of the launcher an interrupt of this rank: a launcher that is interrupted twice ends at once and leaves its ranks
-/// behind.
+/// running.
 #[cfg(all(feature = "mpi", target_os = "linux"))]
 pub fn end_with_launcher() {
     use rustix::process::{Signal, set_parent_process_death_signal};

@@ -13,6 +13,7 @@ pub mod error;
 pub mod foam;
 pub mod format;
 pub mod htg;
+pub mod leaf;
 pub mod mesh;
 pub mod near_body;
 pub mod options;
@@ -21,4 +22,6 @@ pub mod p8est;
 mod part;
 pub mod pieces;
 pub mod selection;
+#[cfg(test)]
+mod testing;
 pub mod vtu;

@@ -10,27 +10,15 @@ use std::path::Path;
 use contract::leafset::{self, LeafDir, Leaves};
 use contract::manifest::Manifest;
 use contract::octant::{LEVEL_MAX, Octant};
-use contract::word::{self, KEY_END, Side};
+use contract::word::{self, KEY_END};
 
 use crate::error::ExportError;
+use crate::leaf::Leaf;
 use crate::part::{Part, Readers};
 use crate::selection::Selection;
 
 /// Number of words that are read at once: few enough that a slice reads little besides its own leaves.
 const BLOCK: u64 = 1 << 12;
-
-/// A leaf of a mesh on disk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Leaf {
-    /// Its octant.
-    pub octant: Octant,
-    /// Its side.
-    pub side: Side,
-    /// Index of its part, which is the rank that wrote it.
-    pub part: u32,
-    /// Index among all leaves of the mesh, in Morton order.
-    pub index: u64,
-}
 
 /// A range of Morton codes and the number of leaves in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -276,28 +264,10 @@ fn count(intervals: &[Interval]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::lattice::Root;
-    use contract::leafset::LeafSet;
-    use contract::manifest::Tree;
+    use crate::testing::on_disk;
     use contract::testing::random_words;
+    use contract::word::Side;
     use proptest::prelude::*;
-
-    /// A mesh on disk whose leaves are dealt to parts by `part`.
-    fn on_disk(
-        words: &[u64],
-        parts: usize,
-        part: impl Fn(usize) -> usize,
-    ) -> (tempfile::TempDir, Mesh) {
-        let mut dealt = vec![Vec::new(); parts];
-        words.iter().enumerate().for_each(|(i, &w)| dealt[part(i) % parts].push(w));
-        let root = Root { origin: [0.0; 3], edge: 1.0 };
-        let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
-        let set = LeafSet::new(empty, Vec::new()).with_parts(dealt);
-        let dir = tempfile::tempdir().unwrap();
-        set.write(dir.path()).unwrap();
-        let mesh = Mesh::open(dir.path()).unwrap();
-        (dir, mesh)
-    }
 
     fn words(
         mesh: &Mesh,

@@ -18,8 +18,10 @@ use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
 use crate::error::ExportError;
-use crate::mesh::{Leaf, Mesh};
+use crate::leaf::Leaf;
+use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
+use crate::pieces::nothing_selected;
 use crate::selection::Selection;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
@@ -47,9 +49,7 @@ pub fn write(
 ) -> Result<Summary, ExportError> {
     let counts = Counts::of(mesh, selection, options)?;
     if counts.leaves == 0 {
-        return Err(ExportError::Request(
-            "no leaf satisfies all conditions of the selection: remove one of them".to_owned(),
-        ));
+        return Err(nothing_selected(mesh));
     }
     let ends = counts.saved_partition();
     let total = ends[ends.len() - 1];
@@ -213,38 +213,25 @@ fn pad(bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::{Foam, Watch};
+    use crate::options::Foam;
+    use crate::testing::{Unwatched, stored};
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
-    use contract::manifest::{Manifest, Tree};
     use contract::testing::{random_words, words_of};
     use contract::word::Side;
     use proptest::prelude::*;
     use std::fs;
     use std::num::NonZero;
 
-    struct Nobody;
-
-    impl Watch for Nobody {
-        fn progress(&self, _: u64, _: u64) {}
-
-        fn is_interrupted(&self) -> bool {
-            false
-        }
-    }
-
     const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
 
     fn options() -> Options<'static> {
-        Options { jobs: NonZero::<usize>::MIN, watch: &Nobody, foam: Foam::default() }
+        Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam: Foam::default() }
     }
 
     fn mesh_of(parts: Vec<Vec<u64>>) -> Mesh {
-        let empty = Manifest::without_leaves(Tree::Final, ROOT, "test".to_owned());
-        let dir = tempfile::tempdir().unwrap();
-        LeafSet::new(empty, Vec::new()).with_parts(parts).write(dir.path()).unwrap();
         // The files remain open.
-        Mesh::open(dir.path()).unwrap()
+        stored(parts, ROOT).1
     }
 
     /// The leaf set that a reader makes of a file, with or without the data of the quadrants.
@@ -276,11 +263,11 @@ mod tests {
         ) {
             prop_assume!(!words.is_empty());
             let size = words.len().div_ceil(parts);
-            let mut dealt = vec![Vec::new(); parts];
+            let mut by_part = vec![Vec::new(); parts];
             for (i, &w) in words.iter().enumerate() {
-                dealt[if interleaved { i % parts } else { i / size }].push(w);
+                by_part[if interleaved { i % parts } else { i / size }].push(w);
             }
-            let mesh = mesh_of(dealt);
+            let mesh = mesh_of(by_part);
             let (dir, _) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let set = import(&path, true);

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use crate::error::ExportError;
-use crate::mesh::{Block, Leaf, Mesh};
+use crate::leaf::Leaf;
+use crate::mesh::{Block, Mesh};
 use crate::options::Options;
 use crate::ordered::in_order;
 use crate::selection::Selection;

@@ -4,7 +4,7 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word::Side;
 
-use crate::mesh::Leaf;
+use crate::leaf::Leaf;
 
 /// The leaves that satisfy every condition; without conditions, all leaves.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -9,7 +9,8 @@ use contract::manifest::{Manifest, Tree};
 use contract::testing::random_words;
 use contract::word::{self, Leaf as WordLeaf};
 use export::error::ExportError;
-use export::mesh::{Leaf, Mesh};
+use export::leaf::Leaf;
+use export::mesh::Mesh;
 use export::options::{Foam, Options, Watch};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
@@ -94,9 +95,9 @@ proptest! {
     fn the_tree_has_the_leaves_of_the_words(
         all in random_words(5), parts in 1usize..3, axis in 0usize..3, at in 0.0f64..1.0, max in 0u64..60
     ) {
-        let mut dealt = vec![Vec::new(); parts];
-        all.iter().enumerate().for_each(|(i, &w)| dealt[i / 11 % parts].push(w));
-        let (_dir, mesh) = on_disk(dealt);
+        let mut by_part = vec![Vec::new(); parts];
+        all.iter().enumerate().for_each(|(i, &w)| by_part[i / 11 % parts].push(w));
+        let (_dir, mesh) = on_disk(by_part);
         let slice = Slice::new(&ROOT, axis, ROOT.origin[axis] + at * ROOT.edge);
         let cut = Selection { slice, ..Selection::default() };
         for selection in [Selection::default(), cut.clone()] {

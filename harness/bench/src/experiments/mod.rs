@@ -15,6 +15,7 @@ mod foreign;
 pub mod group;
 pub mod machine;
 pub mod network;
+pub mod number;
 pub mod plan;
 mod points;
 pub mod pop;

@@ -6,7 +6,7 @@
 
 use super::entry::{Comm, LeftOut, Run};
 use super::group::{Group, Groups};
-use super::table::grouped;
+use super::number::grouped;
 use crate::statistics::{Median, median};
 use std::fmt::Write;
 

@@ -3,6 +3,7 @@
 use super::cause::sentence;
 use super::entry::{Comm, Network, Setup};
 use super::group::{Group, Groups};
+use super::number::grouped;
 use super::{pop, programs};
 use std::fmt::Write;
 
@@ -168,19 +169,6 @@ fn projections(out: &mut String, groups: &Groups) {
         );
         out.push_str(&phases(group, groups.reference(group), &groups.network));
     }
-}
-
-/// Returns a number with thousands separators.
-pub fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::new();
-    for (i, d) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(d);
-    }
-    out
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use crate::experiments::entry::{Audited, Comm, Network, Phase};
 use crate::experiments::group::Group;
+use crate::experiments::number::grouped;
 use crate::experiments::pop;
-use crate::experiments::table::grouped;
 use crate::statistics::median;
 use serde::Deserialize;
 use std::fmt;

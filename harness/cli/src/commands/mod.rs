@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `session` and `values` are shared.
+//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `session`, `values` and `view` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -27,4 +27,5 @@ pub mod targets;
 pub mod track;
 mod values;
 pub mod verify;
+mod view;
 pub mod why;

@@ -1,7 +1,7 @@
 //! `harness picture --paper`: the pictures of the paper, made of one case.
 
 use super::meshed::{Failure, MeshArguments, Meshed, input};
-use super::picture::{command, unread, write_view};
+use super::view::{command, unread, write_view};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
 use report::picture::format::{Format, put, write};

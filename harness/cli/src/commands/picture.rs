@@ -1,20 +1,19 @@
 //! `harness picture`: draws a slice of a mesh, a view in three dimensions, or the pictures of the paper.
 
-use super::meshed::{Failure, MeshArguments, Meshed, failed, input};
+use super::meshed::{Failure, MeshArguments, Meshed, input};
 use super::paper;
 use super::selection::SelectionArguments;
+use super::view::{command, unread, write_view};
 use clap::{Args, ValueEnum};
 use contract::octant::LEVEL_MAX;
-use export::error::ExportError;
 use export::mesh::Mesh;
 use report::picture::colour;
-use report::picture::format::{Format, put, write};
-use report::picture::scene::{Scene, html};
+use report::picture::format::{Format, write};
+use report::picture::scene::Scene;
 use report::picture::{Picture, Request};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use run::engine::paths::Paths;
-use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING};
-use run::view;
+use run::verify::report::EXIT_HOLDS;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -135,14 +134,6 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A mesh of which no picture could be made.
-pub fn unread(error: ExportError) -> Failure {
-    match error {
-        ExportError::Interrupted => (EXIT_INTERRUPTED, error.to_string()),
-        _ => input(error.to_string()),
-    }
-}
-
 /// The format of the file, if that can be made of a slice or a view, whichever is requested.
 fn requested(arguments: &Arguments) -> Result<Format, String> {
     let Arguments { out, view, .. } = arguments;
@@ -170,37 +161,6 @@ fn request<'a>(
         level_max: LEVEL_MAX,
         command: command(),
     })
-}
-
-/// Writes a view as HTML or, with pyvista, as PNG.
-pub fn write_view(
-    scene: &Scene,
-    out: &Path,
-    paths: &Paths,
-    source: &MeshArguments,
-) -> Result<(), Failure> {
-    let bytes = match Format::of(out) {
-        Ok(Format::Png) => {
-            let json = report::json::pretty(scene);
-            view::png(&json, paths, source.engine.limit()).map_err(|f| failed(&f)).map_err(
-                |(code, why)| match code {
-                    EXIT_MISSING => (code, format!("{why}; a view as .html needs no Python")),
-                    _ => (code, why),
-                },
-            )?
-        }
-        _ => html(scene).into_bytes(),
-    };
-    put(out, &bytes).map_err(|error| input(error.to_string()))
-}
-
-/// The command line, as it can be entered again.
-pub fn command() -> String {
-    let words = std::env::args().skip(1).map(|word| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_=.,/+:".contains(c);
-        if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
-    });
-    ["harness".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ")
 }
 
 fn zoom(text: &str) -> Result<f64, String> {

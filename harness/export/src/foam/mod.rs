@@ -32,9 +32,11 @@ use contract::manifest::Sides;
 use contract::word;
 
 use crate::error::ExportError;
-use crate::mesh::{Leaf, Mesh};
+use crate::leaf::Leaf;
+use crate::mesh::Mesh;
 use crate::options;
 use crate::options::{Options, Processors, Summary};
+use crate::pieces::nothing_selected;
 use crate::selection::Selection;
 use patches::Patches;
 use points::Points;
@@ -136,13 +138,7 @@ fn read<'a>(
         Ok(())
     })?;
     if words.is_empty() {
-        return Err(ExportError::Request(
-            match mesh.is_empty() {
-                true => "the mesh has no leaves",
-                false => "no leaf satisfies all conditions of the selection: remove one of them",
-            }
-            .to_owned(),
-        ));
+        return Err(nothing_selected(mesh));
     }
     Ok(Model {
         tree: builder.finish(),

@@ -66,11 +66,11 @@ mod tests {
 
     #[test]
     fn every_cell_has_one_place() {
-        let dealt = Distribution::new(vec![1, 0, 1, 3, 0], 4);
+        let distribution = Distribution::new(vec![1, 0, 1, 3, 0], 4);
         for (processor, cells) in [(0, &[1, 4][..]), (1, &[0, 2]), (2, &[]), (3, &[3])] {
-            assert_eq!(dealt.cells(processor), cells);
+            assert_eq!(distribution.cells(processor), cells);
             for (number, &cell) in cells.iter().enumerate() {
-                assert_eq!(dealt.place(cell), (processor, number as u32));
+                assert_eq!(distribution.place(cell), (processor, number as u32));
             }
         }
         let equal = Distribution::equal(10, 3);

@@ -15,7 +15,7 @@ use contract::word;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Content(u32);
 
-/// Number of cells that can be told apart.
+/// Number of cells that can be distinguished.
 pub const CELLS_MAX: u64 = (FIRST_NODE - FIRST_CELL) as u64;
 const FIRST_CELL: u32 = 3;
 const FIRST_NODE: u32 = 1 << 31;
@@ -72,7 +72,7 @@ impl Tree {
         of.as_node().map_or(of, |node| self.nodes[node].children[digit])
     }
 
-    /// Removes the cells for which `keep` is false and numbers the others anew.
+    /// Removes the cells for which `keep` is false and renumbers the others.
     pub fn retain(&mut self, keep: &[bool]) {
         let mut number = 0;
         let mut numbers: Vec<u32> = Vec::with_capacity(keep.len() + 1);

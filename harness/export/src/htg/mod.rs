@@ -17,7 +17,8 @@ use contract::manifest::Sides;
 use vtkhdf::tree::{Shape, TreeWriter};
 
 use crate::error::ExportError;
-use crate::mesh::{Leaf, Mesh};
+use crate::leaf::Leaf;
+use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;

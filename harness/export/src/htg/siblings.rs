@@ -5,7 +5,7 @@ use contract::word::{self, Side};
 use vtkhdf::tree::Siblings;
 
 use crate::error::ExportError;
-use crate::mesh::Leaf;
+use crate::leaf::Leaf;
 
 /// The eight children of an octant, or the root in place of the first of them.
 #[derive(Clone, Copy, Debug, Default)]

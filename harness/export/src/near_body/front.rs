@@ -15,7 +15,8 @@ use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, Side};
 
 use crate::error::ExportError;
-use crate::mesh::{Leaf, Mesh};
+use crate::leaf::Leaf;
+use crate::mesh::Mesh;
 use crate::selection::Selection;
 
 /// Octants of at most this many leaves are held as a whole.
@@ -287,7 +288,7 @@ impl Found<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::near_body::testing::on_disk;
+    use crate::testing::on_disk;
     use contract::testing::random_words;
     use proptest::prelude::*;
     use rustc_hash::FxHashMap;

@@ -59,9 +59,9 @@ mod tests {
     use crate::near_body::front::front;
     use crate::near_body::polygons::Polygons;
     use crate::near_body::report::Report;
-    use crate::near_body::testing::{in_root, on_disk};
     use crate::near_body::{files, of_case};
     use crate::selection::Selection;
+    use crate::testing::{in_root, on_disk};
     use contract::lattice::Root;
     use contract::testing::words_with_sides;
     use contract::word::Side;

@@ -73,8 +73,8 @@ mod tests {
     use super::*;
     use crate::mesh::Mesh;
     use crate::near_body::front::front;
-    use crate::near_body::testing::on_disk;
     use crate::selection::Selection;
+    use crate::testing::on_disk;
     use contract::octant::Octant;
     use contract::testing::words_with_sides;
     use contract::word::{self, KEY_END, Side};

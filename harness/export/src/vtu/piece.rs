@@ -9,7 +9,7 @@ use contract::word;
 
 use super::points::{Points, unpacked};
 use super::zlib::Zlib;
-use crate::mesh::Leaf;
+use crate::leaf::Leaf;
 
 /// VTK's number of the cell type hexahedron.
 const HEXAHEDRON: u8 = 12;

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::mesh::Leaf;
+use crate::leaf::Leaf;
 
 /// Corners of a hexahedron in VTK's order, in cell edges.
 const CORNERS: [[usize; 3]; 8] =

@@ -6,7 +6,8 @@ use crate::figure::{Axis, Bars, Body, Claims, Figure, Provenance, svg};
 use bench::experiments::cause::heaviest_base_leaf;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::table::{division, grouped};
+use bench::experiments::number::grouped;
+use bench::experiments::table::division;
 
 /// Rank counts of the paper's Figures 21 to 23.
 const SHOWN: [usize; 3] = [16, 32, 64];

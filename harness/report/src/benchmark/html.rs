@@ -9,7 +9,7 @@ use crate::page::{figure as page_figure, page as whole_page, table, with_code};
 use bench::experiments::cause::sentence;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
-use bench::experiments::table::grouped;
+use bench::experiments::number::grouped;
 use maud::{Markup, html};
 
 /// A figure with its drawing and its values.

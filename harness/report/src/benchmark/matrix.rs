@@ -4,7 +4,8 @@ use super::groups::{Subject, cells_label};
 use crate::figure::{Axis, Body, Claims, Figure, HeatMap, Layer, svg};
 use bench::experiments::entry::Run;
 use bench::experiments::group::Groups;
-use bench::experiments::table::{division, grouped};
+use bench::experiments::number::grouped;
+use bench::experiments::table::division;
 
 /// A figure per recorded message matrix.
 pub fn figures(groups: &Groups) -> Vec<Figure> {

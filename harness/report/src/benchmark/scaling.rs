@@ -5,8 +5,8 @@ use super::paper::{self, cited};
 use crate::figure::{Axis, Bars, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
+use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, messages_s};
-use bench::experiments::table::grouped;
 use bench::statistics::Median;
 
 /// Maximum number of phases that have a segment of their own.

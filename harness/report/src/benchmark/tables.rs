@@ -4,8 +4,9 @@ use super::groups::{Subject, is_summarised};
 use crate::page::table;
 use bench::experiments::entry::Phase;
 use bench::experiments::group::{Group, Groups, Projection};
+use bench::experiments::number::grouped;
 use bench::experiments::pop;
-use bench::experiments::table::{division, grouped};
+use bench::experiments::table::division;
 use maud::{Markup, html};
 
 const EXPERIMENT: [&str; 21] = [

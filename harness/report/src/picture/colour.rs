@@ -6,7 +6,7 @@
 use crate::figure::palette::{COLOURS, SHADES, shade};
 use contract::lattice::Root;
 use contract::word::Side;
-use export::mesh::Leaf;
+use export::leaf::Leaf;
 use std::collections::BTreeSet;
 use std::fmt;
 

@@ -8,7 +8,8 @@
 use super::colour::Colour;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use export::error::ExportError;
-use export::mesh::{Leaf, Mesh};
+use export::leaf::Leaf;
+use export::mesh::Mesh;
 use export::selection::Selection;
 use run::engine::interrupt;
 

@@ -70,10 +70,10 @@ proptest! {
         words in random_words(3), parts in 2usize..5, run in 1usize..30, by_rank in any::<bool>()
     ) {
         prop_assume!(words.len() > 4 * 30);
-        let dealt: Vec<Vec<u64>> = (0..parts)
+        let by_part: Vec<Vec<u64>> = (0..parts)
             .map(|p| words.iter().enumerate().filter(|(i, _)| i / run % parts == p).map(|(_, &w)| w).collect())
             .collect();
-        let (dir, mesh) = on_disk(&leaf_set(dealt));
+        let (dir, mesh) = on_disk(&leaf_set(by_part));
         let case = dir.path().join("case");
         let processors = if by_rank { Processors::Ranks } else { Processors::Equal(parts as u32) };
         let mut options = options(ASCII);

@@ -18,7 +18,8 @@ use contract::word::{self, Side};
 use proptest::prelude::*;
 
 use super::*;
-use crate::options::{Foam, Label, Style, Watch};
+use crate::options::{Foam, Label, Style};
+use crate::testing::Unwatched;
 
 /// Faces with their points, and the cells on both sides of each.
 #[derive(Debug, Default)]
@@ -27,17 +28,6 @@ struct Complex {
     faces: Vec<Vec<usize>>,
     owner: Vec<usize>,
     neighbour: Vec<usize>,
-}
-
-/// Nobody waits.
-struct Unwatched;
-
-impl Watch for Unwatched {
-    fn progress(&self, _: u64, _: u64) {}
-
-    fn is_interrupted(&self) -> bool {
-        false
-    }
 }
 
 fn options<'a>(style: Style) -> Options<'a> {

@@ -10,8 +10,8 @@ proptest! {
         words in random_words(3), is_ascii in any::<bool>(), is_wide in any::<bool>(), parts in 1usize..4
     ) {
         prop_assume!(!words.is_empty());
-        let dealt = (0..parts).map(|p| words.iter().copied().skip(p).step_by(parts).collect()).collect();
-        let (dir, mesh) = on_disk(&leaf_set(dealt));
+        let by_part = (0..parts).map(|p| words.iter().copied().skip(p).step_by(parts).collect()).collect();
+        let (dir, mesh) = on_disk(&leaf_set(by_part));
         let target = dir.path().join("case/constant/polyMesh");
         let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
         let style = Style { is_ascii, label };

@@ -1,0 +1,48 @@
+//! Meshes on disk, for tests.
+
+use crate::mesh::Mesh;
+use crate::options::Watch;
+use contract::lattice::Root;
+use contract::leafset::LeafSet;
+use contract::manifest::{Manifest, Tree};
+use tempfile::TempDir;
+
+/// The unit cube.
+const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
+
+/// Nobody waits.
+pub struct Unwatched;
+
+impl Watch for Unwatched {
+    fn progress(&self, _: u64, _: u64) {}
+
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// A mesh of these parts in a directory, which lasts as long as the first value.
+pub fn stored(parts: Vec<Vec<u64>>, root: Root) -> (TempDir, Mesh) {
+    let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
+    let dir = tempfile::tempdir().unwrap();
+    LeafSet::new(empty, Vec::new()).with_parts(parts).write(dir.path()).unwrap();
+    let mesh = Mesh::open(dir.path()).unwrap();
+    (dir, mesh)
+}
+
+/// A mesh in the unit cube. The leaf with index i is in the part `part(i)`, modulo their number.
+pub fn on_disk(words: &[u64], parts: usize, part: impl Fn(usize) -> usize) -> (TempDir, Mesh) {
+    in_root(words, parts, part, UNIT)
+}
+
+/// The same in another root.
+pub fn in_root(
+    words: &[u64],
+    parts: usize,
+    part: impl Fn(usize) -> usize,
+    root: Root,
+) -> (TempDir, Mesh) {
+    let mut by_part = vec![Vec::new(); parts];
+    words.iter().enumerate().for_each(|(i, &w)| by_part[part(i) % parts].push(w));
+    stored(by_part, root)
+}
