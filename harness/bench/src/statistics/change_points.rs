@@ -13,6 +13,8 @@
 //! On simulated series without steps, the rates of false alarms are bounded by the tests in `tests/change_points.rs`: at most 1 % on
 //! independent noise, with 5 % outliers too (0.1 to 1.0 % of 1,000 series of 15 to 200 values), 5 % on autocorrelated noise and on drifts.
 //!
+//! A history of 3,000 values takes less than a tenth of a second: see [`super::candidates`] and the number of evaluations in the tests below.
+//!
 //! Permutations are drawn from a seed: the result is reproducible.
 
 use super::candidates::{PLACES_MAX, places};

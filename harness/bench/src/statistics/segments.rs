@@ -66,11 +66,14 @@ impl Fit {
 impl Series {
     /// Prepares a series for noise with autocorrelation `phi`, from 0 to below 1.
     pub fn new(values: &[f64], phi: f64) -> Self {
-        let mut sums = vec![[0.0; 5]; values.len().max(1)];
+        let mut sums = Vec::with_capacity(values.len().max(1));
+        let mut last = [0.0; 5];
+        sums.push(last);
         for i in 1..values.len() {
             let (z, time) = (values[i] - phi * values[i - 1], whitened_time(i, phi));
             let terms = [z, z * z, time, time * time, time * z];
-            sums[i] = std::array::from_fn(|k| sums[i - 1][k] + terms[k]);
+            last = std::array::from_fn(|k| last[k] + terms[k]);
+            sums.push(last);
         }
         Self { values: values.to_vec(), phi, sums }
     }
