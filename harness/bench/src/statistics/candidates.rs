@@ -2,7 +2,7 @@
 //!
 //! The best division takes a time quadratic in the number of places. A series of at most [`PLACES_MAX`] values may be divided
 //! anywhere. A longer one may be divided on an even grid, near its ends, and where the windows before and after a place differ
-//! most: [`PER_WIDTH`] places for windows of 1, 2, 4, ... values. Choosing them takes a time linear in the number of values.
+//! most: eight places for windows of 1, 2, 4, ... values. Choosing them takes a time linear in the number of values.
 //!
 //! A step that is clear within windows of about the length of its segments is a place to the exact value; of others the grid has
 //! one nearby, and [`super::segments::Series::refined`] moves the boundary.

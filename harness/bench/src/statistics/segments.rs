@@ -176,7 +176,7 @@ impl Series {
         edges.iter().map(ending_at).collect()
     }
 
-    /// Moves each boundary in turn to the best place between its neighbours, until none moves or [`SWEEPS_MAX`] times.
+    /// Moves each boundary in turn to the best place between its neighbours, until none moves, at most four times.
     pub fn refined(&self, mean: Mean, mut boundaries: Vec<usize>) -> Vec<usize> {
         let (n, least) = (self.values.len(), mean.length_min());
         for _ in 0..SWEEPS_MAX {
