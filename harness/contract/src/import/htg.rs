@@ -5,7 +5,7 @@ use super::ImportError;
 use crate::case::Case;
 use crate::digest::Digest;
 use crate::files::write_atomically;
-use crate::htg::{TreeError, TreeFile};
+use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::manifest::{self, Manifest, Part, Sides, Tally, Tree};
 use crate::npy;
@@ -26,8 +26,8 @@ pub struct ImportedTree {
 }
 
 impl ImportedTree {
-    /// Opens a file and counts its leaves; `None` if VTK has to read it, or if its root is not the one that is given. With
-    /// `sides`, the name of cell data, leaves have sides. The manifest is that of [`leaf_set`](super::leaf_set()).
+    /// Opens a file and counts its leaves; `None` if VTK has to read it, or if its root is not the one that is given. Sides are
+    /// the cell data that `sides` names, otherwise `side` if it has that. The manifest is that of [`leaf_set`](super::leaf_set()).
     ///
     /// # Errors
     /// If the file is damaged or has no such cell data.
@@ -39,7 +39,11 @@ impl ImportedTree {
         program: String,
     ) -> Result<Option<Self>, ImportError> {
         let content = |error: TreeError| ImportError::content(error.to_string());
-        let tree = match TreeFile::open(path, sides) {
+        let tree = match sides {
+            Some(_) => TreeFile::open(path, sides),
+            None => TreeFile::open(path, Some(SIDE)).or_else(|_| TreeFile::open(path, None)),
+        };
+        let tree = match tree {
             Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
             Err(error) if !error.is_of_another_layout() => return Err(content(error)),
             _ => return Ok(None),
@@ -59,7 +63,7 @@ impl ImportedTree {
         };
         manifest.set_tally(tally);
         manifest.root = tree.root;
-        manifest.sides = if sides.is_some() { Sides::Known } else { Sides::Unknown };
+        manifest.sides = if tree.has_sides() { Sides::Known } else { Sides::Unknown };
         Ok(Some(Self { tree, manifest }))
     }
 
