@@ -13,6 +13,7 @@ use mesher::{Options, words};
 
 pub mod draw;
 pub mod fibres;
+pub mod orders;
 pub mod schedules;
 pub mod symmetry;
 

@@ -3,13 +3,14 @@
 
 use super::draw::{leaky_on_rays, soup, thin};
 use super::fibres::Fibres;
-use super::{Run, Small, options, small};
+use super::{Outcome, Run, Small, options, small};
 use mesher::case::Case;
 use mesher::comm::sim::{Adversary, Schedule, Sim};
 use mesher::comm::{Comm, Solo};
 use mesher::error::Error;
 use mesher::record::Recorder;
-use mesher::{Options, mesh};
+use mesher::sides::Summary;
+use mesher::{Options, mesh, words};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -17,11 +18,11 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 /// What must not depend on the schedule.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Meshed {
-    pub digest: String,
-    pub cells: u64,
-    pub components: [u64; 4],
+    pub outcome: Outcome,
+    /// Digest and number of cells in the report, if it was asked for.
+    pub reported: Option<(String, u64)>,
 }
 
 /// A case, and its mesh on one rank.
@@ -34,44 +35,84 @@ pub struct Serial {
 impl Serial {
     pub fn new(small: Small) -> Self {
         let case = Rc::new(small.mesher_case());
-        let meshed = meshed(&case, &options(Run::SOLO.division, false), &Solo);
+        let meshed = merge(vec![part(&case, &options(Run::SOLO.division, false), true, &Solo)]);
         Self { small, case, meshed }
     }
 
-    /// The mesh on the ranks of a run, as coroutines: the same on all ranks.
+    /// Whether this is the mesh of the case.
+    pub fn equals(&self, got: &Result<Meshed, Error>) -> bool {
+        match (got, &self.meshed) {
+            (Ok(got), Ok(want)) => {
+                got.outcome == want.outcome
+                    && (got.reported.is_none() || got.reported == want.reported)
+            }
+            (Err(got), Err(want)) => got == want,
+            _ => false,
+        }
+    }
+
+    /// The mesh on the ranks of a run, as coroutines, each of which communicates through what `wrap` makes of its rank. With all phases,
+    /// the report and the checks of invariants if `whole` is true, otherwise with phases 1 to 8.
     pub fn on_ranks(
         &self,
         fibres: &mut Fibres,
         run: &Run,
         schedule: impl Schedule + 'static,
-        check: bool,
+        whole: bool,
+        wrap: impl Fn(&Sim, &mut dyn FnMut(&dyn Comm)) + 'static,
     ) -> Result<Meshed, Error> {
         let case = self.case.clone();
-        let options = Options { check, ..options(run.division, false) };
-        let mut ranks = fibres.run(run.ranks, schedule, move |sim: &Sim| {
+        let options = Options { check: whole, ..options(run.division, false) };
+        let parts = fibres.run(run.ranks, schedule, move |sim: &Sim| {
             let mut result = None;
+            let mut work = |comm: &dyn Comm| result = Some(part(&case, &options, whole, comm));
             // Counting messages needs the clocks, which take longer than passing the token on.
-            sim.uncounted(&mut || result = Some(meshed(&case, &options, sim)));
-            result.expect("the body has run")
+            sim.uncounted(&mut || wrap(sim, &mut work));
+            result.expect("the work has been done")
         });
-        assert!(ranks.iter().all(|r| *r == ranks[0]), "ranks must agree on the result");
-        ranks.swap_remove(0)
+        merge(parts)
     }
 
     /// The same under the schedule of the run's seed.
-    pub fn on_seed(&self, fibres: &mut Fibres, run: &Run, check: bool) -> Result<Meshed, Error> {
-        self.on_ranks(fibres, run, Adversary::new(run.seed, run.ranks), check)
+    pub fn on_seed(&self, fibres: &mut Fibres, run: &Run, whole: bool) -> Result<Meshed, Error> {
+        if std::env::var("TEMP_THREADS").is_ok() {
+            let case = &*self.case.clone();
+            let options = Options { check: whole, ..options(run.division, false) };
+            return merge(mesher::comm::sim::run(run.ranks, run.seed, |sim| part(case, &options, whole, sim)));
+        }
+        let schedule = Adversary::new(run.seed, run.ranks);
+        self.on_ranks(fibres, run, schedule, whole, |sim, work| work(sim))
     }
 }
 
-fn meshed(case: &Case, options: &Options, comm: &dyn Comm) -> Result<Meshed, Error> {
-    let report = mesh(case, options, comm, &mut Recorder::default())?;
-    let outside = report.components_outside;
-    Ok(Meshed {
-        digest: report.digest,
-        cells: report.cells,
-        components: [report.components, outside, report.components_inside, report.enclosed_leaves],
-    })
+type Part = Result<(Vec<u64>, Summary, Option<(String, u64)>), Error>;
+
+/// A rank's part of the mesh.
+fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
+    let reported = match whole {
+        false => None,
+        true => {
+            let report = mesh(case, options, comm, &mut Recorder::default())?;
+            Some((report.digest, report.cells))
+        }
+    };
+    let (words, summary) = words(case, options, comm)?;
+    Ok((words, summary, reported))
+}
+
+fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
+    let (mut all, mut same) = (Vec::new(), None);
+    for part in parts {
+        let (words, common) = match part {
+            Ok((words, summary, reported)) => (words, Ok((summary, reported))),
+            Err(e) => (Vec::new(), Err(e)),
+        };
+        all.extend(words);
+        assert!(*same.get_or_insert(common.clone()) == common, "ranks must agree on the result");
+    }
+    all.sort_unstable();
+    let (summary, reported) = same.expect("at least one rank")?;
+    Ok(Meshed { outcome: Outcome { words: all, summary }, reported })
 }
 
 /// Draws a value that depends on the number alone.
@@ -92,9 +133,9 @@ pub fn cases() -> impl Strategy<Value = Small> {
 }
 
 /// The first case of at most `cells` cells that is drawn from a number.
-pub fn case(strategy: &impl Strategy<Value = Small>, number: u64, cells: u64) -> Serial {
+pub fn case(strategy: &impl Strategy<Value = Small>, number: u64, cells: usize) -> Serial {
     let tries = (0..).map(|again| Serial::new(drawn(strategy, number ^ again << 48)));
-    let is_small = |s: &Serial| s.meshed.as_ref().map_or(true, |m| m.cells <= cells);
+    let is_small = |s: &Serial| s.meshed.as_ref().map_or(true, |m| m.outcome.words.len() <= cells);
     tries.into_iter().find(is_small).expect("small cases are frequent")
 }
 
@@ -124,7 +165,7 @@ pub fn write(case: &Small, folder: &Path, name: &str) -> PathBuf {
 }
 
 /// The options of the mesher's program for a run.
-pub fn words(run: &Run) -> String {
+pub fn run_words(run: &Run) -> String {
     let lower = |value: String| value.to_lowercase();
     let base = run.division.level_base.map_or("auto".to_owned(), |l| l.to_string());
     format!(
