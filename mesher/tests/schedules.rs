@@ -22,7 +22,7 @@ const PER_CASE: u64 = 64;
 /// Greatest number of cells in a case.
 const CELLS: usize = 1000;
 /// One in this many schedules runs all phases, with the invariants checked after each; the others end with the leaves.
-const WHOLE: u64 = 8;
+const WHOLE: u64 = 16;
 
 fn from_env(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).map_or(otherwise, |n| n.parse().expect("a number of schedules"))
@@ -31,7 +31,7 @@ fn from_env(name: &str, otherwise: u64) -> u64 {
 /// Run configurations with 2 to 64 ranks, mostly few: they take the least time, and each order is more likely. METIS is seldom used, because
 /// it takes longer than a small mesh and sends nothing.
 fn runs() -> impl Strategy<Value = Run> {
-    let ranks = prop_oneof![12 => 2usize..5, 6 => 5usize..10, 2 => 10usize..25, 1 => 25usize..65];
+    let ranks = prop_oneof![30 => 2usize..5, 10 => 5usize..10, 2 => 10usize..25, 1 => 25usize..65];
     let with_metis = prop::bool::weighted(0.1);
     (run(), ranks, with_metis).prop_map(|(run, ranks, with_metis)| {
         let partitioner = if with_metis { Partitioner::Metis } else { Partitioner::Morton };

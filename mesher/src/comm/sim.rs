@@ -2,8 +2,8 @@
 //!
 //! Only one rank runs at a time. It passes the token on when it has to wait for others. The next rank and the order in which messages
 //! arrive are a [`Schedule`]'s choices; [`run`] draws one from a seed, so a failure can be replayed from its seed. In [`run`] each rank is a
-//! thread, so that the CPU time of a rank is not disturbed by the others. Other executors implement [`Token`]: tests run
-//! ranks as coroutines, which pass the token on in a fiftieth of the time.
+//! thread, so that the CPU time of a rank is not disturbed by the others. Other executors implement [`Token`]: tests of
+//! many schedules run ranks as coroutines, which takes a fifth of the time.
 
 mod schedule;
 mod world;

@@ -75,11 +75,6 @@ impl Serial {
 
     /// The same under the schedule of the run's seed.
     pub fn on_seed(&self, fibres: &mut Fibres, run: &Run, whole: bool) -> Result<Meshed, Error> {
-        if std::env::var("TEMP_THREADS").is_ok() {
-            let case = &*self.case.clone();
-            let options = Options { check: whole, ..options(run.division, false) };
-            return merge(mesher::comm::sim::run(run.ranks, run.seed, |sim| part(case, &options, whole, sim)));
-        }
         let schedule = Adversary::new(run.seed, run.ranks);
         self.on_ranks(fibres, run, schedule, whole, |sim, work| work(sim))
     }
