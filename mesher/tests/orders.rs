@@ -65,9 +65,9 @@ fn every_order(
     unreachable!("the number of orders is finite")
 }
 
-/// The rank itself.
+/// The rank without errors.
 fn plain(sim: &Sim, work: &mut dyn FnMut(&dyn Comm)) {
-    work(sim);
+    work(&Faulty::new(sim, Bug::None, &Cell::new(0)));
 }
 
 /// A case whose tree has at most three levels: all spacings are those of level 3 or more.
@@ -242,7 +242,7 @@ enum Bug {
     LostInOneOrder { call: usize, rank: usize },
 }
 
-/// A rank with an error.
+/// A rank that may have an error.
 struct Faulty<'a> {
     sim: &'a Sim<'a>,
     bug: Bug,
@@ -308,9 +308,8 @@ impl Comm for Faulty<'_> {
         self.sim.sent()
     }
 
-    fn uncounted(&self, body: &mut dyn FnMut()) {
-        self.sim.uncounted(body);
-    }
+    /// Leaves out checks of invariants: their messages would multiply the orders.
+    fn uncounted(&self, _: &mut dyn FnMut()) {}
 }
 
 /// Whether some order of a run reveals a bug. The first order, in which messages arrive by sender, never does.
