@@ -12,6 +12,9 @@ use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};
 
 pub mod draw;
+pub mod fibres;
+pub mod orders;
+pub mod schedules;
 pub mod symmetry;
 
 // Each test uses some of these.
