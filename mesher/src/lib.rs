@@ -28,6 +28,7 @@ pub mod leaves;
 mod mesh;
 pub mod octant;
 pub mod partition;
+pub mod plan;
 pub mod quantise;
 pub mod record;
 pub mod refine;
@@ -46,12 +47,21 @@ use case::Case;
 use check::debug_check;
 use comm::Comm;
 use error::Error;
+use facet::Facet;
 use kept::Kept;
+use lattice::{Bounds, Rules};
+use octant::Level;
 use partition::base_leaves::cells_heaviest;
+use partition::cost::Counts;
 use partition::initial::{self, Partition};
+use partition::ownership::Ownership;
 use partition::repartition::{self, LeafCounts, Sets};
+use plan::pilot::{Amounts, Collector};
+use plan::{Plan, Volumes};
 use record::Recorder;
 use report::{Counters, Report};
+use std::borrow::Borrow;
+use tree::Tree;
 use voxelise::BinnedFacets;
 use write::OutDir;
 
@@ -118,6 +128,101 @@ pub fn words(
     Ok((words, mesh.sides.summary))
 }
 
+/// The plan of a case: what a run with these options takes. Makes pilot runs and no mesh. Collective.
+///
+/// # Errors
+/// The same on all ranks.
+pub fn plan(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<Plan, Error> {
+    let quantised = quantised(case, options, comm, record)?;
+    let volumes = Volumes::new(&quantised.rules.boxes);
+    record.report_status("plan");
+    plan::of_case(&quantised.problem(case, &volumes, comm, record), &mut |shift| {
+        pilot(&quantised, &volumes, shift, options, comm)
+    })
+}
+
+/// The result of phases 1 and 2 on a rank.
+struct Quantised {
+    rules: Rules,
+    bounds: Bounds,
+    facets: Vec<Facet>,
+    facets_total: u64,
+}
+
+impl Quantised {
+    fn problem<'a>(
+        &'a self,
+        case: &Case,
+        volumes: &'a Volumes,
+        comm: &'a dyn Comm,
+        record: &Recorder,
+    ) -> plan::Problem<'a> {
+        plan::Problem {
+            rules: &self.rules,
+            bounds: &self.bounds,
+            facets: &self.facets,
+            facets_total: self.facets_total,
+            spacing_min: case.spacing_min,
+            volumes,
+            time_cpu_s: record.phases().iter().map(|p| p.time_cpu_s).sum(),
+            comm,
+        }
+    }
+}
+
+/// Phases 1 and 2. Collective.
+fn quantised(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<Quantised, Error> {
+    // 1. Read: each rank reads its slice of the facets.
+    let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
+    debug_check(options, comm, || check::slices(&slice, comm));
+    let facets_total = slice.total;
+
+    // 2. Quantise: the facets and the rules on the lattice.
+    let (rules, bounds, facets) =
+        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
+    debug_check(options, comm, || check::rules(&rules, comm));
+    Ok(Quantised { rules, bounds, facets, facets_total })
+}
+
+/// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
+fn pilot(
+    quantised: &Quantised,
+    volumes: &Volumes,
+    shift: Level,
+    options: &Options,
+    comm: &dyn Comm,
+) -> Result<Amounts, Error> {
+    let options = Options { check: false, out: None, weight_exposed: None, ..options.clone() };
+    let run = |rules: Rules| {
+        let (mut record, mut counters) = (Recorder::default(), Counters::default());
+        let mut collector = Collector::default();
+        let count = &mut |tree: &Tree, ownership: &Ownership| {
+            collector.base_tree(tree, &Counts::of_rank(tree, ownership));
+        };
+        let facets = (&quantised.facets[..], quantised.facets_total);
+        let mesh = grow(facets, rules, &options, comm, &mut record, &mut counters, count)?;
+        let (_, written) =
+            record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
+        Ok(collector.finish(&mesh, written.leaves, &counters, &record, volumes))
+    };
+    let rules = plan::pilot::coarser(&quantised.rules, shift);
+    match run(rules.clone()) {
+        // A seed may lie in a coarser cell that crosses.
+        Err(_) if shift > 0 && !rules.seeds.is_empty() => run(Rules { seeds: Vec::new(), ..rules }),
+        result => result,
+    }
+}
+
 /// Phases 1 to 8, which make the tree. Collective.
 fn make(
     case: &Case,
@@ -126,41 +231,56 @@ fn make(
     record: &mut Recorder,
     counters: &mut Counters,
 ) -> Result<Mesh, Error> {
+    let quantised = quantised(case, options, comm, record)?;
+    let volumes = Volumes::new(&quantised.rules.boxes);
+    let planned = plan::before_run(
+        &quantised.problem(case, &volumes, comm, record),
+        options.force,
+        record.shows_progress(),
+        &mut |shift| pilot(&quantised, &volumes, shift, options, comm),
+    )?;
+    if let Some(plan) = planned {
+        record.report_plan(&plan.line());
+    }
+    let Quantised { rules, facets, facets_total, .. } = quantised;
+    grow((facets, facets_total), rules, options, comm, record, counters, &mut |_, _| {})
+}
+
+/// Phases 3 to 8: from this rank's facets, and the number of all, to the tree. `count` sees the base tree. Collective.
+fn grow<F: Borrow<[Facet]>>(
+    (facets, facets_total): (F, u64),
+    rules: Rules,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+    counters: &mut Counters,
+    count: &mut dyn FnMut(&Tree, &Ownership),
+) -> Result<Mesh, Error> {
     let division = &options.division;
     let is_parallel = comm.size() > 1;
 
-    // 1. Read: each rank reads its slice of the facets.
-    let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
-    debug_check(options, comm, || check::slices(&slice, comm));
-    let facets_total = slice.total;
-
-    // 2. Quantise: the facets and the rules on the lattice.
-    let (rules, facets) =
-        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
-    debug_check(options, comm, || check::rules(&rules, comm));
-
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
     let mark = |level| {
-        let (tree, work) = refine::refine_top(&facets, &rules, level);
+        let (tree, work) = refine::refine_top(facets.borrow(), &rules, level);
         counters.add_voxelised(&work);
         tree.split
     };
     let Partition { mut ownership, base_leaves, level_base } = match is_parallel {
         false => Partition::solo(),
         true => record.phase("base tree", comm, || {
-            initial::partition(&facets, &rules, division, mark, comm)
+            initial::partition(facets.borrow(), &rules, division, mark, comm)
         })?,
     };
     debug_check(options, comm, || check::ownership(&ownership, comm));
 
     // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
     let routed = is_parallel
-        .then(|| record.phase("route", comm, || refine::route(&facets, &ownership, comm)));
+        .then(|| record.phase("route", comm, || refine::route(facets.borrow(), &ownership, comm)));
     if let Some(routed) = &routed {
-        debug_check(options, comm, || check::facets(&facets, routed, &ownership, comm));
+        debug_check(options, comm, || check::facets(facets.borrow(), routed, &ownership, comm));
     }
     let (mut tree, work) = record.phase("refine", comm, || {
-        let binned = BinnedFacets::new(routed.as_ref().unwrap_or(&facets));
+        let binned = BinnedFacets::new(routed.as_deref().unwrap_or(facets.borrow()));
         drop(routed);
         if check::is_on(options) {
             binned.check_invariants();
@@ -184,9 +304,11 @@ fn make(
         check::base_tree(&tree, &rules, &ownership, comm);
     });
 
+    count(&tree, &ownership);
+
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let sides = record.phase("sides", comm, || {
-        sides::decide(&tree, &ownership, &facets, &rules, options.ungraded, comm)
+        sides::decide(&tree, &ownership, facets.borrow(), &rules, options.ungraded, comm)
     })?;
     debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
     drop(facets);

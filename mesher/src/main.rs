@@ -6,6 +6,7 @@ mod cli;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod heap;
 mod launch;
+mod out_of_memory;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
 use files::{check_writable, interrupt, write_atomically};
@@ -14,9 +15,11 @@ use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
 use mesher::partition::Division;
 use mesher::record::Recorder;
+use mesher::plan::Plan;
 use mesher::report::Report;
+use serde::Serialize;
 use mesher::write::write_json;
-use mesher::{Options, mesh};
+use mesher::{Options, mesh, plan};
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
@@ -84,6 +87,7 @@ fn run_mpi(args: &Result<Args, Error>) {
     let comm = interrupt::uninterrupted(mesher::comm::mpi::Mpi::start);
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
+    out_of_memory::ends_with(mesher::comm::mpi::abort);
     let code = run(args, &comm);
     drop(comm);
     exit(code);
@@ -121,11 +125,31 @@ fn complain(line: &dyn Display) -> bool {
     writeln!(stderr(), "{line}").is_ok()
 }
 
-/// Prints warnings and the report; returns the exit code. A closed pipe is no reason to fail.
-fn print(report: &Report) -> i32 {
+/// The result of a run.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Outcome {
+    Meshed(Box<Report>),
+    Planned(Plan),
+}
+
+impl Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Meshed(report) => report.fmt(f),
+            Self::Planned(plan) => plan.fmt(f),
+        }
+    }
+}
+
+/// Prints warnings and the outcome; returns the exit code. A closed pipe is no reason to fail.
+fn print(outcome: &Outcome) -> i32 {
     let warns = |w| complain(&format_args!("mesher: warning: {w}"));
-    let is_warned = report.warnings.iter().all(warns);
-    match writeln!(stdout(), "{report}").and_then(|()| stdout().flush()) {
+    let is_warned = match outcome {
+        Outcome::Meshed(report) => report.warnings.iter().all(warns),
+        Outcome::Planned(_) => true,
+    };
+    match writeln!(stdout(), "{outcome}").and_then(|()| stdout().flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => {
             fail(&Error::output(format!("standard output: {e}: free disk space")), true)
         }
@@ -163,13 +187,13 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
         let _ = write!(stderr(), "\r\x1b[K");
     }
     match result {
-        Ok(report) if first && !args.quiet => print(&report),
+        Ok(outcome) if first && !args.quiet => print(&outcome),
         Ok(_) => 0,
         Err(e) => fail(&e, first),
     }
 }
 
-fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
+fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
     if let Some(dir) = &args.status {
         comm.agree(std::fs::create_dir_all(dir).map_err(|e| {
             Error::output(format!("{}: {e}: choose another --status", dir.display()))
@@ -196,11 +220,16 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         out: cli::output(args),
         check: args.check,
         weight_exposed: args.weight_exposed,
+        force: args.force,
     };
-    let mut report = mesh(&case, &options, comm, record)?;
-    if args.message_matrix {
-        report = report.with_message_matrix(comm);
-    }
-    on_json(&|path| write_atomically(path, |to| write_json(to, &report)))?;
-    Ok(report)
+    let outcome = if args.plan {
+        Outcome::Planned(plan(&case, &options, comm, record)?)
+    } else {
+        let report = mesh(&case, &options, comm, record)?;
+        let report =
+            if args.message_matrix { report.with_message_matrix(comm) } else { report };
+        Outcome::Meshed(Box::new(report))
+    };
+    on_json(&|path| write_atomically(path, |to| write_json(to, &outcome)))?;
+    Ok(outcome)
 }
