@@ -211,8 +211,7 @@ fn pilot(
         };
         let facets = (&quantised.facets[..], quantised.facets_total);
         let mesh = grow(facets, rules, &options, comm, &mut record, &mut counters, count)?;
-        let (_, written) =
-            record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
+        let (_, written) = record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
         Ok(collector.finish(&mesh, written.leaves, &counters, &record, volumes))
     };
     let rules = plan::pilot::coarser(&quantised.rules, shift);
@@ -387,4 +386,79 @@ fn repartition_by_leaves(
         mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
     }
     max
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::{Solo, sim};
+    use crate::lattice::{Enclosed, Keep};
+    use crate::partition::{Division, Partitioner, Weights};
+    use case::{BoxSpec, RootSpec};
+    use geometries::{Generator, Shape};
+
+    fn case() -> Case {
+        let extent = BoxSpec { min: [-0.2; 3], max: [0.9, 0.2, 0.2], spacing: 0.03 };
+        Case {
+            source: ingest::Source::Generated(Generator::new(Shape::Sphere, 1280)),
+            spacing_min: 0.01,
+            layer_cells_min: 4,
+            keep: Keep::Outside,
+            keep_crossing: true,
+            root: RootSpec::Scale(4.0),
+            boxes: vec![extent],
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
+        }
+    }
+
+    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
+    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+        let division = Division {
+            partitioner: Partitioner::Morton,
+            weights: Weights::Rebalance,
+            level_base: None,
+        };
+        let (ungraded, out, check, weight_exposed) = (false, None, false, None);
+        let options = Options { division, ungraded, out, check, weight_exposed, force: true };
+        let on_rank = |comm: &dyn Comm| {
+            let quantised = quantised(&case(), &options, comm, &mut Recorder::default()).unwrap();
+            let volumes = Volumes::new(&quantised.rules.boxes);
+            let run = |shift| pilot(&quantised, &volumes, shift, &options, comm).unwrap();
+            ([2, 1, 0].map(run), volumes.cells())
+        };
+        let all = match ranks {
+            1 => vec![on_rank(&Solo)],
+            _ => sim::run(ranks, 7, |comm| on_rank(comm)),
+        };
+        let sum = |i: usize| Amounts::sum(all.iter().map(|(amounts, _)| amounts[i]));
+        ((0..3).map(sum).collect(), all[0].1)
+    }
+
+    #[test]
+    fn two_pilot_runs_predict_the_mesh() {
+        let (amounts, cells_boxed) = pilots(1);
+        let [coarse, fine, mesh] = amounts[..] else { unreachable!("three runs") };
+        assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
+        let pilots =
+            plan::pilot::Pilots { fine: (1, fine), coarse: Some((2, coarse)), cells_boxed };
+        let predicted = pilots.at(0);
+        for (name, predicted, measured) in [
+            ("cells", predicted.cells, mesh.cells),
+            ("bytes", predicted.bytes(), mesh.bytes()),
+            ("tests", predicted.tests, mesh.tests),
+        ] {
+            let error = predicted / measured - 1.0;
+            assert!(error.abs() < 0.2, "{name}: {predicted} for {measured}");
+        }
+    }
+
+    #[test]
+    fn pilot_runs_on_several_ranks_have_the_cells_of_one() {
+        let [one, three] = [1, 3].map(|ranks| pilots(ranks).0);
+        for (one, three) in one.iter().zip(&three) {
+            assert_eq!(one.cells, three.cells);
+            assert!((one.cells_boxed_deleted - three.cells_boxed_deleted).abs() < 1e-6);
+        }
+    }
 }

@@ -14,12 +14,12 @@ use mesher::agreement;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
 use mesher::partition::Division;
-use mesher::record::Recorder;
 use mesher::plan::Plan;
+use mesher::record::Recorder;
 use mesher::report::Report;
-use serde::Serialize;
 use mesher::write::write_json;
 use mesher::{Options, mesh, plan};
+use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
@@ -79,8 +79,21 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
+/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
+#[cfg(feature = "mpi")]
+const ADDRESS_SPACE_MPI: f64 = 384e6;
+
 #[cfg(feature = "mpi")]
 fn run_mpi(args: &Result<Args, Error>) {
+    let left = mesher::plan::address_space_left();
+    if left < ADDRESS_SPACE_MPI {
+        let e = Error::memory(format!(
+            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
+            left / 1e6,
+            (ADDRESS_SPACE_MPI - left) / 1e6
+        ));
+        exit(fail(&e, launch::is_first()));
+    }
     #[cfg(target_os = "linux")]
     launch::end_with_launcher();
     // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
@@ -226,8 +239,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         Outcome::Planned(plan(&case, &options, comm, record)?)
     } else {
         let report = mesh(&case, &options, comm, record)?;
-        let report =
-            if args.message_matrix { report.with_message_matrix(comm) } else { report };
+        let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
         Outcome::Meshed(Box::new(report))
     };
     on_json(&|path| write_atomically(path, |to| write_json(to, &outcome)))?;

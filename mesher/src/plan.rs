@@ -113,7 +113,7 @@ const BYTES_USUAL: f64 = 0.6;
 /// A pilot run has at most this fraction of the cells, so that two take about 2 % of the time.
 const PART_OF_CELLS: f64 = 64.0;
 /// Cells per facet below which pilot runs would take more than that, because their time does not fall with the cells.
-const CELLS_PER_FACET: f64 = 512.0;
+const CELLS_PER_FACET: f64 = 2048.0;
 /// Cells of a pilot run that takes a moment, a fraction of a second.
 const CELLS_MOMENT: f64 = 8.4e6;
 /// Greatest number of cells of a pilot run.
@@ -122,6 +122,11 @@ const CELLS_PILOT: f64 = 67e6;
 const TREE_BYTES_PER_CELL: f64 = 0.055;
 /// Bytes of the header of a file of leaf words.
 const WORDS_HEADER: u64 = 128;
+
+/// Bytes that the limit on the address space leaves this process; infinite without one.
+pub fn address_space_left() -> f64 {
+    room::Room::read().address_space
+}
 
 impl Problem<'_> {
     /// Whether the run is small for certain, from the extent of the facets alone.
@@ -164,10 +169,11 @@ pub fn before_run(
     uncounted(comm, || {
         let rough = problem.cells_rough();
         let cells: f64 = rough.iter().sum();
-        let ranks = Ranks::gather(comm, Amounts::default());
+        let ranks = Ranks::gather(comm, Amounts::default(), 0);
         let used = used(&ranks, cells);
         let is_close = !is_forced && used > 0.5;
-        let is_cheap = cells >= CELLS_SMALL && cells >= CELLS_PER_FACET * problem.facets_total as f64;
+        let is_cheap =
+            cells >= CELLS_SMALL && cells >= CELLS_PER_FACET * problem.facets_total as f64;
         if !is_close && !is_cheap {
             let amounts = Amounts { cells, ..Amounts::default() };
             let more = vec![cells * BYTES_USUAL / ranks.count() as f64; ranks.count()];
@@ -186,7 +192,7 @@ pub fn of_case(problem: &Problem, pilot: Pilot) -> Result<Plan, Error> {
     uncounted(problem.comm, || {
         let rough = problem.cells_rough();
         let cells: f64 = rough.iter().sum();
-        let used = used(&Ranks::gather(problem.comm, Amounts::default()), cells);
+        let used = used(&Ranks::gather(problem.comm, Amounts::default(), 0), cells);
         from_pilots(problem, rough, cells_max(cells, used, CELLS_MOMENT), pilot)
     })
 }
@@ -200,18 +206,27 @@ fn used(ranks: &Ranks, cells: f64) -> f64 {
 
 /// Greatest number of cells of a pilot run; `least` of them in any case. Where there is no doubt that the run does not fit, few.
 fn cells_max(cells: f64, used: f64, least: f64) -> f64 {
-    if used > 100.0 { CELLS_MOMENT / 4.0 } else { (cells / PART_OF_CELLS).max(least).min(CELLS_PILOT) }
+    if used > 100.0 {
+        CELLS_MOMENT / 4.0
+    } else {
+        (cells / PART_OF_CELLS).max(least).min(CELLS_PILOT)
+    }
 }
 
 /// Makes the pilot runs and extrapolates them. Collective.
-fn from_pilots(problem: &Problem, rough: [f64; 2], cells_max: f64, pilot: Pilot) -> Result<Plan, Error> {
+fn from_pilots(
+    problem: &Problem,
+    rough: [f64; 2],
+    cells_max: f64,
+    pilot: Pilot,
+) -> Result<Plan, Error> {
     let comm = problem.comm;
     let coarsest = problem.rules.level_deepest();
     let rough_at =
         |shift: Level| rough[0] / 4f64.powi(shift as i32) + rough[1] / 8f64.powi(shift as i32);
     let mut runs: Vec<(Level, Ranks)> = Vec::new();
     let mut run = |shift: Level| {
-        runs.push((shift, Ranks::gather(comm, pilot(shift)?)));
+        runs.push((shift, Ranks::gather(comm, pilot(shift)?, problem.facets.len())));
         Ok::<_, Error>(extrapolation(&runs, rough[1]))
     };
     let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);

@@ -312,11 +312,9 @@ mod tests {
 
     #[test]
     fn errors_are_unpacked_as_they_were_packed() {
-        for e in [
-            Error::input("häßlich: 'x'"),
-            Error::output("no space"),
-            Error::memory("12345678"),
-        ] {
+        for e in
+            [Error::input("häßlich: 'x'"), Error::output("no space"), Error::memory("12345678")]
+        {
             assert_eq!(unpack(&pack(&e)), e);
         }
     }

@@ -14,8 +14,16 @@ pub struct Ranks {
     in_process: f64,
 }
 
+/// Bytes per facet that refinement has freed in the heap, where other sets reuse them.
+const FREED_PER_FACET: f64 = 60.0;
+/// Sets that grow in the heap leave holes: this part of them, as long as they are smaller than the blocks that get mappings of their
+/// own; and bytes at most.
+const HOLES: [f64; 2] = [0.3, 5e6];
+
 struct Rank {
     amounts: Amounts,
+    /// Facets of its slice.
+    facets: f64,
     room: Room,
     /// Peak resident memory so far, in bytes.
     peak: f64,
@@ -34,10 +42,10 @@ pub struct Tightest {
 
 impl Ranks {
     /// Gathers the amounts and limits of all ranks. Collective.
-    pub fn gather(comm: &dyn Comm, amounts: Amounts) -> Self {
+    pub fn gather(comm: &dyn Comm, amounts: Amounts, facets: usize) -> Self {
         let Room { resident, address_space, control_group, machine, node } = Room::read();
         let peak = peak_rss_bytes() as f64;
-        let room = [resident, address_space, control_group, machine, peak];
+        let room = [resident, address_space, control_group, machine, peak, facets as f64];
         let words = amounts.to_array().into_iter().chain(room).map(f64::to_bits);
         let words: Vec<u64> = words.chain([node]).collect();
         let rank = |(_, words): (usize, &[u64])| {
@@ -50,9 +58,10 @@ impl Ranks {
                     address_space: number(1),
                     control_group: number(2),
                     machine: number(3),
-                    node: room[5],
+                    node: room[6],
                 },
                 peak: number(4),
+                facets: number(5),
             }
         };
         let all = comm.all_gather(&words).messages().map(rank).collect();
@@ -73,7 +82,12 @@ impl Ranks {
     pub fn growth(&self, amounts: &Amounts) -> Vec<f64> {
         let total = self.total().bytes().max(1.0);
         let factor = amounts.bytes() / total - 1.0;
-        self.all.iter().map(|rank| (rank.amounts.bytes() * factor).max(0.0)).collect()
+        let of_rank = |rank: &Rank| {
+            let sets = (rank.amounts.bytes() * factor).max(0.0);
+            let holes = (HOLES[0] * sets).min(HOLES[1]) - FREED_PER_FACET * rank.facets;
+            sets + holes.max(0.0)
+        };
+        self.all.iter().map(of_rank).collect()
     }
 
     /// Peak resident memory of each rank, if each takes as many bytes as given beyond what it has. Ranks of one process have equal
@@ -111,9 +125,10 @@ mod tests {
     use super::*;
 
     fn rank(node: u64, address_space: f64, machine: f64) -> Rank {
-        let room = Room { resident: 50.0, address_space, control_group: f64::INFINITY, machine, node };
+        let room =
+            Room { resident: 50.0, address_space, control_group: f64::INFINITY, machine, node };
         let amounts = Amounts { bytes_sides: 10.0, ..Amounts::default() };
-        Rank { amounts, room, peak: 70.0 }
+        Rank { amounts, facets: 1.0, room, peak: 70.0 }
     }
 
     #[test]

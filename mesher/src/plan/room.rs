@@ -152,7 +152,10 @@ mod tests {
             ("a/memory.stat", "cache 1\ntotal_cache 100\n"),
         ];
         let folder = group(&one);
-        assert_eq!([within(folder.path(), "/"), within(folder.path(), "/a")], [f64::INFINITY, 400.0]);
+        assert_eq!(
+            [within(folder.path(), "/"), within(folder.path(), "/a")],
+            [f64::INFINITY, 400.0]
+        );
     }
 
     #[test]

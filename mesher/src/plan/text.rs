@@ -8,7 +8,8 @@ use std::fmt;
 impl Plan {
     /// The plan in one line.
     pub fn line(&self) -> String {
-        let time = self.time_cpu_s.map_or(String::new(), |s| format!(", {} of CPU time", seconds(s)));
+        let time =
+            self.time_cpu_s.map_or(String::new(), |s| format!(", {} of CPU time", seconds(s)));
         let ranks = if self.ranks > 1 { " per rank" } else { "" };
         format!(
             "{} cells{time}, {} of memory{ranks}, leaf words of {}{ranks}",
@@ -24,14 +25,16 @@ impl Plan {
         let needed = bytes(tightest.needed_bytes as f64);
         let left = bytes(tightest.left_bytes as f64);
         let limit = match tightest.limit {
-            Limit::AddressSpace => format!("the limit on its address space leaves a process {left}"),
+            Limit::AddressSpace => {
+                format!("the limit on its address space leaves a process {left}")
+            }
             Limit::ControlGroup => format!("the control group has {left} left"),
             Limit::Machine => format!("the machine has {left} available"),
         };
         let fitting = match (self.spacing_factor_fits, self.spacing_min_fits) {
-            (Some(factor), Some(spacing)) => format!(
-                "multiply all spacings by {factor}, which fits (spacing_min = {spacing})"
-            ),
+            (Some(factor), Some(spacing)) => {
+                format!("multiply all spacings by {factor}, which fits (spacing_min = {spacing})")
+            }
             _ => "no spacing of this case fits".into(),
         };
         Error::memory(format!(

@@ -29,9 +29,8 @@ impl Volumes {
             for y in ends[1].windows(2) {
                 for x in ends[0].windows(2) {
                     let (min, max) = ([x[0], y[0], z[0]], [x[1], y[1], z[1]]);
-                    let holds = |b: &&ExtentBox| {
-                        (0..3).all(|a| b.min[a] <= min[a] && max[a] <= b.max[a])
-                    };
+                    let holds =
+                        |b: &&ExtentBox| (0..3).all(|a| b.min[a] <= min[a] && max[a] <= b.max[a]);
                     let level = boxes.iter().filter(holds).map(|b| b.level).max();
                     parts.extend(level.map(|level| ExtentBox { min, max, level }));
                 }
