@@ -58,6 +58,22 @@ impl<'a> Clearance<'a> {
         found
     }
 
+    /// The facets that can be the nearest one of a point at most `radius` from `centre`.
+    pub fn near(&self, centre: Point, radius: f64) -> Vec<u32> {
+        // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
+        // The summand exceeds the rounding of distances.
+        let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + 1.0;
+        let mut found = Vec::new();
+        self.within(centre, &mut (reach * reach), &mut |_, facet, _| found.push(facet));
+        found
+    }
+
+    /// Distance from a point to the nearest of some facets.
+    pub fn among(&self, facets: &[u32], point: Point) -> f64 {
+        let squared = |&facet: &u32| distance::from_point(point, &self.triangle(facet)).0;
+        facets.iter().map(squared).fold(f64::INFINITY, f64::min).sqrt()
+    }
+
     /// A nearest point of the nearest facet.
     pub fn nearest(&self, point: Point) -> Option<Point> {
         let mut nearest = None;

@@ -149,13 +149,14 @@ impl Path {
         let (first, last) = self.surroundings(f64::from(STEPS) * step);
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
         let mut known = vec![f32::NAN; grid.count()];
+        let mut blocks = Blocks::new(&grid, clearance);
         let mut width = |place: u32, near: u32| {
             if known[place as usize].is_nan() {
                 let bound = match known[near as usize] {
                     near if near >= 0.0 => f64::from(near) + 2.0 * step,
                     _ => f64::INFINITY,
                 };
-                let free = clearance.at(grid.position(place), bound);
+                let free = blocks.clearance(place, bound);
                 // Balls at neighbours must overlap, so that no facet is between them.
                 known[place as usize] = if free > step { free as f32 } else { -1.0 };
             }
@@ -199,6 +200,47 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
 struct Grid {
     centre: Point,
     step: f64,
+}
+
+/// Distances from the points of a grid to the nearest facet. Points of a block share the search for the few facets that can
+/// be the nearest.
+struct Blocks<'a> {
+    grid: &'a Grid,
+    clearance: &'a Clearance<'a>,
+    /// The facets that can be the nearest of each block's points, empty for many facets; `None` where they are not known yet.
+    facets: Vec<Option<Vec<u32>>>,
+}
+
+/// Points of a block along an edge.
+const BLOCK: i32 = 4;
+
+/// Blocks of a grid along an edge.
+const BLOCKS: i32 = (SIDE + BLOCK - 1) / BLOCK;
+
+impl<'a> Blocks<'a> {
+    fn new(grid: &'a Grid, clearance: &'a Clearance<'a>) -> Self {
+        let facets = vec![None; (BLOCKS * BLOCKS * BLOCKS) as usize];
+        Self { grid, clearance, facets }
+    }
+
+    /// Distance from a point to the nearest facet; `bound` is an upper bound that the caller knows.
+    fn clearance(&mut self, place: u32, bound: f64) -> f64 {
+        /// A search among more facets costs more than a search for the nearest of all.
+        const FACETS_FEW: usize = 24;
+        let [x, y, z] = Grid::indices(place).map(|i| i / BLOCK);
+        let (grid, clearance) = (self.grid, self.clearance);
+        let facets = self.facets[((z * BLOCKS + y) * BLOCKS + x) as usize].get_or_insert_with(|| {
+            let half = f64::from(BLOCK - 1) / 2.0;
+            let offset = [x, y, z].map(|i| f64::from(i * BLOCK - STEPS) + half);
+            let centre = std::array::from_fn(|a| grid.centre[a] + offset[a] * grid.step);
+            let near = clearance.near(centre, 3f64.sqrt() * half * grid.step);
+            if near.len() <= FACETS_FEW { near } else { Vec::new() }
+        });
+        match facets.is_empty() {
+            true => clearance.at(grid.position(place), bound),
+            false => clearance.among(facets, grid.position(place)),
+        }
+    }
 }
 
 /// Points of a grid along an edge.
