@@ -177,13 +177,12 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     }
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
-    let on_json = |write: &dyn Fn(&Path) -> std::io::Result<()>| {
-        let named = |path: &Path, e| {
-            Error::output(format!("{}: {e}: choose another --json", path.display()))
-        };
+    let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
+        let named =
+            |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
         comm.agree(json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
-    on_json(&check_writable)?;
+    on_json("choose another --json", &check_writable)?;
     let case = mesher::comm::agree(comm, case(args))?;
     agreement::on_case(&case, comm)?;
     let options = Options {
@@ -201,6 +200,10 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     if args.message_matrix {
         report = report.with_message_matrix(comm);
     }
-    on_json(&|path| write_atomically(path, |to| write_json(to, &report)))?;
+    let advice = match args.out {
+        Some(_) => "the mesh is complete, only its report is missing; free disk space",
+        None => "free disk space",
+    };
+    on_json(advice, &|path| write_atomically(path, |to| write_json(to, &report)))?;
     Ok(report)
 }
