@@ -178,8 +178,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
     let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
-        let named =
-            |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
+        let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
         comm.agree(json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
     on_json("choose another --json", &check_writable)?;
@@ -200,7 +199,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     if args.message_matrix {
         report = report.with_message_matrix(comm);
     }
-    let advice = match args.out {
+    let advice = match options.out {
         Some(_) => "the mesh is complete, only its report is missing; free disk space",
         None => "free disk space",
     };

@@ -1,7 +1,7 @@
 //! System calls that fail, in each program, one after another.
 
 use crate::place::{Ended, Files, Place, TMP};
-use crate::programs::{Program, all, inputs};
+use crate::programs::{Leaves, Program, all, inputs};
 use crate::table::{Row, Table};
 use crate::tools::{injector, is_full, mpi, program, skip};
 use std::collections::BTreeSet;
@@ -162,6 +162,8 @@ impl Subject<'_> {
             return match self.is_complete(after) {
                 true if !lost => None,
                 true => Some("the failure was not reported".to_owned()),
+                // The program could not remove what it had to.
+                false if call.is_some_and(|call| self.is_scratch(call)) => self.unfinished(after),
                 false => Some("success without complete output".to_owned()),
             };
         }
@@ -178,7 +180,25 @@ impl Subject<'_> {
             }
             _ => {}
         }
-        self.remains(after).or_else(|| self.unexplained(&ended.err))
+        // A signal at the last call, when everything was done.
+        if end == End::Interrupt && self.is_complete(after) {
+            return None;
+        }
+        let remains = match self.program.leaves {
+            Leaves::Files => self.unfinished(after),
+            _ if call.is_some_and(|call| self.is_scratch(call)) => self.unfinished(after),
+            _ => self.remains(after),
+        };
+        remains.or_else(|| self.unexplained(&ended.err))
+    }
+
+    /// Whether a call lists or opens a temporary directory, which can then not be removed.
+    fn is_scratch(&self, call: &str) -> bool {
+        let (class, path) = call.split_once(' ').unwrap_or_default();
+        let path = Path::new(path.trim_end());
+        let name = path.strip_prefix(self.place.path()).unwrap_or(path);
+        let is_temporary = name.starts_with(TMP) || name.to_string_lossy().contains(".tmp");
+        ["list", "open"].contains(&class) && (is_temporary || self.program.leaves == Leaves::Files)
     }
 
     /// Whether a call was made for the output: its file, or a temporary one beside it.
@@ -188,7 +208,11 @@ impl Subject<'_> {
         let path = Path::new(words.next().unwrap_or_default());
         let name = path.strip_prefix(self.place.path()).unwrap_or(path);
         let is_temporary = name.to_string_lossy().contains(".tmp") && !name.starts_with(TMP);
-        class != Some("mkdir") && (self.program.output_of(name).is_some() || is_temporary)
+        // Status files serve the diagnosis of hangs.
+        let is_status = name.components().any(|part| part.as_os_str() == "status");
+        class != Some("mkdir")
+            && !is_status
+            && (self.program.output_of(name).is_some() || is_temporary)
     }
 
     /// Whether all output is as without a fault.
@@ -214,14 +238,28 @@ impl Subject<'_> {
             let same = |path: &&std::path::PathBuf| self.program.output_of(path) == output;
             paths.iter().copied().filter(same).all(|path| self.is_as(state, after, path))
         };
+        // Directories that contain the output stay.
+        let is_parent = |path: &Path| {
+            let outputs = self.program.outputs.iter();
+            after.get(path) == Some(&None)
+                && outputs.into_iter().any(|output| Path::new(output).starts_with(path))
+        };
         if let Some(path) = paths.iter().find(|path| {
-            self.program.output_of(path).is_none() && !self.is_as(&self.before, after, path)
+            self.program.output_of(path).is_none()
+                && !self.is_as(&self.before, after, path)
+                && !is_parent(path)
         }) {
             return Some(format!("{} was left or changed", path.display()));
         }
+        let is_lost = |output: &str| {
+            self.program.leaves == Leaves::NoOutput
+                && !after.keys().any(|path| path.starts_with(output))
+        };
         let mut outputs = self.program.outputs.iter();
         let broken = outputs.find(|output| {
-            !is_all(&self.before, Some(output)) && !is_all(&self.complete, Some(output))
+            !is_lost(output)
+                && !is_all(&self.before, Some(output))
+                && !is_all(&self.complete, Some(output))
         });
         broken.map(|output| format!("{output} is unfinished"))
     }
@@ -230,7 +268,9 @@ impl Subject<'_> {
     fn unfinished(&self, after: &Files) -> Option<String> {
         let is_temporary = |path: &Path| {
             let name = path.to_string_lossy();
-            path.starts_with(TMP) || name.contains(".tmp") || name.ends_with(".draft")
+            // The files of a case that fails are kept.
+            let is_kept = self.program.leaves == Leaves::Files && path.components().count() > 2;
+            is_kept || path.starts_with(TMP) || name.contains(".tmp") || name.ends_with(".draft")
         };
         let broken = after.keys().filter(|path| after[*path].is_some()).find(|path| {
             !is_temporary(path)

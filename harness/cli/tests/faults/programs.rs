@@ -21,8 +21,21 @@ pub struct Program {
     pub code: i32,
     /// Documented exit codes of a run that cannot read or write a file.
     pub refusals: &'static [i32],
+    /// Whether it may lose an old output that it is replacing, or keeps the files of a case that fails.
+    pub leaves: Leaves,
     /// What every line on its standard error begins with; none if a table on the standard output states what failed.
     pub prefix: Option<&'static str>,
+}
+
+/// What may be there after a failure, besides output that is as before or complete.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Leaves {
+    /// Nothing.
+    Nothing,
+    /// Neither the old nor the new output: they have several files.
+    NoOutput,
+    /// Complete files below the output, such as those of a case that fails.
+    Files,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -150,7 +163,17 @@ fn new(
     };
     let arguments = arguments.into();
     let prefix = Some(prefix);
-    Program { name, arguments, kind, outputs, varying: &[], code: 0, refusals, prefix }
+    Program {
+        name,
+        arguments,
+        kind,
+        outputs,
+        varying: &[],
+        code: 0,
+        refusals,
+        prefix,
+        leaves: Leaves::Nothing,
+    }
 }
 
 /// All programs. `with_mpi` adds those that run on MPI ranks.
@@ -178,10 +201,18 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             )
         },
         new("export .vtu", Harness, "export mesh a.vtu", &["a.vtu"]),
-        new("export .pvtu", Harness, "export mesh a.pvtu", &["a.pvtu", "a_pieces"]),
+        Program {
+            leaves: Leaves::NoOutput,
+            ..new("export .pvtu", Harness, "export mesh a.pvtu", &["a.pvtu", "a_pieces"])
+        },
         new("export .vtkhdf", Harness, "export mesh a.vtkhdf", &["a.vtkhdf"]),
         new("export .p8est", Harness, "export mesh a.p8est", &["a.p8est"]),
-        new("export polyMesh", Harness, "export mesh foam/constant/polyMesh", &["foam"]),
+        new(
+            "export polyMesh",
+            Harness,
+            "export mesh foam/constant/polyMesh",
+            &["foam/constant/polyMesh"],
+        ),
         new("import .vtkhdf", Harness, "import mesh/mesh.vtkhdf --sides side --out out", &["out"]),
         new(
             "import .p8est",
@@ -191,6 +222,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
         ),
         Program {
             varying: &["report"],
+            leaves: Leaves::Files,
             refusals: &[1, 2, 3],
             prefix: None,
             ..new("verify", Harness, verify, &["report"])
