@@ -159,6 +159,11 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
     record.report_status("done");
+    if args.stall_limit.is_some() {
+        // MPI ends without a limit of its own.
+        comm.enter("done");
+        comm.barrier();
+    }
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
