@@ -196,6 +196,11 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
     record.report_status("done");
+    if args.stall_limit.is_some() {
+        // MPI ends without a limit of its own.
+        comm.enter("done");
+        comm.barrier();
+    }
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
@@ -214,13 +219,11 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
     }
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
-    let on_json = |write: &dyn Fn(&Path) -> std::io::Result<()>| {
-        let named = |path: &Path, e| {
-            Error::output(format!("{}: {e}: choose another --json", path.display()))
-        };
+    let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
+        let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
         comm.agree(json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
-    on_json(&check_writable)?;
+    on_json("choose another --json", &check_writable)?;
     let case = mesher::comm::agree(comm, case(args))?;
     agreement::on_case(&case, comm)?;
     let options = Options {
@@ -242,6 +245,12 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
         Outcome::Meshed(Box::new(report))
     };
-    on_json(&|path| write_atomically(path, |to| write_json(to, &outcome)))?;
+    let advice = match options.out {
+        Some(_) if !args.plan => {
+            "the mesh is complete, only its report is missing; free disk space"
+        }
+        _ => "free disk space",
+    };
+    on_json(advice, &|path| write_atomically(path, |to| write_json(to, &outcome)))?;
     Ok(outcome)
 }

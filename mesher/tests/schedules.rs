@@ -83,7 +83,11 @@ fn explain(number: u64, serial: &Serial, run: &Run, got: Option<Result<Meshed, E
     let what = match (&serial.meshed, got) {
         (_, None) => "a rank panicked".to_owned(),
         (Ok(want), Some(Ok(got))) => {
-            format!("{}; {:?}", first_difference(&got.outcome.words, &want.outcome.words), got.reported)
+            format!(
+                "{}; {:?}",
+                first_difference(&got.outcome.words, &want.outcome.words),
+                got.reported
+            )
         }
         (want, Some(got)) => {
             let error = |m: &Result<Meshed, Error>| m.as_ref().err().map(Error::to_string);

@@ -152,7 +152,8 @@ pub fn write(case: &Small, folder: &Path, name: &str) -> PathBuf {
     text += &format!("seeds = {:?}\n", case.seeds);
     text += &format!("[root]\norigin = {:?}\nedge = {:?}\n", case.root.origin, case.root.edge);
     for b in &case.boxes {
-        text += &format!("[[box]]\nmin = {:?}\nmax = {:?}\nspacing = {:?}\n", b.min, b.max, b.spacing);
+        text +=
+            &format!("[[box]]\nmin = {:?}\nmax = {:?}\nspacing = {:?}\n", b.min, b.max, b.spacing);
     }
     let path = folder.join(format!("{name}.toml"));
     std::fs::write(&path, text).expect("the folder is writable");
