@@ -1,5 +1,6 @@
 //! P-values by permutation: how often a statistic is as large as observed if the residuals are in random order.
 
+use super::candidates::PLACES_MAX;
 use super::random::Random;
 
 /// Number of operations on segments for one test; the number of permutations is reduced to fit.
@@ -11,7 +12,8 @@ const PERMUTATIONS_MIN: usize = 199;
 /// Number of exceedances after which a p-value is known well enough.
 const EXCEEDANCES_MAX: usize = 50;
 
-/// Number of permutations after which a p-value is known well enough if it is below [`P_CLEAR`].
+/// Number of permutations after which a p-value is known well enough if it is below [`P_CLEAR`]. Those of at most
+/// [`PLACES_MAX`] values cost little, and all are drawn.
 const EARLY: usize = 99;
 
 /// A p-value this small decides every test, whatever more permutations would add. A statistic that follows the tail is so
@@ -59,7 +61,7 @@ impl Permutations {
             if as_clear > EXCEEDANCES_MAX {
                 return as_clear as f64 / (drawn + 1) as f64;
             }
-            if drawn == EARLY && as_clear == 1 {
+            if drawn == EARLY && as_clear == 1 && residuals.len() > PLACES_MAX {
                 let p = tail(&mut gains, observed);
                 if p < P_CLEAR {
                     return p;
