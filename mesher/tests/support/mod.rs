@@ -12,6 +12,9 @@ use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};
 
 pub mod draw;
+pub mod fibres;
+pub mod orders;
+pub mod schedules;
 pub mod symmetry;
 
 // Each test uses some of these.
@@ -196,7 +199,7 @@ pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {
-    Options { division, ungraded, out: None, check: false, weight_exposed: None }
+    Options { division, ungraded, out: None, check: false, weight_exposed: None, force: true }
 }
 
 /// Describes the first leaf that differs.

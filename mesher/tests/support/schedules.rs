@@ -1,0 +1,174 @@
+//! Small cases drawn from a number, the same mesh on simulated ranks and on one rank, and the command that repeats a schedule.
+#![allow(dead_code, missing_docs)]
+
+use super::draw::{leaky_on_rays, soup, thin};
+use super::fibres::Fibres;
+use super::{Outcome, Run, Small, options, small};
+use mesher::case::Case;
+use mesher::comm::sim::{Adversary, Schedule, Sim};
+use mesher::comm::{Comm, Solo};
+use mesher::error::Error;
+use mesher::record::Recorder;
+use mesher::sides::Summary;
+use mesher::{Options, mesh, words};
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// What must not depend on the schedule.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Meshed {
+    pub outcome: Outcome,
+    /// Digest and number of cells in the report, if it was asked for.
+    pub reported: Option<(String, u64)>,
+}
+
+/// A case, and its mesh on one rank.
+pub struct Serial {
+    pub small: Small,
+    pub case: Rc<Case>,
+    pub meshed: Result<Meshed, Error>,
+}
+
+impl Serial {
+    pub fn new(small: Small) -> Self {
+        let case = Rc::new(small.mesher_case());
+        let meshed = merge(vec![part(&case, &options(Run::SOLO.division, false), true, &Solo)]);
+        Self { small, case, meshed }
+    }
+
+    /// Whether this is the mesh of the case.
+    pub fn equals(&self, got: &Result<Meshed, Error>) -> bool {
+        match (got, &self.meshed) {
+            (Ok(got), Ok(want)) => {
+                got.outcome == want.outcome
+                    && (got.reported.is_none() || got.reported == want.reported)
+            }
+            (Err(got), Err(want)) => got == want,
+            _ => false,
+        }
+    }
+
+    /// The mesh on the ranks of a run, as coroutines, each of which communicates through what `wrap` makes of its rank. With all phases,
+    /// the report and the checks of invariants if `whole` is true, otherwise with phases 1 to 8.
+    pub fn on_ranks(
+        &self,
+        fibres: &mut Fibres,
+        run: &Run,
+        schedule: impl Schedule + 'static,
+        whole: bool,
+        wrap: impl Fn(&Sim, &mut dyn FnMut(&dyn Comm)) + 'static,
+    ) -> Result<Meshed, Error> {
+        let case = self.case.clone();
+        let options = Options { check: whole, ..options(run.division, false) };
+        let parts = fibres.run(run.ranks, schedule, move |sim: &Sim| {
+            let mut result = None;
+            let mut work = |comm: &dyn Comm| result = Some(part(&case, &options, whole, comm));
+            // Counting messages needs the clocks, which take longer than passing the token on.
+            sim.uncounted(&mut || wrap(sim, &mut work));
+            result.expect("the work has been done")
+        });
+        merge(parts)
+    }
+
+    /// The same under the schedule of the run's seed.
+    pub fn on_seed(&self, fibres: &mut Fibres, run: &Run, whole: bool) -> Result<Meshed, Error> {
+        let schedule = Adversary::new(run.seed, run.ranks);
+        self.on_ranks(fibres, run, schedule, whole, |sim, work| work(sim))
+    }
+}
+
+type Part = Result<(Vec<u64>, Summary, Option<(String, u64)>), Error>;
+
+/// A rank's part of the mesh.
+fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
+    let reported = match whole {
+        false => None,
+        true => {
+            let report = mesh(case, options, comm, &mut Recorder::default())?;
+            Some((report.digest, report.cells))
+        }
+    };
+    let (words, summary) = words(case, options, comm)?;
+    Ok((words, summary, reported))
+}
+
+fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
+    let (mut all, mut same) = (Vec::new(), None);
+    for part in parts {
+        let (words, common) = match part {
+            Ok((words, summary, reported)) => (words, Ok((summary, reported))),
+            Err(e) => (Vec::new(), Err(e)),
+        };
+        all.extend(words);
+        assert!(*same.get_or_insert(common.clone()) == common, "ranks must agree on the result");
+    }
+    all.sort_unstable();
+    let (summary, reported) = same.expect("at least one rank")?;
+    Ok(Meshed { outcome: Outcome { words: all, summary }, reported })
+}
+
+/// Draws a value that depends on the number alone.
+pub fn drawn<T: std::fmt::Debug>(strategy: &impl Strategy<Value = T>, number: u64) -> T {
+    let mut seed = [0; 32];
+    seed[..8].copy_from_slice(&number.to_le_bytes());
+    let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let mut runner = TestRunner::new_with_rng(Config::default(), rng);
+    strategy.new_tree(&mut runner).expect("the strategies reject nothing").current()
+}
+
+/// Cases of all kinds, some with seeds.
+pub fn cases() -> impl Strategy<Value = Small> {
+    let case = prop_oneof![3 => small(soup()), 1 => thin(), 1 => leaky_on_rays()];
+    let point = [0.0f64..64.0, 0.0f64..64.0, 0.0f64..64.0];
+    let seeds = prop_oneof![3 => Just(vec![]), 1 => prop::collection::vec(point, 1..3)];
+    (case, seeds).prop_map(|(case, seeds)| Small { seeds, ..case })
+}
+
+/// The first case of at most `cells` cells that is drawn from a number.
+pub fn case(strategy: &impl Strategy<Value = Small>, number: u64, cells: usize) -> Serial {
+    let tries = (0..).map(|again| Serial::new(drawn(strategy, number ^ again << 48)));
+    let is_small = |s: &Serial| s.meshed.as_ref().map_or(true, |m| m.outcome.words.len() <= cells);
+    tries.into_iter().find(is_small).expect("small cases are frequent")
+}
+
+/// Writes the case for the mesher's program; returns the path of the case file.
+pub fn write(case: &Small, folder: &Path, name: &str) -> PathBuf {
+    std::fs::create_dir_all(folder).expect("the folder can be made");
+    let mut bytes = Vec::new();
+    geometries::write_stl_binary(&case.facets, &mut bytes).expect("memory can be written to");
+    std::fs::write(folder.join(format!("{name}.stl")), bytes).expect("the folder is writable");
+    let lower = |value: String| value.to_lowercase();
+    let mut text = format!(
+        "geometry = \"{name}.stl\"\nspacing_min = {:?}\nlayer_cells_min = {}\nkeep = \"{}\"\nkeep_crossing = {}\n",
+        case.spacing_min,
+        case.layer_cells_min,
+        lower(format!("{:?}", case.keep)),
+        case.keep_crossing,
+    );
+    text += &format!("enclosed = \"{}\"\n", lower(format!("{:?}", case.enclosed)));
+    text += &format!("seeds = {:?}\n", case.seeds);
+    text += &format!("[root]\norigin = {:?}\nedge = {:?}\n", case.root.origin, case.root.edge);
+    for b in &case.boxes {
+        text +=
+            &format!("[[box]]\nmin = {:?}\nmax = {:?}\nspacing = {:?}\n", b.min, b.max, b.spacing);
+    }
+    let path = folder.join(format!("{name}.toml"));
+    std::fs::write(&path, text).expect("the folder is writable");
+    path
+}
+
+/// The options of the mesher's program for a run.
+pub fn run_words(run: &Run) -> String {
+    let lower = |value: String| value.to_lowercase();
+    let base = run.division.level_base.map_or("auto".to_owned(), |l| l.to_string());
+    format!(
+        "--comm sim:{}:{} --partitioner {} --weights {} --level-base {base} --check",
+        run.ranks,
+        run.seed,
+        lower(format!("{:?}", run.division.partitioner)),
+        lower(format!("{:?}", run.division.weights)),
+    )
+}
