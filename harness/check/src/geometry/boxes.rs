@@ -1,6 +1,6 @@
 //! A binary tree of bounding boxes over facets.
 //!
-//! Facets are sorted along the Morton curve of their centres and grouped by `GROUP`; the groups are the
+//! Facets are sorted along the Morton curve of their centres, after the directions of their normals if asked, and grouped by `GROUP`; the groups are the
 //! leaves of a complete tree. Every node encloses its facets and their unit normals in boxes.
 
 use std::ops::Range;
@@ -37,10 +37,12 @@ impl Bounds {
 
     fn of(facet: &FacetLattice) -> Self {
         let unit = unit_normal(facet).map(|x| x as f32);
+        // Bounds on what was rounded.
+        let [normal_low, normal_high] = [unit.map(f32::next_down), unit.map(f32::next_up)];
         let fold = |f: fn(i64, i64) -> i64| -> [i32; 3] {
             std::array::from_fn(|a| f(f(facet[0][a], facet[1][a]), facet[2][a]) as i32)
         };
-        Self { low: fold(i64::min), high: fold(i64::max), normal_low: unit, normal_high: unit }
+        Self { low: fold(i64::min), high: fold(i64::max), normal_low, normal_high }
     }
 
     fn union(&self, other: &Self) -> Self {
@@ -108,6 +110,13 @@ pub fn unit_normal(facet: &FacetLattice) -> [f64; 3] {
     if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
 }
 
+/// The direction along an axis that is nearest to the normal, from 0 to 5.
+fn direction(facet: &FacetLattice) -> u8 {
+    let n = normal(facet);
+    let longest = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
+    2 * longest as u8 + u8::from(n[longest] > 0)
+}
+
 /// The tree.
 #[derive(Debug)]
 pub struct Boxes {
@@ -123,17 +132,29 @@ pub struct Boxes {
 impl Boxes {
     /// The tree over those of at least one facet that have an area.
     pub fn new(lattice: &[FacetLattice]) -> Self {
-        Self::of(lattice, |facet| !is_degenerate(facet))
+        Self::of(lattice, |facet| !is_degenerate(facet), |_| 0)
+    }
+
+    /// The same tree, but facets with other normals are far apart in its order. On a wing that is thin, bounds on the normals
+    /// of nodes would else be those of both its sides.
+    pub fn by_normal(lattice: &[FacetLattice]) -> Self {
+        Self::of(lattice, |facet| !is_degenerate(facet), direction)
     }
 
     /// The tree over all of at least one facet.
     pub fn of_all(lattice: &[FacetLattice]) -> Self {
-        Self::of(lattice, |_| true)
+        Self::of(lattice, |_| true, |_| 0)
     }
 
-    fn of(lattice: &[FacetLattice], is_included: impl Fn(&FacetLattice) -> bool) -> Self {
+    fn of(
+        lattice: &[FacetLattice],
+        is_included: impl Fn(&FacetLattice) -> bool,
+        class: impl Fn(&FacetLattice) -> u8,
+    ) -> Self {
         let code = codes(lattice);
-        let key = |(i, facet): (usize, &FacetLattice)| u128::from(code(facet)) << 32 | i as u128;
+        let key = |(i, facet): (usize, &FacetLattice)| {
+            u128::from(class(facet)) << 96 | u128::from(code(facet)) << 32 | i as u128
+        };
         let included = lattice.iter().enumerate().filter(|(_, facet)| is_included(facet));
         let mut keys: Vec<u128> = included.map(key).collect();
         keys.sort_unstable();

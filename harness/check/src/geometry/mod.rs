@@ -52,19 +52,18 @@ impl Default for Options {
 pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
     let edges = Edges::new(&input.facets);
     let shells = shells::shells(&edges);
-    let boxes = (options.intersections || input.cell.is_some()).then(|| Boxes::new(&input.lattice));
     let mut findings: Vec<Finding> = Vec::new();
     findings.extend(openings::openings(input, &edges, options.first));
     findings.extend(edges::findings(input, &edges, options.first));
     findings.push(facets::duplicates(input, &edges, options.first));
     findings.extend(facets::shapes(input, options.first));
-    if let Some(boxes) = boxes {
-        if options.intersections {
-            findings.extend(intersections::intersections(input, &boxes, options.first));
-        }
-        if let Some(cell) = input.cell {
-            findings.extend(sheets::sheets(input, &edges, &boxes, cell, options.first));
-        }
+    if options.intersections {
+        let boxes = Boxes::new(&input.lattice);
+        findings.extend(intersections::intersections(input, &boxes, options.first));
+    }
+    if let Some(cell) = input.cell {
+        let boxes = Boxes::by_normal(&input.lattice);
+        findings.extend(sheets::sheets(input, &edges, &boxes, cell, options.first));
     }
     findings.extend(extent::findings(input, options.first));
     Diagnosis::new(input, &edges, shells, findings, options.first)

@@ -17,11 +17,22 @@ use super::intersections::{Relation, relation};
 /// The cosine of 60 degrees.
 const COSINE: f64 = 0.5;
 
+/// No position.
+const NONE: usize = usize::MAX;
+
 /// The nearest opposite facet on one side, as far as known.
 #[derive(Clone, Copy)]
 struct Opposite {
     squared: f64,
-    facet: u32,
+    /// Position in the tree of boxes.
+    position: usize,
+    at: [f64; 3],
+}
+
+/// A facet with its nearest opposite facet.
+struct Sheet {
+    squared: f64,
+    facets: [u32; 2],
     at: [f64; 3],
 }
 
@@ -34,12 +45,21 @@ pub fn sheets(
     first: usize,
 ) -> [Finding; 2] {
     let unit = input.root.edge / UNITS_PER_EDGE as f64;
-    let none = Opposite { squared: (cell / unit).powi(2), facet: u32::MAX, at: [0.0; 3] };
-    let mut found: [Vec<(u32, Opposite)>; 2] = Default::default();
+    let none = Opposite { squared: (cell / unit).powi(2), position: NONE, at: [0.0; 3] };
+    let mut found: [Vec<Sheet>; 2] = Default::default();
     let mut best: Vec<[Opposite; 2]> = Vec::new();
+    let mut candidates: Vec<usize> = Vec::new();
     for (bounds, group) in boxes.groups() {
+        // The opposite facets of the previous group are near this one's, and few others are nearer.
+        candidates.clear();
+        candidates.extend(best.iter().flatten().map(|b| b.position).filter(|&j| j != NONE));
+        candidates.sort_unstable();
+        candidates.dedup();
         best.clear();
         best.resize(group.len(), [none; 2]);
+        for (i, best) in group.clone().zip(&mut best) {
+            candidates.iter().for_each(|&j| improve(input, edges, boxes, i, j, best));
+        }
         boxes.search(
             |node, members| {
                 let limits = [0, 1].map(|s| best.iter().map(|b| b[s].squared).fold(0.0, f64::max));
@@ -58,8 +78,13 @@ pub fn sheets(
         );
         for (i, best) in group.zip(&best) {
             for side in 0..2 {
-                if best[side].facet != u32::MAX {
-                    found[side].push((boxes.facets[i], best[side]));
+                let Opposite { squared, position, at } = best[side];
+                if position != NONE {
+                    found[side].push(Sheet {
+                        squared,
+                        facets: [i, position].map(|i| boxes.facets[i]),
+                        at,
+                    });
                 }
             }
         }
@@ -70,7 +95,7 @@ pub fn sheets(
 
 /// Whether the facets of two nodes may be opposite within the given squared distances, as wall or as gap.
 fn may_oppose(group: &Bounds, node: &Bounds, limits: [f64; 2]) -> bool {
-    // The bounds on normals are rounded.
+    // Sums of f32 are rounded.
     if f64::from(group.cosine_min(node)) > 1e-5 - COSINE {
         return false;
     }
@@ -78,8 +103,13 @@ fn may_oppose(group: &Bounds, node: &Bounds, limits: [f64; 2]) -> bool {
     if squared >= limits[0].max(limits[1]) {
         return false;
     }
-    let (least, greatest) = group.height_range(node);
-    (least <= 0.0 && squared < limits[0]) || (greatest >= 0.0 && squared < limits[1])
+    // The shortest line is no shorter than this, and is within 60 degrees of the normals of both: each facet is as far below
+    // the other one, or above it.
+    let height = (COSINE - 1e-9) * squared.sqrt();
+    let ranges = [group.height_range(node), node.height_range(group)];
+    let is_below = || ranges.iter().all(|&(least, _)| least <= -height);
+    let is_above = || ranges.iter().all(|&(_, greatest)| greatest >= height);
+    (squared < limits[0] && is_below()) || (squared < limits[1] && is_above())
 }
 
 /// Updates the nearest wall and gap of the facet at position `i` with the one at position `j`.
@@ -117,7 +147,7 @@ fn improve(
     let is_opposite = along_n.abs() >= limit && along_m.abs() >= limit && along_n * along_m < 0.0;
     if squared < best[side].squared && is_opposite && relation(a, b, true) == Relation::Disjoint {
         let at = std::array::from_fn(|x| (p[x] + q[x]) / 2.0);
-        best[side] = Opposite { squared, facet: g, at };
+        best[side] = Opposite { squared, position: j, at };
     }
 }
 
@@ -130,21 +160,18 @@ fn is_beyond(a: &[[f64; 3]; 3], n: [f64; 3], b: &[[f64; 3]; 3], limits: [f64; 2]
         || (greatest < 0.0 && greatest * greatest >= limits[0])
 }
 
-fn finding(
-    input: &Input,
-    kind: Kind,
-    found: &mut Vec<(u32, Opposite)>,
-    unit: f64,
-    first: usize,
-) -> Finding {
+fn finding(input: &Input, kind: Kind, found: &mut Vec<Sheet>, unit: f64, first: usize) -> Finding {
     let count = found.len() as u64;
-    let pair = |(f, o): &(u32, Opposite)| (*f.min(&o.facet), *f.max(&o.facet));
-    found.sort_by(|a, b| a.1.squared.total_cmp(&b.1.squared).then(pair(a).cmp(&pair(b))));
-    found.dedup_by_key(|entry| pair(entry));
-    let place = |entry: &(u32, Opposite)| {
-        let (f, g) = pair(entry);
-        let width = entry.1.squared.sqrt() * unit;
-        let at = entry.1.at.map(|c| c.round() as i64);
+    let pair = |sheet: &Sheet| {
+        let [f, g] = sheet.facets;
+        (f.min(g), f.max(g))
+    };
+    found.sort_by(|a, b| a.squared.total_cmp(&b.squared).then(pair(a).cmp(&pair(b))));
+    found.dedup_by_key(|sheet| pair(sheet));
+    let place = |sheet: &Sheet| {
+        let (f, g) = pair(sheet);
+        let width = sheet.squared.sqrt() * unit;
+        let at = sheet.at.map(|c| c.round() as i64);
         Place {
             width: Some(width),
             width_cells: input.in_cells(width),
