@@ -64,7 +64,7 @@ fn the_plan_of_a_case_with_few_cells_is_its_mesh() {
 fn what_a_refusal_recommends_fits() {
     let workspace = Workspace::new();
     workspace.write("case.toml", boxed(0.1, 0.0016));
-    let limit = 80_000;
+    let limit = 40_000;
     let args = ["case.toml", "--out", "mesh"];
     let refused = run(workspace.enter(limited(limit, &args)));
     refused.refuses(MEMORY, &["address space", "multiply all spacings"]);
