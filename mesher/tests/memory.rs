@@ -64,7 +64,7 @@ fn the_plan_of_a_case_with_few_cells_is_its_mesh() {
 fn what_a_refusal_recommends_fits() {
     let workspace = Workspace::new();
     workspace.write("case.toml", boxed(0.1, 0.0016));
-    let limit = 80_000;
+    let limit = 40_000;
     let args = ["case.toml", "--out", "mesh"];
     let refused = run(workspace.enter(limited(limit, &args)));
     refused.refuses(MEMORY, &["address space", "multiply all spacings"]);
@@ -130,7 +130,7 @@ fn a_rank_without_enough_memory_ends_all_ranks() {
     let body = BODY.replace("1280", "5242880");
     workspace.write("case.toml", format!("spacing_min = 0.5\n{body}"));
     // Rank 0 generates the facets; 300 MB are too little to start MPI.
-    for kib in [300_000, 500_000, 600_000, 700_000] {
+    for kib in [300_000, 500_000, 550_000, 600_000] {
         let mut command = Command::new("mpirun");
         let args = [&["case.toml"], &OUTPUT[..]].concat();
         let limited = limited(kib, &args);
