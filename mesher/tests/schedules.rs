@@ -42,7 +42,7 @@ fn runs() -> impl Strategy<Value = Run> {
 #[test]
 fn schedules_do_not_change_the_mesh() {
     let (first, count) = (from_env("SCHEDULES_FIRST", 0), from_env("SCHEDULES", 2000));
-    let (cases, runs) = (cases().boxed(), runs().boxed());
+    let (cases, runs) = (cases(), runs().boxed());
     let mut fibres = Fibres::default();
     let mut serial: Option<(u64, Serial)> = None;
     let (mut by_ranks, mut cells, mut refused) = (BTreeMap::<usize, u64>::new(), 0, 0);
@@ -83,7 +83,11 @@ fn explain(number: u64, serial: &Serial, run: &Run, got: Option<Result<Meshed, E
     let what = match (&serial.meshed, got) {
         (_, None) => "a rank panicked".to_owned(),
         (Ok(want), Some(Ok(got))) => {
-            format!("{}; {:?}", first_difference(&got.outcome.words, &want.outcome.words), got.reported)
+            format!(
+                "{}; {:?}",
+                first_difference(&got.outcome.words, &want.outcome.words),
+                got.reported
+            )
         }
         (want, Some(got)) => {
             let error = |m: &Result<Meshed, Error>| m.as_ref().err().map(Error::to_string);
