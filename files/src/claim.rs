@@ -72,6 +72,13 @@ fn names_of(name: &str) -> [CString; 2] {
         .map(|name| CString::new(name).expect("output files have names without NUL"))
 }
 
+/// Whether a directory has a single entry.
+fn is_alone(path: &Path) -> io::Result<bool> {
+    let mut entries = fs::read_dir(path)?;
+    entries.next().transpose()?;
+    Ok(entries.next().transpose()?.is_none())
+}
+
 impl Claim {
     /// Claims a directory, which must be empty or not exist; its parent must exist. In one process of the run. `last` is the name of
     /// the file that is written last, `others` are the names of all others that this and other processes will write.
@@ -89,18 +96,26 @@ impl Claim {
                     Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e.into()),
                     created => created.is_ok(),
                 };
+                // A directory that another run has claimed since then is not empty, and stays.
+                let give_up = |error| {
+                    if is_new {
+                        let _ = fs::remove_dir(path);
+                    }
+                    Err(error)
+                };
                 match Self::open(path, last, OFlags::CREATE | OFlags::EXCL) {
                     // Another run has removed the directory since then.
                     Err(Errno::NOENT) => {}
                     Err(Errno::EXIST) => return Err(ClaimError::Claimed),
-                    Err(e) => return Err(e.into()),
+                    Err(e) => return give_up(e.into()),
                     Ok((dir, file)) => {
                         let names = names_of(last);
-                        if fs::read_dir(path)?.count() > 1 {
-                            unlinkat(&dir, &names[0], AtFlags::empty())?;
-                            return Err(ClaimError::NotEmpty);
+                        let is_alone = is_alone(path);
+                        if let Ok(true) = is_alone {
+                            return Ok(Self::new(path, dir, (file, names), others, is_new)?);
                         }
-                        return Ok(Self::new(path, dir, (file, names), others, is_new)?);
+                        let _ = unlinkat(&dir, &names[0], AtFlags::empty());
+                        return give_up(is_alone.map_or_else(Into::into, |_| ClaimError::NotEmpty));
                     }
                 }
             }
@@ -175,8 +190,16 @@ impl Claim {
         fill(&mut out)?;
         out.into_inner()?.sync_all()?;
         rename_to_new(self.dir.as_fd(), draft, name)?;
-        unfinished::complete();
-        Ok(rustix::fs::fsync(&self.dir)?)
+        match rustix::fs::fsync(&self.dir) {
+            // Some network file systems cannot.
+            Ok(()) | Err(Errno::INVAL) => unfinished::complete(),
+            Err(e) => {
+                // Without its last file the directory is unfinished, and will be removed.
+                let _ = unlinkat(&self.dir, name, AtFlags::empty());
+                return Err(e.into());
+            }
+        }
+        Ok(())
     }
 
     /// Keeps the files. In every process of the run, after [`commit`](Self::commit).

@@ -5,7 +5,7 @@
 //! of the mesher.
 
 use crate::case::Case;
-use crate::comm::Comm;
+use crate::comm::{Comm, uncounted};
 use crate::error::Error;
 use crate::ingest::Source;
 use std::fs::File;
@@ -46,12 +46,6 @@ pub fn on_case(case: &Case, comm: &dyn Comm) -> Result<(), Error> {
             _ => Ok(()),
         }
     })
-}
-
-fn uncounted<T>(comm: &dyn Comm, body: impl FnOnce() -> T) -> T {
-    let (mut body, mut result) = (Some(body), None);
-    comm.uncounted(&mut || result = body.take().map(|body| body()));
-    result.expect("the body was run")
 }
 
 /// An error with the first difference between the words of rank 0 and those of the first rank that has others. Collective.

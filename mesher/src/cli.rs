@@ -20,8 +20,9 @@ pub const UNPRINTED: i32 = 4;
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
-/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 75 a
-/// rank exceeded --stall-limit, 130 interrupted by SIGINT, SIGTERM or SIGHUP. Unless the code is 0, no file of the mesh remains.
+/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
+/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by SIGINT, SIGTERM or
+/// SIGHUP. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
@@ -63,6 +64,12 @@ pub struct Args {
     /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated
     #[arg(long)]
     pub check: bool,
+    /// Make no mesh: print what the run would take, in cells, time, memory and files, from pilot runs at coarser spacings
+    #[arg(long, conflicts_with_all = ["message_matrix", "weight_exposed"])]
+    pub plan: bool,
+    /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
+    #[arg(long)]
+    pub force: bool,
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,

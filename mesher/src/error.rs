@@ -1,8 +1,11 @@
 //! Errors that a user can correct; bugs panic instead.
 //!
-//! Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 130 interrupted.
+//! Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 130 interrupted.
 
 use thiserror::Error;
+
+/// Exit code of a run that does not fit into memory, or that ran out of it.
+pub const OUT_OF_MEMORY: i32 = 71;
 
 /// An error with a message of one sentence: what, where, what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -13,6 +16,9 @@ pub enum Error {
     /// Output could not be written.
     #[error("{0}")]
     Output(String),
+    /// The memory does not suffice.
+    #[error("{0}")]
+    Memory(String),
 }
 
 impl Error {
@@ -26,11 +32,17 @@ impl Error {
         Self::Output(message.into())
     }
 
+    /// An [`Error::Memory`].
+    pub fn memory(message: impl Into<String>) -> Self {
+        Self::Memory(message.into())
+    }
+
     /// The process's exit code.
     pub fn exit_code(&self) -> i32 {
         match self {
             Self::Input(_) => 2,
             Self::Output(_) => 4,
+            Self::Memory(_) => OUT_OF_MEMORY,
         }
     }
 }

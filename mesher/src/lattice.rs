@@ -180,15 +180,6 @@ pub struct ExtentBox {
 }
 
 impl ExtentBox {
-    /// The number of octants of the box's level that lie in the box. All of them are leaves of the base tree, or split.
-    fn octants_contained(&self) -> f64 {
-        let edge = ROOT_EDGE >> self.level;
-        let along = |a: usize| {
-            (self.max[a].div_euclid(edge) - (self.min[a] + edge - 1).div_euclid(edge)).max(0)
-        };
-        (0..3).map(|a| along(a) as f64).product()
-    }
-
     /// Whether the interiors of the box and of the cube with minimum corner `corner` and edge `h` meet.
     #[inline]
     pub fn meets(&self, corner: [i64; 3], h: i64) -> bool {
@@ -293,27 +284,7 @@ impl Rules {
             .map(|b| b.level)
             .fold(self.level_surface, Level::max)
     }
-
-    /// Refuses extent boxes that alone ask for more cells than any memory holds.
-    ///
-    /// # Errors
-    /// If a box contains more than [`CELLS_MAX`] octants of its level for each of `ranks` ranks.
-    pub fn check_size(&self, ranks: usize) -> Result<(), Error> {
-        for (number, b) in self.boxes.iter().enumerate() {
-            let cells = b.octants_contained();
-            if cells > CELLS_MAX * ranks as f64 {
-                return Err(Error::input(format!(
-                    "the mesh would have {cells:.1e} cells in box {number} alone, but a rank cannot hold more than {CELLS_MAX:.0e}: \
-                     increase the box's spacing or make it smaller"
-                )));
-            }
-        }
-        Ok(())
-    }
 }
-
-/// Number of cells that are beyond the memory of any machine that runs a rank: at 0.2 bytes per cell of a uniform region, 200 GB.
-pub const CELLS_MAX: f64 = 1e12;
 
 #[cfg(test)]
 mod tests {

@@ -28,6 +28,7 @@ pub mod leaves;
 mod mesh;
 pub mod octant;
 pub mod partition;
+pub mod plan;
 pub mod quantise;
 pub mod record;
 pub mod refine;
@@ -46,12 +47,21 @@ use case::Case;
 use check::debug_check;
 use comm::Comm;
 use error::Error;
+use facet::Facet;
 use kept::Kept;
+use lattice::{Bounds, Rules};
+use octant::Level;
 use partition::base_leaves::cells_heaviest;
+use partition::cost::Counts;
 use partition::initial::{self, Partition};
+use partition::ownership::Ownership;
 use partition::repartition::{self, LeafCounts, Sets};
+use plan::pilot::{Amounts, Collector};
+use plan::{Plan, Volumes};
 use record::Recorder;
 use report::{Counters, Report};
+use std::borrow::Borrow;
+use tree::Tree;
 use voxelise::BinnedFacets;
 use write::OutDir;
 
@@ -118,6 +128,100 @@ pub fn words(
     Ok((words, mesh.sides.summary))
 }
 
+/// The plan of a case: what a run with these options takes. Makes pilot runs and no mesh. Collective.
+///
+/// # Errors
+/// The same on all ranks.
+pub fn plan(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<Plan, Error> {
+    let quantised = quantised(case, options, comm, record)?;
+    let volumes = Volumes::new(&quantised.rules.boxes);
+    record.report_status("plan");
+    plan::of_case(&quantised.problem(case, &volumes, comm, record), &mut |shift| {
+        pilot(&quantised, &volumes, shift, options, comm)
+    })
+}
+
+/// The result of phases 1 and 2 on a rank.
+struct Quantised {
+    rules: Rules,
+    bounds: Bounds,
+    facets: Vec<Facet>,
+    facets_total: u64,
+}
+
+impl Quantised {
+    fn problem<'a>(
+        &'a self,
+        case: &Case,
+        volumes: &'a Volumes,
+        comm: &'a dyn Comm,
+        record: &Recorder,
+    ) -> plan::Problem<'a> {
+        plan::Problem {
+            rules: &self.rules,
+            bounds: &self.bounds,
+            facets: &self.facets,
+            facets_total: self.facets_total,
+            spacing_min: case.spacing_min,
+            volumes,
+            time_cpu_s: record.phases().iter().map(|p| p.time_cpu_s).sum(),
+            comm,
+        }
+    }
+}
+
+/// Phases 1 and 2. Collective.
+fn quantised(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+) -> Result<Quantised, Error> {
+    // 1. Read: each rank reads its slice of the facets.
+    let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
+    debug_check(options, comm, || check::slices(&slice, comm));
+    let facets_total = slice.total;
+
+    // 2. Quantise: the facets and the rules on the lattice.
+    let (rules, bounds, facets) =
+        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
+    debug_check(options, comm, || check::rules(&rules, comm));
+    Ok(Quantised { rules, bounds, facets, facets_total })
+}
+
+/// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
+fn pilot(
+    quantised: &Quantised,
+    volumes: &Volumes,
+    shift: Level,
+    options: &Options,
+    comm: &dyn Comm,
+) -> Result<Amounts, Error> {
+    let options = Options { check: false, out: None, weight_exposed: None, ..options.clone() };
+    let run = |rules: Rules| {
+        let (mut record, mut counters) = (Recorder::default(), Counters::default());
+        let mut collector = Collector::default();
+        let count = &mut |tree: &Tree, ownership: &Ownership| {
+            collector.base_tree(tree, &Counts::of_rank(tree, ownership));
+        };
+        let facets = (&quantised.facets[..], quantised.facets_total);
+        let mesh = grow(facets, rules, &options, comm, &mut record, &mut counters, count)?;
+        let (_, written) = record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
+        Ok(collector.finish(&mesh, written.leaves, &counters, &record, volumes))
+    };
+    let rules = plan::pilot::coarser(&quantised.rules, shift);
+    match run(rules.clone()) {
+        // A seed may lie in a coarser cell that crosses.
+        Err(_) if shift > 0 && !rules.seeds.is_empty() => run(Rules { seeds: Vec::new(), ..rules }),
+        result => result,
+    }
+}
+
 /// Phases 1 to 8, which make the tree. Collective.
 fn make(
     case: &Case,
@@ -126,41 +230,56 @@ fn make(
     record: &mut Recorder,
     counters: &mut Counters,
 ) -> Result<Mesh, Error> {
+    let quantised = quantised(case, options, comm, record)?;
+    let volumes = Volumes::new(&quantised.rules.boxes);
+    let planned = plan::before_run(
+        &quantised.problem(case, &volumes, comm, record),
+        options.force,
+        record.shows_progress(),
+        &mut |shift| pilot(&quantised, &volumes, shift, options, comm),
+    )?;
+    if let Some(plan) = planned {
+        record.report_plan(&plan.line());
+    }
+    let Quantised { rules, facets, facets_total, .. } = quantised;
+    grow((facets, facets_total), rules, options, comm, record, counters, &mut |_, _| {})
+}
+
+/// Phases 3 to 8: from this rank's facets, and the number of all, to the tree. `count` sees the base tree. Collective.
+fn grow<F: Borrow<[Facet]>>(
+    (facets, facets_total): (F, u64),
+    rules: Rules,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+    counters: &mut Counters,
+    count: &mut dyn FnMut(&Tree, &Ownership),
+) -> Result<Mesh, Error> {
     let division = &options.division;
     let is_parallel = comm.size() > 1;
 
-    // 1. Read: each rank reads its slice of the facets.
-    let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
-    debug_check(options, comm, || check::slices(&slice, comm));
-    let facets_total = slice.total;
-
-    // 2. Quantise: the facets and the rules on the lattice.
-    let (rules, facets) =
-        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
-    debug_check(options, comm, || check::rules(&rules, comm));
-
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
     let mark = |level| {
-        let (tree, work) = refine::refine_top(&facets, &rules, level);
+        let (tree, work) = refine::refine_top(facets.borrow(), &rules, level);
         counters.add_voxelised(&work);
         tree.split
     };
     let Partition { mut ownership, base_leaves, level_base } = match is_parallel {
         false => Partition::solo(),
         true => record.phase("base tree", comm, || {
-            initial::partition(&facets, &rules, division, mark, comm)
+            initial::partition(facets.borrow(), &rules, division, mark, comm)
         })?,
     };
     debug_check(options, comm, || check::ownership(&ownership, comm));
 
     // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
     let routed = is_parallel
-        .then(|| record.phase("route", comm, || refine::route(&facets, &ownership, comm)));
+        .then(|| record.phase("route", comm, || refine::route(facets.borrow(), &ownership, comm)));
     if let Some(routed) = &routed {
-        debug_check(options, comm, || check::facets(&facets, routed, &ownership, comm));
+        debug_check(options, comm, || check::facets(facets.borrow(), routed, &ownership, comm));
     }
     let (mut tree, work) = record.phase("refine", comm, || {
-        let binned = BinnedFacets::new(routed.as_ref().unwrap_or(&facets));
+        let binned = BinnedFacets::new(routed.as_deref().unwrap_or(facets.borrow()));
         drop(routed);
         if check::is_on(options) {
             binned.check_invariants();
@@ -184,9 +303,11 @@ fn make(
         check::base_tree(&tree, &rules, &ownership, comm);
     });
 
+    count(&tree, &ownership);
+
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let sides = record.phase("sides", comm, || {
-        sides::decide(&tree, &ownership, &facets, &rules, options.ungraded, comm)
+        sides::decide(&tree, &ownership, facets.borrow(), &rules, options.ungraded, comm)
     })?;
     debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
     drop(facets);
@@ -265,4 +386,79 @@ fn repartition_by_leaves(
         mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
     }
     max
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::{Solo, sim};
+    use crate::lattice::{Enclosed, Keep};
+    use crate::partition::{Division, Partitioner, Weights};
+    use case::{BoxSpec, RootSpec};
+    use geometries::{Generator, Shape};
+
+    fn case() -> Case {
+        let extent = BoxSpec { min: [-0.2; 3], max: [0.9, 0.2, 0.2], spacing: 0.03 };
+        Case {
+            source: ingest::Source::Generated(Generator::new(Shape::Sphere, 1280)),
+            spacing_min: 0.01,
+            layer_cells_min: 4,
+            keep: Keep::Outside,
+            keep_crossing: true,
+            root: RootSpec::Scale(4.0),
+            boxes: vec![extent],
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
+        }
+    }
+
+    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
+    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+        let division = Division {
+            partitioner: Partitioner::Morton,
+            weights: Weights::Rebalance,
+            level_base: None,
+        };
+        let (ungraded, out, check, weight_exposed) = (false, None, false, None);
+        let options = Options { division, ungraded, out, check, weight_exposed, force: true };
+        let on_rank = |comm: &dyn Comm| {
+            let quantised = quantised(&case(), &options, comm, &mut Recorder::default()).unwrap();
+            let volumes = Volumes::new(&quantised.rules.boxes);
+            let run = |shift| pilot(&quantised, &volumes, shift, &options, comm).unwrap();
+            ([2, 1, 0].map(run), volumes.cells())
+        };
+        let all = match ranks {
+            1 => vec![on_rank(&Solo)],
+            _ => sim::run(ranks, 7, |comm| on_rank(comm)),
+        };
+        let sum = |i: usize| Amounts::sum(all.iter().map(|(amounts, _)| amounts[i]));
+        ((0..3).map(sum).collect(), all[0].1)
+    }
+
+    #[test]
+    fn two_pilot_runs_predict_the_mesh() {
+        let (amounts, cells_boxed) = pilots(1);
+        let [coarse, fine, mesh] = amounts[..] else { unreachable!("three runs") };
+        assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
+        let pilots =
+            plan::pilot::Pilots { fine: (1, fine), coarse: Some((2, coarse)), cells_boxed };
+        let predicted = pilots.at(0);
+        for (name, predicted, measured) in [
+            ("cells", predicted.cells, mesh.cells),
+            ("bytes", predicted.bytes(), mesh.bytes()),
+            ("tests", predicted.tests, mesh.tests),
+        ] {
+            let error = predicted / measured - 1.0;
+            assert!(error.abs() < 0.2, "{name}: {predicted} for {measured}");
+        }
+    }
+
+    #[test]
+    fn pilot_runs_on_several_ranks_have_the_cells_of_one() {
+        let [one, three] = [1, 3].map(|ranks| pilots(ranks).0);
+        for (one, three) in one.iter().zip(&three) {
+            assert_eq!(one.cells, three.cells);
+            assert!((one.cells_boxed_deleted - three.cells_boxed_deleted).abs() < 1e-6);
+        }
+    }
 }

@@ -6,6 +6,7 @@ mod cli;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod heap;
 mod launch;
+mod out_of_memory;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
 use files::{check_writable, interrupt, write_atomically};
@@ -13,10 +14,12 @@ use mesher::agreement;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
 use mesher::partition::Division;
+use mesher::plan::Plan;
 use mesher::record::Recorder;
 use mesher::report::Report;
 use mesher::write::write_json;
-use mesher::{Options, mesh};
+use mesher::{Options, mesh, plan};
+use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
@@ -76,14 +79,28 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
+/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
+#[cfg(feature = "mpi")]
+const ADDRESS_SPACE_MPI: f64 = 384e6;
+
 #[cfg(feature = "mpi")]
 fn run_mpi(args: &Result<Args, Error>) {
+    let left = mesher::plan::address_space_left();
+    if left < ADDRESS_SPACE_MPI {
+        let e = Error::memory(format!(
+            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
+            left / 1e6,
+            (ADDRESS_SPACE_MPI - left) / 1e6
+        ));
+        exit(fail(&e, launch::is_first()));
+    }
     #[cfg(target_os = "linux")]
     launch::end_with_launcher();
     // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
     let comm = interrupt::uninterrupted(mesher::comm::mpi::Mpi::start);
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
+    out_of_memory::ends_with(mesher::comm::mpi::abort);
     let code = run(args, &comm);
     drop(comm);
     exit(code);
@@ -121,11 +138,31 @@ fn complain(line: &dyn Display) -> bool {
     writeln!(stderr(), "{line}").is_ok()
 }
 
-/// Prints warnings and the report; returns the exit code. A closed pipe is no reason to fail.
-fn print(report: &Report) -> i32 {
+/// The result of a run.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Outcome {
+    Meshed(Box<Report>),
+    Planned(Plan),
+}
+
+impl Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Meshed(report) => report.fmt(f),
+            Self::Planned(plan) => plan.fmt(f),
+        }
+    }
+}
+
+/// Prints warnings and the outcome; returns the exit code. A closed pipe is no reason to fail.
+fn print(outcome: &Outcome) -> i32 {
     let warns = |w| complain(&format_args!("mesher: warning: {w}"));
-    let is_warned = report.warnings.iter().all(warns);
-    match writeln!(stdout(), "{report}").and_then(|()| stdout().flush()) {
+    let is_warned = match outcome {
+        Outcome::Meshed(report) => report.warnings.iter().all(warns),
+        Outcome::Planned(_) => true,
+    };
+    match writeln!(stdout(), "{outcome}").and_then(|()| stdout().flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => {
             fail(&Error::output(format!("standard output: {e}: free disk space")), true)
         }
@@ -159,17 +196,22 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
     record.report_status("done");
+    if args.stall_limit.is_some() {
+        // MPI ends without a limit of its own.
+        comm.enter("done");
+        comm.barrier();
+    }
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
     match result {
-        Ok(report) if first && !args.quiet => print(&report),
+        Ok(outcome) if first && !args.quiet => print(&outcome),
         Ok(_) => 0,
         Err(e) => fail(&e, first),
     }
 }
 
-fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, Error> {
+fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
     if let Some(dir) = &args.status {
         comm.agree(std::fs::create_dir_all(dir).map_err(|e| {
             Error::output(format!("{}: {e}: choose another --status", dir.display()))
@@ -177,13 +219,11 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
     }
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
-    let on_json = |write: &dyn Fn(&Path) -> std::io::Result<()>| {
-        let named = |path: &Path, e| {
-            Error::output(format!("{}: {e}: choose another --json", path.display()))
-        };
+    let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
+        let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
         comm.agree(json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
-    on_json(&check_writable)?;
+    on_json("choose another --json", &check_writable)?;
     let case = mesher::comm::agree(comm, case(args))?;
     agreement::on_case(&case, comm)?;
     let options = Options {
@@ -196,11 +236,21 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Report, E
         out: cli::output(args),
         check: args.check,
         weight_exposed: args.weight_exposed,
+        force: args.force,
     };
-    let mut report = mesh(&case, &options, comm, record)?;
-    if args.message_matrix {
-        report = report.with_message_matrix(comm);
-    }
-    on_json(&|path| write_atomically(path, |to| write_json(to, &report)))?;
-    Ok(report)
+    let outcome = if args.plan {
+        Outcome::Planned(plan(&case, &options, comm, record)?)
+    } else {
+        let report = mesh(&case, &options, comm, record)?;
+        let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
+        Outcome::Meshed(Box::new(report))
+    };
+    let advice = match options.out {
+        Some(_) if !args.plan => {
+            "the mesh is complete, only its report is missing; free disk space"
+        }
+        _ => "free disk space",
+    };
+    on_json(advice, &|path| write_atomically(path, |to| write_json(to, &outcome)))?;
+    Ok(outcome)
 }

@@ -22,6 +22,8 @@ pub struct Options {
     pub check: bool,
     /// Count the [exposed faces](crate::exposed), each of which weighs as much as this many leaves in the last repartition.
     pub weight_exposed: Option<u32>,
+    /// Mesh even if the memory probably does not suffice.
+    pub force: bool,
 }
 
 /// A mesh as one rank holds it.

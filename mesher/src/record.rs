@@ -73,6 +73,18 @@ impl Recorder {
         }
     }
 
+    /// Whether this rank shows the user what it does.
+    pub fn shows_progress(&self) -> bool {
+        self.progress
+    }
+
+    /// Shows the user the plan of the run, in one line.
+    pub fn report_plan(&self, plan: &str) {
+        if self.progress {
+            let _ = writeln!(std::io::stderr(), "\r\x1b[Kplan: {plan}");
+        }
+    }
+
     /// The phases so far.
     pub fn phases(&self) -> &[Phase] {
         &self.phases

@@ -3,6 +3,8 @@
 mod text;
 mod warnings;
 
+pub(crate) use text::grouped;
+
 use crate::comm::{Comm, Traffic, matrix};
 use crate::digest::hex;
 use crate::leaves::Totals;

@@ -76,6 +76,16 @@ pub enum Error {
         /// Its maximum corner.
         max: [f64; 3],
     },
+    /// A box alone has more cells than fit into memory.
+    #[error(
+        "box {index} alone has about {cells:.1e} cells, which do not fit into memory: increase its spacing or make it smaller"
+    )]
+    TooManyCells {
+        /// Index of the box, from 0.
+        index: usize,
+        /// The number of cells of its level that fill it.
+        cells: f64,
+    },
     /// A vertex is not finite.
     #[error("facet {facet} has a vertex {vertex:?} that is not finite: repair the geometry")]
     VertexNotFinite {
@@ -153,11 +163,12 @@ fn remedy(nearest: Option<[f64; 3]>) -> String {
 }
 
 impl Error {
-    /// The exit code of the program: 4 if output could not be written, otherwise 2.
+    /// The exit code of the program: 4 if output could not be written, 71 if the mesh does not fit into memory, otherwise 2.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Write { .. } => 4,
+            Error::TooManyCells { .. } => 71,
             _ => 2,
         }
     }

@@ -53,7 +53,7 @@ impl Input {
     /// # Errors
     /// An edge or a spacing is not finite and positive; the origin is not finite; a layer has no
     /// cells; a spacing requires a level beyond 19; along an axis, a box has a corner that is not
-    /// finite or a minimum that is not less than its maximum; a vertex is not finite or more than
+    /// finite or a minimum that is not less than its maximum; a box has too many cells; a vertex is not finite or more than
     /// one root edge outside the root; a seed is not finite.
     pub fn new(case: &Case) -> Result<Self, Error> {
         let root = case.root;
@@ -76,6 +76,10 @@ impl Input {
             let level = level(&root, &format!("the spacing of box {index}"), spec.spacing)?;
             let corner = |x| quantised(&root, x).map(|q| q.clamp(0.0, ROOT_EDGE as f64) as i64);
             let extent = Extent { min: corner(spec.min), max: corner(spec.max) };
+            let cells = cells_in(&extent, level);
+            if cells > CELLS_MAX {
+                return Err(Error::TooManyCells { index, cells });
+            }
             boxes.push(LatticeBox { extent, level });
         }
         let facets = case.facets.iter().enumerate();
@@ -107,6 +111,15 @@ pub fn location(root: &Root, point: [i64; 3]) -> [f64; 3] {
 
 fn is_length(x: f64) -> bool {
     x.is_finite() && x > 0.0
+}
+
+/// More cells than this, of some hundred bytes each, fit into no memory.
+const CELLS_MAX: f64 = 1e9;
+
+/// The number of cells of a level that fill a box.
+fn cells_in(extent: &Extent, level: u32) -> f64 {
+    let edge = (ROOT_EDGE >> level) as f64;
+    (0..3).map(|a| (extent.max[a] - extent.min[a]) as f64 / edge).product()
 }
 
 /// The coarsest level whose cells have an edge of at most `spacing`.

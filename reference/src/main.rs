@@ -17,7 +17,7 @@ const EXIT_OUTPUT: u8 = 4;
 
 /// Mesh a case by the paper's serial algorithm: simple, exact and slow
 ///
-/// Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 130 interrupted.
+/// Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 71 a mesh that does not fit into memory, 130 interrupted.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {

@@ -34,4 +34,8 @@ fn each_invalid_input_has_its_own_error() {
     assert!(matches!(boxed([0.0; 3], [1.0, 1.0, 0.0], 1e6), Error::BoxCorners { index: 0, .. }));
     assert!(matches!(boxed([0.0; 3], [f64::INFINITY; 3], 1e6), Error::BoxCorners { .. }));
     assert!(matches!(boxed([0.0; 3], [1.0; 3], 1.0), Error::SpacingTooFine { .. }));
+    // At level 19.
+    let too_many = boxed([0.0; 3], [edge; 3], 256.0);
+    assert!(matches!(too_many, Error::TooManyCells { index: 0, cells } if cells == 2f64.powi(57)));
+    assert!(too_many.to_string().contains("1.4e17 cells") && too_many.exit_code() == 71);
 }

@@ -132,6 +132,22 @@ fn a_step_within_a_drift_is_found_and_both_drifts_are_reported() {
     assert!((17.0..22.0).contains(&rise(before)) && (17.0..22.0).contains(&rise(after)));
 }
 
+/// These are divided at chosen places only.
+#[test]
+fn long_histories_rarely_have_a_step_by_chance_and_short_excursions_are_found() {
+    let rate = alarms_of(100, |seed| independent(2000, seed, normal));
+    assert!(rate <= 1.0, "normal: {rate} %");
+    let rate = alarms_of(100, |seed| autoregressive(2000, seed, 0.7));
+    assert!(rate <= 5.0, "autocorrelated: {rate} %");
+    let found = |seed: &u64| {
+        let mut values = independent(3000, *seed, normal);
+        values[1000..1010].iter_mut().for_each(|value| *value += 6.0);
+        values[2994..].iter_mut().for_each(|value| *value += 8.0);
+        matches!(places(&values)[..], [999..=1001, 1009..=1011, 2993..=2995])
+    };
+    assert!((0..10).filter(found).count() >= 9);
+}
+
 #[test]
 fn an_exact_counter_needs_few_values_after_the_change() {
     let mut values = vec![7.0; 30];

@@ -120,6 +120,11 @@ impl TreeFile {
         &self.path
     }
 
+    /// Whether its leaves have sides.
+    pub fn has_sides(&self) -> bool {
+        self.sides.is_some()
+    }
+
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
     ///
     /// # Errors

@@ -12,6 +12,9 @@ use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 /// One past the Morton code of the last level-19 cell.
 pub const KEY_END: u64 = 1 << 57;
 
+/// The bits of a word that hold the side.
+pub const SIDE_BITS: u64 = 3;
+
 /// Position of a leaf relative to the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -154,7 +157,7 @@ pub fn octant(word: u64) -> Octant {
 
 /// The side of a valid word.
 pub fn side(word: u64) -> Side {
-    Side::ALL[(word & 3) as usize]
+    Side::ALL[(word & SIDE_BITS) as usize]
 }
 
 #[cfg(test)]

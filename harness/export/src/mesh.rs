@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use contract::leafset::{self, LeafDir, Leaves};
 use contract::manifest::Manifest;
@@ -39,6 +40,60 @@ pub struct Mesh {
 
 /// Leaves of an octant in one part: an interval of indices.
 type Interval = (usize, Range<u64>);
+
+/// A mesh with readers that keep what they have read last. It can be shared by threads.
+pub struct Visitor<'a> {
+    mesh: &'a Mesh,
+    /// The readers that are not in use.
+    readers: Mutex<Vec<Readers<'a>>>,
+}
+
+impl<'a> Visitor<'a> {
+    /// The same as [`Mesh::visit`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn visit<E: From<ExportError>>(
+        &self,
+        keys: Range<u64>,
+        selection: &Selection,
+        visit: &mut impl FnMut(Leaf) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.with_readers(|readers| {
+            let (mut intervals, mut before) = (Vec::new(), 0);
+            for (part, file) in self.mesh.parts.iter().enumerate() {
+                let mut bound = |key| readers.lower_bound(part, 0..file.len(), key);
+                let interval = bound(keys.start)?..bound(keys.end)?;
+                before += interval.start;
+                intervals.extend((!interval.is_empty()).then_some((part, interval)));
+            }
+            self.mesh.visit_octant(readers, Octant::ROOT, &intervals, before, selection, visit)
+        })
+    }
+
+    /// Number of leaves whose Morton codes are in `keys`.
+    ///
+    /// # Errors
+    /// If a part cannot be read.
+    pub fn count(&self, keys: Range<u64>) -> Result<u64, ExportError> {
+        self.with_readers(|readers| {
+            (0..self.mesh.parts.len()).try_fold(0, |sum, part| {
+                let all = 0..self.mesh.parts[part].len();
+                let start = readers.lower_bound(part, all.clone(), keys.start)?;
+                Ok(sum + readers.lower_bound(part, start..all.end, keys.end)? - start)
+            })
+        })
+    }
+
+    fn with_readers<T>(&self, read: impl FnOnce(&mut Readers<'a>) -> T) -> T {
+        let free = || self.readers.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = free().pop();
+        let mut readers = kept.unwrap_or_else(|| Readers::new(&self.mesh.parts));
+        let result = read(&mut readers);
+        free().push(readers);
+        result
+    }
+}
 
 impl Mesh {
     /// Opens a leaf-set directory. If it has the tree alone, that is its only part.
@@ -82,29 +137,12 @@ impl Mesh {
         selection: &Selection,
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
-        let mut intervals = Vec::new();
-        let mut before = 0;
-        let mut readers = Readers::new(&self.parts);
-        for (part, file) in self.parts.iter().enumerate() {
-            let mut bound = |key| readers.lower_bound(part, 0..file.len(), key);
-            let interval = bound(keys.start)?..bound(keys.end)?;
-            before += interval.start;
-            intervals.extend((!interval.is_empty()).then_some((part, interval)));
-        }
-        self.visit_octant(&mut readers, Octant::ROOT, &intervals, before, selection, visit)
+        self.visitor().visit(keys, selection, visit)
     }
 
-    /// Number of leaves whose Morton codes are in `keys`.
-    ///
-    /// # Errors
-    /// If a part cannot be read.
-    pub fn count(&self, keys: Range<u64>) -> Result<u64, ExportError> {
-        let mut readers = Readers::new(&self.parts);
-        (0..self.parts.len()).try_fold(0, |sum, part| {
-            let all = 0..self.parts[part].len();
-            let start = readers.lower_bound(part, all.clone(), keys.start)?;
-            Ok(sum + readers.lower_bound(part, start..all.end, keys.end)? - start)
-        })
+    /// A visitor, for repeated visits of few leaves each.
+    pub fn visitor(&self) -> Visitor<'_> {
+        Visitor { mesh: self, readers: Mutex::default() }
     }
 
     /// Ranges of Morton codes, in order, that together contain all selected leaves: each is an octant of at most
@@ -262,91 +300,4 @@ fn count(intervals: &[Interval]) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::on_disk;
-    use contract::testing::random_words;
-    use contract::word::Side;
-    use proptest::prelude::*;
-
-    fn words(
-        mesh: &Mesh,
-        keys: Range<u64>,
-        selection: &Selection,
-    ) -> Result<Vec<u64>, ExportError> {
-        let mut words = Vec::new();
-        mesh.visit(keys, selection, &mut |leaf: Leaf| {
-            words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
-            Ok::<(), ExportError>(())
-        })?;
-        Ok(words)
-    }
-
-    proptest! {
-        #[test]
-        fn all_leaves_of_interleaved_parts_are_visited_in_order(
-            leaves in random_words(5), parts in 1usize..4, run in 1usize..40
-        ) {
-            let (_dir, mesh) = on_disk(&leaves, parts, |i| i / run);
-            prop_assert_eq!(&words(&mesh, Mesh::ALL, &Selection::default()).unwrap(), &leaves);
-        }
-
-        #[test]
-        fn blocks_are_disjoint_and_contain_all_leaves(
-            leaves in random_words(5), parts in 1usize..4, leaves_max in 1u64..100
-        ) {
-            let (_dir, mesh) = on_disk(&leaves, parts, |i| i / 7);
-            let blocks = mesh.blocks(&Selection::default(), leaves_max).unwrap();
-            prop_assert!(blocks.windows(2).all(|w| w[0].keys.end <= w[1].keys.start));
-            let mut visited = Vec::new();
-            for Block { keys, leaves } in blocks {
-                let block = words(&mesh, keys, &Selection::default()).unwrap();
-                prop_assert!(!block.is_empty() && leaves <= leaves_max);
-                prop_assert_eq!(block.len() as u64, leaves);
-                visited.extend(block);
-            }
-            prop_assert_eq!(visited, leaves);
-        }
-
-        #[test]
-        fn a_selection_has_the_leaves_that_satisfy_it(
-            leaves in random_words(5), axis in 0usize..3, at in 0.0f64..=1.0, level in 0u8..6
-        ) {
-            let (_dir, mesh) = on_disk(&leaves, 2, |i| i / 9);
-            let slice = crate::selection::Slice::new(&mesh.manifest.root, axis, at);
-            let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
-            let mut expected = Vec::new();
-            let mut index = 0;
-            mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
-                assert_eq!(leaf.index, index);
-                index += 1;
-                expected.extend(selection.has(&leaf).then(|| {
-                    word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
-                }));
-                Ok::<(), ExportError>(())
-            }).unwrap();
-            prop_assert_eq!(&words(&mesh, Mesh::ALL, &selection).unwrap(), &expected);
-            let blocks = mesh.blocks(&selection, 20).unwrap();
-            let of_block = |b: &Block| words(&mesh, b.keys.clone(), &selection).unwrap();
-            prop_assert_eq!(blocks.iter().flat_map(of_block).collect::<Vec<_>>(), expected);
-        }
-    }
-
-    #[test]
-    fn leaves_out_of_order_and_invalid_words_are_errors_that_name_the_leaf() {
-        let leaves: Vec<u64> = contract::testing::words_of(|o| o.level < 1);
-        let mut swapped = leaves.clone();
-        swapped.swap(2, 3);
-        let mut overlapping = leaves.clone();
-        overlapping
-            .insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
-        let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
-        for (leaves, expected) in
-            [(swapped, "leaf 3"), (overlapping, "leaf 1"), (invalid, "leaf 0")]
-        {
-            let (_dir, mesh) = on_disk(&leaves, 1, |_| 0);
-            let error = words(&mesh, Mesh::ALL, &Selection::default()).unwrap_err().to_string();
-            assert!(error.contains(expected), "{error}");
-        }
-    }
-}
+mod tests;

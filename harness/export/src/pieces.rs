@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::mesh::{Block, Mesh};
+use crate::mesh::{Block, Mesh, Visitor};
 use crate::options::Options;
 use crate::ordered::in_order;
 use crate::selection::Selection;
@@ -23,6 +23,7 @@ pub fn pieces(
     options: &Options<'_>,
 ) -> Result<Vec<Piece>, ExportError> {
     let blocks = mesh.blocks(selection, leaves_max)?;
+    let visitor = mesh.visitor();
     let mut pieces: Vec<Piece> = Vec::new();
     let add = |_: usize, block: Block| {
         match pieces.last_mut() {
@@ -37,7 +38,7 @@ pub fn pieces(
     let count = |index: usize| {
         let Block { keys, leaves } = blocks[index].clone();
         let all = *selection == Selection::default();
-        let leaves = if all { leaves } else { count(mesh, keys.clone(), selection, options)? };
+        let leaves = if all { leaves } else { count(&visitor, keys.clone(), selection, options)? };
         Ok(Block { keys, leaves })
     };
     in_order(blocks.len(), options.jobs, count, add)?;
@@ -55,14 +56,14 @@ pub(crate) fn nothing_selected(mesh: &Mesh) -> ExportError {
 
 /// Number of selected leaves with these Morton codes.
 fn count(
-    mesh: &Mesh,
+    visitor: &Visitor,
     keys: Range<u64>,
     selection: &Selection,
     options: &Options<'_>,
 ) -> Result<u64, ExportError> {
     options.check()?;
     let mut leaves = 0;
-    mesh.visit(keys, selection, &mut |_: Leaf| {
+    visitor.visit(keys, selection, &mut |_: Leaf| {
         leaves += 1;
         Ok::<(), ExportError>(())
     })?;

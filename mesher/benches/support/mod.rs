@@ -52,7 +52,14 @@ pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Cas
 pub fn options() -> Options {
     let (partitioner, weights) = (Partitioner::Morton, Weights::Area);
     let division = Division { partitioner, weights, level_base: None };
-    Options { division, ungraded: false, out: None, check: false, weight_exposed: None }
+    Options {
+        division,
+        ungraded: false,
+        out: None,
+        check: false,
+        weight_exposed: None,
+        force: true,
+    }
 }
 
 /// Results of all phases for the aircraft.

@@ -114,8 +114,15 @@ pub fn agree<T>(comm: &dyn Comm, mine: Result<T, Error>) -> Result<T, Error> {
     Ok(value.expect("no rank has an error"))
 }
 
+/// Runs `body` without counting or timing its calls, and returns its result.
+pub fn uncounted<T>(comm: &dyn Comm, body: impl FnOnce() -> T) -> T {
+    let (mut body, mut result) = (Some(body), None);
+    comm.uncounted(&mut || result = body.take().map(|body| body()));
+    result.expect("the body was run")
+}
+
 fn pack(e: &Error) -> Vec<u64> {
-    let (Error::Input(text) | Error::Output(text)) = e;
+    let (Error::Input(text) | Error::Output(text) | Error::Memory(text)) = e;
     let head = [e.exit_code() as u64, text.len() as u64];
     let body = text.as_bytes().chunks(8).map(|c| {
         let mut word = [0; 8];
@@ -131,6 +138,7 @@ fn unpack(words: &[u64]) -> Error {
     let text = String::from_utf8_lossy(&bytes).into_owned();
     match words[0] {
         2 => Error::Input(text),
+        71 => Error::Memory(text),
         _ => Error::Output(text),
     }
 }
@@ -304,7 +312,8 @@ mod tests {
 
     #[test]
     fn errors_are_unpacked_as_they_were_packed() {
-        for e in [Error::input("häßlich: 'x'"), Error::output("no space"), Error::input("12345678")]
+        for e in
+            [Error::input("häßlich: 'x'"), Error::output("no space"), Error::memory("12345678")]
         {
             assert_eq!(unpack(&pack(&e)), e);
         }

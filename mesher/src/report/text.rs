@@ -102,7 +102,7 @@ fn components(report: &Report) -> String {
 }
 
 /// A number with a comma before each group of three digits.
-fn grouped(n: u64) -> String {
+pub fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, d) in digits.chars().enumerate() {

@@ -81,7 +81,7 @@ pub struct Overrides {
     pub cases: Vec<String>,
     /// Experiments instead of all.
     pub experiments: Vec<Experiment>,
-    /// Ranks of simulated runs.
+    /// Ranks of simulated runs; of runs on MPI with `no_sim` and without `ranks_mpi`.
     pub ranks: Vec<usize>,
     /// Ranks of runs on MPI.
     pub ranks_mpi: Vec<usize>,
@@ -179,12 +179,19 @@ fn with_cells(studies: Vec<Study>, cells: &[u64]) -> Vec<Study> {
 }
 
 fn change(study: &mut Study, overrides: &Overrides) {
-    if !overrides.ranks.is_empty() || !overrides.ranks_mpi.is_empty() {
+    // Without simulated ranks, the only ranks are those on MPI.
+    let only_mpi = overrides.no_sim && overrides.ranks_mpi.is_empty();
+    let (sim, mpi) = if only_mpi {
+        (&[][..], &overrides.ranks[..])
+    } else {
+        (&overrides.ranks[..], &overrides.ranks_mpi[..])
+    };
+    if !sim.is_empty() || !mpi.is_empty() {
         let scales = matches!(study.experiment, Experiment::Strong | Experiment::Weak);
         if scales {
-            study.layouts = layouts(&overrides.ranks, &overrides.ranks_mpi);
-        } else if study.experiment == Experiment::Weights && !overrides.ranks.is_empty() {
-            study.layouts = layouts(&overrides.ranks, &[]);
+            study.layouts = layouts(sim, mpi);
+        } else if study.experiment == Experiment::Weights && !sim.is_empty() {
+            study.layouts = layouts(sim, &[]);
         }
     }
     if overrides.no_mpi {
@@ -360,6 +367,16 @@ mod tests {
         let all = studies(Preset::Small, &real);
         assert!(all.iter().flat_map(|s| &s.layouts).all(|l| l.comm == Comm::Mpi));
         assert!(!all.is_empty() && all.iter().all(|s| s.experiment != Experiment::Weights));
+    }
+
+    #[test]
+    fn without_simulated_ranks_all_ranks_are_on_mpi() {
+        let experiments = vec![Experiment::Strong];
+        let overrides =
+            Overrides { experiments, ranks: vec![1, 3], no_sim: true, ..Overrides::default() };
+        let of = |overrides: &Overrides| studies(Preset::Small, overrides)[0].layouts.clone();
+        assert_eq!(of(&overrides), layouts(&[], &[1, 3]));
+        assert_eq!(of(&Overrides { ranks_mpi: vec![2], ..overrides }), layouts(&[], &[2]));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! drift is then one line rather than many steps, and a slow random fluctuation is noise rather than steps. The penalties
 //! were chosen by simulation, so that series without steps rarely get any; see the tests of `change_points`.
 
+use super::candidates::{PLACES_MAX, places};
 use super::median::median_of;
 use super::segments::{Mean, Series};
 
@@ -57,11 +58,12 @@ pub fn select(values: &[f64], floor: f64) -> Model {
     let constant = Model { phi: 0.0, mean: Mean::Constant, boundaries: Vec::new() };
     let mut whole = (f64::INFINITY, constant.clone());
     let mut divided = (f64::INFINITY, constant);
+    let means = [Mean::Constant, Mean::Linear].map(|mean| (mean, places(values, mean)));
     for phi in PHIS {
         let series = Series::new(values, phi);
-        for mean in [Mean::Constant, Mean::Linear] {
-            let (mut least, mut worse) = (f64::INFINITY, 0);
-            for (cost, boundaries) in series.divisions(mean).take(count_max) {
+        for (mean, places) in &means {
+            let (mean, mut least, mut worse) = (*mean, f64::INFINITY, 0);
+            for (cost, boundaries) in series.divisions(mean, places).take(count_max) {
                 let best = if boundaries.is_empty() { &mut whole } else { &mut divided };
                 let model = Model { phi, mean, boundaries };
                 let criterion = criterion(&model, cost, values.len() as f64, floor);
@@ -77,7 +79,15 @@ pub fn select(values: &[f64], floor: f64) -> Model {
         }
     }
     let advantage = ADVANTAGE_MAX.min(ADVANTAGE_OF_ONE / values.len() as f64);
-    if divided.0 + advantage < whole.0 { divided.1 } else { whole.1 }
+    if divided.0 + advantage < whole.0 { refined(divided.1, values) } else { whole.1 }
+}
+
+/// Moves the boundaries of a model to the best places, if not all were tried.
+fn refined(mut model: Model, values: &[f64]) -> Model {
+    if values.len() > PLACES_MAX {
+        model.boundaries = Series::new(values, model.phi).refined(model.mean, model.boundaries);
+    }
+    model
 }
 
 /// Returns twice the negative logarithm of the likelihood, plus penalties that grow where there are few values per parameter;
@@ -116,7 +126,14 @@ pub fn without_outliers(values: &[f64]) -> Vec<f64> {
     }
     let moved = |i: usize| {
         let from = i.saturating_sub(width / 2).min(n - width);
-        let middle = median_of(&values[from..from + width]);
+        let near = &values[from..from + width];
+        // The median is far from the value only if half of the others are far on the same side.
+        let above = near.iter().filter(|other| **other - values[i] > limit).count();
+        let below = near.iter().filter(|other| values[i] - **other > limit).count();
+        if 2 * above.max(below) < width {
+            return values[i];
+        }
+        let middle = median_of(near);
         values[i].clamp(middle - limit, middle + limit)
     };
     (0..n).map(moved).collect()

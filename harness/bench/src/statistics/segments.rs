@@ -66,17 +66,23 @@ impl Fit {
 impl Series {
     /// Prepares a series for noise with autocorrelation `phi`, from 0 to below 1.
     pub fn new(values: &[f64], phi: f64) -> Self {
-        let mut sums = vec![[0.0; 5]; values.len().max(1)];
+        let mut sums = Vec::with_capacity(values.len().max(1));
+        let mut last = [0.0; 5];
+        sums.push(last);
         for i in 1..values.len() {
             let (z, time) = (values[i] - phi * values[i - 1], whitened_time(i, phi));
             let terms = [z, z * z, time, time * time, time * z];
-            sums[i] = std::array::from_fn(|k| sums[i - 1][k] + terms[k]);
+            last = std::array::from_fn(|k| last[k] + terms[k]);
+            sums.push(last);
         }
         Self { values: values.to_vec(), phi, sums }
     }
 
     /// Returns the fit of the values `from..until`, which are at least one.
+    #[inline]
     pub fn fit(&self, from: usize, until: usize, mean: Mean) -> Fit {
+        #[cfg(test)]
+        count_evaluation();
         let (first, last) = (&self.sums[from], &self.sums[until - 1]);
         let [z, zz, t, tt, tz]: Sums = std::array::from_fn(|k| last[k] - first[k]);
         let (weight, gain) = (1.0 - self.phi * self.phi, 1.0 - self.phi);
@@ -121,12 +127,19 @@ impl Series {
         values
     }
 
-    /// Returns for 1, 2, ... segments, as far as they fit: the least total cost, and the first indices of all segments but
-    /// the first. Each takes a time quadratic in the number of values when it is requested.
-    pub fn divisions(&self, mean: Mean) -> impl Iterator<Item = (f64, Vec<usize>)> {
-        let (n, least) = (self.values.len(), mean.length_min());
-        // costs[until] is that of the best division of the values before `until`; origins[k][until] is the first index of
-        // the last of k + 1 segments.
+    /// Returns for 1, 2, ... segments between ascending places, as far as they fit: the least total cost, and the first
+    /// indices of all segments but the first. Each takes a time quadratic in the number of places when it is requested.
+    pub fn divisions(
+        &self,
+        mean: Mean,
+        places: &[usize],
+    ) -> impl Iterator<Item = (f64, Vec<usize>)> + use<> {
+        let n = self.values.len();
+        let edges: Vec<usize> = [&[0], places, &[n]].concat();
+        let (last, least) = (edges.len() - 1, mean.length_min());
+        let of_segments = self.costs(&edges, mean);
+        // costs[until] is that of the best division of the values before edges[until]; origins[k][until] is the edge at which
+        // the last of k + 1 segments begins.
         let mut costs: Vec<f64> = Vec::new();
         let mut origins: Vec<Vec<usize>> = Vec::new();
         std::iter::from_fn(move || {
@@ -134,43 +147,77 @@ impl Series {
             if segments * least > n.max(least) {
                 return None;
             }
-            let mut next = vec![f64::INFINITY; n + 1];
-            let mut origin = vec![0; n + 1];
-            for until in least * segments..=n {
+            let mut next = vec![f64::INFINITY; edges.len()];
+            let mut origin = vec![0; edges.len()];
+            for (until, of) in of_segments.iter().enumerate() {
                 if segments == 1 {
-                    next[until] = self.fit(0, until, mean).cost;
-                }
-                for from in least * (segments - 1)..=until - least {
-                    // A cost is never negative.
-                    if segments > 1 && costs[from] < next[until] {
-                        let cost = costs[from] + self.fit(from, until, mean).cost;
-                        if cost < next[until] {
-                            (next[until], origin[until]) = (cost, from);
+                    next[until] = of.first().copied().unwrap_or(f64::INFINITY);
+                } else {
+                    for (from, (before, cost)) in costs.iter().zip(of).enumerate() {
+                        if before + cost < next[until] {
+                            (next[until], origin[until]) = (before + cost, from);
                         }
                     }
                 }
             }
             costs = next;
             origins.push(origin);
-            Some((costs[n], boundaries(&origins, n)))
+            Some((costs[last], boundaries(&origins, &edges)))
         })
     }
 
-    /// Returns the least cost of two segments; `None` if the series is too short for two.
+    /// Returns for every edge the costs of the segments that end there and begin at an edge before it, as far as they are long
+    /// enough.
+    fn costs(&self, edges: &[usize], mean: Mean) -> Vec<Vec<f64>> {
+        let ending_at = |until: &usize| {
+            let long_enough = edges.iter().take_while(|from| **from + mean.length_min() <= *until);
+            long_enough.map(|from| self.fit(*from, *until, mean).cost).collect()
+        };
+        edges.iter().map(ending_at).collect()
+    }
+
+    /// Moves each boundary in turn to the best place between its neighbours, until none moves, at most four times.
+    pub fn refined(&self, mean: Mean, mut boundaries: Vec<usize>) -> Vec<usize> {
+        let (n, least) = (self.values.len(), mean.length_min());
+        for _ in 0..SWEEPS_MAX {
+            let before = boundaries.clone();
+            for i in 0..boundaries.len() {
+                let from = if i == 0 { 0 } else { boundaries[i - 1] };
+                let until = boundaries.get(i + 1).copied().unwrap_or(n);
+                let cost =
+                    |at: usize| self.fit(from, at, mean).cost + self.fit(at, until, mean).cost;
+                let costs = (from + least..=until - least).map(|at| (cost(at), at));
+                let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
+                boundaries[i] = best.map_or(boundaries[i], |(_, at)| at);
+            }
+            if boundaries == before {
+                break;
+            }
+        }
+        boundaries
+    }
+
+    /// Returns the least cost of two segments; `None` if the series is too short for two. Far from the ends the boundaries that
+    /// are tried are a 64th of the distance apart, so their number grows with the logarithm of the length.
     pub fn halves(&self, mean: Mean) -> Option<f64> {
         let (n, least) = (self.values.len(), mean.length_min());
         let cost = |at: usize| self.fit(0, at, mean).cost + self.fit(at, n, mean).cost;
-        (least..(n + 1).saturating_sub(least)).map(cost).min_by(f64::total_cmp)
+        let next = |at: &usize| Some(at + 1 + (*at).min(n.saturating_sub(*at)) / 64);
+        let places = std::iter::successors(Some(least), next);
+        places.take_while(|at| at + least <= n).map(cost).min_by(f64::total_cmp)
     }
 }
 
+/// Greatest number of times that all boundaries are moved.
+const SWEEPS_MAX: usize = 4;
+
 /// Follows the origins of the last segments from the end of the series.
-fn boundaries(origins: &[Vec<usize>], n: usize) -> Vec<usize> {
-    let mut until = n;
+fn boundaries(origins: &[Vec<usize>], edges: &[usize]) -> Vec<usize> {
+    let mut until = edges.len() - 1;
     let mut places: Vec<usize> = Vec::with_capacity(origins.len() - 1);
     for origin in origins[1..].iter().rev() {
         until = origin[until];
-        places.push(until);
+        places.push(edges[until]);
     }
     places.reverse();
     places
@@ -179,6 +226,23 @@ fn boundaries(origins: &[Vec<usize>], n: usize) -> Vec<usize> {
 /// The regressor of a slope in the whitened value at index `i`.
 fn whitened_time(i: usize, phi: f64) -> f64 {
     i as f64 - phi * (i as f64 - 1.0)
+}
+
+#[cfg(test)]
+thread_local! {
+    static EVALUATIONS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
+/// Counts a fit or contrast of this thread.
+#[cfg(test)]
+pub fn count_evaluation() {
+    EVALUATIONS.set(evaluations() + 1);
+}
+
+/// Returns the number of fits and contrasts of this thread so far.
+#[cfg(test)]
+pub fn evaluations() -> usize {
+    EVALUATIONS.get()
 }
 
 #[cfg(test)]
@@ -229,7 +293,8 @@ mod tests {
     fn the_best_division_is_found() {
         let values = values(16);
         let series = Series::new(&values, 0.3);
-        let (cost, places) = series.divisions(Mean::Constant).nth(2).unwrap();
+        let anywhere: Vec<usize> = (1..16).collect();
+        let (cost, places) = series.divisions(Mean::Constant, &anywhere).nth(2).unwrap();
         let of = |a: usize, b: usize| {
             [(0, a), (a, b), (b, 16)]
                 .iter()
@@ -240,7 +305,17 @@ mod tests {
         let least = all.map(|(a, b)| of(a, b)).fold(f64::INFINITY, f64::min);
         assert!((cost - least).abs() < 1e-9 && (of(places[0], places[1]) - least).abs() < 1e-9);
         let halves = series.halves(Mean::Constant).unwrap();
-        assert_eq!(series.divisions(Mean::Constant).nth(1).unwrap().0, halves);
-        assert_eq!(series.divisions(Mean::Linear).count(), 3);
+        assert_eq!(series.divisions(Mean::Constant, &anywhere).nth(1).unwrap().0, halves);
+        assert_eq!(series.divisions(Mean::Linear, &anywhere).count(), 3);
+    }
+    #[test]
+    fn boundaries_near_the_best_ones_are_moved_there() {
+        let mut values = values(300);
+        values[100..].iter_mut().for_each(|value| *value += 20.0);
+        values[200..].iter_mut().for_each(|value| *value -= 30.0);
+        let series = Series::new(&values, 0.3);
+        assert_eq!(series.refined(Mean::Constant, vec![90, 215]), [100, 200]);
+        let (_, few) = series.divisions(Mean::Constant, &[90, 150, 215]).nth(2).unwrap();
+        assert_eq!(few, [90, 215]);
     }
 }

@@ -1,19 +1,21 @@
-//! The differences of two meshes: of their inputs and counts, and of the leaves in the first octant that differs.
+//! The differences of two meshes: of their inputs and counts, and of the leaves in the first octant that differs. If the sides of
+//! one are unknown, only the cells are compared.
 //!
 //! All leaves are read once, to count and digest them, with memory for one buffer. A comparison that trusts the digests in the
 //! manifests reads only the first octant that differs.
 
+mod fields;
 mod region;
 pub mod rule;
 mod witness;
 
-use std::fmt::{self, Debug};
+use std::fmt;
 use std::path::Path;
 
 use crate::checks::Terms;
 use contract::case::Case;
 use contract::leafset::{self, LeafDir, ReadError};
-use contract::manifest::{Manifest, Tally, octant_index};
+use contract::manifest::{Manifest, Sides, Tally, octant_index};
 use contract::octant::Octant;
 use contract::word;
 
@@ -32,6 +34,8 @@ pub enum Trust {
 pub struct DiffReport {
     /// What was compared.
     pub compared: Trust,
+    /// The mesh whose sides are unknown, so that only the cells were compared.
+    pub without_sides: Option<&'static str>,
     /// Number of leaves of the first mesh.
     pub leaves: u64,
     /// Manifests with counts or digests that their leaves do not have, one sentence each.
@@ -61,6 +65,9 @@ const OCTANTS_LISTED: usize = 8;
 
 impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(mesh) = self.without_sides {
+            writeln!(f, "the sides of {mesh} are unknown: only the cells are compared")?;
+        }
         for line in self.contradictions.iter().chain(&self.fields) {
             writeln!(f, "{line}")?;
         }
@@ -99,28 +106,41 @@ pub fn diff(
     case: Option<&Case>,
     trust: Trust,
 ) -> Result<DiffReport, ReadError> {
-    let (mut a, mut b) = (leafset::open(a)?, leafset::open(b)?);
+    let mut sets = [leafset::open(a)?, leafset::open(b)?];
+    let unknown = |set: &LeafDir| set.manifest.sides == Sides::Unknown;
+    let without_sides = NAMES.into_iter().zip(&sets).find(|(_, set)| unknown(set));
+    let without_sides = without_sides.map(|(name, _)| name);
+    // The digests in the manifests include the sides.
+    let trust = if without_sides.is_some() { Trust::Leaves } else { trust };
+    let mask = if without_sides.is_some() { !word::SIDE_BITS } else { u64::MAX };
     let mut contradictions = Vec::new();
     if trust == Trust::Leaves {
-        for (name, set) in [("A", &mut a), ("B", &mut b)] {
-            if recount(set)? {
+        for (name, set) in NAMES.into_iter().zip(&mut sets) {
+            if recount(set, mask)? {
                 contradictions.push(format!(
                     "the manifest of {name} contradicts its leaves: run harness audit on the directory"
                 ));
             }
         }
     }
-    let mut report =
-        DiffReport { compared: trust, contradictions, ..manifests(&a.manifest, &b.manifest) };
+    let [a, b] = sets;
+    let of_manifests = manifests(&a.manifest, &b.manifest);
+    let mut report = DiffReport { compared: trust, without_sides, contradictions, ..of_manifests };
     for i in octants_differing(&a.manifest, &b.manifest) {
-        if let Some((x, y)) = first_difference(&a, &b, i)? {
-            report.leaf = Some(rule::sides(x, y, &a.manifest.root));
-            report.rules = rules(&a, &b, case, x, y)?;
+        if let Some((x, y)) = first_difference(&a, &b, i, mask)? {
+            let sides_known = without_sides.is_none();
+            report.leaf = Some(rule::leaves(x, y, sides_known, &a.manifest.root));
+            if sides_known {
+                report.rules = rules(&a, &b, case, x, y)?;
+            }
             break;
         }
     }
     Ok(report)
 }
+
+/// The names of the two meshes.
+const NAMES: [&str; 2] = ["A", "B"];
 
 /// Compares two manifests, digests included.
 pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
@@ -129,7 +149,7 @@ pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
     DiffReport {
         compared,
         leaves: a.leaves,
-        fields: fields(a, b),
+        fields: fields::differing(a, b),
         octants,
         ..DiffReport::default()
     }
@@ -138,21 +158,30 @@ pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
 /// Number of words that are read at once.
 const CHUNK: u64 = 1 << 16;
 
-/// Replaces the counts and digests in a manifest by those of the leaves. Returns whether they differed.
-fn recount(set: &mut LeafDir) -> Result<bool, ReadError> {
-    let mut tally = Tally::default();
+/// Replaces the counts and digests in a manifest by those of the leaves, of whose words only the bits of `mask` count. Returns
+/// whether the manifest contradicts the whole words.
+fn recount(set: &mut LeafDir, mask: u64) -> Result<bool, ReadError> {
+    let (mut whole, mut masked) = (Tally::default(), Tally::default());
     for part in &set.parts {
         let mut words = Vec::new();
         for first in (0..part.len()).step_by(CHUNK as usize) {
             words.resize(CHUNK.min(part.len() - first) as usize, 0);
             part.read_at(first, &mut words).map_err(|error| ReadError::part(part, error))?;
-            words.iter().for_each(|&word| tally.add(word));
+            words.iter().for_each(|&word| whole.add(word));
+            if mask != u64::MAX {
+                words.iter().for_each(|&word| masked.add(word & mask));
+            }
         }
     }
-    tally.finish();
+    whole.finish();
     let stated = set.manifest.clone();
-    set.manifest.set_tally(tally);
-    Ok(set.manifest != stated)
+    set.manifest.set_tally(whole);
+    let contradicts = set.manifest != stated;
+    if mask != u64::MAX {
+        masked.finish();
+        set.manifest.set_tally(masked);
+    }
+    Ok(contradicts)
 }
 
 /// Level-3 octants whose digests differ.
@@ -166,44 +195,22 @@ fn level_3(index: usize) -> Octant {
     Octant { corner: word::corner_of((index as u64) << 48), level: 3 }
 }
 
-/// The differences of inputs and counts.
-fn fields(a: &Manifest, b: &Manifest) -> Vec<String> {
-    let mut fields = Vec::new();
-    let mut same = |name: &str, x: &dyn Debug, y: &dyn Debug| {
-        let (x, y) = (format!("{x:?}"), format!("{y:?}"));
-        if x != y {
-            fields.push(format!("{name}: {x} and {y}"));
-        }
-    };
-    same("tree", &a.tree, &b.tree);
-    same("root", &a.root, &b.root);
-    same("level_surface", &a.level_surface, &b.level_surface);
-    same("layer_cells_min", &a.layer_cells_min, &b.layer_cells_min);
-    same("keep", &a.keep, &b.keep);
-    same("keep_crossing", &a.keep_crossing, &b.keep_crossing);
-    same("boxes", &a.boxes, &b.boxes);
-    same("seeds", &a.seeds, &b.seeds);
-    same("enclosed", &a.enclosed, &b.enclosed);
-    same("components", &a.components, &b.components);
-    same("components_ambiguous", &a.components_ambiguous, &b.components_ambiguous);
-    same("leaves", &a.leaves, &b.leaves);
-    same("leaves_by_side", &a.leaves_by_side, &b.leaves_by_side);
-    for (level, (x, y)) in a.leaves_by_level.iter().zip(&b.leaves_by_level).enumerate() {
-        same(&format!("leaves of level {level}"), x, y);
-    }
-    fields
-}
-
 /// The first words of two meshes that differ; `None` for a mesh that has no more leaves.
 type Differing = (Option<u64>, Option<u64>);
 
-/// The first words that differ in a level-3 octant; `None` if the leaves are the same.
+/// The first words that differ in a level-3 octant, in the bits of `mask`; `None` if the leaves are the same.
 fn first_difference(
     a: &LeafDir,
     b: &LeafDir,
     index: usize,
+    mask: u64,
 ) -> Result<Option<Differing>, ReadError> {
-    let (words_a, words_b) = (octant_words(a, index)?, octant_words(b, index)?);
+    let words = |set| -> Result<Vec<u64>, ReadError> {
+        let mut words = octant_words(set, index)?;
+        words.iter_mut().for_each(|word| *word &= mask);
+        Ok(words)
+    };
+    let (words_a, words_b) = (words(a)?, words(b)?);
     if words_a == words_b {
         return Ok(None);
     }
@@ -274,6 +281,26 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         leaf_set(vec![words]).write(dir.path()).unwrap();
         dir
+    }
+
+    #[test]
+    fn without_the_sides_of_one_mesh_the_cells_are_compared() {
+        let words = words_of(|o| o.level < 2);
+        let with_sides = words.iter().map(|word| word | 1).collect();
+        let (a, b) = (written(with_sides), written(words.clone()));
+        let compare = || diff(a.path(), b.path(), None, Trust::Manifests).unwrap();
+        assert!(!compare().same_leaves());
+        let unknown = |mut set: contract::leafset::LeafSet| {
+            set.manifest.sides = Sides::Unknown;
+            set.write(b.path()).unwrap();
+        };
+        unknown(leaf_set(vec![words.clone()]));
+        let same = compare();
+        assert!(same.same_leaves(), "{same}");
+        assert!(same.to_string().starts_with("the sides of B are unknown"), "{same}");
+        unknown(leaf_set(vec![words[1..].to_vec()]));
+        let other = compare();
+        assert!(!other.same_leaves() && other.rules.is_empty(), "{other}");
     }
 
     #[test]

@@ -243,10 +243,18 @@ fn crossed_by(octant: &Octant, case: &Case) -> Option<usize> {
     })
 }
 
-/// The words of both meshes at the first difference, as text.
-pub fn sides(a: Option<u64>, b: Option<u64>, root: &contract::lattice::Root) -> String {
-    let text =
-        |word: Option<u64>| word.map_or("no more leaves".to_owned(), |word| describe(word, root));
+/// The leaves of both meshes at the first difference, as text.
+pub fn leaves(
+    a: Option<u64>,
+    b: Option<u64>,
+    sides_known: bool,
+    root: &contract::lattice::Root,
+) -> String {
+    let text = |word: Option<u64>| match word {
+        None => "no more leaves".to_owned(),
+        Some(word) if sides_known => describe(word, root),
+        Some(word) => root.describe(&word::octant(word)),
+    };
     format!("first difference:\n  A has {}\n  B has {}", text(a), text(b))
 }
 

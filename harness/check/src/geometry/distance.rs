@@ -113,6 +113,11 @@ pub fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// Length of a vector.
+pub fn length(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
 /// Vector product.
 pub fn cross(u: Point, v: Point) -> Point {
     std::array::from_fn(|a| {

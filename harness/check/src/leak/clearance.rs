@@ -5,6 +5,9 @@ use contract::lattice::FacetLattice;
 use crate::geometry::boxes::{Bounds, Boxes};
 use crate::geometry::distance;
 
+/// Exceeds the rounding of a distance, in lattice units.
+const ROUNDING: f64 = 1.0;
+
 /// A point, in lattice units.
 pub type Point = [f64; 3];
 
@@ -25,7 +28,7 @@ impl<'a> Clearance<'a> {
     /// knows, and limits the search.
     pub fn at(&self, point: Point, bound: f64) -> f64 {
         // Rounding must not exclude the facet that the bound comes from.
-        let mut best = (bound + 1.0) * (bound + 1.0);
+        let mut best = (bound + ROUNDING) * (bound + ROUNDING);
         self.within(point, &mut best, &mut |squared, _, best| *best = squared.min(*best));
         best.sqrt()
     }
@@ -33,7 +36,7 @@ impl<'a> Clearance<'a> {
     /// Distance from a square that no facet enters to the nearest facet; infinite without facets. The square has its corners in
     /// order around it, and lies in a plane normal to an axis. `bound` is an upper bound that the caller knows.
     pub fn at_square(&self, corners: &[Point; 4], bound: f64) -> f64 {
-        let mut best = (bound + 1.0) * (bound + 1.0);
+        let mut best = (bound + ROUNDING) * (bound + ROUNDING);
         let fold = |f: fn(f64, f64) -> f64| -> Point {
             std::array::from_fn(|a| corners.iter().map(|c| c[a]).fold(corners[0][a], f))
         };
@@ -56,6 +59,27 @@ impl<'a> Clearance<'a> {
         });
         found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         found
+    }
+
+    /// The facets that can be the nearest one of a point at most `radius` from `centre`, each with its distance from the
+    /// centre, nearest first.
+    pub fn near(&self, centre: Point, radius: f64) -> Vec<(u32, f64)> {
+        // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
+        let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + ROUNDING;
+        self.facets_within(centre, reach)
+    }
+
+    /// Distance from a point to the nearest of the facets near a centre, which is `offset` from the point.
+    pub fn among(&self, near: &[(u32, f64)], point: Point, offset: f64) -> f64 {
+        let mut best = f64::INFINITY;
+        for &(facet, from_centre) in near {
+            let least = from_centre - offset - ROUNDING;
+            if least > 0.0 && least * least > best {
+                break;
+            }
+            best = distance::from_point(point, &self.triangle(facet)).0.min(best);
+        }
+        best.sqrt()
     }
 
     /// A nearest point of the nearest facet.
@@ -98,7 +122,11 @@ impl<'a> Clearance<'a> {
                 if from_box(bounds) >= *limit {
                     return false;
                 }
-                for &facet in members.map_or(&[][..], |m| &boxes.facets[m]) {
+                for i in members.into_iter().flatten() {
+                    if from_box(&boxes.bounds[i]) >= *limit {
+                        continue;
+                    }
+                    let facet = boxes.facets[i];
                     let squared = from_triangle(&self.triangle(facet));
                     if squared < *limit {
                         visit(squared, facet, limit);

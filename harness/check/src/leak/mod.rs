@@ -2,7 +2,8 @@
 //! close or open?
 //!
 //! - [`leaves`]: a base tree with neighbours; [`ends`]: the ends of the path; [`search`]: the path through the leaves;
-//! - [`clearance`]: distances to facets; [`path`]: free widths along a path and its narrowest place;
+//! - [`clearance`]: distances to facets; [`grid`]: the same for the points of a grid;
+//! - [`path`]: free widths along a path and its narrowest place;
 //! - [`passage`]: the widest path; [`surface`]: whether the facets form a closed surface between the ends;
 //! - [`report`]: the answer as data; [`text`]: the answer for a terminal.
 //!
@@ -12,6 +13,7 @@
 
 pub mod clearance;
 pub mod ends;
+pub mod grid;
 pub mod leaves;
 pub mod passage;
 pub mod path;

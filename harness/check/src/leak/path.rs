@@ -6,9 +6,10 @@
 //! narrowest point of the path is one of the finest grid: its ball is the largest that passes.
 
 use super::clearance::{Clearance, Point};
+use super::grid::{Distances, Grid, STEPS};
 use super::leaves::{Leaves, shared_face_centre};
 use super::search::{self, Goal, Graph, Interrupted, nearest_boundary};
-use crate::geometry::distance::{dot, sub};
+use crate::geometry::distance::{length, sub};
 
 /// A point and its distance to the nearest facet, in lattice units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,11 +22,8 @@ pub struct Spot {
     pub step: f64,
 }
 
-/// Step of the finest grid, in parts of the clearance.
+/// Step of a grid that is fine enough, in parts of the clearance.
 const PRECISION: f64 = 1e-3;
-
-/// Half of a grid's edge, in steps.
-const STEPS: i32 = 16;
 
 /// Grids that are searched at most.
 const GRIDS_MAX: usize = 150;
@@ -76,19 +74,19 @@ impl Path {
             narrowest: 0,
             approaches: route.approaches.map(|count| 2 * count),
         };
+        // No ball of a greater radius passes the grids.
+        let mut bound = f64::INFINITY;
         for _ in 0..GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
-            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
-            let is_unwanted = spot.clearance + 3f64.sqrt() * spot.step < route.wanted;
-            let is_precise = spot.step <= PRECISION * spot.clearance;
-            if path.is_narrowest_at_end() || is_precise || is_unwanted {
+            let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.clearance;
+            if path.is_narrowest_at_end() || is_precise || bound < route.wanted {
                 break;
             }
             let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
-            if !path.widen(step, clearance, stop)? {
-                break;
-            }
+            let Some(narrowest) = path.widen(step, clearance, stop)? else { break };
+            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
+            bound = bound.min(narrowest.clearance + 3f64.sqrt() * narrowest.step);
         }
         path.narrowest = path.find_narrowest();
         Ok(path)
@@ -116,7 +114,7 @@ impl Path {
         let (first, last) = self.surroundings(self.throat().clearance / 2.0);
         let (from, to) = (first.saturating_sub(1), (last + 1).min(self.spots.len() - 1));
         let step = sub(self.spots[to].at, self.spots[from].at);
-        let length = dot(step, step).sqrt();
+        let length = length(step);
         if length > 0.0 { step.map(|c| c / length) } else { [1.0, 0.0, 0.0] }
     }
 
@@ -137,34 +135,39 @@ impl Path {
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
     }
 
-    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. Returns whether
-    /// there is one.
+    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. Returns the narrowest
+    /// point of the grid's path, or `None` if there is no path.
     fn widen(
         &mut self,
         step: f64,
         clearance: &Clearance,
         stop: &dyn Fn() -> bool,
-    ) -> Result<bool, Interrupted> {
+    ) -> Result<Option<Spot>, Interrupted> {
         let grid = Grid { centre: self.throat().at, step };
         let (first, last) = self.surroundings(f64::from(STEPS) * step);
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
         let mut known = vec![f32::NAN; grid.count()];
+        let mut distances = Distances::new(&grid, clearance);
         let mut width = |place: u32, near: u32| {
             if known[place as usize].is_nan() {
                 let bound = match known[near as usize] {
                     near if near >= 0.0 => f64::from(near) + 2.0 * step,
                     _ => f64::INFINITY,
                 };
-                let free = clearance.at(grid.position(place), bound);
+                let free = distances.at(place, bound);
                 // Balls at neighbours must overlap, so that no facet is between them.
                 known[place as usize] = if free > step { free as f32 } else { -1.0 };
             }
             known[place as usize]
         };
         let goal = Goal::Place(to);
-        let Some(route) = search::widest(&grid, from, goal, &mut width, stop)? else {
-            return Ok(false);
+        let Some(widest) = search::widest(&grid, from, goal, &mut width, stop)? else {
+            return Ok(None);
         };
+        // Through a slit the widest path leads to and fro: each of its points is almost the narrowest and would need grids.
+        let least = widest.iter().map(|&place| width(place, place)).fold(f32::INFINITY, f32::min);
+        let route = search::shortest(&grid, from, goal, least, &mut width, stop)?;
+        let route = route.expect("the widest path is as wide");
         // Points near the grid's edge depend on where the path enters it, so they are not final.
         let coarse = self.spots[first].step.max(self.spots[last].step);
         let spot = |&place: &u32| Spot {
@@ -173,10 +176,11 @@ impl Path {
             step: if Grid::is_inner(place) { step } else { coarse },
         };
         let widened: Vec<Spot> = route.iter().map(spot).collect();
+        let narrowest = widened.iter().copied().min_by(|a, b| a.clearance.total_cmp(&b.clearance));
         let (begin, end) = self.inner();
         let replaced = first + usize::from(first == begin)..last + usize::from(last != end);
         self.spots.splice(replaced, widened);
-        Ok(true)
+        Ok(narrowest)
     }
 }
 
@@ -193,62 +197,4 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
     }
     let spot = |at| Spot { at, clearance: clearance.at(at, f64::INFINITY), step: f64::INFINITY };
     points.into_iter().map(spot).collect()
-}
-
-/// A cubic grid of points, each joined to the 26 around it.
-struct Grid {
-    centre: Point,
-    step: f64,
-}
-
-/// Points of a grid along an edge.
-const SIDE: i32 = 2 * STEPS + 1;
-
-impl Grid {
-    fn nearest(&self, at: Point) -> u32 {
-        let index = |a: usize| {
-            let steps = ((at[a] - self.centre[a]) / self.step).round() as i32;
-            steps.clamp(-STEPS, STEPS) + STEPS
-        };
-        ((index(2) * SIDE + index(1)) * SIDE + index(0)) as u32
-    }
-
-    /// Whether a place is far from the grid's edge.
-    fn is_inner(place: u32) -> bool {
-        Self::indices(place).iter().all(|i| (i - STEPS).abs() <= STEPS * 3 / 4)
-    }
-
-    fn indices(place: u32) -> [i32; 3] {
-        let place = place as i32;
-        [place % SIDE, place / SIDE % SIDE, place / SIDE / SIDE]
-    }
-}
-
-impl Graph for Grid {
-    fn count(&self) -> usize {
-        (SIDE * SIDE * SIDE) as usize
-    }
-
-    fn position(&self, place: u32) -> Point {
-        let indices = Self::indices(place);
-        std::array::from_fn(|a| self.centre[a] + f64::from(indices[a] - STEPS) * self.step)
-    }
-
-    fn is_far(&self, _: u32) -> bool {
-        false
-    }
-
-    fn joined(&self, place: u32, visit: &mut impl FnMut(u32)) {
-        let [x, y, z] = Self::indices(place);
-        let around = |i: i32| (i - 1).max(0)..=(i + 1).min(SIDE - 1);
-        for k in around(z) {
-            for j in around(y) {
-                for i in around(x) {
-                    if (i, j, k) != (x, y, z) {
-                        visit(((k * SIDE + j) * SIDE + i) as u32);
-                    }
-                }
-            }
-        }
-    }
 }

@@ -24,7 +24,7 @@ pub struct Arguments {
     /// Experiments to run [default: all]
     #[arg(long, value_enum, value_delimiter = ',')]
     pub experiment: Vec<Experiment>,
-    /// Ranks of simulated runs, as in 1,2,7 or 1..64 for powers of two [default: those of the preset]
+    /// Ranks of simulated runs, or on MPI if several programs are compared or the program does not simulate ranks; as in 1,2,7 or 1..64 for powers of two [default: those of the preset]
     #[arg(long, value_parser = rank_list)]
     pub ranks: Option<RankList>,
     /// Ranks of runs on MPI

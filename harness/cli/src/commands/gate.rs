@@ -68,7 +68,7 @@ pub struct Arguments {
     repository: Option<PathBuf>,
     /// Measure the gate itself: which planted slow-downs each layer finds, for these sizes in percent [default: 0,0.1,0.3,1,3,10]
     #[arg(long, value_name = "PERCENT", value_delimiter = ',', num_args = 0..=1, value_parser = percentage,
-          default_missing_value = "0,0.1,0.3,1,3,10", conflicts_with_all = ["baseline", "candidate", "record"])]
+          default_missing_value = "0,0.1,0.3,1,3,10", conflicts_with_all = ["baseline", "candidate", "record", "junit", "json", "markdown", "require_layers"])]
     selftest: Option<Vec<f64>>,
     /// Gates per slow-down in --selftest
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]

@@ -24,6 +24,8 @@ pub(super) struct LevelReader<'a> {
     split: Option<Bytes<'a>>,
     masked: Option<Bytes<'a>>,
     sides: Option<Bytes<'a>>,
+    /// The numbers of split nodes and of masked ones before the first node, when they are known.
+    before: Option<[u64; 2]>,
 }
 
 impl<'a> LevelReader<'a> {
@@ -44,6 +46,7 @@ impl<'a> LevelReader<'a> {
             split: bytes(split),
             masked: bytes(masked),
             sides: bytes(sides),
+            before: None,
         }
     }
 
@@ -74,14 +77,21 @@ impl<'a> LevelReader<'a> {
         if node > self.end {
             return nodes(format!("node {} has no children", node - 1));
         }
-        let begin = self.begin;
-        let count = |bytes: &mut Option<Bytes>, counts: &[u64]| -> Result<u64> {
-            match bytes {
-                Some(bytes) => {
-                    Ok(bytes.ones_before(node, counts)? - bytes.ones_before(begin, counts)?)
-                }
-                None => Ok(0),
-            }
+        // Where a level begins is often in another chunk than the node.
+        let before = match self.before {
+            Some(before) => before,
+            None => self.bits_before_in_file(self.begin, index)?,
+        };
+        self.before = Some(before);
+        let [split, masked] = self.bits_before_in_file(node, index)?;
+        Ok([split - before[0], masked - before[1]])
+    }
+
+    /// The same for nodes of all levels.
+    fn bits_before_in_file(&mut self, node: u64, index: &Index) -> Result<[u64; 2]> {
+        let count = |bytes: &mut Option<Bytes>, counts: &[u64]| match bytes {
+            Some(bytes) => bytes.ones_before(node, counts),
+            None => Ok(0),
         };
         Ok([count(&mut self.split, &index.split)?, count(&mut self.masked, &index.masked)?])
     }

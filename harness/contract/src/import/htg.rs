@@ -4,13 +4,13 @@
 use super::ImportError;
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::files::write_atomically;
-use crate::htg::{TreeError, TreeFile};
+use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::manifest::{self, Manifest, Part, Sides, Tally, Tree};
 use crate::npy;
+use ::files::Claim;
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
@@ -26,8 +26,8 @@ pub struct ImportedTree {
 }
 
 impl ImportedTree {
-    /// Opens a file and counts its leaves; `None` if VTK has to read it, or if its root is not the one that is given. With
-    /// `sides`, the name of cell data, leaves have sides. The manifest is that of [`leaf_set`](super::leaf_set()).
+    /// Opens a file and counts its leaves; `None` if VTK has to read it, or if its root is not the one that is given. Sides are
+    /// the cell data that `sides` names, otherwise `side` if it has that. The manifest is that of [`leaf_set`](super::leaf_set()).
     ///
     /// # Errors
     /// If the file is damaged or has no such cell data.
@@ -39,7 +39,11 @@ impl ImportedTree {
         program: String,
     ) -> Result<Option<Self>, ImportError> {
         let content = |error: TreeError| ImportError::content(error.to_string());
-        let tree = match TreeFile::open(path, sides) {
+        let tree = match sides {
+            Some(_) => TreeFile::open(path, sides),
+            None => TreeFile::open(path, Some(SIDE)).or_else(|_| TreeFile::open(path, None)),
+        };
+        let tree = match tree {
             Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
             Err(error) if !error.is_of_another_layout() => return Err(content(error)),
             _ => return Ok(None),
@@ -59,7 +63,7 @@ impl ImportedTree {
         };
         manifest.set_tally(tally);
         manifest.root = tree.root;
-        manifest.sides = if sides.is_some() { Sides::Known } else { Sides::Unknown };
+        manifest.sides = if tree.has_sides() { Sides::Known } else { Sides::Unknown };
         Ok(Some(Self { tree, manifest }))
     }
 
@@ -70,16 +74,11 @@ impl ImportedTree {
     pub fn create(&self, dir: &Path) -> io::Result<()> {
         let named =
             |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", dir.display()));
-        fs::create_dir_all(dir).map_err(named)?;
-        if fs::read_dir(dir).map_err(named)?.next().is_some() {
-            return Err(named(io::Error::other("the directory is not empty: choose another")));
-        }
         let Manifest { leaves, digest, .. } = self.manifest;
-        let mut found = Digest::default();
         let name = manifest::part_name(0);
-        let fill = |out: &mut dyn Write| {
+        let fill = |out: &mut dyn Write| -> io::Result<()> {
             out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
-            let mut written = Ok(());
+            let (mut found, mut written) = (Digest::default(), Ok(()));
             let read = self.tree.words(&mut |run| {
                 run.iter().for_each(|&word| found.add(word));
                 let bytes: Vec<u8> = run.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -93,12 +92,20 @@ impl ImportedTree {
                 Err(error) => Err(io::Error::other(error)),
             }
         };
-        write_atomically(&dir.join(&name), fill).map_err(named)?;
-        let parts = vec![Part { file: name, leaves, digest }];
-        let manifest = Manifest { parts, ..self.manifest.clone() };
-        let text = manifest.text();
-        write_atomically(&dir.join(manifest::FILE), |out| out.write_all(text.as_bytes()))
-            .map_err(named)
+        let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
+        let write = || {
+            let names = [name.clone()];
+            let claim = Claim::create(dir, manifest::FILE, names).map_err(io::Error::from)?;
+            let mut out = BufWriter::new(claim.draft(&name)?);
+            fill(&mut out)?;
+            out.into_inner()?.publish()?;
+            let parts = vec![Part { file: name.clone(), leaves, digest }];
+            let text = Manifest { parts, ..self.manifest.clone() }.text();
+            claim.commit(|out| out.write_all(text.as_bytes()))?;
+            claim.keep();
+            Ok(())
+        };
+        parents.and_then(|()| write()).map_err(named)
     }
 
     /// Makes an empty directory a leaf set that has the tree alone, by a link to its file.

@@ -107,7 +107,7 @@ fn edge(
     polygon: &mut Vec<(Point, u64)>,
 ) {
     let middle = std::array::from_fn(|a| from.0[a].midpoint(to[a]));
-    match if length > 1 { points.find(middle) } else { None } {
+    match if points.may_halve(length) { points.find(middle) } else { None } {
         Some(number) => {
             edge(points, from, middle, length / 2, polygon);
             edge(points, (middle, number), to, length / 2, polygon);

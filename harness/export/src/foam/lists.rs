@@ -40,12 +40,12 @@ pub fn header(style: Style, class: &str, object: &str, note: &str) -> String {
     )
 }
 
-fn write_label(out: &mut impl Write, style: Style, label: u64) -> io::Result<()> {
-    debug_assert!(label <= label_max(style.label));
+fn write_label(out: &mut impl Write, style: Style, label: i64) -> io::Result<()> {
+    debug_assert!(label.unsigned_abs() <= label_max(style.label));
     match (style.is_ascii, style.label) {
-        (true, _) => write!(out, "{label}"),
+        (true, _) => out.write_all(itoa::Buffer::new().format(label).as_bytes()),
         (false, Label::Bits32) => out.write_all(&(label as i32).to_le_bytes()),
-        (false, Label::Bits64) => out.write_all(&(label as i64).to_le_bytes()),
+        (false, Label::Bits64) => out.write_all(&label.to_le_bytes()),
     }
 }
 
@@ -86,7 +86,7 @@ impl List {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn label(&mut self, label: u64) -> io::Result<()> {
+    pub fn label(&mut self, label: i64) -> io::Result<()> {
         write_label(&mut self.out, self.style, label)?;
         self.end_line()
     }
@@ -96,25 +96,38 @@ impl List {
     /// # Errors
     /// If the file cannot be written.
     pub fn point(&mut self, point: [f64; 3]) -> io::Result<()> {
-        match self.style.is_ascii {
-            true => write!(self.out, "({} {} {})", point[0], point[1], point[2])?,
-            false => point.iter().try_for_each(|c| self.out.write_all(&c.to_le_bytes()))?,
+        if !self.style.is_ascii {
+            return point.iter().try_for_each(|c| self.out.write_all(&c.to_le_bytes()));
         }
-        self.end_line()
+        for (before, coordinate) in [b"(", b" ", b" "].into_iter().zip(point) {
+            self.out.write_all(before)?;
+            self.out.write_all(zmij::Buffer::new().format_finite(coordinate).as_bytes())?;
+        }
+        self.out.write_all(b")\n")
     }
 
     /// Adds a face to a `faceList`.
     fn face(&mut self, vertices: &[u64]) -> io::Result<()> {
-        write!(self.out, "{}(", vertices.len())?;
-        for (i, vertex) in vertices.iter().enumerate() {
-            let blank = if i == 0 { "" } else { " " };
-            write!(self.out, "{blank}{vertex}")?;
+        write_label(&mut self.out, self.style, vertices.len() as i64)?;
+        for (i, &vertex) in vertices.iter().enumerate() {
+            self.out.write_all(if i == 0 { b"(" } else { b" " })?;
+            write_label(&mut self.out, self.style, vertex as i64)?;
         }
         self.out.write_all(b")\n")
     }
 
     fn end_line(&mut self) -> io::Result<()> {
         if self.style.is_ascii { self.out.write_all(b"\n") } else { Ok(()) }
+    }
+
+    /// The same as [`Self::finish`], with another note of the same length.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish_with_note(self, class: &str, object: &str, note: &str) -> io::Result<()> {
+        let header = header(self.style, class, object, note);
+        self.out.get_ref().write_all_at(header.as_bytes(), 0)?;
+        self.finish()
     }
 
     /// Ends the list, and waits until the file is on disk.
@@ -178,8 +191,8 @@ impl Faces {
                 if *count > label_max(positions.style.label) {
                     return Ok(false);
                 }
-                positions.label(*count)?;
-                vertices.iter().try_for_each(|&v| write_label(out, positions.style, v))?;
+                positions.label(*count as i64)?;
+                vertices.iter().try_for_each(|&v| write_label(out, positions.style, v as i64))?;
             }
         }
         Ok(true)

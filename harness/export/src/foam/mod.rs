@@ -4,7 +4,8 @@
 //! and every cell is closed. `checkMesh -allTopology` verifies that. Cells are numbered in Morton order, which yields
 //! OpenFOAM's upper-triangular order of faces: a cell on the high side of another has the higher number.
 //!
-//! Cells and tree are kept in memory, about 20 bytes per cell; the files are written cell by cell.
+//! Cells and tree are kept in memory, about 20 bytes per cell, and 5 more for each thread that writes the directory of a processor; the
+//! files are written cell by cell.
 //!
 //! - [`tree`]: the cells and what is across their faces; [`faces`]: the faces and their vertices; [`points`]: the numbers of points;
 //! - [`regions`], [`patches`], [`processors`];
@@ -36,13 +37,15 @@ use crate::leaf::Leaf;
 use crate::mesh::Mesh;
 use crate::options;
 use crate::options::{Options, Processors, Summary};
+use crate::ordered::in_order;
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
 use patches::Patches;
 use points::Points;
+use poly_mesh::Counts;
 use processors::Distribution;
 use regions::{Regions, Size};
-use survey::{Domain, Model, visit};
+use survey::{Domain, Model, survey, visit};
 use tree::{Builder, CELLS_MAX};
 
 /// Writes the selected leaves as `path`, which is a case's `constant/polyMesh`, or as one
@@ -63,22 +66,26 @@ pub fn write(
     let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
         .map_err(ExportError::Request)?;
 
+    let survey = survey(&model, &mut patches, distribution.as_ref())?;
+
     let named = |error| ExportError::write(path, error);
     let staging = files::temporary_directory(&existing(path).join("polyMesh")).map_err(named)?;
-    let mut counts = Vec::new();
-    for processor in 0..targets.len() as u32 {
+    let make = |processor: usize| {
         let dir = staging.path().join(processor.to_string());
         fs::create_dir(&dir).map_err(named)?;
-        let domain = Domain(distribution.as_ref().map(|distribution| (distribution, processor)));
-        counts.push(poly_mesh::write(&model, &mut patches, domain, &dir).map_err(|error| {
-            match error {
-                ExportError::Write(error) => named(error),
-                error => error,
-            }
-        })?);
-        let done = counts.iter().map(|counts| counts.cells).sum();
+        let domain = Domain(distribution.as_ref().map(|of_cells| (of_cells, processor as u32)));
+        poly_mesh::write(&model, &patches, &survey, domain, &dir).map_err(|error| match error {
+            ExportError::Write(error) => named(error),
+            error => error,
+        })
+    };
+    let (mut counts, mut done) = (Vec::new(), 0);
+    in_order(targets.len(), options.jobs, make, |_, of_directory: Counts| {
+        done += of_directory.cells;
+        counts.push(of_directory);
         options.watch.progress(done, model.words.len() as u64);
-    }
+        Ok(())
+    })?;
     let (files, bytes) = sizes(staging.path()).map_err(named)?;
     options.check()?;
     for (processor, target) in targets.iter().enumerate() {
@@ -88,7 +95,10 @@ pub fn write(
         };
         place().map_err(|error| ExportError::write(target, error))?;
     }
-    let notes = notes::notes(&counts, &regions, options.foam.regions);
+    let mut notes = notes::notes(&counts, &regions, options.foam.regions);
+    if counts.len() > 1 && !survey.has_addressing(&model) {
+        notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
+    }
     Ok(Summary { leaves: model.words.len() as u64, files, bytes, notes })
 }
 

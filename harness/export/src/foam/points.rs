@@ -16,6 +16,17 @@ pub struct Points {
     /// Index of each brick.
     index: FxHashMap<u64, u32>,
     bricks: Vec<Brick>,
+    /// Bitwise or of all coordinates: its lowest bit is the finest grid that has a point.
+    bits: u32,
+}
+
+/// Points of a set, numbered anew in the order in which they are first asked for.
+#[derive(Debug)]
+pub struct Own {
+    /// One more than the new number of each point of the set; 0 if it has none.
+    numbers: Vec<u32>,
+    /// The points in the order of their new numbers.
+    pub points: Vec<Point>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +62,7 @@ fn point(key: u64, bit: u32) -> Point {
 impl Points {
     /// Adds a point. Numbers are valid after [`Self::number`].
     pub fn insert(&mut self, point: Point) {
+        self.bits |= point[0] | point[1] | point[2];
         let (key, bit) = place(point);
         let next = self.bricks.len() as u32;
         let index = *self.index.entry(key).or_insert(next);
@@ -67,6 +79,11 @@ impl Points {
             brick.first = first;
             first += u64::from(brick.mask.count_ones());
         }
+    }
+
+    /// Whether there may be points halfway along an edge of this length, a power of two, between points of its grid.
+    pub fn may_halve(&self, length: u32) -> bool {
+        length > 1 && self.bits & (length - 1) != 0
     }
 
     /// Number of points.
@@ -87,6 +104,23 @@ impl Points {
         self.bricks.iter().flat_map(|brick| {
             (0..64).filter(|bit| brick.mask >> bit & 1 == 1).map(|bit| point(brick.key, bit))
         })
+    }
+}
+
+impl Own {
+    /// No points of a set that has been numbered.
+    pub fn new(all: &Points) -> Self {
+        Self { numbers: vec![0; all.count() as usize], points: Vec::new() }
+    }
+
+    /// The new number of a point, which has the number `of_all` in the set.
+    pub fn number(&mut self, point: Point, of_all: u64) -> u64 {
+        let number = &mut self.numbers[of_all as usize];
+        if *number == 0 {
+            self.points.push(point);
+            *number = u32::try_from(self.points.len()).expect("the points fit in memory");
+        }
+        u64::from(*number) - 1
     }
 }
 

@@ -10,8 +10,8 @@ use contract::word;
 use super::faces::Square;
 use super::lists::{self, Faces, List};
 use super::patches::Patches;
-use super::points::{Point, Points};
-use super::survey::{Boundary, Domain, Face, Model, survey, visit};
+use super::points::{Own, Point};
+use super::survey::{Boundary, Domain, Face, Model, Survey, owned, visit};
 use crate::error::ExportError;
 use crate::options::Style;
 
@@ -37,6 +37,15 @@ impl Counts {
         let between = self.faces_between.iter().map(|(_, faces)| faces);
         self.faces_internal + patches.chain(between).sum::<u64>()
     }
+
+    /// What the header of `owner` and `neighbour` states. Its length does not depend on the number of points.
+    fn note(&self) -> String {
+        let Self { points, cells, faces_internal, .. } = self;
+        let faces = self.faces();
+        format!(
+            "nPoints:{points:<20} nCells:{cells} nFaces:{faces} nInternalFaces:{faces_internal}"
+        )
+    }
 }
 
 /// Writes the files into an existing directory.
@@ -45,15 +54,16 @@ impl Counts {
 /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
 pub fn write(
     model: &Model,
-    patches: &mut Patches,
+    patches: &Patches,
+    survey: &Survey,
     domain: Domain,
     dir: &Path,
 ) -> Result<Counts, ExportError> {
-    let boundary = survey(model, patches, domain)?;
+    let boundary = &survey.boundaries[domain.0.map_or(0, |(_, here)| here as usize)];
     let size = |faces: &Vec<Face>| faces.len() as u64;
-    let counts = Counts {
+    let mut counts = Counts {
         cells: domain.cells(model.tree.cells()).count() as u64,
-        points: boundary.points.as_ref().unwrap_or(&model.points).count(),
+        points: model.points.count(),
         faces_internal: boundary.internal,
         patches: patches.names.iter().cloned().zip(boundary.by_patch.iter().map(size)).collect(),
         faces_between: boundary.by_processor.iter().map(|(&p, faces)| (p, size(faces))).collect(),
@@ -63,8 +73,16 @@ pub fn write(
     {
         return Err(narrow());
     }
-    write_points(model, boundary.points.as_ref().unwrap_or(&model.points), dir)?;
-    write_faces(model, domain, &boundary, &counts, dir)?;
+    let own = write_faces(model, domain, survey, boundary, &mut counts, dir)?;
+    match &own {
+        None => write_points(model, model.points.iter(), &counts, dir)?,
+        Some(own) => {
+            write_points(model, own.points.iter().copied(), &counts, dir)?;
+            if survey.has_addressing(model) {
+                write_addressing(model, domain, own, &counts, dir)?;
+            }
+        }
+    }
     write_cells(model, domain, &counts, dir)?;
     write_boundary(model, patches, domain, &counts, dir)?;
     Ok(counts)
@@ -76,10 +94,15 @@ fn narrow() -> ExportError {
     )
 }
 
-fn write_points(model: &Model, points: &Points, dir: &Path) -> Result<(), ExportError> {
+fn write_points(
+    model: &Model,
+    points: impl Iterator<Item = Point>,
+    counts: &Counts,
+    dir: &Path,
+) -> Result<(), ExportError> {
     let mut list =
-        List::create(dir, model.options.foam.style, "vectorField", "points", "", points.count())?;
-    for point in points.iter() {
+        List::create(dir, model.options.foam.style, "vectorField", "points", "", counts.points)?;
+    for point in points {
         list.point(model.root.to_user(point.map(|c| i64::from(c) * UNITS_PER_CELL)))?;
     }
     Ok(list.finish()?)
@@ -87,77 +110,135 @@ fn write_points(model: &Model, points: &Points, dir: &Path) -> Result<(), Export
 
 /// The lists that are written face by face.
 struct FaceFiles<'a> {
+    model: &'a Model<'a>,
     faces: Faces,
     owner: List,
     polygon: Vec<(Point, u64)>,
     vertices: Vec<u64>,
-    all: &'a Points,
-    own: Option<&'a Points>,
+    /// The points of a directory that has not all cells.
+    own: Option<Own>,
+    /// The numbers of its faces in the whole mesh.
+    addressing: Option<List>,
 }
 
 impl FaceFiles<'_> {
-    fn push(&mut self, owner: u32, square: &Square) -> Result<(), ExportError> {
+    /// Adds the face with this number in the whole mesh. `is_turned` is whether the whole mesh has it the other way round.
+    fn push(
+        &mut self,
+        owner: u32,
+        square: &Square,
+        number: u64,
+        is_turned: bool,
+    ) -> Result<(), ExportError> {
         // Normals point away from the owner. Between two cells that is the one on the low side, whose number is lower.
-        square.polygon(self.all, !square.is_high, &mut self.polygon);
+        square.polygon(&self.model.points, !square.is_high, &mut self.polygon);
         self.vertices.clear();
-        let number = |&(point, number): &(Point, u64)| match self.own {
-            None => number,
-            Some(own) => own.find(point).expect("the survey has added all points"),
-        };
-        self.vertices.extend(self.polygon.iter().map(number));
-        self.owner.label(u64::from(owner))?;
+        match &mut self.own {
+            None => self.vertices.extend(self.polygon.iter().map(|&(_, number)| number)),
+            Some(own) => {
+                self.vertices.extend(self.polygon.iter().map(|&(p, number)| own.number(p, number)));
+            }
+        }
+        if let Some(addressing) = &mut self.addressing {
+            // Counted from 1, so that every number has a sign.
+            let number = number as i64 + 1;
+            addressing.label(if is_turned { -number } else { number })?;
+        }
+        self.owner.label(i64::from(owner))?;
         if self.faces.push(&self.vertices)? { Ok(()) } else { Err(narrow()) }
     }
 }
 
+/// Writes the faces, and returns the points of a directory that has not all cells; its number of points is known then.
 fn write_faces(
     model: &Model,
     domain: Domain,
+    survey: &Survey,
     boundary: &Boundary,
-    counts: &Counts,
+    counts: &mut Counts,
     dir: &Path,
-) -> Result<(), ExportError> {
-    let (style, all) = (model.options.foam.style, counts.faces());
-    let Counts { points, cells, faces_internal: internal, .. } = counts;
-    let note = format!("nPoints:{points} nCells:{cells} nFaces:{all} nInternalFaces:{internal}");
-    let mut neighbours = List::create(dir, style, "labelList", "neighbour", &note, *internal)?;
+) -> Result<Option<Own>, ExportError> {
+    let (style, all, internal) = (model.options.foam.style, counts.faces(), counts.faces_internal);
+    let labels = |object: &str, note: &str, count: u64| {
+        List::create(dir, style, "labelList", object, note, count)
+    };
+    let mut neighbours = labels("neighbour", &counts.note(), internal)?;
+    let own = domain.0.map(|_| Own::new(&model.points));
+    let has_addressing = own.is_some() && survey.has_addressing(model);
+    let addressing = has_addressing.then(|| labels("faceProcAddressing", "", all)).transpose()?;
     let mut files = FaceFiles {
+        model,
         faces: Faces::create(dir, style, all)?,
-        owner: List::create(dir, style, "labelList", "owner", &note, all)?,
+        owner: labels("owner", &counts.note(), all)?,
         polygon: Vec::new(),
         vertices: Vec::new(),
-        all: &model.points,
-        own: boundary.points.as_ref(),
+        own,
+        addressing,
     };
-    let number = |cell: u32| domain.number(cell);
-    let mut internal: Vec<(u32, Square)> = Vec::new();
+    let (mut of_cell, mut number) = (Vec::new(), 0);
     visit(model, domain, |cell, _, squares| {
-        let Ok(owner) = number(cell) else {
-            unreachable!("only cells of the directory are visited")
-        };
-        internal.clear();
-        internal.extend(
-            squares
-                .iter()
-                .filter(|s| s.is_high)
-                .filter_map(|square| Some((number(square.across.as_cell()?).ok()?, *square))),
-        );
-        internal.sort_unstable_by_key(|&(neighbour, _)| neighbour);
-        for (neighbour, square) in &internal {
-            neighbours.label(u64::from(*neighbour))?;
-            files.push(owner, square)?;
+        number = survey.first_face(cell).unwrap_or(number);
+        let owner = domain.number(cell).expect("only cells of the directory are visited");
+        owned(squares, &mut of_cell);
+        for (across, square) in &of_cell {
+            if let Some(neighbour) = domain.number(*across) {
+                neighbours.label(i64::from(neighbour))?;
+                files.push(owner, square, number, false)?;
+            }
+            number += 1;
         }
         Ok(())
     })?;
-    for face in boundary.by_patch.iter().chain(boundary.by_processor.values()).flatten() {
-        let Ok(owner) = number(face.cell) else {
-            unreachable!("a face has a cell of its directory")
-        };
-        files.push(owner, &face.square)?;
+    let owner = |face: &Face| domain.number(face.cell).expect("a face has a cell of its directory");
+    for face in boundary.by_patch.iter().flatten() {
+        files.push(owner(face), &face.square, face.number, false)?;
     }
-    neighbours.finish()?;
-    files.owner.finish()?;
-    Ok(files.faces.finish()?)
+    for face in boundary.by_processor.values().flatten() {
+        files.push(owner(face), &face.square, face.number, !face.square.is_high)?;
+    }
+    let FaceFiles { faces, owner, own, addressing, .. } = files;
+    faces.finish()?;
+    addressing.map_or(Ok(()), List::finish)?;
+    counts.points = own.as_ref().map_or(counts.points, |own| own.points.len() as u64);
+    neighbours.finish_with_note("labelList", "neighbour", &counts.note())?;
+    owner.finish_with_note("labelList", "owner", &counts.note())?;
+    Ok(own)
+}
+
+/// Writes what reconstructPar needs besides the addressing of faces: the numbers that the points, cells and patches of a
+/// processor have in the whole mesh.
+fn write_addressing(
+    model: &Model,
+    domain: Domain,
+    own: &Own,
+    counts: &Counts,
+    dir: &Path,
+) -> Result<(), ExportError> {
+    let write = |object: &str, count: u64, numbers: &mut dyn Iterator<Item = i64>| {
+        write_labels(model, object, count, numbers, dir)
+    };
+    let number = |&point: &Point| model.points.find(point).expect("it is a point of the mesh");
+    let mut points = own.points.iter().map(|point| number(point) as i64);
+    write("pointProcAddressing", counts.points, &mut points)?;
+    let mut cells = domain.cells(model.tree.cells()).map(i64::from);
+    write("cellProcAddressing", counts.cells, &mut cells)?;
+    let (of_mesh, between) = (counts.patches.len(), counts.faces_between.len());
+    let mut patches = (0..of_mesh as i64).chain(std::iter::repeat_n(-1, between));
+    write("boundaryProcAddressing", (of_mesh + between) as u64, &mut patches)
+}
+
+fn write_labels(
+    model: &Model,
+    object: &str,
+    count: u64,
+    labels: &mut dyn Iterator<Item = i64>,
+    dir: &Path,
+) -> Result<(), ExportError> {
+    let mut list = List::create(dir, model.options.foam.style, "labelList", object, "", count)?;
+    for label in labels {
+        list.label(label)?;
+    }
+    Ok(list.finish()?)
 }
 
 /// Writes the level of each cell, and its side and rank where they are known.
@@ -167,20 +248,16 @@ fn write_cells(
     counts: &Counts,
     dir: &Path,
 ) -> Result<(), ExportError> {
-    let write = |object: &str, label: &dyn Fn(usize) -> u64| -> Result<(), ExportError> {
-        let mut list =
-            List::create(dir, model.options.foam.style, "labelList", object, "", counts.cells)?;
-        for cell in domain.cells(model.tree.cells()) {
-            list.label(label(cell as usize))?;
-        }
-        Ok(list.finish()?)
+    let write = |object: &str, label: &dyn Fn(usize) -> i64| {
+        let cells = domain.cells(model.tree.cells());
+        write_labels(model, object, counts.cells, &mut cells.map(|c| label(c as usize)), dir)
     };
-    write("cellLevel", &|cell| u64::from(word::level(model.words[cell])))?;
+    write("cellLevel", &|cell| i64::from(word::level(model.words[cell])))?;
     if model.has_sides {
-        write("side", &|cell| model.words[cell] & 3)?;
+        write("side", &|cell| (model.words[cell] & 3) as i64)?;
     }
     if !model.ranks.is_empty() {
-        write("rank", &|cell| u64::from(model.ranks[cell]))?;
+        write("rank", &|cell| i64::from(model.ranks[cell]))?;
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ use contract::word::{self, Side};
 
 use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Visitor};
 use crate::selection::Selection;
 
 /// Octants of at most this many leaves are held as a whole.
@@ -82,7 +82,7 @@ fn front_holding(
     check: &dyn Fn() -> Result<(), ExportError>,
 ) -> Result<Vec<Face>, ExportError> {
     let found = Found { selection, faces: Vec::new() };
-    let mut search = Search { mesh, leaves_held, check, found };
+    let mut search = Search { mesh: mesh.visitor(), leaves_held, check, found };
     search.octant(Octant::ROOT)?;
     Ok(search.found.faces)
 }
@@ -105,7 +105,7 @@ type Layers = [[Vec<Entry>; 2]; 3];
 
 /// The traversal of octants that may have too many leaves to be held.
 struct Search<'a> {
-    mesh: &'a Mesh,
+    mesh: Visitor<'a>,
     leaves_held: u64,
     check: &'a dyn Fn() -> Result<(), ExportError>,
     found: Found<'a>,

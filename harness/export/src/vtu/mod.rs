@@ -72,12 +72,13 @@ fn encode(
     mut take: impl FnMut(usize, Encoded) -> Result<(), ExportError> + Send,
 ) -> Result<(), ExportError> {
     let Content { root, with_sides, .. } = content(mesh);
+    let visitor = mesh.visitor();
     let make = |index: usize| {
         options.check()?;
         let keys = &pieces[index].keys;
         ENCODER.with_borrow_mut(|encoder| {
             encoder.leaves.clear();
-            mesh.visit(keys.clone(), selection, &mut |leaf| {
+            visitor.visit(keys.clone(), selection, &mut |leaf| {
                 encoder.leaves.push(leaf);
                 Ok::<(), ExportError>(())
             })?;

@@ -2,13 +2,13 @@
 //!
 //! `NAME.pvtu` names `NAME_pieces/NAME_0000.vtu` and so on. The directory is filled under another name. An older one in
 //! its place is deleted if this program wrote every file in it, and is otherwise an error. The old `NAME.pvtu` is deleted before its
-//! directory, and the new one is written last, so a `.pvtu` always has its files.
+//! directory, and the new one gets its name last, so a `.pvtu` always has its files. If that fails, neither the old nor the new export is left.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use contract::files::{self, write_atomically};
+use contract::files;
 use tempfile::TempDir;
 
 use super::file::VtuFile;
@@ -127,25 +127,40 @@ impl Names {
         let named = |error| ExportError::write(&self.directory, error);
         File::open(place.path()).and_then(|directory| directory.sync_all()).map_err(named)?;
         self.refuse_other_files()?;
-        match fs::remove_file(&self.path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                return Err(ExportError::write(&self.path, error));
-            }
-            _ => {}
-        }
-        match fs::remove_dir_all(&self.directory) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(named(error)),
-            _ => {}
-        }
-        fs::rename(place.path(), &self.directory).map_err(named)?;
-        // Nothing is left to delete.
-        let _ = place.keep();
         let directory = format!("{}_pieces", self.stem);
         let files: Vec<_> = written.iter().map(|name| format!("{directory}/{name}")).collect();
         let xml = content.pvtu(&files);
-        write_atomically(&self.path, |out| out.write_all(xml.as_bytes()))
-            .map_err(|error| ExportError::write(&self.path, error))?;
-        Ok(xml.len() as u64)
+        let mut is_replaced = false;
+        // Whatever may fail for want of space comes before anything is deleted.
+        let published = files::fill_atomically(&self.path, to_write(&self.path), |file| {
+            file.write_all(xml.as_bytes()).map_err(to_write(&self.path))?;
+            delete(|| fs::remove_file(&self.path)).map_err(to_write(&self.path))?;
+            delete(|| fs::remove_dir_all(&self.directory)).map_err(named)?;
+            fs::rename(place.path(), &self.directory).map_err(named)?;
+            is_replaced = true;
+            Ok(())
+        });
+        if is_replaced {
+            // Nothing is left to delete.
+            let _ = place.keep();
+        }
+        if is_replaced && published.is_err() {
+            let _ = fs::remove_dir_all(&self.directory);
+        }
+        published.map(|()| xml.len() as u64)
+    }
+}
+
+/// Makes an error of a file that names it.
+fn to_write(path: &Path) -> impl Fn(io::Error) -> ExportError + '_ {
+    |error| ExportError::write(path, error)
+}
+
+/// Deletes something that may be missing.
+fn delete(delete: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    match delete() {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
     }
 }
 

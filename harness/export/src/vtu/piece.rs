@@ -8,7 +8,7 @@ use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
 use super::points::{Points, unpacked};
-use super::zlib::Zlib;
+use super::zlib::{Known, Zlib};
 use crate::leaf::Leaf;
 
 /// VTK's number of the cell type hexahedron.
@@ -36,12 +36,14 @@ pub struct Encoder {
     pub leaves: Vec<Leaf>,
     points: Points,
     zlib: Zlib,
+    offsets: Known,
+    types: Known,
 }
 
 impl Encoder {
     /// Encodes the leaves; `with_sides` is whether their sides are known.
     pub fn encode(&mut self, root: &Root, with_sides: bool) -> Encoded {
-        let Self { leaves, points, zlib } = self;
+        let Self { leaves, points, zlib, offsets, types } = self;
         points.set(leaves);
         let cells = leaves.len();
         let mut to = Encoded {
@@ -56,8 +58,11 @@ impl Encoder {
         let connectivity = points.connectivity.iter();
         to.push(zlib, points.packed.len(), points.packed.iter().map(|&p| point(p, root)));
         to.push(zlib, 8 * cells, connectivity.map(|&i| u64::from(i).to_le_bytes()));
-        to.push(zlib, cells, (1..=cells as u64).map(|i| (8 * i).to_le_bytes()));
-        to.push(zlib, cells, leaves.iter().map(|_| [HEXAHEDRON]));
+        to.begin_array();
+        let end = |cell: usize| (8 * cell as u64 + 8).to_le_bytes();
+        zlib.append_known(cells, end, offsets, &mut to.bytes);
+        to.begin_array();
+        zlib.append_known(cells, |_| [HEXAHEDRON], types, &mut to.bytes);
         to.push(zlib, cells, leaves.iter().map(|leaf| [leaf.octant.level]));
         to.push(zlib, cells, leaves.iter().map(|leaf| leaf.part.to_le_bytes()));
         to.push(zlib, cells, leaves.iter().map(|leaf| edges(leaf).to_le_bytes()));
@@ -76,8 +81,12 @@ impl Encoded {
         count: usize,
         values: impl Iterator<Item = [u8; N]>,
     ) {
-        self.offsets.push(self.bytes.len() as u64);
+        self.begin_array();
         zlib.append(count, values, &mut self.bytes);
+    }
+
+    fn begin_array(&mut self) {
+        self.offsets.push(self.bytes.len() as u64);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::leaf::Leaf;
 const CORNERS: [[usize; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 /// Greatest depth of the blocks that are numbered as a whole.
-const DEPTH_MAX: u32 = 2;
+const DEPTH_MAX: u32 = 3;
 
 /// Points and cells of a piece.
 #[derive(Debug, Default)]

@@ -1,4 +1,4 @@
-//! A verification as JSON; the schema is documented in harness/README.md.
+//! A verification as JSON; the schema is documented in harness/doc/verify.md.
 
 use run::verify::report::Report;
 

@@ -51,9 +51,6 @@ pub fn install() {
 
 fn watch() -> io::Result<()> {
     let (mut received, sent) = UnixStream::pair()?;
-    let place = tempfile::Builder::new().prefix("harness-").tempdir()?.keep();
-    let _ = tempfile::env::override_temp_dir(&place);
-    leftovers().temporary = Some(place);
     let wait = move || {
         let mut byte = [0];
         if received.read_exact(&mut byte).is_ok() {
@@ -68,6 +65,11 @@ fn watch() -> io::Result<()> {
     for signal in interrupt::signals() {
         pipe::register(signal, sent.try_clone()?)?;
     }
+    // A signal after this thread has made the directory removes it.
+    let mut leftovers = leftovers();
+    let place = tempfile::Builder::new().prefix("harness-").tempdir()?.keep();
+    let _ = tempfile::env::override_temp_dir(&place);
+    leftovers.temporary = Some(place);
     Ok(())
 }
 

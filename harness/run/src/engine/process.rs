@@ -11,7 +11,7 @@ use super::failure::{End, Failure, describe_activity};
 use super::interrupt;
 use super::memory::MemorySampler;
 use super::output::Output;
-use super::reap::try_reap;
+use super::reap::{Ending, try_reap};
 use super::session;
 use rustix::process::{Signal, setsid};
 use std::fs;
@@ -111,6 +111,7 @@ fn wait(
     mut sampler: Option<&mut MemorySampler>,
     outputs: &mut [Output; 2],
 ) -> io::Result<Result<f64, End>> {
+    let ending = Ending::of(child);
     let mut pause = Duration::from_millis(1);
     loop {
         if let Some((status, time_cpu_s)) = try_reap(child)? {
@@ -131,7 +132,7 @@ fn wait(
         if let Some(sampler) = &mut sampler {
             sampler.sample(child.id());
         }
-        std::thread::sleep(pause);
+        ending.wait(pause);
         pause = (pause * 2).min(Duration::from_millis(20));
     }
 }

@@ -153,6 +153,10 @@ impl Engine {
         let finished = self.execute(&mut command, layout.ranks, options)?;
         let mesh = self.mesh_path(options);
         if let Some(mesh) = mesh.as_ref().filter(|mesh| !mesh.join(manifest::FILE).exists()) {
+            // Our programs write it last: without it their mesh is incomplete.
+            if description::is_own(self.name()) {
+                return Err(self.unusable(format!("wrote no {}", manifest::FILE)));
+            }
             let tree = if options.ungraded { Tree::Base } else { Tree::Final };
             self.describe(mesh, case, tree)
                 .map_err(|why| self.unusable(format!("wrote a mesh that cannot be read: {why}")))?;

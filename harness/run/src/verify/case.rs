@@ -28,6 +28,8 @@ pub struct CaseRun<'a> {
     pub place: &'a Path,
     /// The progress line.
     pub progress: &'a Progress,
+    /// Oracles that gave no answer, although they exist.
+    pub oracles_silent: Vec<Failure>,
     /// The report so far.
     report: CaseReport,
 }
@@ -43,7 +45,8 @@ impl<'a> CaseRun<'a> {
         progress: &'a Progress,
     ) -> Self {
         let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
-        Self { selected, options, programs, needs, place, progress, report }
+        let oracles_silent = Vec::new();
+        Self { selected, options, programs, needs, place, progress, oracles_silent, report }
     }
 
     /// Performs all steps: serial meshes and their checks, ranks and threads, oracles, p4est. Without serial meshes the

@@ -106,7 +106,9 @@ fn verify_case(
     let selected = &plain(selected, programs, &place);
     let mut run = CaseRun::new(selected, options, programs, needs, &place, progress);
     run.verify();
+    let silent = std::mem::take(&mut run.oracles_silent);
     let mut report = run.into_report();
+    needs.note_silent_oracles(silent);
     if report.tally().run() == 0 && report.input_error.is_none() {
         needs.note_unchecked(&selected.name);
     }

@@ -90,6 +90,11 @@ impl Needs {
         }
     }
 
+    /// Records oracles that gave no answer on a case: a required vote needs all of them.
+    pub fn note_silent_oracles(&mut self, failures: Vec<Failure>) {
+        self.oracles_missing.extend(failures);
+    }
+
     /// Records that no check of a case was run.
     pub fn note_unchecked(&mut self, case: &str) {
         self.unchecked.push(case.to_owned());

@@ -44,12 +44,14 @@ impl CaseRun<'_> {
             Err(failure) if failure.is_interrupt() => return,
             Err(failure) => {
                 let outcome = Outcome::LeftOut(failure.to_string());
+                self.oracles_silent.push(failure);
                 return self.add(Check::new(SUBJECT, NAME, outcome), None);
             }
         };
         let mut check = judge(case, &sample, &answers);
         check.notes.extend(failures.iter().map(|failure| format!("no answer: {failure}")));
         check.time_s = start.elapsed().as_secs_f64();
+        self.oracles_silent.extend(failures);
         self.add(check, None);
     }
 

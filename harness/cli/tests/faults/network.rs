@@ -1,0 +1,176 @@
+//! Ranks on two hosts with a network between them, which is cut during the run. The hosts are network namespaces, joined by a pair of virtual
+//! interfaces; a script in place of a remote shell starts OpenMPI's daemon in the second one.
+
+use crate::place::Place;
+use crate::table::{Row, Table};
+use crate::tools::{is_full, mpi, mpirun, skip};
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// A mesh that takes many seconds.
+const CASE: &str = "spacing_min = 0.0012\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
+[generator]\nshape = \"sphere\"\nfacets = 5120\n";
+/// Time for a job with a network that is cut: until the ranks notice, and then the launcher.
+const LIMIT: Duration = Duration::from_secs(30);
+/// What the launcher prints.
+const LOST: &str = "lost communication";
+/// Addresses that no machine of the internet has.
+const NETWORK: &str = "198.18.77.0/24";
+const HOSTS: [&str; 2] = ["198.18.77.1", "198.18.77.2"];
+/// The launcher notices a host that does not answer after three seconds, and not after many minutes: before the ranks do, because
+/// a message of theirs that is under way would stop its watch.
+const OPTIONS: &str = "--mca btl self,tcp --mca btl_tcp_if_include NETWORK --mca oob_tcp_if_include NETWORK \
+    --mca oob_tcp_keepalive_time 1 --mca oob_tcp_keepalive_intvl 1 --mca oob_tcp_keepalive_probes 2";
+
+/// The network is cut on either side, at several times.
+pub fn family() {
+    let mesher = match mpi() {
+        Ok(mesher) => mesher,
+        Err(why) => return skip("a network that is cut", &why),
+    };
+    let hosts = match Hosts::make() {
+        Ok(hosts) => hosts,
+        Err(why) => return skip("a network that is cut", &why),
+    };
+    let place = Place::new();
+    place.write("case.toml", CASE);
+    let short = CASE.replace("0.0012", "0.02");
+    place.write("short.toml", short);
+    let before = place.files();
+    let mut table = Table::new();
+
+    let ended = place.run(hosts.job(&place, &mesher, "short.toml"), LIMIT);
+    let is_right = ended.code == Some(0) && place.path().join("out/mesh.json").exists();
+    let mut row = Row::new("mesher on 2 hosts", "none");
+    let wrong = ended.wrong.clone().or_else(|| (!is_right).then(|| format!("{ended:?}")));
+    row.add(ended.code, ended.seconds, "all output", wrong);
+    table.push(row);
+
+    let times = if is_full() { &[0, 300, 600, 1200, 2000][..] } else { &[300] };
+    for &delay_ms in times {
+        for host in if is_full() { &[0, 1][..] } else { &[1] } {
+            place.reset(&before);
+            hosts.link(*host, "up");
+            let job = hosts.job(&place, &mesher, "case.toml");
+            let is_cut = std::thread::scope(|scope| {
+                let cut = scope.spawn(|| {
+                    let start = Instant::now();
+                    while !place.path().join("out/mesh.json.draft").exists()
+                        && start.elapsed() < LIMIT
+                    {
+                        sleep(Duration::from_millis(2));
+                    }
+                    sleep(Duration::from_millis(delay_ms));
+                    hosts.link(*host, "down");
+                    !place.path().join("out/mesh.json").exists()
+                });
+                let mut ended = place.run(job, LIMIT);
+                let is_cut = cut.join().unwrap();
+                // The daemon of the other host is not reached by the launcher, and ends when the test removes the host.
+                ended.wrong = ended.wrong.filter(|why| !why.starts_with("processes"));
+                (is_cut, ended)
+            });
+            let (is_cut, ended) = is_cut;
+            let after = place.files();
+            let named = ended.err.lines().filter(|line| line.starts_with("mesher: ")).count();
+            let left =
+                if after.keys().any(|path| path.starts_with("out")) { "files" } else { "nothing" };
+            let wrong = match () {
+                () if ended.wrong.is_some() => ended.wrong.clone(),
+                () if !is_cut => Some("the run was over before the network was cut".to_owned()),
+                () if ended.code.is_none_or(|code| code == 0) => Some("it succeeded".to_owned()),
+                () if named == 0 && !ended.err.contains(LOST) => {
+                    Some("no sentence names the host".to_owned())
+                }
+                () if left != "nothing" => Some("files were left".to_owned()),
+                () => None,
+            };
+            let what = format!(
+                "host {host} is cut off {:.1} s after the claim",
+                f64::from(delay_ms as u32) / 1000.0
+            );
+            let mut row = Row::new("mesher on 2 hosts, --stall-limit 5", what);
+            row.add(ended.code, ended.seconds, left, wrong.map(|why| format!("{why}: {ended:?}")));
+            table.push(row);
+        }
+    }
+    table.finish("a network that is cut");
+}
+
+/// Two network namespaces, which are removed when this is dropped.
+struct Hosts {
+    names: [String; 2],
+    interfaces: [String; 2],
+}
+
+fn ip(arguments: &str) -> Result<String, String> {
+    let output = Command::new("ip").args(arguments.split(' ')).output();
+    let output = output.map_err(|e| format!("ip: {e}"))?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        false => Err(format!("ip {arguments}: {}", String::from_utf8_lossy(&output.stderr).trim())),
+    }
+}
+
+impl Hosts {
+    fn make() -> Result<Self, String> {
+        let id = std::process::id();
+        let hosts = Self {
+            names: ["a", "b"].map(|host| format!("faults-{id}-{host}")),
+            interfaces: ["a", "b"].map(|host| format!("f{id}{host}")),
+        };
+        let ([a, b], [x, y]) = (&hosts.names, &hosts.interfaces);
+        for name in [a, b] {
+            ip(&format!("netns add {name}"))?;
+        }
+        ip(&format!("link add {x} netns {a} type veth peer name {y} netns {b}"))?;
+        for (i, address) in HOSTS.iter().enumerate() {
+            let (name, interface) = (&hosts.names[i], &hosts.interfaces[i]);
+            ip(&format!("-n {name} addr add {address}/24 dev {interface}"))?;
+            ip(&format!("-n {name} link set lo up"))?;
+            hosts.link(i, "up");
+        }
+        Ok(hosts)
+    }
+
+    /// Connects a host, or cuts it off.
+    fn link(&self, host: usize, state: &str) {
+        ip(&format!("-n {} link set {} {state}", self.names[host], self.interfaces[host])).unwrap();
+    }
+
+    /// A job with a rank on each host.
+    fn job(&self, place: &Place, mesher: &Path, case: &str) -> Command {
+        let agent = place.beside("agent");
+        let script = "#!/bin/sh\nwhile [ \"${1#-}\" != \"$1\" ]; do shift; done\nshift\nexec ip netns exec HOST sh -c \"$*\"\n";
+        fs::write(&agent, script.replace("HOST", &self.names[1])).unwrap();
+        fs::set_permissions(&agent, fs::Permissions::from_mode(0o755)).unwrap();
+        let launcher = mpirun(2);
+        let mut job = Command::new("ip");
+        job.args(["netns", "exec", &self.names[0]])
+            .arg(launcher.get_program())
+            .args(launcher.get_args());
+        for (name, value) in launcher.get_envs() {
+            value.map(|value| job.env(name, value));
+        }
+        job.args(["--mca", "plm_rsh_agent"]).arg(agent);
+        job.args(OPTIONS.replace("NETWORK", NETWORK).split_whitespace());
+        job.args(["--host", &HOSTS.map(|host| format!("{host}:1")).join(",")]).arg(mesher);
+        job.args([case, "--out", "out", "--quiet", "--stall-limit", "5"]);
+        job
+    }
+}
+
+impl Drop for Hosts {
+    fn drop(&mut self) {
+        for name in &self.names {
+            for id in ip(&format!("netns pids {name}")).unwrap_or_default().lines() {
+                let _ = Command::new("kill").args(["-s", "KILL", id]).output();
+            }
+            let _ = ip(&format!("netns del {name}"));
+        }
+    }
+}

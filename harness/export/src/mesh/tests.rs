@@ -1,0 +1,79 @@
+use super::*;
+use crate::testing::on_disk;
+use contract::testing::random_words;
+use contract::word::Side;
+use proptest::prelude::*;
+
+fn words(mesh: &Mesh, keys: Range<u64>, selection: &Selection) -> Result<Vec<u64>, ExportError> {
+    let mut words = Vec::new();
+    mesh.visit(keys, selection, &mut |leaf: Leaf| {
+        words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
+        Ok::<(), ExportError>(())
+    })?;
+    Ok(words)
+}
+
+proptest! {
+    #[test]
+    fn all_leaves_of_interleaved_parts_are_visited_in_order(
+        leaves in random_words(5), parts in 1usize..4, run in 1usize..40
+    ) {
+        let (_dir, mesh) = on_disk(&leaves, parts, |i| i / run);
+        prop_assert_eq!(&words(&mesh, Mesh::ALL, &Selection::default()).unwrap(), &leaves);
+    }
+
+    #[test]
+    fn blocks_are_disjoint_and_contain_all_leaves(
+        leaves in random_words(5), parts in 1usize..4, leaves_max in 1u64..100
+    ) {
+        let (_dir, mesh) = on_disk(&leaves, parts, |i| i / 7);
+        let blocks = mesh.blocks(&Selection::default(), leaves_max).unwrap();
+        prop_assert!(blocks.windows(2).all(|w| w[0].keys.end <= w[1].keys.start));
+        let mut visited = Vec::new();
+        for Block { keys, leaves } in blocks {
+            let block = words(&mesh, keys, &Selection::default()).unwrap();
+            prop_assert!(!block.is_empty() && leaves <= leaves_max);
+            prop_assert_eq!(block.len() as u64, leaves);
+            visited.extend(block);
+        }
+        prop_assert_eq!(visited, leaves);
+    }
+
+    #[test]
+    fn a_selection_has_the_leaves_that_satisfy_it(
+        leaves in random_words(5), axis in 0usize..3, at in 0.0f64..=1.0, level in 0u8..6
+    ) {
+        let (_dir, mesh) = on_disk(&leaves, 2, |i| i / 9);
+        let slice = crate::selection::Slice::new(&mesh.manifest.root, axis, at);
+        let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
+        let mut expected = Vec::new();
+        let mut index = 0;
+        mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
+            assert_eq!(leaf.index, index);
+            index += 1;
+            expected.extend(selection.has(&leaf).then(|| {
+                word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
+            }));
+            Ok::<(), ExportError>(())
+        }).unwrap();
+        prop_assert_eq!(&words(&mesh, Mesh::ALL, &selection).unwrap(), &expected);
+        let blocks = mesh.blocks(&selection, 20).unwrap();
+        let of_block = |b: &Block| words(&mesh, b.keys.clone(), &selection).unwrap();
+        prop_assert_eq!(blocks.iter().flat_map(of_block).collect::<Vec<_>>(), expected);
+    }
+}
+
+#[test]
+fn leaves_out_of_order_and_invalid_words_are_errors_that_name_the_leaf() {
+    let leaves: Vec<u64> = contract::testing::words_of(|o| o.level < 1);
+    let mut swapped = leaves.clone();
+    swapped.swap(2, 3);
+    let mut overlapping = leaves.clone();
+    overlapping.insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
+    let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
+    for (leaves, expected) in [(swapped, "leaf 3"), (overlapping, "leaf 1"), (invalid, "leaf 0")] {
+        let (_dir, mesh) = on_disk(&leaves, 1, |_| 0);
+        let error = words(&mesh, Mesh::ALL, &Selection::default()).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}

@@ -1,0 +1,298 @@
+//! The plan of a run: its cells, time, memory and files, estimated before it is made; and the refusal of a run that would not fit.
+//!
+//! First the cells are estimated roughly, from the extents and areas of facets and from the volumes of boxes. A run whose memory
+//! is far from every [limit](room) needs no more. Otherwise [pilot runs](pilot) of the same case at coarser spacings are
+//! extrapolated: two of them, of which the finer has at most a 64th of the cells. A case with few cells is its own pilot.
+//!
+//! The memory of a rank is what it has resident after the pilots, with its facets, plus the growth of its sets. Nothing here is
+//! counted as communication of the mesher.
+
+pub mod pilot;
+mod ranks;
+mod room;
+mod text;
+mod volumes;
+
+pub use ranks::Tightest;
+pub use room::Limit;
+pub use volumes::Volumes;
+
+use crate::comm::{Comm, uncounted};
+use crate::error::Error;
+use crate::facet::Facet;
+use crate::lattice::{Bounds, Rules};
+use crate::octant::{Level, ROOT_EDGE, edge};
+use crate::partition::area;
+use pilot::{Amounts, Pilots};
+use ranks::Ranks;
+use serde::Serialize;
+
+/// What a plan is made for.
+pub struct Problem<'a> {
+    /// The rules on the lattice.
+    pub rules: &'a Rules,
+    /// The bounds of all facets.
+    pub bounds: &'a Bounds,
+    /// This rank's slice of the facets.
+    pub facets: &'a [Facet],
+    /// Number of facets on all ranks.
+    pub facets_total: u64,
+    /// The spacing at the surface that the case gives.
+    pub spacing_min: f64,
+    /// The parts of the boxes.
+    pub volumes: &'a Volumes,
+    /// CPU time of this rank so far, in seconds.
+    pub time_cpu_s: f64,
+    /// All ranks.
+    pub comm: &'a dyn Comm,
+}
+
+/// A pilot run, coarser by some levels: the amounts of this rank. Collective.
+pub type Pilot<'a> = &'a mut dyn FnMut(Level) -> Result<Amounts, Error>;
+
+/// The source of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// The case was meshed.
+    Mesh,
+    /// Two pilot runs were extrapolated.
+    Pilots,
+    /// The areas of facets and the volumes of boxes: a guess.
+    Areas,
+}
+
+/// One pilot run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PilotEntry {
+    /// The factor by which its spacings were larger.
+    pub spacing_factor: f64,
+    /// Its leaves.
+    pub cells: u64,
+    /// Its CPU time over all ranks, in seconds.
+    pub time_cpu_s: f64,
+}
+
+/// An estimate of what a run takes. In JSON, under `schema`, `octree-mesher-plan/1`. The same on all ranks.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    schema: &'static str,
+    program: &'static str,
+    /// Number of ranks.
+    pub ranks: usize,
+    /// The source of the estimate.
+    pub source: Source,
+    /// The pilot runs, coarsest first.
+    pub pilots: Vec<PilotEntry>,
+    /// Leaves of the mesh.
+    pub cells: u64,
+    /// CPU time over all ranks, in seconds, at the rate of the pilot runs; none without any.
+    pub time_cpu_s: Option<f64>,
+    /// Peak resident memory by rank, in bytes.
+    pub memory_peak_bytes: Vec<u64>,
+    /// Size of the leaf words (`--write words`) by rank, in bytes.
+    pub words_bytes: Vec<u64>,
+    /// Size of the tree (`--write htg`), in bytes.
+    pub tree_bytes: u64,
+    /// The limit that the run comes closest to; none if nothing limits memory.
+    pub tightest: Option<Tightest>,
+    /// Whether the memory suffices.
+    pub fits: bool,
+    /// If it does not: the least factor, a power of two, by which all spacings must be multiplied.
+    pub spacing_factor_fits: Option<f64>,
+    /// `spacing_min` times that factor.
+    pub spacing_min_fits: Option<f64>,
+}
+
+/// Cells below which a run is too small to be planned, at a byte for each: it fits wherever the program does.
+const CELLS_SMALL: f64 = 64e6;
+/// Bytes per cell of a rough estimate; a quarter of it is usual.
+const BYTES_ROUGH: f64 = 2.0;
+/// Bytes per cell that are usual.
+const BYTES_USUAL: f64 = 0.6;
+/// A pilot run has at most this fraction of the cells, so that two take about 2 % of the time.
+const PART_OF_CELLS: f64 = 64.0;
+/// Cells per facet below which pilot runs would take more than that, because their time does not fall with the cells.
+const CELLS_PER_FACET: f64 = 2048.0;
+/// Cells of a pilot run that takes a moment, a fraction of a second.
+const CELLS_MOMENT: f64 = 8.4e6;
+/// Greatest number of cells of a pilot run.
+const CELLS_PILOT: f64 = 67e6;
+/// Bytes per cell of the tree's file.
+const TREE_BYTES_PER_CELL: f64 = 0.055;
+/// Bytes of the header of a file of leaf words.
+const WORDS_HEADER: u64 = 128;
+
+/// Bytes that the limit on the address space leaves this process; infinite without one.
+pub fn address_space_left() -> f64 {
+    room::Room::read().address_space
+}
+
+impl Problem<'_> {
+    /// Whether the run is small for certain, from the extent of the facets alone.
+    fn is_small(&self) -> bool {
+        let h = edge(self.rules.level_surface);
+        let layers = 2.0 * (f64::from(self.rules.layer_cells_min) + 2.0);
+        let cells: f64 = (0..3)
+            .map(|a| {
+                let ends = [self.bounds.lo[a], self.bounds.hi[a]];
+                let ends = ends.map(|x| self.rules.root.quantise(a, x).clamp(0, ROOT_EDGE));
+                (ends[1] - ends[0]) as f64 / h as f64 + layers
+            })
+            .product();
+        2.0 * (cells + self.volumes.cells()) < CELLS_SMALL
+    }
+
+    /// A rough estimate of the cells: around facets, and in boxes. Collective.
+    fn cells_rough(&self) -> [f64; 2] {
+        let face = (edge(self.rules.level_surface) as f64).powi(2);
+        let faces = self.comm.sum((area::total(self.facets) / face) as u64) as f64;
+        [faces * area::leaves_per_surface_cell(self.rules) as f64, self.volumes.cells()]
+    }
+}
+
+/// The plan of a run that is about to be made: only if it `is_shown` or might not fit. Collective.
+///
+/// # Errors
+/// If the run would not fit and is not forced; the same on all ranks.
+pub fn before_run(
+    problem: &Problem,
+    is_forced: bool,
+    is_shown: bool,
+    pilot: Pilot,
+) -> Result<Option<Plan>, Error> {
+    let comm = problem.comm;
+    let is_shown = uncounted(comm, || comm.max(u64::from(is_shown))) == 1;
+    if !is_shown && (is_forced || problem.is_small()) {
+        return Ok(None);
+    }
+    uncounted(comm, || {
+        let rough = problem.cells_rough();
+        let cells: f64 = rough.iter().sum();
+        let ranks = Ranks::gather(comm, Amounts::default(), 0);
+        let used = used(&ranks, cells);
+        let is_close = !is_forced && used > 0.5;
+        let is_cheap =
+            cells >= CELLS_SMALL && cells >= CELLS_PER_FACET * problem.facets_total as f64;
+        if !is_close && !is_cheap {
+            let amounts = Amounts { cells, ..Amounts::default() };
+            let more = vec![cells * BYTES_USUAL / ranks.count() as f64; ranks.count()];
+            return Ok(is_shown.then(|| Plan::new(Source::Areas, &ranks, amounts, more)));
+        }
+        let plan = from_pilots(problem, rough, cells_max(cells, used, 0.0), pilot)?;
+        if is_forced || plan.fits { Ok(Some(plan)) } else { Err(plan.refusal()) }
+    })
+}
+
+/// The plan of a case, whatever it takes. Collective.
+///
+/// # Errors
+/// If a pilot run fails.
+pub fn of_case(problem: &Problem, pilot: Pilot) -> Result<Plan, Error> {
+    uncounted(problem.comm, || {
+        let rough = problem.cells_rough();
+        let cells: f64 = rough.iter().sum();
+        let used = used(&Ranks::gather(problem.comm, Amounts::default(), 0), cells);
+        from_pilots(problem, rough, cells_max(cells, used, CELLS_MOMENT), pilot)
+    })
+}
+
+/// The part of the tightest limit that a mesh of some cells takes at most.
+fn used(ranks: &Ranks, cells: f64) -> f64 {
+    let more = vec![cells * BYTES_ROUGH / ranks.count() as f64; ranks.count()];
+    let part = |t: Tightest| t.needed_bytes as f64 / (t.left_bytes as f64).max(1.0);
+    ranks.tightest(&more).map_or(0.0, part)
+}
+
+/// Greatest number of cells of a pilot run; `least` of them in any case. Where there is no doubt that the run does not fit, few.
+fn cells_max(cells: f64, used: f64, least: f64) -> f64 {
+    if used > 100.0 {
+        CELLS_MOMENT / 4.0
+    } else {
+        (cells / PART_OF_CELLS).max(least).min(CELLS_PILOT)
+    }
+}
+
+/// Makes the pilot runs and extrapolates them. Collective.
+fn from_pilots(
+    problem: &Problem,
+    rough: [f64; 2],
+    cells_max: f64,
+    pilot: Pilot,
+) -> Result<Plan, Error> {
+    let comm = problem.comm;
+    let coarsest = problem.rules.level_deepest();
+    let rough_at =
+        |shift: Level| rough[0] / 4f64.powi(shift as i32) + rough[1] / 8f64.powi(shift as i32);
+    let mut runs: Vec<(Level, Ranks)> = Vec::new();
+    let mut run = |shift: Level| {
+        runs.push((shift, Ranks::gather(comm, pilot(shift)?, problem.facets.len())));
+        Ok::<_, Error>(extrapolation(&runs, rough[1]))
+    };
+    let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);
+    let mut pilots = run(first)?;
+    if first > 0 {
+        let last = (0..first).find(|&s| pilots.at(s).cells <= cells_max).unwrap_or(first - 1);
+        if 0 < last && last + 1 < first {
+            run(last + 1)?;
+        }
+        pilots = run(last)?;
+    }
+    let entry = |(shift, ranks): &(Level, Ranks)| {
+        let total = ranks.total();
+        let (cells, time_cpu_s) = (total.cells as u64, total.time_cpu_s());
+        PilotEntry { spacing_factor: factor(*shift), cells, time_cpu_s }
+    };
+    let entries = runs.iter().map(entry).collect();
+    let (finest, ranks) = runs.pop().expect("a pilot was run");
+    let source = if finest == 0 { Source::Mesh } else { Source::Pilots };
+    let at = |shift| Plan::new(source, &ranks, pilots.at(shift), ranks.growth(&pilots.at(shift)));
+    let before = comm.all_gather(&[problem.time_cpu_s.to_bits()]);
+    let before: f64 = before.words().iter().map(|&time| f64::from_bits(time)).sum();
+    let mut plan = at(0);
+    plan.pilots = entries;
+    plan.time_cpu_s = Some(before + pilots.at(0).time_cpu_s());
+    if !plan.fits {
+        let fitting = (1..=coarsest).find(|&shift| at(shift).fits).map(factor);
+        plan.spacing_factor_fits = fitting;
+        plan.spacing_min_fits = fitting.map(|factor| factor * problem.spacing_min);
+    }
+    Ok(plan)
+}
+
+/// The factor between spacings that are some levels apart.
+fn factor(shift: Level) -> f64 {
+    2f64.powi(shift as i32)
+}
+
+/// The last two of some pilot runs.
+fn extrapolation(runs: &[(Level, Ranks)], cells_boxed: f64) -> Pilots {
+    let mut latest = runs.iter().rev().map(|(shift, ranks)| (*shift, ranks.total()));
+    let fine = latest.next().expect("a pilot was run");
+    Pilots { fine, coarse: latest.next(), cells_boxed }
+}
+
+impl Plan {
+    /// The plan of a mesh with these amounts, for which each rank takes as many bytes as given beyond what it has.
+    fn new(source: Source, ranks: &Ranks, amounts: Amounts, more: Vec<f64>) -> Self {
+        let count = ranks.count();
+        let tightest = ranks.tightest(&more);
+        let words = (amounts.cells / count as f64 * 8.0) as u64 + WORDS_HEADER;
+        Self {
+            schema: "octree-mesher-plan/1",
+            program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
+            ranks: count,
+            source,
+            pilots: Vec::new(),
+            cells: amounts.cells as u64,
+            time_cpu_s: None,
+            memory_peak_bytes: ranks.peaks(&more),
+            words_bytes: vec![words; count],
+            tree_bytes: (amounts.cells * TREE_BYTES_PER_CELL) as u64,
+            tightest,
+            fits: tightest.is_none_or(|t| t.needed_bytes <= t.left_bytes),
+            spacing_factor_fits: None,
+            spacing_min_fits: None,
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Pilot runs: what the case needs at a coarser spacing, and what it therefore needs at its own.
+//!
+//! Coarsening every spacing by a power of two shifts the whole mesh by that many levels. Let x be the number of levels to which
+//! a mesh is refined further. What the boxes fill grows like 8^x and is known from their volumes. The remainder is a shell around
+//! surfaces, n cells thick at every level: it grows like 4^x with the areas, with a term in 2^x for curvature, edges and layers that
+//! overlap, and with slower terms for the far field. Two pilot runs give the first term and one for all others, whose base lies
+//! between 2 and 1 for the slower ones.
+
+use crate::brickset::ones;
+use crate::kept::Kept;
+use crate::lattice::{ExtentBox, Rules};
+use crate::mesh::Mesh;
+use crate::octant::{Level, corner, edge};
+use crate::partition::cost::Counts;
+use crate::plan::volumes::Volumes;
+use crate::record::Recorder;
+use crate::report::Counters;
+use crate::tree::{PerLevel, Tree};
+
+/// Number of quantities in [`Amounts`].
+pub const AMOUNTS: usize = 10;
+
+/// What one rank needs for a mesh, or all ranks together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Amounts {
+    /// Leaves.
+    pub cells: f64,
+    /// Leaves that the boxes would ask for, where the geometry has deleted them, at the case's own spacing.
+    pub cells_boxed_deleted: f64,
+    /// Tests and visits of bricks in refinement.
+    pub tests: f64,
+    /// Bricks and local components of the base tree.
+    pub components: f64,
+    /// Bytes of the sets, nodes and components while sides are decided.
+    pub bytes_sides: f64,
+    /// Bytes of the sets in gradation.
+    pub bytes_graded: f64,
+    /// CPU time of refinement, in seconds.
+    pub time_refine_s: f64,
+    /// CPU time of sides.
+    pub time_sides_s: f64,
+    /// CPU time of gradation and leaves.
+    pub time_leaves_s: f64,
+    /// CPU time of the other phases, most of which is spent on facets or on waiting for other ranks.
+    pub time_fixed_s: f64,
+}
+
+impl Amounts {
+    /// The quantities in the order of the fields.
+    pub fn to_array(self) -> [f64; AMOUNTS] {
+        let Self {
+            cells, cells_boxed_deleted, tests, components, bytes_sides, bytes_graded, ..
+        } = self;
+        let [refine, sides] = [self.time_refine_s, self.time_sides_s];
+        let [leaves, fixed] = [self.time_leaves_s, self.time_fixed_s];
+        let [first, second, third] =
+            [[cells, cells_boxed_deleted], [tests, components], [bytes_sides, bytes_graded]];
+        let times = [[refine, sides], [leaves, fixed]];
+        let all = [first, second, third, times[0], times[1]];
+        std::array::from_fn(|i| all[i / 2][i % 2])
+    }
+
+    /// Inverse of [`to_array`](Self::to_array).
+    pub fn from_array(v: [f64; AMOUNTS]) -> Self {
+        Self {
+            cells: v[0],
+            cells_boxed_deleted: v[1],
+            tests: v[2],
+            components: v[3],
+            bytes_sides: v[4],
+            bytes_graded: v[5],
+            time_refine_s: v[6],
+            time_sides_s: v[7],
+            time_leaves_s: v[8],
+            time_fixed_s: v[9],
+        }
+    }
+
+    /// The sums of several ranks' amounts.
+    pub fn sum(of: impl Iterator<Item = Self>) -> Self {
+        let add = |a: [f64; AMOUNTS], b: Self| {
+            let b = b.to_array();
+            std::array::from_fn(|i| a[i] + b[i])
+        };
+        Self::from_array(of.fold([0.0; AMOUNTS], add))
+    }
+
+    /// CPU time of all phases, in seconds.
+    pub fn time_cpu_s(&self) -> f64 {
+        self.time_refine_s + self.time_sides_s + self.time_leaves_s + self.time_fixed_s
+    }
+
+    /// The greater of the bytes that sets take in any phase.
+    pub fn bytes(&self) -> f64 {
+        self.bytes_sides.max(self.bytes_graded)
+    }
+}
+
+/// Bytes of a brick in a set: half a key and 64 bits.
+const BRICK: f64 = 12.0;
+/// Bytes of a brick in `sides`: its first component; and its split octants and first child if its level has any.
+const NODE: [f64; 2] = [4.0, 12.0];
+/// Bytes of a local component: its octants, its parent in the union-find and its class.
+const COMPONENT: f64 = 13.0;
+/// Copies of the graded sets that exist at a time in gradation: the sets, and for one level also the octants reached and the union that
+/// replaces the set. Measured on a sphere with layers of 4 to 30 cells.
+const COPIES_GRADED: f64 = 1.75;
+/// Visits of bricks without facets that take as long as one test of a facet against a brick.
+const VISITS_PER_TEST: f64 = 5.0;
+
+/// Factor per level of what does not grow with the area. Best on average for cases with layers of 1 to 30 cells.
+const BASE_BELOW_AREA: f64 = 1.85;
+
+/// The rules of a pilot: every spacing coarser by `shift` levels.
+pub fn coarser(rules: &Rules, shift: Level) -> Rules {
+    let boxes = rules.boxes.iter();
+    Rules {
+        level_surface: rules.level_surface.saturating_sub(shift),
+        boxes: boxes.map(|b| ExtentBox { level: b.level.saturating_sub(shift), ..*b }).collect(),
+        ..rules.clone()
+    }
+}
+
+/// Collects the amounts of a pilot run on this rank.
+#[derive(Debug, Default)]
+pub struct Collector {
+    amounts: Amounts,
+}
+
+impl Collector {
+    /// Counts the base tree, before its sides are decided.
+    pub fn base_tree(&mut self, mesh: &Tree, counts: &Counts) {
+        let bricks = |sets: &PerLevel| sets.iter().map(|s| s.len() as f64).sum::<f64>();
+        let depth = mesh.depth();
+        let linked: usize = (0..depth).map(|l| Tree::exists(&mesh.split, l).count()).sum();
+        self.amounts.components = (counts.bricks + counts.components) as f64;
+        self.amounts.bytes_sides = BRICK * (bricks(&mesh.split) + bricks(&mesh.crossing))
+            + NODE[0] * counts.bricks as f64
+            + NODE[1] * linked as f64
+            + COMPONENT * counts.components as f64;
+    }
+
+    /// The amounts of a finished pilot.
+    pub fn finish(
+        self,
+        mesh: &Mesh,
+        cells: u64,
+        counters: &Counters,
+        record: &Recorder,
+        volumes: &Volumes,
+    ) -> Amounts {
+        let bricks = |sets: &PerLevel| sets.iter().map(|s| s.len() as f64).sum::<f64>();
+        let stored =
+            bricks(&mesh.crossing) + bricks(&mesh.sides.deleted) + bricks(&mesh.sides.inside);
+        let time = |of: &[&str]| -> f64 {
+            let phases = record.phases().iter();
+            phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
+        };
+        let all: f64 = record.phases().iter().map(|p| p.time_cpu_s).sum();
+        let [refine, sides] = [time(&["refine"]), time(&["sides"])];
+        let leaves = time(&["grade", "leaves"]);
+        Amounts {
+            cells: cells as f64,
+            cells_boxed_deleted: deleted_in(volumes, mesh),
+            tests: counters.facet_brick_tests as f64
+                + counters.bricks_voxelised as f64 / VISITS_PER_TEST,
+            bytes_graded: BRICK * (stored + COPIES_GRADED * bricks(&mesh.split)),
+            time_refine_s: refine,
+            time_sides_s: sides,
+            time_leaves_s: leaves,
+            time_fixed_s: all - refine - sides - leaves,
+            ..self.amounts
+        }
+    }
+}
+
+/// The cells that the boxes ask for in deleted leaves that this rank owns.
+fn deleted_in(volumes: &Volumes, mesh: &Mesh) -> f64 {
+    if volumes.is_empty() {
+        return 0.0;
+    }
+    let kept = Kept::new(&mesh.sides.deleted);
+    let mut cells = 0.0;
+    for l in 0..mesh.sides.deleted.len() as Level {
+        for brick in kept.deleted(l).bricks().filter(|b| mesh.ownership.owns(l, b.key)) {
+            if !volumes.meet(corner(l, brick.key << 6), 4 * edge(l)) {
+                continue;
+            }
+            let at = |bit| corner(l, brick.key << 6 | u64::from(bit));
+            cells += ones(brick.bits).map(|bit| volumes.cells_in(at(bit), edge(l))).sum::<f64>();
+        }
+    }
+    cells
+}
+
+/// Pilot runs of a case, and their extrapolation.
+#[derive(Clone, Debug)]
+pub struct Pilots {
+    /// The finest, and by how many levels it is coarser than the case.
+    pub fine: (Level, Amounts),
+    /// A coarser one; none if the finest is the case itself, or as coarse as can be.
+    pub coarse: Option<(Level, Amounts)>,
+    /// Cells in the boxes at the case's own spacing.
+    pub cells_boxed: f64,
+}
+
+/// Cells of a box that one brick holds, about: the bytes of a region of uniform cells are those of its bricks and their ancestors.
+const BYTES_PER_CELL_BOXED: [f64; 2] = [0.36, 0.05];
+
+impl Pilots {
+    /// The amounts of a mesh that is coarser than the case by `shift` levels.
+    pub fn at(&self, shift: Level) -> Amounts {
+        let (shift_fine, fine) = self.fine;
+        if shift == shift_fine {
+            return fine;
+        }
+        let boxed = |shift: Level| {
+            (self.cells_boxed - fine.cells_boxed_deleted).max(0.0) / 8f64.powi(shift as i32)
+        };
+        let further = f64::from(shift_fine) - f64::from(shift);
+        // Extrapolates one quantity, of which a cell in a box has `per_cell`.
+        let grown = |of: fn(&Amounts) -> f64, per_cell: f64| {
+            let shell = |(at, amounts): (Level, Amounts)| {
+                (of(&amounts) - per_cell * boxed(at)).max(0.05 * of(&amounts))
+            };
+            let fine = shell(self.fine);
+            let coarse = self.coarse.map(|c| (f64::from(c.0 - shift_fine), shell(c)));
+            shell_at(further, fine, coarse) + per_cell * boxed(shift)
+        };
+        let cells = grown(|a| a.cells, 1.0);
+        let [per_cell_sides, per_cell_graded] = BYTES_PER_CELL_BOXED;
+        let components = grown(|a| a.components, 2.0 / 56.0);
+        let tests = self.tests_at(further, components / fine.components.max(1.0));
+        Amounts {
+            cells,
+            cells_boxed_deleted: fine.cells_boxed_deleted,
+            tests,
+            components,
+            bytes_sides: grown(|a| a.bytes_sides, per_cell_sides),
+            bytes_graded: grown(|a| a.bytes_graded, per_cell_graded),
+            time_refine_s: fine.time_refine_s * tests / fine.tests.max(1.0),
+            time_sides_s: self.time_sides_at(components),
+            time_leaves_s: fine.time_leaves_s * cells / fine.cells.max(1.0),
+            time_fixed_s: fine.time_fixed_s,
+        }
+    }
+
+    /// Tests: one for each brick that a facet crosses, which grow by `growth`, and those of facets that cross several bricks, which
+    /// double with every level.
+    fn tests_at(&self, further: f64, growth: f64) -> f64 {
+        let (shift_fine, fine) = self.fine;
+        let Some((shift, coarse)) = self.coarse else { return fine.tests * growth };
+        let per_brick = |a: &Amounts| (a.tests - a.components / 3.0).max(0.0);
+        let (now, before) = (per_brick(&fine), per_brick(&coarse));
+        let gap = f64::from(shift - shift_fine);
+        let slope = (now - before).max(0.0) / (1.0 - 0.5f64.powf(gap));
+        now + slope * (2f64.powf(further) - 1.0) + growth * fine.components / 3.0
+    }
+
+    /// Time of sides: a constant, for the rays of components, and a time per brick and component.
+    fn time_sides_at(&self, components: f64) -> f64 {
+        let fine = self.fine.1;
+        let all_per_component = fine.time_sides_s / fine.components.max(1.0);
+        let per_component = self.coarse.map_or(all_per_component, |(_, coarse)| {
+            let slope = (fine.time_sides_s - coarse.time_sides_s)
+                / (fine.components - coarse.components).max(1.0);
+            slope.clamp(0.0, all_per_component)
+        });
+        (fine.time_sides_s + per_component * (components - fine.components)).max(0.0)
+    }
+}
+
+/// A quantity of a shell around surfaces, `further` levels finer than a mesh for which it is `fine`. A mesh that is coarser by some
+/// levels has `coarse`.
+fn shell_at(further: f64, fine: f64, coarse: Option<(f64, f64)>) -> f64 {
+    let [by_area, by_length] = [4.0, BASE_BELOW_AREA].map(|base: f64| base.powf(further));
+    let Some((gap, coarse)) = coarse else { return fine * by_area };
+    let [area, length] = [4.0, BASE_BELOW_AREA].map(|base: f64| base.powf(-gap));
+    let of_area = ((fine * length - coarse) / (length - area)).max(0.0);
+    of_area * by_area + (fine - of_area) * by_length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shells_and_boxes_grow_as_their_dimensions() {
+        let amounts = |shift: i32| {
+            let x = -f64::from(shift);
+            let shell = 5e9 * 4f64.powf(x) + 7e6 * BASE_BELOW_AREA.powf(x);
+            Amounts {
+                cells: shell + 9e9 * 8f64.powf(x),
+                cells_boxed_deleted: 1e9,
+                components: 1.0,
+                ..Amounts::default()
+            }
+        };
+        let pilots =
+            Pilots { fine: (4, amounts(4)), coarse: Some((6, amounts(6))), cells_boxed: 10e9 };
+        for shift in 0..4 {
+            let error = pilots.at(shift).cells / amounts(shift as i32).cells - 1.0;
+            assert!(error.abs() < 1e-9, "{shift}: {error}");
+        }
+    }
+
+    #[test]
+    fn arrays_hold_all_amounts() {
+        let all = std::array::from_fn(|i| i as f64);
+        assert_eq!(Amounts::from_array(all).to_array(), all);
+        let sum = Amounts::sum([Amounts::from_array(all); 2].into_iter());
+        assert_eq!(sum.to_array(), all.map(|v| 2.0 * v));
+    }
+}

@@ -1,0 +1,154 @@
+//! What all ranks need, and the limits that they share: a process has an address space, and the ranks of one machine divide its
+//! memory.
+
+use crate::comm::Comm;
+use crate::plan::pilot::{AMOUNTS, Amounts};
+use crate::plan::room::{Limit, Room};
+use crate::record::peak_rss_bytes;
+use serde::Serialize;
+
+/// All ranks after a pilot run.
+pub struct Ranks {
+    all: Vec<Rank>,
+    /// Number of ranks in each process.
+    in_process: f64,
+}
+
+/// Bytes per facet that refinement has freed in the heap, where other sets reuse them.
+const FREED_PER_FACET: f64 = 60.0;
+/// Sets that grow in the heap leave holes: this part of them, as long as they are smaller than the blocks that get mappings of their
+/// own; and bytes at most.
+const HOLES: [f64; 2] = [0.3, 5e6];
+
+struct Rank {
+    amounts: Amounts,
+    /// Facets of its slice.
+    facets: f64,
+    room: Room,
+    /// Peak resident memory so far, in bytes.
+    peak: f64,
+}
+
+/// The limit that a run comes closest to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tightest {
+    /// The limit.
+    pub limit: Limit,
+    /// Bytes that it leaves: to a process if it limits the address space, otherwise to the ranks of one machine.
+    pub left_bytes: u64,
+    /// Bytes that these would take beyond what they have.
+    pub needed_bytes: u64,
+}
+
+impl Ranks {
+    /// Gathers the amounts and limits of all ranks. Collective.
+    pub fn gather(comm: &dyn Comm, amounts: Amounts, facets: usize) -> Self {
+        let Room { resident, address_space, control_group, machine, node } = Room::read();
+        let peak = peak_rss_bytes() as f64;
+        let room = [resident, address_space, control_group, machine, peak, facets as f64];
+        let words = amounts.to_array().into_iter().chain(room).map(f64::to_bits);
+        let words: Vec<u64> = words.chain([node]).collect();
+        let rank = |(_, words): (usize, &[u64])| {
+            let (amounts, room) = words.split_at(AMOUNTS);
+            let number = |i: usize| f64::from_bits(room[i]);
+            Rank {
+                amounts: Amounts::from_array(std::array::from_fn(|i| f64::from_bits(amounts[i]))),
+                room: Room {
+                    resident: number(0),
+                    address_space: number(1),
+                    control_group: number(2),
+                    machine: number(3),
+                    node: room[6],
+                },
+                peak: number(4),
+                facets: number(5),
+            }
+        };
+        let all = comm.all_gather(&words).messages().map(rank).collect();
+        Self { all, in_process: comm.ranks_in_process() as f64 }
+    }
+
+    /// Number of ranks.
+    pub fn count(&self) -> usize {
+        self.all.len()
+    }
+
+    /// The amounts of all ranks together.
+    pub fn total(&self) -> Amounts {
+        Amounts::sum(self.all.iter().map(|rank| rank.amounts))
+    }
+
+    /// Bytes that each rank takes beyond what it has, for a mesh that takes `amounts` on all ranks.
+    pub fn growth(&self, amounts: &Amounts) -> Vec<f64> {
+        let total = self.total().bytes().max(1.0);
+        let factor = amounts.bytes() / total - 1.0;
+        let of_rank = |rank: &Rank| {
+            let sets = (rank.amounts.bytes() * factor).max(0.0);
+            let holes = (HOLES[0] * sets).min(HOLES[1]) - FREED_PER_FACET * rank.facets;
+            sets + holes.max(0.0)
+        };
+        self.all.iter().map(of_rank).collect()
+    }
+
+    /// Peak resident memory of each rank, if each takes as many bytes as given beyond what it has. Ranks of one process have equal
+    /// parts of it.
+    pub fn peaks(&self, more: &[f64]) -> Vec<u64> {
+        let peak = |(rank, more): (&Rank, &f64)| {
+            rank.peak.max(rank.room.resident + more * self.in_process) / self.in_process
+        };
+        self.all.iter().zip(more).map(|pair| peak(pair) as u64).collect()
+    }
+
+    /// The limit that the ranks come closest to, if each takes as many bytes as given beyond what it has.
+    pub fn tightest(&self, more: &[f64]) -> Option<Tightest> {
+        let mut all = Vec::new();
+        for (rank, own) in self.all.iter().zip(more) {
+            let on_node = self.all.iter().zip(more).filter(|(r, _)| r.room.node == rank.room.node);
+            let node: f64 = on_node.map(|(_, more)| more).sum();
+            let room = &rank.room;
+            all.push((Limit::AddressSpace, room.address_space, own * self.in_process));
+            all.push((Limit::ControlGroup, room.control_group, node));
+            all.push((Limit::Machine, room.machine, node));
+        }
+        let part = |(_, left, needed): &(Limit, f64, f64)| needed / left.max(1.0);
+        let limited = all.into_iter().filter(|(_, left, _)| left.is_finite());
+        limited.max_by(|a, b| part(a).total_cmp(&part(b))).map(|(limit, left, needed)| Tightest {
+            limit,
+            left_bytes: left as u64,
+            needed_bytes: needed as u64,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rank(node: u64, address_space: f64, machine: f64) -> Rank {
+        let room =
+            Room { resident: 50.0, address_space, control_group: f64::INFINITY, machine, node };
+        let amounts = Amounts { bytes_sides: 10.0, ..Amounts::default() };
+        Rank { amounts, facets: 1.0, room, peak: 70.0 }
+    }
+
+    #[test]
+    fn ranks_of_one_machine_divide_its_memory() {
+        let all = vec![rank(1, 900.0, 100.0), rank(2, 900.0, 1000.0), rank(1, 900.0, 100.0)];
+        let ranks = Ranks { all, in_process: 1.0 };
+        let tightest = ranks.tightest(&[40.0, 500.0, 50.0]).unwrap();
+        assert_eq!((tightest.limit, tightest.needed_bytes), (Limit::Machine, 90));
+        let tightest = ranks.tightest(&[0.0, 850.0, 0.0]).unwrap();
+        assert_eq!((tightest.limit, tightest.left_bytes), (Limit::AddressSpace, 900));
+        assert_eq!(ranks.peaks(&[5.0, 50.0, 500.0]), [70, 100, 550]);
+        let three_times = Amounts { bytes_sides: 90.0, ..Amounts::default() };
+        assert_eq!(ranks.growth(&three_times), [20.0; 3]);
+    }
+
+    #[test]
+    fn ranks_of_one_process_have_one_address_space() {
+        let all = vec![rank(1, 100.0, f64::INFINITY), rank(1, 100.0, f64::INFINITY)];
+        let ranks = Ranks { all, in_process: 2.0 };
+        assert_eq!(ranks.tightest(&[60.0, 60.0]).unwrap().needed_bytes, 120);
+        assert_eq!(ranks.peaks(&[60.0, 60.0]), [85, 85]);
+    }
+}

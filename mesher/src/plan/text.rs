@@ -1,0 +1,127 @@
+//! A plan for people: a table, a line, and the sentence that refuses a run.
+
+use super::{Limit, Plan, Source};
+use crate::error::Error;
+use crate::report::grouped;
+use std::fmt;
+
+impl Plan {
+    /// The plan in one line.
+    pub fn line(&self) -> String {
+        let time =
+            self.time_cpu_s.map_or(String::new(), |s| format!(", {} of CPU time", seconds(s)));
+        let ranks = if self.ranks > 1 { " per rank" } else { "" };
+        format!(
+            "{} cells{time}, {} of memory{ranks}, leaf words of {}{ranks}",
+            self.about(),
+            bytes(self.memory_max()),
+            bytes(self.words_bytes[0] as f64)
+        )
+    }
+
+    /// The error that refuses a run that does not fit.
+    pub fn refusal(&self) -> Error {
+        let Some(tightest) = self.tightest else { return Error::memory("the run does not fit") };
+        let needed = bytes(tightest.needed_bytes as f64);
+        let left = bytes(tightest.left_bytes as f64);
+        let limit = match tightest.limit {
+            Limit::AddressSpace => {
+                format!("the limit on its address space leaves a process {left}")
+            }
+            Limit::ControlGroup => format!("the control group has {left} left"),
+            Limit::Machine => format!("the machine has {left} available"),
+        };
+        let fitting = match (self.spacing_factor_fits, self.spacing_min_fits) {
+            (Some(factor), Some(spacing)) => {
+                format!("multiply all spacings by {factor}, which fits (spacing_min = {spacing})")
+            }
+            _ => "no spacing of this case fits".into(),
+        };
+        Error::memory(format!(
+            "the mesh would have {} cells and need {needed} of memory, but {limit}: {fitting}, use more machines, or try with --force",
+            self.about(),
+        ))
+    }
+
+    /// The number of cells, to the precision of its source.
+    fn about(&self) -> String {
+        match self.source {
+            Source::Mesh => grouped(self.cells),
+            Source::Pilots => format!("about {:.1e}", self.cells as f64),
+            Source::Areas => format!("very roughly {:.0e}", self.cells as f64),
+        }
+    }
+
+    fn memory_max(&self) -> f64 {
+        self.memory_peak_bytes.iter().copied().max().unwrap_or(0) as f64
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for p in &self.pilots {
+            let cells = grouped(p.cells);
+            writeln!(
+                f,
+                "pilot          spacings times {}: {cells} cells, {} of CPU time",
+                p.spacing_factor,
+                seconds(p.time_cpu_s)
+            )?;
+        }
+        writeln!(f, "cells          {}", self.about())?;
+        if let Some(time) = self.time_cpu_s {
+            writeln!(f, "time           {} of CPU time over {} ranks", seconds(time), self.ranks)?;
+        }
+        let all: u64 = self.memory_peak_bytes.iter().sum();
+        writeln!(
+            f,
+            "peak memory    {} over all ranks, {} on a rank at most",
+            bytes(all as f64),
+            bytes(self.memory_max())
+        )?;
+        writeln!(
+            f,
+            "files          leaf words of {} per rank; or a tree of {}",
+            bytes(self.words_bytes[0] as f64),
+            bytes(self.tree_bytes as f64)
+        )?;
+        match self.tightest {
+            None => write!(f, "limit          none is known"),
+            Some(_) if !self.fits => write!(f, "fits           no: {}", self.refusal()),
+            Some(t) => {
+                let what = match t.limit {
+                    Limit::AddressSpace => "address space of a process",
+                    Limit::ControlGroup => "control group",
+                    Limit::Machine => "memory of the machine",
+                };
+                let (needed, left) = (bytes(t.needed_bytes as f64), bytes(t.left_bytes as f64));
+                write!(f, "fits           yes: {needed} more of {left} that are left ({what})")
+            }
+        }
+    }
+}
+
+/// A number of bytes with three digits.
+fn bytes(n: f64) -> String {
+    let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
+    let power = ((n.max(1.0).log10() / 3.0) as usize).min(units.len() - 1);
+    let value = n / 1000f64.powi(power as i32);
+    let digits = if power == 0 || value >= 100.0 { 0 } else { 1 };
+    format!("{value:.digits$} {}", units[power])
+}
+
+fn seconds(s: f64) -> String {
+    let digits = if s < 10.0 { 2 } else { 0 };
+    format!("{s:.digits$} s")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bytes;
+
+    #[test]
+    fn bytes_have_units() {
+        let shown = [0.0, 999.0, 1500.0, 448e6, 2.5e13, 5e22].map(bytes);
+        assert_eq!(shown, ["0 bytes", "999 bytes", "1.5 kB", "448 MB", "25.0 TB", "50000 EB"]);
+    }
+}
