@@ -42,7 +42,7 @@ fn runs() -> impl Strategy<Value = Run> {
 #[test]
 fn schedules_do_not_change_the_mesh() {
     let (first, count) = (from_env("SCHEDULES_FIRST", 0), from_env("SCHEDULES", 2000));
-    let (cases, runs) = (cases().boxed(), runs().boxed());
+    let (cases, runs) = (cases(), runs().boxed());
     let mut fibres = Fibres::default();
     let mut serial: Option<(u64, Serial)> = None;
     let (mut by_ranks, mut cells, mut refused) = (BTreeMap::<usize, u64>::new(), 0, 0);

@@ -119,12 +119,13 @@ pub fn drawn<T: std::fmt::Debug>(strategy: &impl Strategy<Value = T>, number: u6
     strategy.new_tree(&mut runner).expect("the strategies reject nothing").current()
 }
 
-/// Cases of all kinds, some with seeds.
-pub fn cases() -> impl Strategy<Value = Small> {
-    let case = prop_oneof![3 => small(soup()), 1 => thin(), 1 => leaky_on_rays()];
+/// Cases of all kinds, some with seeds. Boxed, as the strategies of unoptimised builds would fill the stack of a test.
+pub fn cases() -> BoxedStrategy<Small> {
+    let soup = small(soup().boxed()).boxed();
+    let case = prop_oneof![3 => soup, 1 => thin().boxed(), 1 => leaky_on_rays().boxed()].boxed();
     let point = [0.0f64..64.0, 0.0f64..64.0, 0.0f64..64.0];
     let seeds = prop_oneof![3 => Just(vec![]), 1 => prop::collection::vec(point, 1..3)];
-    (case, seeds).prop_map(|(case, seeds)| Small { seeds, ..case })
+    (case, seeds).prop_map(|(case, seeds)| Small { seeds, ..case }).boxed()
 }
 
 /// The first case of at most `cells` cells that is drawn from a number.
