@@ -142,6 +142,79 @@ class FoamTest(unittest.TestCase):
             # The explicit correction converges, which it does only if geometry and interpolation are right.
             self.assertLess(serial[-1], 1e-4)
 
+    @unittest.skipUnless(shutil.which("reconstructPar"), "reconstructPar is not installed: run ci/peers snappy")
+    def test_fields_of_processors_are_reconstructed_on_the_whole_mesh(self):
+        """The whole mesh and the processors are two exports, and the addressing joins them: values of cells, faces of patches and
+        points arrive where the serial program has them, whether the labels are text or binary and whatever part of the mesh each has."""
+        self.mesh("keep_crossing = false\n" + (ROOT / "geometries/sphere-small.toml").read_text())
+        case = self.at / "case"
+        for count, options in ((2, ["--ascii"]), (5, []), (3, ["--label", "64"])):
+            with self.subTest(count=count, options=options):
+                shutil.rmtree(case)
+                shutil.copytree(TEMPLATE, case)
+                self.export(*options)
+                self.export("--processors", count, *options)
+                (case / "system/decomposeParDict").write_text(
+                    (TEMPLATE / "system/decomposeParDict").read_text().replace("RANKS", str(count))
+                )
+                for processor in range(count):
+                    shutil.copytree(TEMPLATE / "0", case / f"processor{processor}/0")
+                control = case / "system/controlDict"
+                control.write_text(re.sub(r"(writeFormat +)\w+", r"\1ascii", control.read_text()))
+                centres = ["postProcess", "-func", "writeCellCentres", "-time", "0"]
+                call(case, "mpirun", "-n", count, *centres, "-parallel")
+                # Positions of the cells and of the faces of patches, by the serial program.
+                call(case, *centres)
+                expected = positions(case / "0/C")
+                (case / "0/C").unlink()
+                call(case, "reconstructPar", "-withZero", "-fields", "(C)")
+                found = positions(case / "0/C")
+                self.assertEqual(len(found), len(expected))
+                np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)
+
+    def test_the_addressing_of_processors_is_that_of_the_mesh(self):
+        """Points, faces with their direction, and owners of each processor are those of the whole mesh that the addressing names."""
+        self.mesh("keep_crossing = false\n" + (ROOT / "geometries/sphere-small.toml").read_text())
+        self.export("--ascii")
+        self.export("--ascii", "--processors", "4")
+        whole = {name: lists(self.at / "case/constant/polyMesh" / name) for name in ("points", "faces", "owner", "cellLevel")}
+        cells, seen = [], np.zeros(len(whole["faces"]), int)
+        for processor in range(4):
+            part = self.at / f"case/processor{processor}/constant/polyMesh"
+            own = {path.name: lists(path) for path in part.iterdir() if path.name != "boundary"}
+            numbers = {name: np.array([int(n) for [n] in own[f"{name}ProcAddressing"]]) for name in ("point", "cell", "face", "boundary")}
+            self.assertEqual([whole["points"][n] for n in numbers["point"]], own["points"])
+            self.assertEqual([whole["cellLevel"][n] for n in numbers["cell"]], own["cellLevel"])
+            cells.extend(numbers["cell"])
+            self.assertEqual(len(numbers["face"]), len(own["faces"]))
+            for number, face, [owner] in zip(numbers["face"], own["faces"], own["owner"]):
+                index = abs(number) - 1
+                seen[index] += 1
+                vertices = [str(numbers["point"][int(v)]) for v in face]
+                turned = whole["faces"][index][:1] + whole["faces"][index][:0:-1]
+                self.assertEqual(vertices, whole["faces"][index] if number > 0 else turned)
+                is_owner = int(whole["owner"][index][0]) == numbers["cell"][int(owner)]
+                self.assertEqual(is_owner, number > 0)
+            patches = re.findall(r"^    (\w+)\n    {", (part / "boundary").read_text(), re.M)
+            expected = [-1 if name.startswith("procBoundary") else i for i, name in enumerate(patches)]
+            self.assertEqual(list(numbers["boundary"]), expected)
+        self.assertEqual(sorted(cells), list(range(len(cells))))
+        self.assertEqual(len(cells), len(whole["cellLevel"]))
+        self.assertTrue(((seen == 1) | (seen == 2)).all())
+
+
+def lists(path):
+    """The items of a list in ASCII, each as its words."""
+    items = path.read_text().split("}\n", 1)[1].split("(\n", 1)[1].rsplit(")", 1)[0].splitlines()
+    words = [item.replace("(", " ").replace(")", " ").split() for item in items]
+    return [w[1:] for w in words] if path.name == "faces" else words
+
+
+def positions(path):
+    """The vectors in a field in ASCII, those of the cells first and then those of the patches."""
+    vectors = re.findall(r"^\(([-+.e\d]+) ([-+.e\d]+) ([-+.e\d]+)\)$", path.read_text(), re.M)
+    return np.array(vectors, float)
+
 
 def call_any(directory, *command):
     """The output of a command, which may fail."""

@@ -142,11 +142,12 @@ fn a_poly_mesh_is_a_directory_of_a_case_or_one_per_processor() {
     let (code, output, _) = export(&place, "case/constant/polyMesh/", &["--processors", "ranks"]);
     assert_eq!(code, 0);
     assert!(output.contains("2 processors of 49 to 99 cells, "), "{output}");
+    let addressing = ["boundary", "cell", "face", "point"].map(|of| format!("{of}ProcAddressing"));
+    let mut of_processor = [&files.map(str::to_owned)[..], &addressing].concat();
+    of_processor.sort();
     for processor in ["processor0", "processor1"] {
-        assert_eq!(
-            names(&place.path().join("case").join(processor).join("constant/polyMesh")),
-            files
-        );
+        let dir = place.path().join("case").join(processor).join("constant/polyMesh");
+        assert_eq!(names(&dir), of_processor);
     }
     assert_eq!(names(place.path()), ["case", "mesh"]);
 }
