@@ -67,7 +67,9 @@ fn findings_of(
 /// Verifies a program.
 fn verified(bench: &Bench, engine: &Engine, cases: Vec<String>) -> Result<Report, GateError> {
     let programs = Programs { engine: engine.clone(), ..bench.programs.clone() };
-    let options = Options { limit: bench.options.limit, ..Options::of_leaves_alone(cases) };
+    // The files of a case that fails end with the gate.
+    let out = Some(bench.place.join("correctness"));
+    let options = Options { limit: bench.options.limit, out, ..Options::of_leaves_alone(cases) };
     verify(&options, &programs).map_err(|error| match error {
         VerifyError::Input(why) => GateError::Input(why),
         VerifyError::Missing(why) => GateError::Missing(why),

@@ -3,7 +3,7 @@
 use crate::place::{Ended, Files, Place, TMP};
 use crate::programs::{Leaves, Program, all, inputs};
 use crate::table::{Row, Table};
-use crate::tools::{injector, is_full, mpi, program, skip};
+use crate::tools::{calls_max, injector, mpi, program, skip};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -59,9 +59,8 @@ const fn fault(name: &'static str, classes: &'static str, action: &'static str, 
     Fault { name, classes, action, is_lasting: false, end }
 }
 
-/// Runs per program and fault: of all calls, or of a sample; fewer of jobs, which take longer.
-const RUNS: [usize; 2] = [24, 2];
-const RUNS_OF_JOBS: [usize; 2] = [8, 1];
+/// Jobs of MPI take longer: this part of the calls fails.
+const PART_OF_JOBS: usize = 2;
 
 /// A program, and what it does without faults.
 struct Subject<'a> {
@@ -119,8 +118,8 @@ impl Subject<'_> {
         self.place.reset(&self.before);
         let (_, calls) =
             inject(&self.program, self.injector, self.place, [fault.classes, "count", "0"]);
-        let runs = if self.program.is_parallel() { RUNS_OF_JOBS } else { RUNS };
-        let runs = runs[usize::from(!is_full())].min(calls.len());
+        let part = if self.program.is_parallel() { PART_OF_JOBS } else { 1 };
+        let runs = (calls_max() / part).min(calls.len());
         // Faults that change nothing may all occur in one run.
         let runs = if fault.is_lasting && fault.end == End::Success { runs.min(1) } else { runs };
         let at: BTreeSet<usize> =

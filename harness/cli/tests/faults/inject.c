@@ -171,7 +171,8 @@ int main(int argc, char **argv) {
             fprintf(log, "%s %s %s%s\n", call->class, path, word, is_hit ? " !" : "");
             fflush(log);
             if (is_hit && !strncmp(action, "SIG", 3)) {
-                kill((pid_t)n.pid, atoi(action + 3));
+                /* A user interrupts the program, whichever of its processes calls. */
+                kill(atoi(action + 3) == SIGKILL ? (pid_t)n.pid : child, atoi(action + 3));
             } else if (is_hit && !strcmp(action, "short")) {
                 if (transfer(&n, &answer)) answer.flags = 0;
             } else if (is_hit) {

@@ -58,6 +58,9 @@ pub fn family() {
         return skip("programs that lie", "mesher and reference were not built");
     };
     let place = inputs(&mesher);
+    let both =
+        "[[case]]\nname = \"case.toml\"\nlayers = [\"correctness\", \"counters\"]\nranks = [2]\n";
+    place.write("both.toml", both);
     let test =
         Test { place: &place, mesher: &mesher, reference: &reference, before: place.files() };
     let mut table = Table::new();

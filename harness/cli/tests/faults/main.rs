@@ -1,7 +1,8 @@
 //! Faults: calls of the system that fail, ranks that are killed or stopped, programs that hang, flood or lie, a clock that jumps, a network
 //! that is cut. Every run ends in a stated time with one sentence and a documented exit code, and leaves no unfinished file.
 //!
-//! Each test prints a table. `ci/faults` tries all faults; without `FAULTS=full` in the environment, a sample of each kind is tried.
+//! Each test prints a table. `ci/faults` sets `FAULTS` to a number of calls that fail per program and fault, and tries all other faults;
+//! without it a sample of each kind is tried.
 
 mod calls;
 mod clock;

@@ -9,9 +9,19 @@ use tempfile::TempDir;
 /// The command `harness`.
 pub const HARNESS: &str = env!("CARGO_BIN_EXE_harness");
 
-/// Whether all faults are tried, and not a sample of each kind.
+/// The extent of the test, a number or nothing.
+fn extent() -> Option<usize> {
+    std::env::var("FAULTS").ok()?.parse().ok()
+}
+
+/// Whether faults occur in all phases and under all commands, and not in a sample.
 pub fn is_full() -> bool {
-    std::env::var_os("FAULTS").is_some_and(|value| value == "full")
+    extent().is_some()
+}
+
+/// Calls per program that fail in the same way: all of them, or as many that are spread over the run.
+pub fn calls_max() -> usize {
+    extent().unwrap_or(2)
 }
 
 /// Reports, even if the output of the test is captured, that something was left out.
