@@ -1,0 +1,56 @@
+//! Whole cases: any facets, boxes, seeds, layers, enclosed components and sides to keep, meshed by the reference, by the mesher on one rank, and
+//! by the mesher on simulated ranks. All leaves are the same, or all refuse the seeds.
+
+#[path = "../../../../mesher/tests/support/mod.rs"]
+mod support;
+
+use crate::Scratch;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use support::{Run, Small};
+
+/// A case, and how it is meshed in parallel.
+fn drawn() -> impl Strategy<Value = (Small, Run)> {
+    let seed = || [0.0f64..64.0, 0.0f64..64.0, 0.0f64..64.0];
+    let seeds = prop_oneof![3 => Just(vec![]), 1 => prop::collection::vec(seed(), 1..3)];
+    let case = prop_oneof![
+        4 => support::small(support::soup()),
+        1 => support::thin(),
+        1 => support::leaky_on_rays(),
+    ];
+    (case, seeds, support::run()).prop_map(|(case, seeds, run)| (Small { seeds, ..case }, run))
+}
+
+/// The case that is drawn with these bytes as the seed.
+pub(super) fn run(_: &mut Scratch, bytes: &[u8]) -> bool {
+    let mut seed = [0; 32];
+    for (i, byte) in bytes.iter().enumerate() {
+        seed[i % 32] ^= byte;
+    }
+    let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let mut runner = TestRunner::new_with_rng(Config::default(), rng);
+    let (case, run) = drawn().new_tree(&mut runner).expect("no value is rejected").current();
+    for ungraded in [true, false] {
+        let wanted = match ungraded {
+            true => reference::base_tree(&case.reference_case()),
+            false => reference::mesh(&case.reference_case()),
+        };
+        let wanted = wanted.ok().map(|mesh| mesh.words);
+        for run in [Run::SOLO, run] {
+            let found = case.try_outcome(&run, ungraded).ok().map(|outcome| outcome.words);
+            assert!(
+                found == wanted,
+                "{case:?}\n{run:?}\nungraded: {ungraded}: {}",
+                support::first_difference(
+                    &found.unwrap_or_default(),
+                    wanted.as_ref().map_or(&[], |words| words)
+                )
+            );
+        }
+        if wanted.is_none() {
+            return false;
+        }
+    }
+    true
+}
