@@ -130,8 +130,7 @@ pub enum GeneratorError {
         /// The condition that it must satisfy.
         requirement: String,
     },
-    /// The number of facets is less than the minimum of the shape, or exceeds the range of vertex
-    /// indices.
+    /// The number of facets is less than the minimum of the shape, or more than a hundred million.
     #[error("[generator] facets = {facets}: {shape} needs at least {least} and at most {most}")]
     InvalidFacets {
         /// The shape.
@@ -148,9 +147,9 @@ pub enum GeneratorError {
     Unrepresentable(String),
 }
 
-/// Maximum number of facets. Vertex indices are 32 bits wide, and a closed surface has about half
-/// as many vertices as facets.
-const FACETS_MOST: usize = 1 << 31;
+/// Maximum number of facets, so that a mistyped number is an error instead of the end of all memory.
+/// Vertex indices are 32 bits wide, and a closed surface has about half as many vertices as facets.
+const FACETS_MOST: usize = 100_000_000;
 
 impl Generator {
     /// A shape with default dimensions.

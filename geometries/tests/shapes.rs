@@ -260,7 +260,8 @@ fn invalid_tables_are_refused_with_the_reason() {
         ("shape = 'pipe'\nfacets = 100\nangle = 200", "at most 180"),
         ("shape = 'pipes_crossing'\nfacets = 200\nangle = 60", "no dimension `angle`"),
         ("shape = 'box_in_box'\nfacets = 100\nthickness = 0.5", "less than half of edge"),
-        ("shape = 'sphere'\nfacets = 99999999999999", "at most 2147483648"),
+        ("shape = 'sphere'\nfacets = 99999999999999", "at most 100000000"),
+        ("shape = 'uav'\nfacets = 100000001", "at most 100000000"),
         ("shape = 'sphere'\nfacets = 100\ncentre = [1e9, 0, 0]", "has no area in f32"),
         ("shape = 'sphere'\nfacets = 100\nradius = 1e300", "has no area in f32"),
     ] {

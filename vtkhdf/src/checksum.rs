@@ -1,7 +1,7 @@
 //! The checksum of HDF5's metadata: Bob Jenkins' lookup3, as `H5_checksum_lookup3` computes it, with initial value 0.
 
 /// The checksum of some bytes.
-pub(crate) fn lookup3(bytes: &[u8]) -> u32 {
+pub fn lookup3(bytes: &[u8]) -> u32 {
     let start = 0xdead_beef_u32.wrapping_add(bytes.len() as u32);
     let mut s = [start; 3];
     let mut rest = bytes;

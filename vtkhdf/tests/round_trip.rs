@@ -118,3 +118,9 @@ fn other_versions_are_named_and_not_called_damaged() {
     assert!(matches!(error, ReadError::Unknown(_)), "{error}");
     assert!(error.to_string().contains("superblock"), "{error}");
 }
+
+#[test]
+fn a_device_is_refused_without_reading_it() {
+    let error = read(Path::new("/dev/zero")).unwrap_err();
+    assert!(error.to_string().contains("a device"), "{error}");
+}

@@ -146,8 +146,9 @@ impl TreeFile {
     /// # Errors
     /// If the file is damaged.
     pub fn index(&self) -> Result<Index> {
-        let total = self.nodes.iter().sum();
-        Index::new(&self.file, total, &self.split, self.masked.as_ref())
+        let total: u64 = self.nodes.iter().sum();
+        let described = total - self.nodes.last().copied().unwrap_or(0);
+        Index::new(&self.file, [described, total], &self.split, self.masked.as_ref())
     }
 
     fn level(&self, level: usize) -> LevelReader<'_> {

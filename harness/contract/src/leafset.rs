@@ -218,8 +218,8 @@ pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
     if manifest.schema != manifest::SCHEMA {
         return wrong(format!("its schema is {:?}, not {:?}", manifest.schema, manifest::SCHEMA));
     }
-    if manifest.octant_digests.len() != manifest::OCTANTS {
-        return wrong(format!("it has {} octant digests, not 512", manifest.octant_digests.len()));
+    if let Some(fault) = manifest.fault() {
+        return wrong(fault.to_owned());
     }
     // A path instead of a file name could refer to the leaves of another mesh.
     let mut names = manifest.parts.iter().map(|p| &p.file).chain(&manifest.hyper_tree_grid);

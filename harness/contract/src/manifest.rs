@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
-use crate::lattice::Root;
+use crate::lattice::{Root, UNITS_PER_EDGE};
 use crate::octant::{LEVEL_MAX, Octant};
 
 /// The only supported schema.
@@ -229,6 +229,34 @@ impl Manifest {
         }
     }
 
+    /// The entry that no mesh has, because a number is out of range; `None` if there is none. Checks compute with all these numbers.
+    pub fn fault(&self) -> Option<&'static str> {
+        let lattice = 0..=UNITS_PER_EDGE;
+        let is_box = |b: &ExtentBox| {
+            b.level <= LEVEL_MAX
+                && (0..3).all(|a| {
+                    b.min[a] <= b.max[a] && [b.min[a], b.max[a]].iter().all(|c| lattice.contains(c))
+                })
+        };
+        let Root { origin, edge } = self.root;
+        let range = 1e-100..1e100;
+        let faults = [
+            (self.octant_digests.len() == OCTANTS, "octant_digests: give 512"),
+            (self.level_surface <= LEVEL_MAX, "level_surface: give a level from 0 to 19"),
+            (self.layer_cells_min > 0, "layer_cells_min: a layer has at least one cell"),
+            (self.boxes.iter().all(is_box), "boxes: one is not in the root, or has no level"),
+            (
+                self.seeds.as_flattened().iter().all(|c| lattice.contains(c)),
+                "seeds: one is not in the root",
+            ),
+            (
+                range.contains(&edge) && origin.iter().all(|c| c.abs() < range.end),
+                "root: give a cube with an edge from 1e-100 to 1e100",
+            ),
+        ];
+        faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault)
+    }
+
     /// Replaces all entries that depend on the leaves.
     pub fn set_tally(&mut self, tally: Tally) {
         self.leaves = tally.leaves;
@@ -347,5 +375,33 @@ mod tests {
             text.contains("\"enclosed\":{\"count\":1,\"leaves\":512,\"example\":[0.5,1.0,2.0]}")
         );
         assert_eq!(serde_json::from_str::<Manifest>(&text).unwrap(), manifest);
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_faults() {
+        let manifest = crate::testing::leaf_set(vec![vec![0]]).manifest;
+        assert_eq!(manifest.fault(), None);
+        let faulty = |edit: &dyn Fn(&mut Manifest)| {
+            let mut manifest = manifest.clone();
+            edit(&mut manifest);
+            manifest.fault().unwrap_or_default()
+        };
+        let with_box = |min: i64, max: i64, level: u8| {
+            faulty(&|m| m.boxes.push(ExtentBox { min: [0, min, 0], max: [1, max, 1], level }))
+        };
+        assert_eq!(with_box(0, UNITS_PER_EDGE, 19), "");
+        for (min, max, level) in
+            [(0, 1, 20), (1, 0, 3), (i64::MIN, 1, 3), (0, UNITS_PER_EDGE + 1, 3)]
+        {
+            assert!(with_box(min, max, level).starts_with("boxes"));
+        }
+        assert!(faulty(&|m| m.level_surface = 20).starts_with("level_surface"));
+        assert!(faulty(&|m| m.layer_cells_min = 0).starts_with("layer_cells_min"));
+        assert!(faulty(&|m| m.seeds.push([0, i64::MAX, 0])).starts_with("seeds"));
+        assert!(faulty(&|m| m.octant_digests.clear()).starts_with("octant_digests"));
+        for edge in [0.0, -1.0, f64::NAN, 1e-300, 1e300] {
+            assert!(faulty(&|m| m.root.edge = edge).starts_with("root"));
+        }
+        assert!(faulty(&|m| m.root.origin[2] = f64::INFINITY).starts_with("root"));
     }
 }

@@ -12,6 +12,8 @@ use npyz::{DType, NpyHeader};
 
 /// Longer than any header that the programs write, so that one read suffices.
 const HEADER_BYTES_MAX: u64 = 1 << 16;
+/// Dictionary, list of fields, field, shape of a field, and as many again.
+const NESTING_MAX: i32 = 8;
 
 /// An open part file with a valid header, for reading at any position.
 #[derive(Debug)]
@@ -196,17 +198,38 @@ impl MappedPart {
 /// The npy header at the beginning of a file, and its length.
 ///
 /// # Errors
-/// If the bytes begin with no header, or with one of more items than can be counted, which npyz multiplies unchecked.
-pub(crate) fn read_header(head: &[u8]) -> std::io::Result<(NpyHeader, u64)> {
+/// If the bytes begin with no header, or with one that is incomplete, is nested more deeply than an array's, or has more items than can be
+/// counted: npyz allocates the length that the file states, descends by recursion and multiplies unchecked.
+pub fn read_header(head: &[u8]) -> std::io::Result<(NpyHeader, u64)> {
     let head = &head[..head.len().min(HEADER_BYTES_MAX as usize)];
-    let text = String::from_utf8_lossy(head);
+    let wrong = |why: &str| Err(std::io::Error::other(why));
+    let length = match head {
+        [_, _, _, _, _, _, 1, _, a, b, ..] => u64::from(u16::from_le_bytes([*a, *b])) + 10,
+        [_, _, _, _, _, _, _, _, a, b, c, d, ..] => {
+            u64::from(u32::from_le_bytes([*a, *b, *c, *d])) + 12
+        }
+        _ => return wrong("it is too short"),
+    };
+    if length > head.len() as u64 {
+        return wrong(&format!(
+            "it states {length} bytes, but the file has fewer, or more than {HEADER_BYTES_MAX} belong to no header"
+        ));
+    }
+    let text = String::from_utf8_lossy(&head[..length as usize]);
+    let mut depth = 0;
+    for c in text.chars() {
+        depth += i32::from(matches!(c, '(' | '[' | '{')) - i32::from(matches!(c, ')' | ']' | '}'));
+        if depth > NESTING_MAX {
+            return wrong("it is nested too deeply");
+        }
+    }
     let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once(')'));
     let mut items = shape
         .map_or("", |(shape, _)| shape)
         .split([',', '('])
         .filter_map(|n| n.trim().parse().ok());
     if items.try_fold(1u64, u64::checked_mul).is_none() {
-        return Err(std::io::Error::other("its shape has more items than can be counted"));
+        return wrong("its shape has more items than can be counted");
     }
     let mut cursor = Cursor::new(head);
     let header = NpyHeader::from_reader(&mut cursor)?;
@@ -290,5 +313,24 @@ mod tests {
         assert!(matches!(refused("<u8", "(4294967296, 4294967296)", 16), NpyError::Header(_)));
         let headless = file_of(b"not an array");
         assert!(matches!(PartFile::open(headless.path()), Err(NpyError::Header(_))));
+    }
+
+    /// npyz allocates the length that a header of version 2 states, and descends into each bracket by recursion.
+    #[test]
+    fn a_header_longer_than_the_file_or_nested_deeply_is_refused() {
+        let refused = |bytes: &[u8]| match PartFile::open(file_of(bytes).path()) {
+            Err(NpyError::Header(why)) => why.to_string(),
+            other => panic!("{other:?}"),
+        };
+        for length in [u32::MAX, 1 << 30, 200] {
+            let long = [&b"\x93NUMPY\x02\x00"[..], &length.to_le_bytes(), &[b' '; 100]].concat();
+            let stated = format!("states {} bytes", u64::from(length) + 12);
+            assert!(refused(&long).contains(&stated), "{}", refused(&long));
+        }
+        for bracket in ["(", "[", "{"] {
+            let deep = header("<u8", &bracket.repeat(20_000));
+            assert!(refused(&deep).contains("nested too deeply"));
+        }
+        assert!(refused(b"\x93NUMPY\x01").contains("too short"));
     }
 }

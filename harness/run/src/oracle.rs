@@ -6,7 +6,7 @@ use crate::engine::paths::Paths;
 use crate::engine::process::{self, Watch};
 use check::oracle::vote::Answer;
 use contract::case::Facet;
-use contract::npy;
+use contract::{files, npy};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -80,10 +80,19 @@ impl Question {
 }
 
 fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
-    let bytes = std::fs::read(path).map_err(|error| format!("wrote no answer: {error}"))?;
-    let sides: Vec<u8> = npyz::NpyFile::new(&bytes[..])
-        .and_then(npyz::NpyFile::into_vec)
-        .map_err(|error| format!("wrote an answer that is not an array of bytes: {error}"))?;
+    let bytes = files::read(path).map_err(|error| format!("wrote no answer: {error}"))?;
+    let array = || {
+        let (header, offset) = npy::read_header(&bytes).map_err(|error| error.to_string())?;
+        let sides = &bytes[offset as usize..];
+        match (header.dtype().descr().as_str(), header.shape()) {
+            ("'|u1'", &[length]) if length == sides.len() as u64 => Ok(sides),
+            (dtype, shape) => {
+                Err(format!("{} bytes of type {dtype} and shape {shape:?}", sides.len()))
+            }
+        }
+    };
+    let sides =
+        array().map_err(|why| format!("wrote an answer that is not an array of bytes: {why}"))?;
     if sides.len() != count {
         return Err(format!("classified {} of {count} points", sides.len()));
     }
@@ -115,9 +124,11 @@ mod tests {
 
     fn answering(bytes: &[u8]) -> String {
         let header = npy::header("|u1", &format!("({},)", bytes.len()));
-        let octal: String =
-            [&header, bytes].concat().iter().map(|byte| format!("\\{byte:03o}")).collect();
-        format!("printf '{octal}' > \"$5\"")
+        format!("printf '{}' > \"$5\"", octal(&[&header, bytes].concat()))
+    }
+
+    fn octal(bytes: &[u8]) -> String {
+        bytes.iter().map(|byte| format!("\\{byte:03o}")).collect()
     }
 
     #[test]
@@ -149,6 +160,12 @@ mod tests {
         assert_eq!(sentence(&answering(&[1, 2])), side);
         assert!(sentence("exit 0").contains("wrote no answer"));
         assert!(sentence("echo x > \"$5\"").contains("not an array"));
+        assert!(sentence("mkfifo \"$5\"").contains("a pipe"));
+        let promising = answering(&[1]).replace(
+            &octal(&npy::header("|u1", "(1,)")),
+            &octal(&npy::header("|u1", "(999999999999,)")),
+        );
+        assert!(sentence(&promising).contains("1 bytes of type '|u1' and shape [999999999999]"));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Bits are counted before every [`STEP`] bytes: about 3 MB for a billion leaves. Counting from there to any bit reads a few hundred
 //! bytes.
 
-use super::bytes::{STEP, ones};
+use super::bytes::{Bytes, STEP, ones};
 use super::{Result, layout, nodes};
 use vtkhdf::format::Chunked;
 use vtkhdf::read::File;
@@ -18,23 +18,28 @@ pub struct Index {
 }
 
 impl Index {
+    /// The index of `total` nodes, of which the first `described` may be split. Bits beyond them have no meaning.
     pub(super) fn new(
         file: &File,
-        total: u64,
+        [described, total]: [u64; 2],
         split: &Chunked,
         masked: Option<&Chunked>,
     ) -> Result<Self> {
-        let split = counts(file, Some(split))?;
-        let masked = counts(file, masked)?;
-        let all = |counts: &[u64]| counts.last().copied().unwrap_or(0);
-        let Some(leaves) = total.checked_sub(all(&split) + all(&masked)) else {
+        let all = |array: &Chunked, counts: &[u64], bits: u64| {
+            Bytes::new(file, array).ones_before(bits, counts)
+        };
+        let split_counts = counts(file, Some(split))?;
+        let masked_counts = counts(file, masked)?;
+        let split = all(split, &split_counts, described)?;
+        let masked = masked.map_or(Ok(0), |array| all(array, &masked_counts, total))?;
+        let Some(leaves) = total.checked_sub(split + masked) else {
             return nodes("more nodes are split or masked than there are");
         };
-        Ok(Self { split, masked, leaves })
+        Ok(Self { split: split_counts, masked: masked_counts, leaves })
     }
 }
 
-/// Numbers of set bits before each step, and at the end. Bits beyond the nodes must be zero.
+/// Numbers of set bits before each step, and at the end.
 fn counts(file: &File, array: Option<&Chunked>) -> Result<Vec<u64>> {
     let Some(array) = array else { return Ok(Vec::new()) };
     let (mut counts, mut sum, mut chunk) = (vec![0], 0, Vec::new());

@@ -22,6 +22,7 @@ mod testing;
 pub mod text;
 pub mod words;
 
+use crate::files;
 use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
@@ -127,6 +128,7 @@ pub fn guess(path: &Path) -> Result<Format, ImportError> {
 
 /// The first bytes of a file.
 fn head(path: &Path) -> io::Result<Vec<u8>> {
+    files::refuse_special(path)?;
     let mut head = Vec::new();
     File::open(path)?.take(4096).read_to_end(&mut head)?;
     Ok(head)
@@ -242,5 +244,6 @@ mod tests {
         assert!(
             guess(&empty.path().join("absent")).unwrap_err().to_string().contains("cannot be read")
         );
+        assert!(guess(Path::new("/dev/zero")).unwrap_err().to_string().contains("a device"));
     }
 }

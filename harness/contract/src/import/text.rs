@@ -19,6 +19,9 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
         return Err(ImportError::content("has no cells"));
     };
     let columns = fields(first).count();
+    if columns == 0 {
+        return Err(ImportError::content(format!("line {number} has separators, but no fields")));
+    }
     let named = fields(first).next().is_some_and(|field| field.parse::<f64>().is_err());
     let names = if named { fields(first).map(str::to_owned).collect() } else { names(columns) };
     if named {
@@ -112,6 +115,7 @@ mod tests {
         let refused = |text, request: &Request| read_with(text, request).unwrap_err().to_string();
         let cases = [
             ("", "has no cells"),
+            ("# a comment\n,;\n", "line 2 has separators, but no fields"),
             ("0,0,0,1\n0,0,1\n", "line 2 has 3 fields, but line 1 has 4"),
             ("0,0,0,1\n0,0,zero,1\n", "line 2 has \"zero\", which is not a number"),
             ("x,y,level\n0,0,1\n", "has no column z: its columns are x, y, level"),

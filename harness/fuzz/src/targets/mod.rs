@@ -1,0 +1,34 @@
+//! The targets.
+
+mod case_file;
+mod imports;
+mod leaf_set;
+mod stl;
+mod texts;
+mod tree_file;
+mod whole_case;
+
+use crate::Target;
+
+/// All targets.
+pub const TARGETS: [Target; 19] = [
+    Target { name: "stl", run: stl::bytes },
+    Target { name: "stl-grammar", run: stl::grammar },
+    Target { name: "case", run: case_file::run },
+    Target { name: "manifest", run: leaf_set::manifest },
+    Target { name: "npy-words", run: leaf_set::words },
+    Target { name: "npy-table", run: imports::npy },
+    Target { name: "csv", run: imports::csv },
+    Target { name: "p4est", run: imports::p4est },
+    Target { name: "discretize", run: imports::discretize },
+    Target { name: "openfoam", run: imports::openfoam },
+    Target { name: "tree-file", run: tree_file::run },
+    Target { name: "engine", run: texts::engine },
+    Target { name: "rules", run: texts::rules },
+    Target { name: "targets", run: texts::targets },
+    Target { name: "catalogue", run: texts::catalogue },
+    Target { name: "record", run: texts::record },
+    Target { name: "history", run: texts::history },
+    Target { name: "reports", run: texts::reports },
+    Target { name: "whole-case", run: whole_case::run },
+];
