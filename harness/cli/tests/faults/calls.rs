@@ -281,7 +281,7 @@ impl Subject<'_> {
 
     /// What is wrong with the message, of which there must be one.
     fn unexplained(&self, err: &str) -> Option<String> {
-        let Some(prefix) = self.program.prefix else { return None };
+        let prefix = self.program.prefix?;
         let ours = err.lines().filter(|line| line.starts_with(prefix)).count();
         let others = err.lines().count() - ours;
         match ours {

@@ -44,7 +44,8 @@ pub fn family() {
         for (what, action, codes) in SIGNALS {
             for (i, phase) in phases.iter().enumerate() {
                 let is_first = phases.iter().position(|p| p == phase) == Some(i);
-                if !is_full() && !(SAMPLE.contains(&&**phase) && is_first && rank == 1) {
+                let is_sampled = SAMPLE.contains(&&**phase) && is_first && rank == 1;
+                if !(is_full() || is_sampled) {
                     continue;
                 }
                 place.reset(&before);
