@@ -156,7 +156,7 @@ fn a_box_beyond_all_memory_is_refused_at_once() {
     workspace.write("case.toml", case);
     for comm in process::COMMS {
         let args = ["case.toml", "--out", "mesh", comm];
-        run(workspace.mesher(&args)).refuses(2, &["1.4e17 cells", "box 1", "spacing"]);
+        run(workspace.mesher(&args)).refuses(71, &["1.4e17 cells", "multiply all spacings"]);
         assert!(!workspace.path().join("mesh").exists());
     }
 }
