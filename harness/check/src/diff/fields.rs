@@ -23,7 +23,13 @@ pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
     same("leaves", debug(&a.leaves), debug(&b.leaves));
     if a.sides == Sides::Known && b.sides == Sides::Known {
         same("components", components(a.components.as_ref()), components(b.components.as_ref()));
-        let ambiguous = |mesh: &Manifest| mesh.components_ambiguous.count.to_string();
+        let ambiguous = |mesh: &Manifest| {
+            format!(
+                "{}{}",
+                mesh.components_ambiguous.count,
+                place(mesh.components_ambiguous.example)
+            )
+        };
         same("components decided by a majority of rays", ambiguous(a), ambiguous(b));
         same("leaves by side", by_side(&a.leaves_by_side), by_side(&b.leaves_by_side));
     }
@@ -45,9 +51,15 @@ fn by_side(leaves: &BySide) -> String {
 fn components(of: Option<&Components>) -> String {
     of.map_or("not stated".to_owned(), |of| {
         let (enclosed, leaves) = (of.enclosed.count, of.enclosed.leaves);
+        let place = place(of.enclosed.example);
         format!(
-            "{} outside ({enclosed} enclosed, of {leaves} leaves), {} inside",
+            "{} outside ({enclosed} enclosed, of {leaves} leaves{place}), {} inside",
             of.outside, of.inside
         )
     })
+}
+
+/// A point of a component, after the text that precedes it.
+fn place(example: Option<[f64; 3]>) -> String {
+    example.map_or(String::new(), |[x, y, z]| format!(", one at ({x}, {y}, {z})"))
 }
