@@ -107,6 +107,14 @@ impl Catalogue {
     pub fn named(&self, name: &str) -> Result<&Selected, String> {
         let cases = self.cases()?;
         cases.iter().find(|case| case.name == name).ok_or_else(|| {
+            if name.to_lowercase().ends_with(".stl") {
+                return format!(
+                    "{name} is a geometry: give a case file, CASE.toml, with its name in `geometry` and a `spacing_min` (reference/DEFINITION.md, section 9)"
+                );
+            }
+            if Path::new(name).exists() {
+                return format!("{name} is neither the name of a case nor a case file: its name must end in .toml");
+            }
             let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
             format!("no case {name} in the catalogue, which has {}", names.join(", "))
         })

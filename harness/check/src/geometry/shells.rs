@@ -49,7 +49,7 @@ pub fn shells(edges: &Edges) -> Vec<Shell> {
 }
 
 /// The representative of a set; halves the path to it.
-pub(super) fn find(parents: &mut [u32], mut of: u32) -> u32 {
+pub(crate) fn find(parents: &mut [u32], mut of: u32) -> u32 {
     while parents[of as usize] != of {
         let above = parents[parents[of as usize] as usize];
         parents[of as usize] = above;
@@ -59,7 +59,7 @@ pub(super) fn find(parents: &mut [u32], mut of: u32) -> u32 {
 }
 
 /// Unites the sets of two members under the lower representative.
-pub(super) fn unite(parents: &mut [u32], a: u32, b: u32) {
+pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
     let (a, b) = (find(parents, a), find(parents, b));
     parents[a.max(b) as usize] = a.min(b);
 }

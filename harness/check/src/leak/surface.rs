@@ -1,26 +1,47 @@
 //! Whether the facets form a closed surface between two places, which then no path joins at any spacing.
 
+use crate::geometry::shells::{find, unite};
 use crate::oracle::watertight::is_watertight;
 use contract::case::Case;
-use contract::lattice::UNITS_PER_EDGE;
+use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::parity::Parity;
+use std::collections::{BTreeMap, HashMap};
 
 /// Whether a closed surface separates two lattice points off the facets; `to` is `None` for the root's boundary.
 ///
 /// If every edge belongs to an even number of facets, all curves from a point to another one that avoid the facets'
-/// edges cross the same number of facets modulo two. If that number is odd, no curve avoids the facets. The result is
-/// exact, but false does not mean that a path exists: an open sheet or two closed surfaces can separate places too.
+/// edges cross the same number of facets modulo two. If that number is odd, no curve avoids the facets. This is tried with every
+/// shell, the facets that shared edges connect, because two shells around a point, as of a hollow body, have an even number. The result is
+/// exact, but false does not mean that a path exists: an open sheet or several surfaces together can separate places too.
 pub fn separates(case: &Case, from: [i64; 3], to: Option<[i64; 3]>) -> bool {
-    let facets = &case.facets_lattice;
     let interior = 1..UNITS_PER_EDGE;
-    let is_interior = || facets.iter().flatten().flatten().all(|c| interior.contains(c));
-    // Without facets at the root's boundary, all of it is outside.
-    if (to.is_none() && !is_interior()) || !is_watertight(facets) {
-        return false;
+    shells(&case.facets_lattice).into_iter().any(|facets| {
+        let is_interior = || facets.iter().flatten().flatten().all(|c| interior.contains(c));
+        // Without facets at the root's boundary, all of it is outside.
+        if (to.is_none() && !is_interior()) || !is_watertight(&facets) {
+            return false;
+        }
+        let parity = Parity::new(&facets);
+        let is_odd = |at| parity.inside(at)[0];
+        is_odd(from) != to.is_some_and(is_odd)
+    })
+}
+
+/// The facets by the shells that shared edges make of them.
+fn shells(facets: &[FacetLattice]) -> Vec<Vec<FacetLattice>> {
+    let mut parents: Vec<u32> = (0..facets.len() as u32).collect();
+    let mut first_at: HashMap<[[i64; 3]; 2], u32> = HashMap::new();
+    for (facet, &[a, b, c]) in (0u32..).zip(facets) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let first = *first_at.entry([from.min(to), from.max(to)]).or_insert(facet);
+            unite(&mut parents, first, facet);
+        }
     }
-    let parity = Parity::new(facets);
-    let is_odd = |at| parity.inside(at)[0];
-    is_odd(from) != to.is_some_and(is_odd)
+    let mut shells: BTreeMap<u32, Vec<FacetLattice>> = BTreeMap::new();
+    for (facet, corners) in (0u32..).zip(facets) {
+        shells.entry(find(&mut parents, facet)).or_default().push(*corners);
+    }
+    shells.into_values().collect()
 }
 
 #[cfg(test)]
@@ -46,6 +67,19 @@ mod tests {
         assert!(!separates(&closed, outside, None));
         assert!(!separates(&closed, inside, Some([3 << 23; 3])));
         assert!(!separates(&tetrahedron(3), inside, None));
+    }
+
+    #[test]
+    fn each_of_two_shells_separates_a_cavity_from_the_outside() {
+        let mut hollow = tetrahedron(4);
+        let cavity = hollow.facets_lattice.clone();
+        let shrunk = |corner: [i64; 3]| corner.map(|c| (3 << 23) + c / 16);
+        hollow.facets_lattice.extend(cavity.iter().map(|facet| facet.map(shrunk)));
+        let inner = cavity[0].map(shrunk);
+        let in_cavity = std::array::from_fn(|a| inner[0][a] + (1 << 18));
+        assert!(separates(&hollow, in_cavity, None));
+        assert!(separates(&hollow, in_cavity, Some([2 << 24; 3])));
+        assert!(!separates(&hollow, [2 << 24, 3 << 23, 2 << 24], Some([2 << 24; 3])));
     }
 
     #[test]

@@ -25,15 +25,9 @@ impl fmt::Display for Report {
             (true, Some(closes), ..) => {
                 let why = self.levels.last().and_then(|level| level.why);
                 let why = why.map_or(String::new(), |why| format!(", where {why}"));
-                writeln!(
-                    f,
-                    "\nLEAK: free leaves join start and end; closed at spacing {}{why}",
-                    spacing(closes)
-                )?;
+                writeln!(f, "\n{}; closed at spacing {}{why}", self.verdict(), spacing(closes))?;
             }
-            (true, None, ..) => {
-                writeln!(f, "\nLEAK: free leaves join start and end at every spacing")?
-            }
+            (true, None, ..) => writeln!(f, "\n{}, at every spacing", self.verdict())?,
             (false, _, Some(opens), _) => {
                 writeln!(f, "\nno leak; it would open at spacing {}", spacing(opens))?;
             }
@@ -52,6 +46,18 @@ impl fmt::Display for Report {
     }
 }
 
+impl Report {
+    /// What it means that free leaves join start and end.
+    fn verdict(&self) -> &'static str {
+        match &self.passage {
+            Some(passage) if passage.narrowest.is_end => {
+                "JOINED: start and end lie in one space, or one of them within the opening"
+            }
+            _ => "LEAK: free leaves join start and end",
+        }
+    }
+}
+
 fn row(meshed: &Meshed, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let path = match (meshed.is_joined, meshed.why) {
         (true, _) => "open".to_owned(),
@@ -59,14 +65,23 @@ fn row(meshed: &Meshed, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         (false, Some(why)) => format!("closed: {why}"),
     };
     let Spacing { level, spacing } = meshed.spacing;
-    writeln!(f, "{level:>5} {:>12} {:>12}  {path}", number(spacing), meshed.leaves)
+    writeln!(f, "{level:>5} {:>12} {:>12}  {path}", rounded_up(spacing), meshed.leaves)
 }
 
 fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let narrowest = &passage.narrowest;
     let (width, cells) = (number(narrowest.width), number(narrowest.width_cells));
     writeln!(f, "\nThe narrowest place of the widest path (level {})", passage.spacing.level)?;
-    writeln!(f, "width     {width} ({cells} cells): diameter of the largest ball that passes")?;
+    writeln!(
+        f,
+        "width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes"
+    )?;
+    if !narrowest.is_end {
+        writeln!(
+            f,
+            "          Spacings above {width} close it wherever the lattice lies; a finer one may close it on this lattice only."
+        )?;
+    }
     writeln!(f, "at        {}", point(&narrowest.at))?;
     writeln!(f, "direction {}", point(&narrowest.direction))?;
     let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
@@ -100,10 +115,34 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
 }
 
 fn spacing(spacing: &Spacing) -> String {
-    format!("{} (level {})", number(spacing.spacing), spacing.level)
+    format!("{} (level {})", rounded_up(spacing.spacing), spacing.level)
+}
+
+/// A spacing with three significant digits, rounded up: a case with this spacing has the same level.
+fn rounded_up(spacing: f64) -> String {
+    let unit = 10f64.powi(spacing.log10().floor() as i32 - 2);
+    let text = number(spacing);
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded < spacing => number(spacing + unit),
+        _ => text,
+    }
 }
 
 fn point(at: &[f64; 3]) -> String {
     let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
     format!("({x}, {y}, {z})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_printed_spacing_has_the_level_of_the_exact_one() {
+        for exact in [8.265 / 512.0, 4.28 / 128.0, 0.25, 0.9996, 1.0 / 3.0, 1234.5, 7.3e-9, 8.1e12]
+        {
+            let printed: f64 = rounded_up(exact).parse().unwrap();
+            assert!(printed >= exact && printed < 1.02 * exact, "{exact}: {printed}");
+        }
+    }
 }

@@ -117,7 +117,9 @@ fn write(arguments: &Arguments, case: &Case, answer: &Answer) -> Result<(), Stri
     }
     let Some(passage) = &report.passage else {
         if arguments.vtk.is_some() || arguments.picture.is_some() {
-            eprintln!("harness: there is no path to draw, so --vtk and --picture write nothing");
+            eprintln!(
+                "harness: there is no path to draw, so --vtk and --picture write nothing: files of these names are from an earlier run"
+            );
         }
         return Ok(());
     };
