@@ -1,7 +1,7 @@
 //! The plan of a run: its cells, time, memory and files, estimated before it is made; and the refusal of a run that would not fit.
 //!
 //! First the cells are estimated roughly, from the extents and areas of facets and from the volumes of boxes. A run whose memory
-//! is far from every [limit](room) needs no more. Otherwise [pilot runs](pilot) of the same case at coarser spacings are
+//! is far from every [limit](Limit) needs no more. Otherwise [pilot runs](pilot) of the same case at coarser spacings are
 //! extrapolated: two of them, of which the finer has at most a 64th of the cells. A case with few cells is its own pilot.
 //!
 //! The memory of a rank is what it has resident after the pilots, with its facets, plus the growth of its sets. Nothing here is

@@ -9,7 +9,7 @@
 //!
 //! - [`tree`]: the cells and what is across their faces; [`faces`]: the faces and their vertices; [`points`]: the numbers of points;
 //! - [`regions`], [`patches`], [`processors`];
-//! - [`survey`]: the boundary of a directory; [`poly_mesh`]: its files; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
+//! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
 pub mod faces;
 pub mod lists;
