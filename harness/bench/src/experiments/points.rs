@@ -186,8 +186,10 @@ mod tests {
             all.into_iter().find(|study| study.experiment == experiment).unwrap()
         };
         let weights = of(Experiment::Weights);
-        let shown: Vec<_> =
-            choices(&weights).iter().map(|c| (c.weights, c.partitioner, c.weight_exposed)).collect();
+        let shown: Vec<_> = choices(&weights)
+            .iter()
+            .map(|c| (c.weights, c.partitioner, c.weight_exposed))
+            .collect();
         let [counted, weighed] = [Some(0), Some(WEIGHT_EXPOSED)];
         let expected = [
             ("unit", "metis", counted),
