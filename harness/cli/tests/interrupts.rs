@@ -119,9 +119,9 @@ fn interrupted_output_has_neither_its_names_nor_a_staging_directory() {
         &["picture", "case.toml", "--paper", "--out", "out/set", "--mesher", "./copier"],
     ];
     // A second signal ends the command before it has cleaned up by itself.
-    for (arguments, signals) in
-        outputs.iter().flat_map(|a| [(a, &["INT"][..]), (a, &["TERM", "INT"])])
-    {
+    let mut interrupts = vec![(outputs[0], &["INT"][..])];
+    interrupts.extend(outputs.iter().map(|arguments| (*arguments, &["TERM", "INT"][..])));
+    for (arguments, signals) in interrupts {
         let mut run = fixture.start(arguments);
         while fs::read_dir(&out).unwrap().next().is_none() {
             assert!(run.try_wait().unwrap().is_none(), "{arguments:?} ended before its interrupt");
