@@ -130,10 +130,10 @@ fn imbalance(
             grouped(cells)
         ),
         x: Axis::linear("partitioner and weights"),
-        y: Axis::linear(&format!("λ = max/mean of {name} per rank")),
+        y: Axis::linear("λ = max/mean over ranks"),
         body: Body::Bars(Bars {
             categories: of.iter().map(|g| division(&g.setup)).collect(),
-            segments: vec![(format!("{}: by {name}", subject.engine), lambdas?)],
+            segments: vec![(format!("{}: {name}", subject.engine), lambdas?)],
             references,
             provenance: Provenance::Measured,
         }),
