@@ -88,15 +88,19 @@ struct Balanced {
     id: &'static str,
     /// Its name.
     name: &'static str,
+    /// Its name in the legend.
+    legend: &'static str,
     /// What the caption adds.
     note: &'static str,
 }
 
-const CELLS: Balanced = Balanced { counter: "leaves", id: "balance", name: "cells", note: "" };
+const CELLS: Balanced =
+    Balanced { counter: "leaves", id: "balance", name: "cells", legend: "by cells", note: "" };
 const EXPOSED: Balanced = Balanced {
     counter: "exposed_faces",
     id: "balance-exposed",
     name: "exposed faces",
+    legend: "by faces",
     note: " Exposed faces are those that the mesh shows to the body, where it meets a near-body mesh. The paper expects them to be distributed badly.",
 };
 
@@ -107,7 +111,7 @@ fn imbalance(
     of: &[&Group],
     balanced: &Balanced,
 ) -> Option<Figure> {
-    let Balanced { counter, id, name, note } = balanced;
+    let Balanced { counter, id, name, legend, note } = balanced;
     let lambda = |g: &&Group| Some(g.typical.counters.get(*counter)?.lambda(ranks));
     let lambdas: Option<Vec<f64>> = of.iter().map(lambda).collect();
     let mut references = vec![("target, 1.10".to_owned(), 1.1)];
@@ -133,7 +137,7 @@ fn imbalance(
         y: Axis::linear("λ = max/mean over ranks"),
         body: Body::Bars(Bars {
             categories: of.iter().map(|g| division(&g.setup)).collect(),
-            segments: vec![(format!("{}: {name}", subject.engine), lambdas?)],
+            segments: vec![(format!("{}: {legend}", subject.engine), lambdas?)],
             references,
             provenance: Provenance::Measured,
         }),
