@@ -73,6 +73,17 @@ impl Draft {
         &mut self.file
     }
 
+    /// Synchronises the file with the disk, so that publishing it takes no time.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn synchronise(&self) -> io::Result<()> {
+        match self.place {
+            Place::Through => Ok(()),
+            _ => self.file.sync_all(),
+        }
+    }
+
     /// Synchronises the file with the disk and gives it its final name.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The end of a program on SIGINT, SIGTERM and SIGHUP: at once, in whatever it does, and without unfinished files.
 
-use crate::unfinished::{abandon_all, complete};
+use crate::unfinished::{abandon_all, abandon_others, complete};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::stdio::stderr;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -75,6 +75,11 @@ pub fn decided() {
 /// Removes all unfinished files: before the process ends because of a bug.
 pub fn abandon() {
     abandon_all();
+}
+
+/// Removes all files that are unfinished, also if others are complete: for a program with several outputs.
+pub fn abandon_unfinished() {
+    abandon_others();
 }
 
 fn is_ignored(signal: i32) -> bool {

@@ -107,6 +107,18 @@ pub fn abandon_all() -> bool {
     is_complete
 }
 
+/// Removes all unfinished output, also if some other is complete. Async-signal-safe.
+pub fn abandon_others() {
+    let mut next = LATEST.load(Ordering::Acquire).cast_const();
+    // SAFETY: entries are never freed.
+    while let Some(entry) = unsafe { next.as_ref() } {
+        if entry.is_live.load(Ordering::Acquire) {
+            entry.output.abandon();
+        }
+        next = entry.before;
+    }
+}
+
 impl Output {
     /// Removes the output, unless it is complete. Returns whether it is.
     fn abandon(&self) -> bool {

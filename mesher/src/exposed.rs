@@ -10,10 +10,12 @@
 
 use crate::brick::{self, AXES, Brick};
 use crate::brickset::{BrickSet, ones};
-use crate::comm::Comm;
+use crate::comm::{Comm, MessageBuffer};
 use crate::mesh::Mesh;
 use crate::octant::{self, Level};
+use crate::partition::ownership::Ownership;
 use crate::tree::{PerLevel, per_level};
+use std::collections::BTreeMap;
 
 /// The six directions: an axis, and whether it is followed upwards.
 const DIRECTIONS: [(usize, bool); 6] =
@@ -49,6 +51,18 @@ pub fn faces(mesh: &Mesh, comm: &dyn Comm) -> Vec<InBrick> {
         }
     }
     search.found
+}
+
+/// The number of faces in bricks that this rank owns, of the faces that all ranks found, perhaps before a repartition. Collective.
+pub fn owned(found: &[InBrick], ownership: &Ownership, comm: &dyn Comm) -> u64 {
+    let mut by_owner: BTreeMap<usize, u64> = BTreeMap::new();
+    for brick in found {
+        *by_owner.entry(ownership.owner(brick.level, brick.key)).or_default() +=
+            u64::from(brick.faces);
+    }
+    let messages =
+        MessageBuffer::of_entries(by_owner.into_iter().map(|(rank, n)| (rank, [n])).collect());
+    comm.sparse_all_to_all(messages).words().iter().sum()
 }
 
 /// The octants in crossing leaves of T0: these and, where gradation has split one, all that it consists of.

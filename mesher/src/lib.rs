@@ -338,18 +338,19 @@ fn grow<F: Borrow<[Facet]>>(
     debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
 
     // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
+    let exposed = options.weight_exposed.map(|weight| {
+        let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
+        (faces, weight)
+    });
     if !(is_parallel && division.is_of_curve()) {
         counters.base_leaf_cells_max =
             cells_heaviest(&mesh.split, &mesh.sides.deleted, &base_leaves);
     } else if !division.repartitions() {
         counters.base_leaf_cells_max = repartition_by_leaves(&mut mesh, false, None, comm);
     } else {
-        let weighted = options.weight_exposed.filter(|&weight| weight > 0).map(|weight| {
-            let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
-            (faces, weight)
+        counters.base_leaf_cells_max = record.phase("rebalance", comm, || {
+            repartition_by_leaves(&mut mesh, true, exposed.as_ref(), comm)
         });
-        counters.base_leaf_cells_max = record
-            .phase("rebalance", comm, || repartition_by_leaves(&mut mesh, true, weighted, comm));
     }
     if is_parallel && division.is_of_curve() {
         debug_check(options, comm, || {
@@ -357,9 +358,9 @@ fn grow<F: Borrow<[Facet]>>(
             check::graded(&mesh, None, comm);
         });
     }
-    if options.weight_exposed.is_some() {
-        let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
-        counters.exposed_faces = Some(faces.iter().map(|brick| u64::from(brick.faces)).sum());
+    if let Some((faces, _)) = exposed {
+        let owned = record.phase("exposed", comm, || exposed::owned(&faces, &mesh.ownership, comm));
+        counters.exposed_faces = Some(owned);
     }
     Ok(mesh)
 }
@@ -369,7 +370,7 @@ fn grow<F: Borrow<[Facet]>>(
 fn repartition_by_leaves(
     mesh: &mut Mesh,
     moves: bool,
-    weighted: Option<(Vec<exposed::InBrick>, u32)>,
+    weighted: Option<&(Vec<exposed::InBrick>, u32)>,
     comm: &dyn Comm,
 ) -> u64 {
     let (inside, deleted) = (&mut mesh.sides.inside, &mut mesh.sides.deleted);
@@ -377,9 +378,9 @@ fn repartition_by_leaves(
     let with_crossing = mesh.rules.keep_crossing;
     let mut counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
     let max = counts.max();
-    if let Some((faces, weight)) = weighted {
+    if let Some((faces, weight)) = weighted.filter(|(_, weight)| *weight > 0) {
         let weights =
-            faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(weight)));
+            faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)));
         counts.add(weights, &mesh.ownership, mesh.level_base);
     }
     if moves {

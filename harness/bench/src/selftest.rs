@@ -69,6 +69,7 @@ fn spacing(
             comm: Comm::Solo,
             partitioner: String::new(),
             weights: String::new(),
+            weight_exposed: None,
         };
         let case = base.variant(spacing_min, layer_cells_min).map_err(Failed::Reason)?;
         runner.run(&setup, &case, 0, true).map(|run| run.cells)

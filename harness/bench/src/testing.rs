@@ -29,6 +29,7 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
             comm,
             partitioner: "metis".into(),
             weights: "area".into(),
+            weight_exposed: None,
         },
         repeat: 0,
         warm_up: false,

@@ -1,5 +1,6 @@
 //! Signals end every command within a second, whatever it does, with exit code 130; no process and no temporary file remains.
 
+use contract::testing::{leaf_set, words_of};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
@@ -13,6 +14,8 @@ const CASE: &str =
     "spacing_min = 0.001\nroot_scale = 2.0\n[generator]\nshape = \"sphere\"\nfacets = 8000000\n";
 /// A mesher that neither meshes nor ends, and starts another process.
 const STUBBORN: &str = "#!/bin/sh\ntrap '' TERM INT HUP\necho $$ >> \"$PLACE/ids\"\nsleep 600 &\necho $! >> \"$PLACE/ids\"\nwhile :; do sleep 1; done\n";
+/// A mesher that copies a mesh.
+const COPYING: &str = "#!/bin/sh\nwhile [ $# -gt 0 ]; do\n[ \"$1\" != --out ] || cp -r \"$PLACE/mesh\" \"$2\"\nshift\ndone\n";
 /// Time to end: less than a second, and the time in which a busy machine gets to it. Without signals, every command takes minutes.
 const LIMIT: Duration = Duration::from_secs(5);
 
@@ -23,10 +26,14 @@ impl Fixture {
         let fixture = Self(tempfile::tempdir().unwrap());
         fs::create_dir(fixture.path().join("temporary")).unwrap();
         fs::write(fixture.path().join("case.toml"), CASE).unwrap();
-        let mesher = fixture.path().join("mesher");
-        fs::write(&mesher, STUBBORN).unwrap();
-        fs::set_permissions(&mesher, fs::Permissions::from_mode(0o755)).unwrap();
+        fixture.program("mesher", STUBBORN);
         fixture
+    }
+
+    fn program(&self, name: &str, text: &str) {
+        let path = self.path().join(name);
+        fs::write(&path, text).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
     }
 
     fn path(&self) -> &Path {
@@ -93,6 +100,36 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
             }
             fixture.interrupt(run, signals);
         }
+    }
+}
+
+#[test]
+fn interrupted_output_has_neither_its_names_nor_a_staging_directory() {
+    let fixture = Fixture::new();
+    fixture.program("copier", COPYING);
+    fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
+    // Two million cells take seconds to write.
+    leaf_set(vec![words_of(|o| o.level < 7)]).create(&fixture.path().join("mesh")).unwrap();
+    let out = fixture.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let outputs: [&[&str]; 4] = [
+        &["export", "mesh", "out/case/constant/polyMesh", "--ascii"],
+        &["export", "mesh", "out/constant/polyMesh", "--ascii", "--processors", "3", "--jobs", "1"],
+        &["export", "mesh", "out/mesh.pvtu", "--jobs", "1"],
+        &["picture", "case.toml", "--paper", "--out", "out/set", "--mesher", "./copier"],
+    ];
+    // A second signal ends the command before it has cleaned up by itself.
+    let mut interrupts = vec![(outputs[0], &["INT"][..])];
+    interrupts.extend(outputs.iter().map(|arguments| (*arguments, &["TERM", "INT"][..])));
+    for (arguments, signals) in interrupts {
+        let mut run = fixture.start(arguments);
+        while fs::read_dir(&out).unwrap().next().is_none() {
+            assert!(run.try_wait().unwrap().is_none(), "{arguments:?} ended before its interrupt");
+            sleep(Duration::from_millis(2));
+        }
+        fixture.interrupt(run, signals);
+        let left: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(left.is_empty(), "{arguments:?} {signals:?}: {left:?}");
     }
 }
 

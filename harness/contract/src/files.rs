@@ -2,9 +2,10 @@
 
 use ::files::Draft;
 use std::fs::{self, File, Permissions};
-use std::io;
+use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard};
 use tempfile::TempDir;
 
 /// Reads a regular file. A pipe could wait for a writer forever, and a device has no end.
@@ -58,18 +59,136 @@ pub fn fill_atomically<T, E>(
     Ok(result)
 }
 
-/// An empty directory in the same directory as `path`, which is deleted when it is dropped.
+/// What [`write_together`] writes into a file.
+pub type Content<'a> = &'a dyn Fn(&mut dyn Write) -> io::Result<()>;
+
+/// Like [`write_atomically`], for several files that are complete or absent together.
 ///
 /// # Errors
-/// If the directory is not writable.
-pub fn temporary_directory(path: &Path) -> io::Result<TempDir> {
-    let mut builder = tempfile::Builder::new();
-    builder.permissions(Permissions::from_mode(0o777)).tempdir_in(directory_of(path))
+/// If a file cannot be written, through `failed`.
+pub fn write_together<E>(
+    files: &[(&Path, Content<'_>)],
+    failed: impl Fn(&Path, io::Error) -> E,
+) -> Result<(), E> {
+    let draft = |(path, fill): &(&Path, Content<'_>)| {
+        let mut out = BufWriter::new(Draft::create(path)?);
+        fill(&mut out)?;
+        let draft = out.into_inner()?;
+        draft.synchronise()?;
+        Ok(draft)
+    };
+    let drafts: Result<Vec<Draft>, E> =
+        files.iter().map(|file| draft(file).map_err(|error| failed(file.0, error))).collect();
+    let mut drafts = files.iter().zip(drafts?);
+    let _publication = publications();
+    drafts.try_for_each(|((path, _), draft)| draft.publish().map_err(|error| failed(path, error)))
+}
+
+/// Directories that are being filled.
+static STAGED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Waits until no output is given its final names, and prevents that as long as the result exists. Returns the directories that are
+/// being filled; those that were published or removed may remain in the list.
+pub fn publications() -> MutexGuard<'static, Vec<PathBuf>> {
+    STAGED.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// A directory that is being filled beside its final place. It is deleted when it is dropped, or when the user interrupts.
+#[derive(Debug)]
+pub struct Staging(TempDir);
+
+impl Staging {
+    /// An empty directory in the same directory as `path`.
+    ///
+    /// # Errors
+    /// If the directory is missing or not writable.
+    pub fn beside(path: &Path) -> io::Result<Self> {
+        Self::inside(directory_of(path))
+    }
+
+    /// An empty directory in this one.
+    ///
+    /// # Errors
+    /// If this one is missing or not writable.
+    pub fn inside(directory: &Path) -> io::Result<Self> {
+        // An interrupt waits until the directory is known.
+        let mut staged = publications();
+        let mut builder = tempfile::Builder::new();
+        let builder = builder.permissions(Permissions::from_mode(0o777));
+        let dir = builder.tempdir_in(directory)?;
+        staged.push(dir.path().to_owned());
+        Ok(Self(dir))
+    }
+
+    /// The directory.
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    /// Lets `publish` move the content to its final names, or the directory itself. An interrupt waits meanwhile.
+    ///
+    /// # Errors
+    /// With whatever `publish` returns.
+    pub fn publish<T, E>(&self, publish: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, E> {
+        let _publication = publications();
+        publish(self.path())
+    }
 }
 
 fn directory_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
+    }
+}
+
+/// The nearest directory above a path that exists.
+pub fn nearest_directory(path: &Path) -> &Path {
+    let above = path.ancestors().skip(1);
+    let named = above.map(|dir| if dir.as_os_str().is_empty() { Path::new(".") } else { dir });
+    named.into_iter().find(|dir| dir.is_dir()).unwrap_or(Path::new("."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_written_together_replace_older_ones_only_if_all_can_be_written() {
+        let place = tempfile::tempdir().unwrap();
+        let [first, second] = ["first", "second"].map(|name| place.path().join(name));
+        let fail = std::cell::Cell::new(true);
+        let write = || {
+            let content: [(&Path, Content<'_>); 2] = [
+                (&first, &|out| out.write_all(b"new")),
+                (&second, &|out| match fail.get() {
+                    true => Err(io::Error::other("full")),
+                    false => out.write_all(b"new"),
+                }),
+            ];
+            write_together(&content, |path, _| path.to_owned())
+        };
+        fs::write(&first, "old").unwrap();
+        assert_eq!(write(), Err(second.clone()));
+        assert_eq!(fs::read(&first).unwrap(), b"old");
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+        fail.set(false);
+        assert_eq!(write(), Ok(()));
+        assert!([&first, &second].iter().all(|path| fs::read(path).unwrap() == b"new"));
+    }
+
+    #[test]
+    fn a_staged_directory_is_removed_unless_it_is_moved() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("absent/target");
+        assert_eq!(nearest_directory(&target), place.path());
+        drop(Staging::inside(place.path()).unwrap());
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
+        let staging = Staging::inside(place.path()).unwrap();
+        fs::write(staging.path().join("file"), "").unwrap();
+        let moved = place.path().join("target");
+        staging.publish(|staged| fs::rename(staged, &moved)).unwrap();
+        drop(staging);
+        assert!(moved.join("file").exists());
     }
 }

@@ -179,6 +179,9 @@ pub struct Setup {
     pub partitioner: String,
     /// `unit`, `area` or `rebalance` (`rehearsal` in old records); empty if the choice was left to the program.
     pub weights: String,
+    /// How many cells each exposed face weighs in the partition; 0 counts these faces only. `None`: they were not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight_exposed: Option<u32>,
 }
 
 /// A run and its measurements.

@@ -195,7 +195,8 @@ fn layout(setup: &Setup) -> Layout {
     };
     let choice = |value: &String| Some(value.clone()).filter(|value| !value.is_empty());
     let (partitioner, weights) = (choice(&setup.partitioner), choice(&setup.weights));
-    Layout { partitioner, weights, ..Layout::on(ranks) }
+    let weight_exposed = setup.weight_exposed;
+    Layout { partitioner, weights, weight_exposed, ..Layout::on(ranks) }
 }
 
 /// The measurements in a run report.

@@ -10,6 +10,9 @@ use contract::case::Case;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Cells that an exposed face weighs in the experiment `weights`.
+const WEIGHT_EXPOSED: u32 = 10;
+
 impl Bench<'_> {
     /// Returns the runs of a study; `sizes` has the known sizes of the case by n.
     pub(crate) fn points(
@@ -26,11 +29,11 @@ impl Bench<'_> {
                 for spacing in self.spacings(study, base, layout, sizes)? {
                     let case = base.variant(spacing, n).map_err(BenchError::Input)?;
                     if let Some(why) = self.declined(study, &case)? {
-                        let setup = setup(study, base, layout, spacing, n, ["", ""]);
+                        let setup = setup(study, base, layout, spacing, n, Choice::default());
                         self.leave_out(setup, why)?;
                         continue;
                     }
-                    for choice in pairs(&study.weights, &study.partitioners) {
+                    for choice in choices(study) {
                         let setup = setup(study, base, layout, spacing, n, choice);
                         points.push(Point { setup, case: case.clone(), failed: false });
                     }
@@ -87,6 +90,7 @@ impl Bench<'_> {
             comm: Comm::Solo,
             partitioner: String::new(),
             weights: String::new(),
+            weight_exposed: None,
         };
         match self.runner.run(&setup, &case, 0, true) {
             Ok(run) => Ok(run.cells),
@@ -102,7 +106,7 @@ fn setup(
     layout: &Layout,
     spacing_min: f64,
     layer_cells_min: u32,
-    [weights, partitioner]: [&str; 2],
+    choice: Choice,
 ) -> Setup {
     Setup {
         experiment: study.experiment.to_string(),
@@ -112,8 +116,9 @@ fn setup(
         layer_cells_min,
         ranks: layout.ranks,
         comm: layout.comm,
-        partitioner: partitioner.to_owned(),
-        weights: weights.to_owned(),
+        partitioner: choice.partitioner.to_owned(),
+        weights: choice.weights.to_owned(),
+        weight_exposed: choice.weight_exposed,
     }
 }
 
@@ -136,20 +141,66 @@ pub(crate) fn warmers(points: &[Point]) -> Vec<usize> {
     best
 }
 
-/// Returns all combinations except `rebalance` with METIS, which is identical to `area`.
-fn pairs<'a>(weights: &'a [String], partitioners: &'a [String]) -> Vec<[&'a str; 2]> {
-    let all =
-        weights.iter().flat_map(|w| partitioners.iter().map(move |p| [w.as_str(), p.as_str()]));
-    all.filter(|pair| partitioners.len() == 1 || *pair != ["rebalance", "metis"]).collect()
+/// What determines the partition of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Choice<'a> {
+    weights: &'a str,
+    partitioner: &'a str,
+    weight_exposed: Option<u32>,
+}
+
+/// Returns all combinations except `rebalance` with METIS, which is identical to `area`. The experiment `weights` counts exposed faces, and has
+/// the repartition that they weigh in beside the one by cells alone.
+fn choices(study: &Study) -> Vec<Choice<'_>> {
+    let counted = (study.experiment == Experiment::Weights).then_some(0);
+    let mut all = Vec::new();
+    for weights in &study.weights {
+        for partitioner in &study.partitioners {
+            let is_repartition = weights == "rebalance";
+            if is_repartition && partitioner == "metis" && study.partitioners.len() > 1 {
+                continue;
+            }
+            let choice = Choice { weights, partitioner, weight_exposed: counted };
+            let weighted = Choice { weight_exposed: Some(WEIGHT_EXPOSED), ..choice };
+            all.push(choice);
+            all.extend((is_repartition && counted.is_some()).then_some(weighted));
+        }
+    }
+    all
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::plan;
     use super::*;
 
     fn point(comm: Comm, ranks: usize, case: &str) -> Point {
         let setup = crate::testing::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
         Point { setup, case: case.into(), failed: false }
+    }
+
+    #[test]
+    fn the_experiment_on_weights_counts_exposed_faces_and_weighs_them_in_the_repartition() {
+        let of = |experiment| {
+            let all = plan::studies(plan::Preset::Small, &plan::Overrides::default());
+            all.into_iter().find(|study| study.experiment == experiment).unwrap()
+        };
+        let weights = of(Experiment::Weights);
+        let shown: Vec<_> = choices(&weights)
+            .iter()
+            .map(|c| (c.weights, c.partitioner, c.weight_exposed))
+            .collect();
+        let [counted, weighed] = [Some(0), Some(WEIGHT_EXPOSED)];
+        let expected = [
+            ("unit", "metis", counted),
+            ("unit", "morton", counted),
+            ("area", "metis", counted),
+            ("area", "morton", counted),
+            ("rebalance", "morton", counted),
+            ("rebalance", "morton", weighed),
+        ];
+        assert_eq!(shown, expected);
+        assert_eq!(choices(&of(Experiment::Strong)), [Choice::default()]);
     }
 
     #[test]

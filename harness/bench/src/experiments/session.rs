@@ -207,6 +207,7 @@ impl Bench<'_> {
             ranks: 1,
             partitioner: String::new(),
             weights: String::new(),
+            weight_exposed: None,
             ..point.setup.clone()
         };
         let expected = match self.runner.run(&setup, &point.case, 0, true) {

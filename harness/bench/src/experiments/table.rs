@@ -103,11 +103,15 @@ fn row(out: &mut String, groups: &Groups, group: &Group) {
     );
 }
 
-/// Returns partitioner and weights, or `default`.
+/// Returns partitioner and weights, or `default`, and the weight W of exposed faces if they have one.
 pub fn division(s: &Setup) -> String {
-    match (s.partitioner.as_str(), s.weights.as_str()) {
+    let chosen = match (s.partitioner.as_str(), s.weights.as_str()) {
         ("", "") => "default".to_owned(),
         (p, w) => format!("{p} {w}").trim().to_owned(),
+    };
+    match s.weight_exposed {
+        None | Some(0) => chosen,
+        Some(weight) => format!("{chosen} W={weight}"),
     }
 }
 

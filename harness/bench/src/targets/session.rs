@@ -279,6 +279,7 @@ fn point(spec: &RunSpec, ready: Ready) -> Point {
         comm: spec.comm,
         partitioner: spec.partitioner.clone(),
         weights: spec.weights.clone(),
+        weight_exposed: None,
     };
     Point { setup, case: ready.case, failed: false }
 }

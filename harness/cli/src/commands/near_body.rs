@@ -3,7 +3,7 @@
 use super::selection::SelectionArguments;
 use clap::Args;
 use contract::case::Case;
-use contract::files::write_atomically;
+use contract::files::{Content, write_together};
 use export::error::ExportError;
 use export::mesh::Mesh;
 use export::near_body::front::{Face, front};
@@ -14,7 +14,6 @@ use export::near_body::{files, of_case};
 use run::engine::interrupt;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// `harness near-body`.
@@ -101,14 +100,13 @@ fn write(
     report: &Report,
 ) -> Result<(), ExportError> {
     let root = &mesh.manifest.root;
-    let replace = |path: &Option<PathBuf>, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
-        let Some(path) = path else { return Ok(()) };
-        write_atomically(path, |out| fill(out)).map_err(|error| ExportError::write(path, error))
-    };
-    replace(&arguments.stl, &|out| files::stl(root, faces, polygons, out))?;
-    replace(&arguments.vtp, &|out| files::vtp(root, faces, polygons, gaps, out))?;
-    replace(&arguments.json, &|out| {
+    let stl: Content<'_> = &|out| files::stl(root, faces, polygons, out);
+    let vtp: Content<'_> = &|out| files::vtp(root, faces, polygons, gaps, out);
+    let json: Content<'_> = &|out| {
         serde_json::to_writer_pretty(&mut *out, report)?;
         out.write_all(b"\n")
-    })
+    };
+    let all = [(&arguments.stl, stl), (&arguments.vtp, vtp), (&arguments.json, json)];
+    let requested = all.iter().filter_map(|(path, fill)| Some((path.as_deref()?, *fill)));
+    write_together(&requested.collect::<Vec<_>>(), ExportError::write)
 }

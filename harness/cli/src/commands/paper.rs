@@ -2,6 +2,7 @@
 
 use super::meshed::{Failure, MeshArguments, Meshed, input};
 use super::view::{command, unread, write_view};
+use contract::files::{Staging, nearest_directory};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
 use report::picture::format::{Format, put, write};
@@ -12,9 +13,12 @@ use run::engine::layout::{Layout, Ranks};
 use run::engine::paths::Paths;
 use run::engine::programs::Programs;
 use run::verify::report::EXIT_MISSING;
-use std::fs;
 use std::path::Path;
+use std::{fs, io};
 use toml::Value;
+
+/// The page of the pictures.
+const INDEX: &str = "index.html";
 
 /// Meshes the case as often as the pictures require, and writes them and a page into the directory.
 ///
@@ -28,7 +32,8 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
     let Programs { engine, paths, .. } = source.engine.find()?;
     let path = paths.catalogue.case_file(&source.mesh, Path::new("")).map_err(input)?;
     let plain = PlainCase::read(&path).map_err(input)?;
-    fs::create_dir_all(out).map_err(|error| input(format!("{}: {error}", out.display())))?;
+    let named = |error| input(format!("{}: {error}", out.display()));
+    let staging = Staging::inside(nearest_directory(out)).map_err(named)?;
     let layout = Layout::on(Ranks::Simulated { ranks: RANKS, seed: 1 });
     let mut drawn: Vec<Option<Drawn>> = MEMBERS.iter().map(|_| None).collect();
     for (i, first) in MEMBERS.iter().enumerate() {
@@ -42,15 +47,25 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
         let meshed = source.engine.mesh(&engine, &case, &layout, first.made == Made::Base)?;
         for (member, drawn) in MEMBERS.iter().zip(&mut drawn) {
             if member.made == first.made {
-                *drawn = Some(draw_member(member, &meshed, out, &paths, source)?);
+                *drawn = Some(draw_member(member, &meshed, staging.path(), &paths, source)?);
             }
         }
     }
     let pictures: Vec<_> = MEMBERS.into_iter().zip(drawn.into_iter().flatten()).collect();
-    let index = out.join("index.html");
     let text = page(&source.mesh, &command(), &pictures);
-    put(&index, text.as_bytes()).map_err(|error| input(error.to_string()))?;
-    println!("{} pictures; the page is {}", pictures.len(), index.display());
+    put(&staging.path().join(INDEX), text.as_bytes()).map_err(|error| input(error.to_string()))?;
+    staging.publish(|staged| publish(staged, out)).map_err(named)?;
+    println!("{} pictures; the page is {}", pictures.len(), out.join(INDEX).display());
+    Ok(())
+}
+
+/// Moves the files into the directory, which may have older ones.
+fn publish(staged: &Path, out: &Path) -> io::Result<()> {
+    fs::create_dir_all(out)?;
+    for entry in fs::read_dir(staged)? {
+        let entry = entry?;
+        fs::rename(entry.path(), out.join(entry.file_name()))?;
+    }
     Ok(())
 }
 

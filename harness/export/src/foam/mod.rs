@@ -28,7 +28,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use contract::files;
+use contract::files::{Staging, nearest_directory};
 use contract::manifest::Sides;
 use contract::word;
 
@@ -69,7 +69,7 @@ pub fn write(
     let survey = survey(&model, &mut patches, distribution.as_ref())?;
 
     let named = |error| ExportError::write(path, error);
-    let staging = files::temporary_directory(&existing(path).join("polyMesh")).map_err(named)?;
+    let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
     let make = |processor: usize| {
         let dir = staging.path().join(processor.to_string());
         fs::create_dir(&dir).map_err(named)?;
@@ -88,13 +88,16 @@ pub fn write(
     })?;
     let (files, bytes) = sizes(staging.path()).map_err(named)?;
     options.check()?;
-    for (processor, target) in targets.iter().enumerate() {
-        let place = || {
-            fs::create_dir_all(target.parent().unwrap_or(target))?;
-            fs::rename(staging.path().join(processor.to_string()), target)
-        };
-        place().map_err(|error| ExportError::write(target, error))?;
-    }
+    staging.publish(|staged| {
+        for (processor, target) in targets.iter().enumerate() {
+            let place = || {
+                fs::create_dir_all(target.parent().unwrap_or(target))?;
+                fs::rename(staged.join(processor.to_string()), target)
+            };
+            place().map_err(|error| ExportError::write(target, error))?;
+        }
+        Ok::<(), ExportError>(())
+    })?;
     let mut notes = notes::notes(&counts, &regions, options.foam.regions);
     if counts.len() > 1 && !survey.has_addressing(&model) {
         notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
@@ -251,11 +254,4 @@ fn targets(path: &Path, processors: Option<u32>) -> Result<Vec<PathBuf>, ExportE
         }
     }
     Ok((0..count).map(|n| case.join(format!("processor{n}")).join("constant/polyMesh")).collect())
-}
-
-/// The nearest directory above a path that exists.
-fn existing(path: &Path) -> &Path {
-    let above = path.ancestors().skip(1);
-    let named = above.map(|dir| if dir.as_os_str().is_empty() { Path::new(".") } else { dir });
-    named.into_iter().find(|dir| dir.is_dir()).unwrap_or(Path::new("."))
 }

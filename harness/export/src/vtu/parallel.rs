@@ -8,8 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use contract::files;
-use tempfile::TempDir;
+use contract::files::{self, Staging};
 
 use super::file::VtuFile;
 use super::header::{Content, MARK};
@@ -38,7 +37,7 @@ pub fn write_files(
     names.refuse_other_files()?;
     let pieces = pieces(mesh, selection, PIECE, options)?;
     let named = |error| ExportError::write(&names.directory, error);
-    let place = files::temporary_directory(&names.directory).map_err(named)?;
+    let place = Staging::beside(&names.directory).map_err(named)?;
     let (mut whole, mut bytes, mut written) = (content(mesh), 0, Vec::new());
     let mut begun: Option<VtuFile> = None;
     encode(mesh, selection, &pieces, options, |index, piece| {
@@ -61,7 +60,7 @@ pub fn write_files(
         Ok(())
     })?;
     options.check()?;
-    bytes += names.publish(place, &whole, &written)?;
+    bytes += place.publish(|staged| names.publish(staged, &whole, &written))?;
     Ok(Summary {
         leaves: leaves(&pieces),
         files: written.len() as u64 + 1,
@@ -120,12 +119,12 @@ impl Names {
     /// Gives all files their final names; returns the size of the `.pvtu` file.
     fn publish(
         &self,
-        place: TempDir,
+        staged: &Path,
         content: &Content,
         written: &[String],
     ) -> Result<u64, ExportError> {
         let named = |error| ExportError::write(&self.directory, error);
-        File::open(place.path()).and_then(|directory| directory.sync_all()).map_err(named)?;
+        File::open(staged).and_then(|directory| directory.sync_all()).map_err(named)?;
         self.refuse_other_files()?;
         let directory = format!("{}_pieces", self.stem);
         let files: Vec<_> = written.iter().map(|name| format!("{directory}/{name}")).collect();
@@ -136,14 +135,10 @@ impl Names {
             file.write_all(xml.as_bytes()).map_err(to_write(&self.path))?;
             delete(|| fs::remove_file(&self.path)).map_err(to_write(&self.path))?;
             delete(|| fs::remove_dir_all(&self.directory)).map_err(named)?;
-            fs::rename(place.path(), &self.directory).map_err(named)?;
+            fs::rename(staged, &self.directory).map_err(named)?;
             is_replaced = true;
             Ok(())
         });
-        if is_replaced {
-            // Nothing is left to delete.
-            let _ = place.keep();
-        }
         if is_replaced && published.is_err() {
             let _ = fs::remove_dir_all(&self.directory);
         }

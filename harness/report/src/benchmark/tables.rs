@@ -9,7 +9,7 @@ use bench::experiments::pop;
 use bench::experiments::table::division;
 use maud::{Markup, html};
 
-const EXPERIMENT: [&str; 21] = [
+const EXPERIMENT: [&str; 22] = [
     "engine",
     "case",
     "cells",
@@ -23,6 +23,7 @@ const EXPERIMENT: [&str; 21] = [
     "runs",
     "λ (time)",
     "λ (cells)",
+    "λ (exposed faces)",
     "load balance",
     "serialisation",
     "transfer",
@@ -46,7 +47,7 @@ pub fn experiments(groups: &Groups) -> Markup {
         of_experiment.map(|group| row(groups, group)).collect()
     };
     html! {
-        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions." }
+        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions. Exposed faces are those that the mesh shows to the body; W is the number of cells that each weighs." }
         @for name in names { h3 { (name) } (table(None, &EXPERIMENT, &rows(name))) }
     }
 }
@@ -54,7 +55,10 @@ pub fn experiments(groups: &Groups) -> Markup {
 fn row(groups: &Groups, group: &Group) -> Vec<Markup> {
     let (s, t) = (&group.setup, group.time_s);
     let e = group.efficiency(groups.reference(group), &groups.network);
-    let leaves = group.typical.counters.get("leaves");
+    let lambda = |counter: &str| {
+        let counted = group.typical.counters.get(counter);
+        counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(s.ranks)))
+    };
     fields([
         s.engine.clone(),
         s.case.clone(),
@@ -68,7 +72,8 @@ fn row(groups: &Groups, group: &Group) -> Vec<Markup> {
         format!("{:.0} %", t.coverage * 100.0),
         t.count.to_string(),
         format!("{:.3}", e.lambda),
-        leaves.map_or("–".to_owned(), |l| format!("{:.3}", l.lambda(s.ranks))),
+        lambda("leaves"),
+        lambda("exposed_faces"),
         format!("{:.3}", e.load_balance),
         format!("{:.3}", e.serialisation),
         format!("{:.3}", e.transfer),

@@ -2,7 +2,7 @@
 
 use super::squares::Detail;
 use super::{Picture, TEX, VECTOR, csv, svg, tikz};
-use contract::files::write_atomically;
+use contract::files::{Content, named, write_atomically, write_together};
 use std::io;
 use std::path::Path;
 
@@ -73,8 +73,10 @@ impl Format {
 /// If a file cannot be written or the format is not available; the message names the file.
 pub fn write(picture: &Picture, format: Format, path: &Path) -> io::Result<()> {
     let drawn = format.draw(picture).map_err(io::Error::other)?;
-    put(path, &drawn)?;
-    put(&path.with_extension("csv"), csv(picture).as_bytes())
+    let (table, data) = (path.with_extension("csv"), csv(picture));
+    let content: [(&Path, Content<'_>); 2] =
+        [(path, &|out| out.write_all(&drawn)), (&table, &|out| out.write_all(data.as_bytes()))];
+    write_together(&content, |path, error| named(path, &error))
 }
 
 /// Writes a file, which is either complete or absent.
@@ -82,6 +84,5 @@ pub fn write(picture: &Picture, format: Format, path: &Path) -> io::Result<()> {
 /// # Errors
 /// If it cannot be written; the message names it.
 pub fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let named = |e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", path.display()));
-    write_atomically(path, |out| out.write_all(bytes)).map_err(named)
+    write_atomically(path, |out| out.write_all(bytes)).map_err(|error| named(path, &error))
 }

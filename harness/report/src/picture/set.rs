@@ -250,7 +250,7 @@ fn caption(member: &Member, drawn: &Drawn) -> Markup {
         (member.caption) " "
         @match drawn {
             Drawn::Slice(_) => { a href=(format!("{name}.svg")) { "SVG" } ", " a href=(format!("{name}.tex")) { "TikZ" } ", " a href=(format!("{name}.csv")) { "data" } }
-            Drawn::View(_) => { a href=(format!("{name}.html")) { "turn it in a browser" } }
+            Drawn::View(_) => { a href=(format!("{name}.html")) { "Turn it in a browser" } }
         }
         "."
     }

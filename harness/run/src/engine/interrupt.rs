@@ -3,7 +3,9 @@
 //! Invariants:
 //! - a first signal lets a command return in the ordinary way, with a partial report, but not for longer than [`GRACE`];
 //! - after that time, or at a second signal, child processes are ended, unfinished files and temporary directories are removed, and
-//!   the harness exits with code 130. Temporary directories are below one that this process has made.
+//!   the harness exits with code 130. Temporary directories are below one that this process has made, or staged beside their final
+//!   place ([`contract::files::Staging`]);
+//! - output that is about to get its final names gets all of them first.
 
 use super::session;
 use files::interrupt::{self, INTERRUPTED};
@@ -111,9 +113,11 @@ fn end() -> ! {
         waited += pause;
     }
     children.iter().for_each(|&child| session::signal(child, Signal::KILL));
-    interrupt::abandon();
+    // Until the process ends, nothing else is published.
+    let staged = contract::files::publications();
+    interrupt::abandon_unfinished();
     let kept = leftovers();
-    kept.directories.iter().chain(&kept.temporary).for_each(|path| remove(path));
+    kept.directories.iter().chain(&kept.temporary).chain(&*staged).for_each(|path| remove(path));
     let _ = writeln!(io::stderr(), "harness: interrupted");
     exit(INTERRUPTED)
 }
