@@ -4,6 +4,7 @@
 //! that of the definition. A reader's own panic, an allocation beyond the limit of `ci/fuzz`, and an input that takes seconds are faults, too.
 //! `ci/fuzz` generates inputs with libFuzzer; the inputs in `corpus/TARGET` are tried by an ordinary test.
 
+pub mod drawn;
 mod repair;
 mod scratch;
 mod targets;
