@@ -29,7 +29,7 @@ fn file(scratch: &mut Scratch, name: &str, bytes: &[u8], format: Format, side: &
     let Some((&options, bytes)) = bytes.split_first() else { return false };
     let path = scratch.file(name, bytes);
     // Whatever it returns, it returns. Seldom, because opening a file takes as long as reading it.
-    if options >> 5 == 0 {
+    if options & 16 == 16 {
         let _ = import::guess(path);
     }
     imported(path, format, options, side)
