@@ -105,8 +105,9 @@ impl Small {
             leaves: enclosed.leaves,
             example: on_lattice(example),
         });
-        let inside_reaches_boundary = self.keep == Keep::Inside
-            && self.reference_mesh(true)?.words.into_iter().any(is_inside_at_boundary);
+        // All inside leaves are kept, and those made by gradation tile the same places.
+        let inside_reaches_boundary =
+            self.keep == Keep::Inside && mesh.words.iter().copied().any(is_inside_at_boundary);
         let summary = Summary { outside, inside, enclosed, ambiguous, inside_reaches_boundary };
         Ok(Outcome { words: mesh.words, summary })
     }
