@@ -107,10 +107,11 @@ impl Root {
     ) -> Result<Vec<Facet>, Error> {
         let (origin, scale) = (self.origin, ROOT_EDGE as f64 / self.edge);
         let limit = ROOT_EDGE as f64 * 1.5;
-        let far = |c: f64, a: usize| off_centre(nearest(c, origin[a], scale)) > limit;
+        // False for a product with an infinite scale that is not a number.
+        let near = |c: f64, a: usize| off_centre(nearest(c, origin[a], scale)) <= limit;
         // Rounding is monotonic, so no vertex is too far if the bounds are not.
-        if !facets.is_empty() && (0..3).any(|a| far(bounds.lo[a], a) || far(bounds.hi[a], a)) {
-            let outside = |v: &[f32; 3]| (0..3).any(|a| far(f64::from(v[a]), a));
+        if !facets.is_empty() && !(0..3).all(|a| near(bounds.lo[a], a) && near(bounds.hi[a], a)) {
+            let outside = |v: &[f32; 3]| !(0..3).all(|a| near(f64::from(v[a]), a));
             let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
             let v = facets[bad].iter().find(|v| outside(v)).unwrap_or(&facets[bad][0]);
             return Err(Error::input(format!(
@@ -337,6 +338,13 @@ mod tests {
                 .to_string()
                 .contains("facet 41")
         );
+    }
+
+    #[test]
+    fn a_root_too_small_for_the_lattice_is_refused() {
+        let root = Root { origin: [0.0; 3], edge: 1e-310 };
+        let at_origin = [[0.0f32; 3]; 3];
+        assert!(root.facets(vec![at_origin], &Bounds::of(&[at_origin]), 0).is_err());
     }
 
     #[test]

@@ -19,6 +19,8 @@ fn each_invalid_input_has_its_own_error() {
         let error = error(&|c| c.facets[1][2][0] = x);
         assert!(matches!(error, Error::VertexNotFinite { facet: 1, .. }));
     }
+    // The product of 0 and an infinite scale is not a number.
+    assert!(matches!(error(&|c| c.root.edge = 1e-310), Error::VertexNotFinite { facet: 0, .. }));
     let mut limit = valid.clone();
     limit.facets[1][2] = [2.0 * edge, -edge, 0.0];
     mesh(&limit).unwrap();

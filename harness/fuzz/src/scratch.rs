@@ -9,7 +9,7 @@ use tempfile::TempDir;
 #[derive(Debug)]
 pub struct Scratch {
     place: TempDir,
-    files: Vec<(PathBuf, File)>,
+    files: Vec<(PathBuf, File, usize)>,
 }
 
 impl Default for Scratch {
@@ -29,13 +29,16 @@ impl Scratch {
     /// The file with this name, which may be below the directory, with these bytes.
     pub fn file(&mut self, name: &str, bytes: &[u8]) -> &Path {
         let path = self.place.path().join(name);
-        let index = self.files.iter().position(|(known, _)| *known == path).unwrap_or_else(|| {
+        let index = self.files.iter().position(|(known, ..)| *known == path).unwrap_or_else(|| {
             fs::create_dir_all(path.parent().expect("a directory")).expect("a writable directory");
-            self.files.push((path.clone(), File::create(&path).expect("a writable directory")));
+            self.files.push((path.clone(), File::create(&path).expect("a writable directory"), 0));
             self.files.len() - 1
         });
-        let (path, file) = &self.files[index];
-        file.set_len(bytes.len() as u64).expect("room for a small file");
+        let (path, file, length) = &mut self.files[index];
+        if bytes.len() < *length {
+            file.set_len(bytes.len() as u64).expect("a writable file");
+        }
+        *length = bytes.len();
         file.write_all_at(bytes, 0).expect("room for a small file");
         path
     }

@@ -79,18 +79,22 @@ impl Small {
 
     /// Leaf words by the reference.
     pub fn reference(&self, ungraded: bool) -> Vec<u64> {
-        self.reference_mesh(ungraded).words
+        self.reference_mesh(ungraded).expect("the case is good").words
     }
 
-    fn reference_mesh(&self, ungraded: bool) -> reference::Mesh {
+    fn reference_mesh(&self, ungraded: bool) -> Result<reference::Mesh, reference::Error> {
         let case = self.reference_case();
-        let mesh = if ungraded { reference::base_tree(&case) } else { reference::mesh(&case) };
-        mesh.expect("the case is good")
+        if ungraded { reference::base_tree(&case) } else { reference::mesh(&case) }
     }
 
     /// The reference's result.
     pub fn reference_outcome(&self, ungraded: bool) -> Outcome {
-        let mesh = self.reference_mesh(ungraded);
+        self.try_reference_outcome(ungraded).expect("the case is good")
+    }
+
+    /// As [`Small::reference_outcome`], for cases that may have unusable seeds.
+    pub fn try_reference_outcome(&self, ungraded: bool) -> Result<Outcome, reference::Error> {
+        let mesh = self.reference_mesh(ungraded)?;
         let on_lattice = |p: [f64; 3]| std::array::from_fn(|a| self.root.quantise(a, p[a]));
         let ambiguous = mesh
             .ambiguous
@@ -101,10 +105,11 @@ impl Small {
             leaves: enclosed.leaves,
             example: on_lattice(example),
         });
-        let inside_reaches_boundary = self.keep == Keep::Inside
-            && self.reference_mesh(true).words.into_iter().any(is_inside_at_boundary);
+        // All inside leaves are kept, and those made by gradation tile the same places.
+        let inside_reaches_boundary =
+            self.keep == Keep::Inside && mesh.words.iter().copied().any(is_inside_at_boundary);
         let summary = Summary { outside, inside, enclosed, ambiguous, inside_reaches_boundary };
-        Outcome { words: mesh.words, summary }
+        Ok(Outcome { words: mesh.words, summary })
     }
 
     /// Leaf words by the mesher on one rank.

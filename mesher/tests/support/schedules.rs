@@ -80,10 +80,11 @@ impl Serial {
     }
 }
 
-type Part = Result<(Vec<u64>, Summary, Option<(String, u64)>), Error>;
+/// Leaf words, components, and digest and number of cells in the report if it was asked for.
+pub type Part = Result<(Vec<u64>, Summary, Option<(String, u64)>), Error>;
 
 /// A rank's part of the mesh.
-fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
+pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
     let reported = match whole {
         false => None,
         true => {
@@ -95,7 +96,11 @@ fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
     Ok((words, summary, reported))
 }
 
-fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
+/// The mesh of which these are the parts of all ranks.
+///
+/// # Panics
+/// If ranks do not agree on the error or on the components.
+pub fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
     let (mut all, mut same) = (Vec::new(), None);
     for part in parts {
         let (words, common) = match part {

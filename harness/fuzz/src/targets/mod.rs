@@ -6,7 +6,7 @@ mod leaf_set;
 mod stl;
 mod texts;
 mod tree_file;
-mod whole_case;
+pub(crate) mod whole_case;
 
 use crate::Target;
 
