@@ -303,7 +303,6 @@ def main():
     given = parser.parse_args()
     tree = given.tree
     update(tree, given.repository)
-    end = time.monotonic() + 60 * given.minutes
     known = {line for line in given.known.read_text().splitlines() if line and line[0] not in "#[ "}
 
     listed = subprocess.run(["cargo", "mutants", "--list", "--json", "--package", given.crate], cwd=tree, capture_output=True, text=True)
@@ -362,6 +361,7 @@ def main():
     outcomes, killers = [], defaultdict(list)
     random.Random(given.seed).shuffle(viable)
     viable.sort(key=lambda mutant: mutant["name"] not in kept)
+    end = time.monotonic() + 60 * given.minutes
     with open(results, "w") as log:
         for mutant in viable:
             if record := kept.get(mutant["name"]):
