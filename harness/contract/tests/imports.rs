@@ -298,6 +298,9 @@ fn each_error_of_a_mesh_names_its_cell() {
         level.contains("cell 2 has level 1 and edge 1, but cell 0 has level 0 and edge 1"),
         "{level}"
     );
+    // The points have the numbers 0 to 461.
+    let point = refusal("foam-ascii", "faces", |bytes| replace(bytes, "6(1 6 158", "6(1 6 462"));
+    assert!(point.contains("has 462 as item"), "{point}");
     let face = refusal("foam-ascii", "faces", |bytes| {
         let at = String::from_utf8_lossy(bytes).find("\n4(").unwrap();
         let end = bytes[at..].iter().position(|&b| b == b')').unwrap() + at;
