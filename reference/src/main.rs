@@ -88,7 +88,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         (Which::Final, mesh(&case)?)
     };
     if let Some((claim, directory)) = claim.zip(arguments.out.as_deref()) {
-        write::leaf_set_into(claim, directory, which, &case, &mesh)?;
+        write::leaf_set(claim, directory, which, &case, &mesh)?;
     }
     let tally = leaves::Tally::of(&mesh.words);
     let record = Run {

@@ -133,19 +133,11 @@ pub fn claim(directory: &Path) -> Result<Claim, Error> {
     })
 }
 
-/// Writes a mesh to `directory`, the manifest last: a directory with a manifest is complete.
-///
-/// # Errors
-/// The directory is not empty, another run writes to it, or a file cannot be written.
-pub fn leaf_set(directory: &Path, which: Which, case: &Case, mesh: &Mesh) -> Result<(), Error> {
-    leaf_set_into(claim(directory)?, directory, which, case, mesh)
-}
-
-/// Writes a mesh to a claimed directory.
+/// Writes a mesh to a claimed directory, the manifest last: a directory with a manifest is complete.
 ///
 /// # Errors
 /// A file cannot be written. Then none remains.
-pub fn leaf_set_into(
+pub fn leaf_set(
     claim: Claim,
     directory: &Path,
     which: Which,

@@ -60,6 +60,12 @@ fn geometry_files_are_relative_to_the_case_file() {
 
     fs::write(directory.path().join("body.stl"), "solid\nendsolid\n").unwrap();
     assert!(case_file::read(&path).unwrap_err().to_string().contains("no facets or its"));
+    let point = facet.replace("vertex 1 0 0 vertex 0 0.1 0", "vertex 0 0 0 vertex 0 0 0");
+    fs::write(directory.path().join("body.stl"), format!("solid\n{point}\nendsolid\n")).unwrap();
+    assert!(
+        case_file::read(&path).unwrap_err().to_string().contains("its bounding box has no extent")
+    );
+    fs::write(directory.path().join("body.stl"), "solid\nendsolid\n").unwrap();
     fs::write(&path, format!("geometry = \"body.stl\"\nspacing_min = 1.0\n{ROOT}")).unwrap();
     assert!(case_file::read(&path).unwrap().facets.is_empty(), "an explicit root suffices");
     fs::write(&path, "geometry = \"boddy.stl\"\nspacing_min = 1.0\n").unwrap();

@@ -84,6 +84,8 @@ fn a_run_writes_a_leaf_set_and_a_record() {
     );
     assert_eq!(run["cells"], expected.words.len());
     assert!(run["time_wall_s"].as_f64().unwrap() > 0.0);
+    // The program itself takes some MiB.
+    assert!((1 << 20..1 << 30).contains(&run["peak_rss_bytes"][0].as_u64().unwrap()));
     let summary = String::from_utf8(output.stdout).unwrap();
     assert!(summary.contains(&digest), "{summary}");
 }
@@ -271,6 +273,17 @@ fn a_full_device_is_an_error_of_output() {
         assert_eq!(run.status.code(), Some(code), "{arguments}: {run:?}");
         assert!(!String::from_utf8_lossy(&run.stderr).contains("panicked"), "{run:?}");
     }
+}
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let directory = directory_with_case(CASE);
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_reference"));
+    let run = command.current_dir(directory.path()).arg("case.toml").stdout(writer).output();
+    let run = run.unwrap();
+    assert_eq!((run.status.code(), run.stderr), (Some(0), Vec::new()));
 }
 
 #[test]

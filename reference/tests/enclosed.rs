@@ -65,6 +65,15 @@ fn nothing_is_enclosed_if_no_outside_component_reaches_the_boundary() {
     assert_eq!(sides(&meshed.words)[0], 8);
 }
 
+/// The shell extends below the root, so its cavity reaches the boundary on one face alone.
+#[test]
+fn a_cavity_that_is_open_at_one_face_of_the_root_is_kept() {
+    let outer = block_of_units([2, 2, -2], [6, 6, 6]);
+    let inner = block_of_units([3, 3, -1], [5, 5, 4]);
+    let meshed = mesh(&Case { keep: Keep::Outside, ..case(&[outer, inner].concat(), 4) }).unwrap();
+    assert_eq!((meshed.components.outside, meshed.components.enclosed.count), (2, 0));
+}
+
 /// Enclosed leaves are neither refined nor sources. A box of level 4 makes the cavity fine; it lies in
 /// a block of level 2, whose other leaves are kept with it or without it.
 #[test]

@@ -29,7 +29,10 @@ fn each_invalid_input_has_its_own_error() {
         assert!(matches!(error(&|c| c.spacing_min = spacing), Error::Spacing { .. }));
         assert!(matches!(error(&|c| c.root.edge = spacing), Error::RootEdge(_)));
     }
-    assert!(matches!(error(&|c| c.spacing_min = 255.9), Error::SpacingTooFine { .. }));
+    let too_fine = error(&|c| c.spacing_min = 255.9);
+    assert!(
+        matches!(too_fine, Error::SpacingTooFine { least, .. } if least == edge / 2f64.powi(19))
+    );
     assert!(matches!(error(&|c| c.root.origin[1] = f64::NAN), Error::RootOrigin(_)));
     assert!(matches!(error(&|c| c.layer_cells_min = 0), Error::LayerCells));
     let boxed = |min, max, spacing| error(&move |c| c.boxes = vec![BoxSpec { min, max, spacing }]);
@@ -40,4 +43,6 @@ fn each_invalid_input_has_its_own_error() {
     let too_many = boxed([0.0; 3], [edge; 3], 256.0);
     assert!(matches!(too_many, Error::TooManyCells { index: 0, cells } if cells == 2f64.powi(57)));
     assert!(too_many.to_string().contains("1.4e17 cells") && too_many.exit_code() == 71);
+    let octant = boxed([edge / 2.0; 3], [edge; 3], 256.0);
+    assert!(matches!(octant, Error::TooManyCells { cells, .. } if cells == 2f64.powi(54)));
 }

@@ -67,3 +67,12 @@ fn at_most_thirty_two_candidates_vote() {
         vec![blind(2, [2, 8], [0, 8]), blind(2, [0, 2], [2, 8]), blind(1, [0, 2], [0, 4])];
     assert_eq!(ambiguous(one_too_late), Some(1));
 }
+
+/// Blinds below, beside and before all 64 leaves of level 2: three of the six rays of every leaf intersect one facet.
+#[test]
+fn a_tie_of_all_rays_means_outside() {
+    let blinds = (0..3).flat_map(|axis| blind(axis, [-2, 10], [-2, 10])).collect::<Vec<_>>();
+    let boxes = vec![box_of_level([0; 3], units([8; 3]), 2)];
+    let base = base_tree(&Case { boxes, ..case(&blinds, 0) }).unwrap();
+    assert_eq!((sides(&base.words), base.ambiguous.unwrap().components), ([64, 0, 0], 1));
+}

@@ -48,8 +48,11 @@ fn ascii_files_may_vary_in_case_white_space_and_names() {
         ("\n", "\r\n"),
         ("\n", "\r"),
         ("\n", " \n\n\t"),
+        ("\n", " "),
         ("solid part one", "solid"),
         ("solid part", "solid facet normal"),
+        ("solid part one\n", "solid facet normal 0 0 1 outer\n"),
+        ("solid part one\n", "solid name of six words and loop\n"),
         ("facet normal 0 0 1", "facet normal nan nan nan"),
         ("facet normal 0 0 1\n    outer", "facet normal 0 0 1 outer"),
     ] {

@@ -297,6 +297,14 @@ mod tests {
     }
 
     #[test]
+    fn the_array_of_a_rank_without_leaves_is_read() {
+        let file = file_of(b"");
+        write(file.path(), &[]).unwrap();
+        let part = PartFile::open(file.path()).unwrap();
+        assert_eq!((part.len(), part.read_all().unwrap()), (0, Vec::new()));
+    }
+
+    #[test]
     fn arrays_of_other_type_shape_or_length_are_rejected() {
         let data = [0; 16];
         let refused = |descr, shape, bytes: usize| {

@@ -5,7 +5,7 @@ use std::path::Path;
 use check::selftest::SelftestCase;
 use contract::case::Case;
 use contract::leafset;
-use reference::write::Which;
+use reference::write::{self, Which};
 
 /// Final mesh and T0 of a case file with this text, which includes the geometry.
 pub fn selftest_case(name: &str, text: &str) -> SelftestCase {
@@ -40,7 +40,7 @@ fn read_meshes(path: &Path, dir: &Path) -> SelftestCase {
     let given = reference::case_file::read(path).unwrap();
     let write = |which, name: &str, mesh| {
         let dir = dir.join(name);
-        reference::write::leaf_set(&dir, which, &given, &mesh).unwrap();
+        write::leaf_set(write::claim(&dir).unwrap(), &dir, which, &given, &mesh).unwrap();
         leafset::read(&dir).unwrap()
     };
     SelftestCase {
