@@ -44,13 +44,17 @@ pub fn widest(
     let mut best: Option<Path> = None;
     let (mut memory, mut scratch) = (Memory::default(), Scratch::default());
     for _ in 0..OPENINGS_MAX {
-        let radius = |leaf, from| field.radius(leaf, from);
+        let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
+        let wanted = WIDER * measured;
+        // A path that is not wider is of no interest, so leaves that are not are not entered.
+        let radius = |leaf, from| match field.radius(leaf, from) {
+            radius if f64::from(radius) > wanted => radius,
+            _ => -1.0,
+        };
         let route = search::widest(leaves, start, inner_goal, radius, &mut memory, stop)?;
         let Some(route) = route else { break };
-        let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let narrowest = field.narrowest(&route);
         let radius = f64::from(field.radii[narrowest as usize]);
-        let wanted = WIDER * measured;
         if radius <= wanted {
             break;
         }

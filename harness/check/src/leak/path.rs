@@ -22,8 +22,8 @@ pub struct Spot {
     pub step: f64,
 }
 
-/// The path is precise if no ball passes that is larger by more than this part.
-const PRECISION: f64 = 8.7e-4;
+/// Step of a grid that is fine enough, in parts of the clearance.
+const PRECISION: f64 = 1e-3;
 
 /// Grids that are searched at most.
 const GRIDS_MAX: usize = 150;
@@ -80,15 +80,14 @@ impl Path {
         for _ in 0..GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
-            let is_precise = bound <= (1.0 + PRECISION) * spot.clearance;
+            let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.clearance;
             if path.is_narrowest_at_end() || is_precise || bound < route.wanted {
                 break;
             }
             let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
             let Some(least) = path.widen(step, clearance, scratch, stop)? else { break };
-            // The points of a grid nearest to those of any path make a path too: each is next to the one before, and at
-            // most half of a step's diagonal away from the path.
-            bound = bound.min(least + 3f64.sqrt() / 2.0 * step);
+            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
+            bound = bound.min(least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
         Ok(path)
