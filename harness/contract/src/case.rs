@@ -410,8 +410,8 @@ mod tests {
         );
         let map = why("spacing_min = 1.0\nlayer_cells_min = { a = 1 }");
         assert!(map.contains("line 2, layer_cells_min: invalid type: map"), "{map}");
-        let table = why("spacing_min = 1.0\n[keep]\na = 1");
-        assert!(table.contains("line 2, [keep]: "), "{table}");
+        let table = why("spacing_min = 1.0\n[layer_cells_min]\na = 1");
+        assert!(table.contains("line 2, [layer_cells_min]: invalid type: map"), "{table}");
         assert!(why("spacing_min = -1.0").contains("spacing_min"));
         assert!(why("spacing_min = 1e-9").contains("deeper"));
         assert!(why("spacing_min = 1.0\nlayer_cells_min = 0").contains("layer_cells_min"));

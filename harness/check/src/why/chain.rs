@@ -15,7 +15,7 @@ use contract::octant::Octant;
 use rustc_hash::FxHashSet;
 
 /// Octants that are pursued per step.
-pub const FRONTIER_MAX: usize = 200;
+pub const FRONTIER_MAX: usize = 400;
 
 /// A rule of section 6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
