@@ -73,7 +73,7 @@ impl Prepared {
             let height = dot(from[0], self.normal);
             return height * height / self.normal_squared;
         }
-        (0..3).map(|i| self.from_edge(i, from[i]).0).fold(f64::INFINITY, f64::min)
+        (0..3).map(|i| self.edge_distance(i, from[i]).0).fold(f64::INFINITY, f64::min)
     }
 
     /// Squared distance of a point, and the nearest point of the triangle.
@@ -85,7 +85,7 @@ impl Prepared {
             return (height * height / self.normal_squared, foot);
         }
         let on_edge = |i: usize| {
-            let (squared, s) = self.from_edge(i, from[i]);
+            let (squared, s) = self.edge_distance(i, from[i]);
             (squared, along(self.corners[i], self.edges[i], s))
         };
         let nearest = (0..3).map(on_edge).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -97,9 +97,9 @@ impl Prepared {
         self.normal_squared > 0.0 && (0..3).all(|i| dot(from[i], self.inward[i]) >= 0.0)
     }
 
-    /// Squared distance from an edge of a point, given relative to its first corner, and the part of the edge before
+    /// Squared distance to an edge of a point, given relative to its first corner, and the part of the edge before
     /// the nearest point.
-    fn from_edge(&self, i: usize, from: Point) -> (f64, f64) {
+    fn edge_distance(&self, i: usize, from: Point) -> (f64, f64) {
         let s = (dot(from, self.edges[i]) * self.inverses[i]).clamp(0.0, 1.0);
         let off = along(from, self.edges[i], -s);
         (dot(off, off), s)
