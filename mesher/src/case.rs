@@ -224,7 +224,7 @@ impl File {
 fn explain(text: &str, e: &toml::de::Error) -> String {
     let begin = e.span().map_or(0, |s| text[..s.start].rfind('\n').map_or(0, |at| at + 1));
     let line = format!("line {}", text[..begin].matches('\n').count() + 1);
-    let message = e.message().replace('\n', " ");
+    let message = e.message().replace('\n', " ").replace("expected f64", "expected a number");
     let mut quoted = message.split('`').skip(1).step_by(2);
     let nearest = message.starts_with("unknown field").then(|| {
         let wrong = quoted.next().unwrap_or_default();

@@ -312,7 +312,7 @@ fn positive(what: &str, value: f64) -> Result<(), String> {
 
 /// A TOML error in one line, with the most similar known key if a key is unknown.
 fn explain(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message();
+    let message = error.message().replace("expected f64", "expected a number");
     let at = error.span().map_or(0, |span| span.start);
     let (line, key) = place(text, at);
     let mut quoted = message.split('`').skip(1).step_by(2);
@@ -324,7 +324,7 @@ fn explain(text: &str, error: &toml::de::Error) -> String {
             }
         }
         // Of the file as a whole.
-        (false, _) if at == 0 && message.starts_with("missing") => message.to_owned(),
+        (false, _) if at == 0 && message.starts_with("missing") => message.clone(),
         _ => format!("{line}{key}: {}", message.replace('\n', " ")),
     }
 }
@@ -410,6 +410,11 @@ mod tests {
         );
         let map = why("spacing_min = 1.0\nlayer_cells_min = { a = 1 }");
         assert!(map.contains("line 2, layer_cells_min: invalid type: map"), "{map}");
+        let word = why("spacing_min = \"fine\"");
+        assert!(
+            word.contains("line 1, spacing_min: ") && word.contains("expected a number"),
+            "{word}"
+        );
         let table = why("spacing_min = 1.0\n[layer_cells_min]\na = 1");
         assert!(table.contains("line 2, [layer_cells_min]: invalid type: map"), "{table}");
         assert!(why("spacing_min = -1.0").contains("spacing_min"));

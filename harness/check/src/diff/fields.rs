@@ -11,7 +11,7 @@ pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
     let mut same = |name: &str, of: &dyn Fn(&Manifest) -> String| {
         let (x, y) = (of(a), of(b));
         if x != y {
-            fields.push(format!("{name}: {x} in A, {y} in B"));
+            fields.push(format!("{name}: {x} in A; {y} in B"));
         }
     };
     same("tree", &|m| key(&m.tree));
@@ -63,7 +63,7 @@ fn point([x, y, z]: [f64; 3]) -> String {
 /// Items with their number from 0, or the word for an empty list.
 fn list(items: impl Iterator<Item: Display>) -> String {
     let items: Vec<String> = items.enumerate().map(|(i, item)| format!("{i}: {item}")).collect();
-    if items.is_empty() { "none".to_owned() } else { items.join("; ") }
+    if items.is_empty() { "none".to_owned() } else { items.join(", ") }
 }
 
 fn by_side(leaves: &BySide) -> String {
@@ -101,11 +101,11 @@ mod tests {
         (b.keep, b.enclosed, b.root.edge) = (Keep::Inside, Enclosed::Keep, 3.0);
         b.boxes = vec![ExtentBox { min: [0; 3], max: [1 << 26; 3], level: 4 }];
         let text = differing(&a, &b).join("\n");
-        assert!(text.contains("keep: all in A, inside in B"), "{text}");
-        assert!(text.contains("enclosed: delete in A, keep in B"), "{text}");
+        assert!(text.contains("keep: all in A; inside in B"), "{text}");
+        assert!(text.contains("enclosed: delete in A; keep in B"), "{text}");
         assert!(text.contains("with edge 3 in B"), "{text}");
         assert!(
-            text.contains("boxes: none in A, 0: (") && text.contains(") at level 4 in B"),
+            text.contains("boxes: none in A; 0: (") && text.contains(") at level 4 in B"),
             "{text}"
         );
     }

@@ -137,7 +137,7 @@ pub fn widest(
     Ok(None)
 }
 
-/// A path among the places of at least the width `least`, of at most [`GREED`] times the least cost; `None` if there is none.
+/// A path among the places of at least the width `least`, of at most `GREED` times the least cost; `None` if there is none.
 /// A step costs its length, and up to twice as much where the place that it enters is narrow, so that the path keeps away from
 /// facets where that is not a detour (the A* algorithm).
 ///

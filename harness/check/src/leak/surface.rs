@@ -14,7 +14,7 @@ const WELD: i64 = 32;
 ///
 /// A gap between vertices that is far narrower than the finest cell does not count. A path of free leaves leads through the
 /// centres of leaves and of shared faces, so it stays half an edge of the finest cell, 128 units, away from all facets. Welding
-/// moves no point of a facet by more than sqrt(3) [`WELD`], 56 units, so the path does not meet the welded surface either.
+/// moves no point of a facet by more than sqrt(3) times `WELD`, 56 units, so the path does not meet the welded surface either.
 pub fn separates(case: &Case, from: [i64; 3], to: Option<[i64; 3]>) -> bool {
     is_separated(&case.facets_lattice, from, to)
         || is_separated(&welded(&case.facets_lattice), from, to)
