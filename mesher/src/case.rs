@@ -222,10 +222,9 @@ impl File {
 
 /// One sentence about a malformed case file. Suggests the nearest known key for an unknown one.
 fn explain(text: &str, e: &toml::de::Error) -> String {
-    let line = e
-        .span()
-        .map_or(String::new(), |s| format!("line {}: ", text[..s.start].matches('\n').count() + 1));
-    let message = e.message().replace('\n', " ");
+    let begin = e.span().map_or(0, |s| text[..s.start].rfind('\n').map_or(0, |at| at + 1));
+    let line = format!("line {}", text[..begin].matches('\n').count() + 1);
+    let message = e.message().replace('\n', " ").replace("expected f64", "expected a number");
     let mut quoted = message.split('`').skip(1).step_by(2);
     let nearest = message.starts_with("unknown field").then(|| {
         let wrong = quoted.next().unwrap_or_default();
@@ -236,9 +235,22 @@ fn explain(text: &str, e: &toml::de::Error) -> String {
             .map(|known| (wrong, known))
     });
     match nearest.flatten() {
-        Some((wrong, known)) => format!("{line}unknown key \"{wrong}\": did you mean \"{known}\"?"),
-        None => format!("{line}{message}"),
+        Some((wrong, known)) => {
+            format!("{line}: unknown key \"{wrong}\": did you mean \"{known}\"?")
+        }
+        // Of the file as a whole.
+        None if begin == 0 && message.starts_with("missing") => message,
+        None => format!("{line}{}: {message}", key(&text[begin..])),
     }
+}
+
+/// The key or table at the beginning of a text, as part of a message; nothing if there is none.
+fn key(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    let key = line.split('=').next().unwrap_or_default().trim();
+    let is_part = |c: char| c.is_alphanumeric() || "_-.[]\"".contains(c);
+    let is_key = !key.is_empty() && key.chars().all(is_part);
+    if is_key { format!(", {key}") } else { String::new() }
 }
 
 #[cfg(test)]
@@ -283,6 +295,8 @@ mod tests {
                 "not both",
             ),
             ("geometry = ", "line 1"),
+            ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1, geometry: invalid type: map"),
+            ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2, [spacing_min]: "),
         ] {
             let e = parse(text).unwrap_err();
             assert!(e.contains(expected), "{e}");

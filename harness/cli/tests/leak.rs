@@ -131,3 +131,13 @@ fn missing_programs_have_their_own_exit_code() {
     let (code, text) = fixture.leak(&["--from", "0,0,0", "--reference", "/nowhere"]);
     assert!(code == 3 && text.contains("the mesher is missing"), "{code}: {text}");
 }
+
+#[test]
+fn a_spacing_that_closes_an_opening_suffices_unless_a_closed_surface_is_required() {
+    let fixture = Fixture::new();
+    let text = format!("geometry = \"box.stl\"\nspacing_min = 2.0\n{ROOT}");
+    fs::write(fixture.path("case.toml"), text).unwrap();
+    let (code, text) = fixture.leak(&["--from", "0,0,0"]);
+    assert!(code == 0 && text.contains("it would open at spacing"), "{code}: {text}");
+    assert_eq!(fixture.leak(&["--from", "0,0,0", "--closed"]).0, 1);
+}

@@ -122,7 +122,7 @@ impl Case {
         let text = files::read_text(path)
             .map_err(|source| CaseError::Io { path: path.to_owned(), source })?;
         let wrong = |why: String| CaseError::Content { path: path.to_owned(), why };
-        let file: CaseFile = toml::from_str(&text).map_err(|e| wrong(explain(&e)))?;
+        let file: CaseFile = toml::from_str(&text).map_err(|e| wrong(explain(&text, &e)))?;
         let facets = facets(path, &file)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let geometry = file.geometry.as_ref().map(|stl| beside(path, stl));
@@ -134,7 +134,7 @@ impl Case {
     /// # Errors
     /// One sentence, if the case is invalid.
     pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
-        let file: CaseFile = toml::from_str(text).map_err(|e| explain(&e))?;
+        let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e))?;
         Self::build("in-memory".to_owned(), &file, facets)
     }
 
@@ -311,18 +311,32 @@ fn positive(what: &str, value: f64) -> Result<(), String> {
 }
 
 /// A TOML error in one line, with the most similar known key if a key is unknown.
-fn explain(error: &toml::de::Error) -> String {
-    let message = error.message();
+fn explain(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().replace("expected f64", "expected a number");
+    let at = error.span().map_or(0, |span| span.start);
+    let (line, key) = place(text, at);
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (message.starts_with("unknown field"), quoted.next()) {
-        (true, Some(key)) => {
-            match quoted.max_by(|a, b| similarity(key, a).total_cmp(&similarity(key, b))) {
-                Some(near) => format!("unknown key `{key}`; did you mean `{near}`?"),
-                None => format!("unknown key `{key}`"),
+        (true, Some(wrong)) => {
+            match quoted.max_by(|a, b| similarity(wrong, a).total_cmp(&similarity(wrong, b))) {
+                Some(near) => format!("{line}: unknown key `{wrong}`; did you mean `{near}`?"),
+                None => format!("{line}: unknown key `{wrong}`"),
             }
         }
-        _ => message.replace('\n', " "),
+        // Of the file as a whole.
+        (false, _) if at == 0 && message.starts_with("missing") => message.clone(),
+        _ => format!("{line}{key}: {}", message.replace('\n', " ")),
     }
+}
+
+/// The line of a byte of a case file, counted from 1, and the key or table on it, as the beginning of a message.
+fn place(text: &str, byte: usize) -> (String, String) {
+    let begin = text[..byte].rfind('\n').map_or(0, |at| at + 1);
+    let (number, line) = (text[..begin].matches('\n').count() + 1, text[begin..].lines().next());
+    let key = line.unwrap_or_default().split('=').next().unwrap_or_default().trim();
+    let is_key = |c: char| c.is_alphanumeric() || "_-.[]\"".contains(c);
+    let is_key = !key.is_empty() && key.chars().all(is_key);
+    (format!("line {number}"), if is_key { format!(", {key}") } else { String::new() })
 }
 
 /// Similarity of two keys, from 0 to 1, by the metric that the mesher uses too.
@@ -390,7 +404,19 @@ mod tests {
     #[test]
     fn errors_name_the_cause() {
         let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
-        assert!(why("spacing_mim = 1.0").contains("did you mean `spacing_min`"));
+        assert!(
+            why("spacing_mim = 1.0")
+                .contains("line 1: unknown key `spacing_mim`; did you mean `spacing_min`")
+        );
+        let map = why("spacing_min = 1.0\nlayer_cells_min = { a = 1 }");
+        assert!(map.contains("line 2, layer_cells_min: invalid type: map"), "{map}");
+        let word = why("spacing_min = \"fine\"");
+        assert!(
+            word.contains("line 1, spacing_min: ") && word.contains("expected a number"),
+            "{word}"
+        );
+        let table = why("spacing_min = 1.0\n[layer_cells_min]\na = 1");
+        assert!(table.contains("line 2, [layer_cells_min]: invalid type: map"), "{table}");
         assert!(why("spacing_min = -1.0").contains("spacing_min"));
         assert!(why("spacing_min = 1e-9").contains("deeper"));
         assert!(why("spacing_min = 1.0\nlayer_cells_min = 0").contains("layer_cells_min"));

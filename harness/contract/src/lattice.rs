@@ -52,6 +52,15 @@ impl Root {
         std::array::from_fn(|a| self.origin[a] + at[a] as f64 * scale)
     }
 
+    /// A point of the user with the decimals that tell lattice points apart, and without the rounding errors beyond them:
+    /// what is printed.
+    pub fn rounded(&self, at: [f64; 3]) -> [f64; 3] {
+        let unit = self.edge / UNITS_PER_EDGE as f64;
+        let decimals = (-unit.log10().floor()).clamp(0.0, 300.0) as usize;
+        // Adding 0 makes -0 positive.
+        at.map(|x| format!("{x:.decimals$}").parse().map_or(x, |rounded: f64| rounded + 0.0))
+    }
+
     /// The coarsest level whose cells are at most `spacing` wide; `None` if it is deeper than 19.
     pub fn level_for(&self, spacing: f64) -> Option<u8> {
         let fits = |level: &u8| self.edge / f64::from(1u32 << level) <= spacing;
@@ -61,7 +70,7 @@ impl Root {
     /// An octant as text: path, level, and bounds on the lattice and in the user's units.
     pub fn describe(&self, octant: &Octant) -> String {
         let (low, high) = octant.bounds();
-        let (from, to) = (self.to_user(low), self.to_user(high));
+        let (from, to) = (self.rounded(self.to_user(low)), self.rounded(self.to_user(high)));
         format!("{octant}, lattice {low:?} to {high:?}, user {from:?} to {to:?}")
     }
 }
@@ -101,6 +110,20 @@ mod tests {
         // Rounding comes first, as for a vertex.
         assert_eq!(ROOT.quantise_seed([-1.0 - 1e-9, 0.0, 2.0]), Some([0; 3]));
         assert_eq!(ROOT.quantise_seed([3.0 - 1e-9, 0.0, 2.0]), None);
+    }
+
+    #[test]
+    fn printed_points_have_the_decimals_of_the_lattice() {
+        let at = [0.1 + 0.2, -1e-12, 2.0 / 3.0];
+        assert_eq!(ROOT.rounded(at), [0.3, 0.0, 0.666_666_67]);
+        assert!(ROOT.rounded(at)[1].is_sign_positive());
+        let wide = Root { origin: [0.0; 3], edge: 1e12 };
+        assert_eq!(wide.rounded([1234.5678, 0.0, 1e11]), [1235.0, 0.0, 1e11]);
+        // Lattice points stay apart.
+        for q in [0i64, 1, 99_999_999, UNITS_PER_EDGE - 1] {
+            let at = ROOT.rounded(ROOT.to_user([q; 3]));
+            assert_eq!(ROOT.quantise(at), Some([q; 3]));
+        }
     }
 
     #[test]

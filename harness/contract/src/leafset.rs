@@ -64,6 +64,11 @@ pub enum ReadError {
         /// The cause.
         source: std::io::Error,
     },
+    /// A file was given in place of a directory.
+    #[error(
+        "{0} is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)"
+    )]
+    NotADirectory(PathBuf),
     /// The manifest does not follow its schema.
     #[error("{path}: not a leaf-set manifest: {why}")]
     Manifest {
@@ -209,6 +214,9 @@ pub fn open_any(dir: &Path) -> Result<Leaves, ReadError> {
 /// # Errors
 /// If it cannot be read, or does not follow its schema.
 pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
+    if dir.is_file() {
+        return Err(ReadError::NotADirectory(dir.to_owned()));
+    }
     let path = dir.join(manifest::FILE);
     let text =
         files::read_text(&path).map_err(|source| ReadError::Io { path: path.clone(), source })?;

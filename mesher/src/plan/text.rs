@@ -61,12 +61,12 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for p in &self.pilots {
             let cells = grouped(p.cells);
-            writeln!(
-                f,
-                "pilot          spacings times {}: {cells} cells, {} of CPU time",
-                p.spacing_factor,
-                seconds(p.time_cpu_s)
-            )?;
+            let spacings = match p.spacing_factor {
+                1.0 => "the run itself".to_owned(),
+                factor => format!("run at {factor} times the spacings"),
+            };
+            let time = seconds(p.time_cpu_s);
+            writeln!(f, "pilot          {spacings}: {cells} cells, {time} of CPU time")?;
         }
         writeln!(f, "cells          {}", self.about())?;
         if let Some(time) = self.time_cpu_s {
@@ -95,7 +95,14 @@ impl fmt::Display for Plan {
                     Limit::Machine => "memory of the machine",
                 };
                 let (needed, left) = (bytes(t.needed_bytes as f64), bytes(t.left_bytes as f64));
-                write!(f, "fits           yes: {needed} more of {left} that are left ({what})")
+                write!(f, "fits           yes: ")?;
+                match t.needed_bytes {
+                    0 => write!(
+                        f,
+                        "needs no more than this program holds already; {left} are left ({what})"
+                    ),
+                    _ => write!(f, "needs {needed} more, of {left} that are left ({what})"),
+                }
             }
         }
     }

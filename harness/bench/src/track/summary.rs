@@ -9,13 +9,15 @@ pub fn summary(all: &[Series]) -> String {
         |percent: Option<f64>| percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
     let mut text = String::new();
     for series in all {
+        // Counts are exact.
+        let shown = |value| if series.unit == "count" { value } else { rounded(value) };
         let unit = if series.unit == "count" { String::new() } else { format!(" {}", series.unit) };
         for change in &series.changes {
             text.push_str(&format!(
                 "{}: {} -> {}{unit} ({}) in {}..{}, p = {:.2e}{}\n",
                 series.name,
-                change.before,
-                change.after,
+                shown(change.before),
+                shown(change.after),
                 relative(change.percent),
                 short(&change.last_old),
                 short(&change.first_new),

@@ -1,46 +1,69 @@
 //! The fields of two manifests that differ, in words.
 
-use contract::manifest::{BySide, Components, Manifest, Sides};
-use std::fmt::Debug;
+use contract::lattice::Root;
+use contract::manifest::{BySide, Components, ExtentBox, Manifest, Sides};
+use serde::Serialize;
+use std::fmt::Display;
 
 /// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
 pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
     let mut fields = Vec::new();
-    let mut same = |name: &str, x: String, y: String| {
+    let mut same = |name: &str, of: &dyn Fn(&Manifest) -> String| {
+        let (x, y) = (of(a), of(b));
         if x != y {
-            fields.push(format!("{name}: {x} and {y}"));
+            fields.push(format!("{name}: {x} in A; {y} in B"));
         }
     };
-    same("tree", debug(&a.tree), debug(&b.tree));
-    same("root", debug(&a.root), debug(&b.root));
-    same("level_surface", debug(&a.level_surface), debug(&b.level_surface));
-    same("layer_cells_min", debug(&a.layer_cells_min), debug(&b.layer_cells_min));
-    same("keep", debug(&a.keep), debug(&b.keep));
-    same("keep_crossing", debug(&a.keep_crossing), debug(&b.keep_crossing));
-    same("boxes", debug(&a.boxes), debug(&b.boxes));
-    same("seeds", debug(&a.seeds), debug(&b.seeds));
-    same("enclosed", debug(&a.enclosed), debug(&b.enclosed));
-    same("leaves", debug(&a.leaves), debug(&b.leaves));
+    same("tree", &|m| key(&m.tree));
+    same("root", &|m| root(&m.root));
+    same("level of the surface (from spacing_min)", &|m| m.level_surface.to_string());
+    same("layer_cells_min", &|m| m.layer_cells_min.to_string());
+    same("keep", &|m| key(&m.keep));
+    same("keep_crossing", &|m| m.keep_crossing.to_string());
+    same("boxes", &|m| list(m.boxes.iter().map(|extent| extent_box(extent, &m.root))));
+    same("seeds", &|m| {
+        list(m.seeds.iter().map(|&seed| point(m.root.rounded(m.root.to_user(seed)))))
+    });
+    same("enclosed", &|m| key(&m.enclosed));
+    same("leaves", &|m| m.leaves.to_string());
     if a.sides == Sides::Known && b.sides == Sides::Known {
-        same("components", components(a.components.as_ref()), components(b.components.as_ref()));
-        let ambiguous = |mesh: &Manifest| {
-            format!(
-                "{}{}",
-                mesh.components_ambiguous.count,
-                place(mesh.components_ambiguous.example)
-            )
-        };
-        same("components decided by a majority of rays", ambiguous(a), ambiguous(b));
-        same("leaves by side", by_side(&a.leaves_by_side), by_side(&b.leaves_by_side));
+        same("components", &|m| components(m.components.as_ref()));
+        same("components decided by a majority of rays", &|m| {
+            format!("{}{}", m.components_ambiguous.count, place(m.components_ambiguous.example))
+        });
+        same("leaves by side", &|m| by_side(&m.leaves_by_side));
     }
-    for (level, (x, y)) in a.leaves_by_level.iter().zip(&b.leaves_by_level).enumerate() {
-        same(&format!("leaves of level {level}"), debug(x), debug(y));
+    for level in 0..a.leaves_by_level.len().max(b.leaves_by_level.len()) {
+        same(&format!("leaves of level {level}"), &|m| m.leaves_by_level[level].to_string());
     }
     fields
 }
 
-fn debug(value: &dyn Debug) -> String {
-    format!("{value:?}")
+/// The word of the case file for a value.
+fn key(value: &impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(word)) => word,
+        other => format!("{other:?}"),
+    }
+}
+
+fn root(root: &Root) -> String {
+    format!("{} with edge {}", point(root.origin), root.edge)
+}
+
+fn extent_box(extent: &ExtentBox, root: &Root) -> String {
+    let [min, max] = [extent.min, extent.max].map(|at| point(root.rounded(root.to_user(at))));
+    format!("{min} to {max} at level {}", extent.level)
+}
+
+fn point([x, y, z]: [f64; 3]) -> String {
+    format!("({x}, {y}, {z})")
+}
+
+/// Items with their number from 0, or the word for an empty list.
+fn list(items: impl Iterator<Item: Display>) -> String {
+    let items: Vec<String> = items.enumerate().map(|(i, item)| format!("{i}: {item}")).collect();
+    if items.is_empty() { "none".to_owned() } else { items.join(", ") }
 }
 
 fn by_side(leaves: &BySide) -> String {
@@ -61,5 +84,29 @@ fn components(of: Option<&Components>) -> String {
 
 /// A point of a component, after the text that precedes it.
 fn place(example: Option<[f64; 3]>) -> String {
-    example.map_or(String::new(), |[x, y, z]| format!(", one at ({x}, {y}, {z})"))
+    example.map_or(String::new(), |at| format!(", one at {}", point(at)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::manifest::{Enclosed, Keep};
+    use contract::testing::{leaf_set, words_of};
+
+    #[test]
+    fn fields_are_described_in_the_words_of_the_case_file() {
+        let a = leaf_set(vec![words_of(|o| o.level < 1)]).manifest;
+        assert_eq!(differing(&a, &a), [""; 0]);
+        let mut b = a.clone();
+        (b.keep, b.enclosed, b.root.edge) = (Keep::Inside, Enclosed::Keep, 3.0);
+        b.boxes = vec![ExtentBox { min: [0; 3], max: [1 << 26; 3], level: 4 }];
+        let text = differing(&a, &b).join("\n");
+        assert!(text.contains("keep: all in A; inside in B"), "{text}");
+        assert!(text.contains("enclosed: delete in A; keep in B"), "{text}");
+        assert!(text.contains("with edge 3 in B"), "{text}");
+        assert!(
+            text.contains("boxes: none in A; 0: (") && text.contains(") at level 4 in B"),
+            "{text}"
+        );
+    }
 }

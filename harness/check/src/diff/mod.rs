@@ -231,7 +231,7 @@ fn rules(
         return undecided("none: one is a base tree, the other a final mesh");
     }
     if Terms::of_manifest(&a.manifest) != Terms::of_manifest(&b.manifest) {
-        return undecided("none: the inputs differ as listed above, so each mesh may be right");
+        return undecided("none: the inputs differ as listed above, so both meshes may be right");
     }
     if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
         return undecided("unknown: the meshes are too large to be held in memory");

@@ -30,18 +30,80 @@ pub fn nearest(a: &Triangle, b: &Triangle) -> (f64, Point, Point) {
 
 /// Squared distance of a point from a triangle, which may have no area, and the nearest point of the triangle.
 pub fn from_point(p: Point, t: &Triangle) -> (f64, Point) {
-    let to = |q: Point| (dot(sub(q, p), sub(q, p)), q);
-    if let Some(foot) = foot(p, t) {
-        return to(foot);
+    Prepared::new(t).nearest(p)
+}
+
+/// A triangle, which may have no area, prepared for the distances of many points.
+#[derive(Clone, Copy, Debug)]
+pub struct Prepared {
+    corners: Triangle,
+    edges: [Point; 3],
+    /// Inverse squared length of each edge; 0 for an edge without length.
+    inverses: [f64; 3],
+    /// In the plane, normal to each edge, towards the third corner.
+    inward: [Point; 3],
+    normal: Point,
+    /// Squared length of the normal; 0 where the triangle is so thin that its edges are as near as its plane and its
+    /// normal is mostly rounding error.
+    normal_squared: f64,
+}
+
+impl Prepared {
+    /// Prepares a triangle.
+    pub fn new(t: &Triangle) -> Self {
+        let edges: [Point; 3] = std::array::from_fn(|i| sub(t[(i + 1) % 3], t[i]));
+        let normal = cross(edges[0], edges[1]);
+        let normal_squared = dot(normal, normal);
+        let squares = edges.map(|e| dot(e, e));
+        let is_thin = normal_squared <= 1e-20 * squares[0] * squares[2];
+        Self {
+            corners: *t,
+            edges,
+            inverses: squares.map(|squared| if squared > 0.0 { squared.recip() } else { 0.0 }),
+            inward: edges.map(|e| cross(normal, e)),
+            normal,
+            normal_squared: if is_thin { 0.0 } else { normal_squared },
+        }
     }
-    let on_edge = |i: usize| {
-        let along_edge = sub(t[(i + 1) % 3], t[i]);
-        let squared = dot(along_edge, along_edge);
-        let s = if squared > 0.0 { dot(sub(p, t[i]), along_edge) / squared } else { 0.0 };
-        to(along(t[i], along_edge, s.clamp(0.0, 1.0)))
-    };
-    let nearest = (0..3).map(on_edge).min_by(|a, b| a.0.total_cmp(&b.0));
-    nearest.expect("a triangle has edges")
+
+    /// Squared distance of a point.
+    pub fn squared(&self, p: Point) -> f64 {
+        let from = self.corners.map(|corner| sub(p, corner));
+        if self.is_over(&from) {
+            let height = dot(from[0], self.normal);
+            return height * height / self.normal_squared;
+        }
+        (0..3).map(|i| self.edge_distance(i, from[i]).0).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Squared distance of a point, and the nearest point of the triangle.
+    pub fn nearest(&self, p: Point) -> (f64, Point) {
+        let from = self.corners.map(|corner| sub(p, corner));
+        if self.is_over(&from) {
+            let height = dot(from[0], self.normal);
+            let foot = along(p, self.normal, -height / self.normal_squared);
+            return (height * height / self.normal_squared, foot);
+        }
+        let on_edge = |i: usize| {
+            let (squared, s) = self.edge_distance(i, from[i]);
+            (squared, along(self.corners[i], self.edges[i], s))
+        };
+        let nearest = (0..3).map(on_edge).min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.expect("a triangle has edges")
+    }
+
+    /// Whether the foot of the perpendicular from a point, given relative to the corners, is in the triangle.
+    fn is_over(&self, from: &[Point; 3]) -> bool {
+        self.normal_squared > 0.0 && (0..3).all(|i| dot(from[i], self.inward[i]) >= 0.0)
+    }
+
+    /// Squared distance to an edge of a point, given relative to its first corner, and the part of the edge before
+    /// the nearest point.
+    fn edge_distance(&self, i: usize, from: Point) -> (f64, f64) {
+        let s = (dot(from, self.edges[i]) * self.inverses[i]).clamp(0.0, 1.0);
+        let off = along(from, self.edges[i], -s);
+        (dot(off, off), s)
+    }
 }
 
 /// Squared distance of a square from a triangle that it does not intersect. The square has its corners in order around it, and

@@ -86,6 +86,9 @@ fn openings(finding: &Finding, input: &Input) -> String {
              at every spacing."
                 .into()
         }
+        _ if widest < input.root.edge / f64::from(CELLS_PER_EDGE) => {
+            "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
+        }
         None => format!(
             "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest \
              may leak: {leak}.",

@@ -1,6 +1,7 @@
 //! Openings: connected sets of open edges, that is, of edges with one facet, apart from T-junctions.
 
 use contract::lattice::UNITS_PER_EDGE;
+use contract::octant::CELLS_PER_EDGE;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
@@ -53,10 +54,9 @@ pub fn openings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
 
 /// Whether cells may fit through the opening.
 fn is_leak(input: &Input, place: &Place) -> bool {
-    place.width.is_some_and(|width| match input.cell {
-        Some(cell) => width >= cell,
-        None => width > 0.0,
-    })
+    // Without a spacing, any may be chosen, up to the finest.
+    let cell = input.cell.unwrap_or(input.root.edge / f64::from(CELLS_PER_EDGE));
+    place.width.is_some_and(|width| width >= cell)
 }
 
 /// All open edges.

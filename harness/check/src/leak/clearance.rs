@@ -3,10 +3,10 @@
 use contract::lattice::FacetLattice;
 
 use crate::geometry::boxes::{Bounds, Boxes};
-use crate::geometry::distance;
+use crate::geometry::distance::{self, Prepared};
 
 /// Exceeds the rounding of a distance, in lattice units.
-const ROUNDING: f64 = 1.0;
+pub const ROUNDING: f64 = 1.0;
 
 /// A point, in lattice units.
 pub type Point = [f64; 3];
@@ -61,25 +61,12 @@ impl<'a> Clearance<'a> {
         found
     }
 
-    /// The facets that can be the nearest one of a point at most `radius` from `centre`, each with its distance from the
-    /// centre, nearest first.
-    pub fn near(&self, centre: Point, radius: f64) -> Vec<(u32, f64)> {
+    /// The facets that can be the nearest one of a point at most `radius` from `centre`.
+    pub fn near(&self, centre: Point, radius: f64) -> Vec<Prepared> {
         // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
         let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + ROUNDING;
-        self.facets_within(centre, reach)
-    }
-
-    /// Distance from a point to the nearest of the facets near a centre, which is `offset` from the point.
-    pub fn among(&self, near: &[(u32, f64)], point: Point, offset: f64) -> f64 {
-        let mut best = f64::INFINITY;
-        for &(facet, from_centre) in near {
-            let least = from_centre - offset - ROUNDING;
-            if least > 0.0 && least * least > best {
-                break;
-            }
-            best = distance::from_point(point, &self.triangle(facet)).0.min(best);
-        }
-        best.sqrt()
+        let facets = self.facets_within(centre, reach).into_iter();
+        facets.map(|(facet, _)| Prepared::new(&self.triangle(facet))).collect()
     }
 
     /// A nearest point of the nearest facet.
@@ -102,7 +89,7 @@ impl<'a> Clearance<'a> {
     fn within(&self, point: Point, limit: &mut f64, visit: &mut impl FnMut(f64, u32, &mut f64)) {
         self.search(
             |bounds| bounds.distance_squared_to_box(point, point),
-            |triangle| distance::from_point(point, triangle).0,
+            |triangle| Prepared::new(triangle).squared(point),
             limit,
             visit,
         );

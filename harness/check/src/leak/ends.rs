@@ -22,10 +22,10 @@ pub enum Target {
 pub fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<[i64; 3], String> {
     let inside = |q: &[i64; 3]| q.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));
     root.quantise(at).filter(inside).ok_or_else(|| {
-        let far = root.to_user([UNITS_PER_EDGE; 3]);
+        let far = root.rounded(root.to_user([UNITS_PER_EDGE; 3]));
         format!(
             "{what} {at:?} is outside the root, which extends from {:?} to {far:?}",
-            root.origin
+            root.rounded(root.origin)
         )
     })
 }
@@ -39,7 +39,7 @@ pub fn free_leaf(what: &str, at: [i64; 3], leaves: &Leaves, root: &Root) -> Resu
     if leaves.is_free(leaf) {
         return Ok(leaf);
     }
-    let user = |at| root.to_user(at).map(|c| c as f32);
+    let user = |at| root.rounded(root.to_user(at));
     let (point, level) = (user(at), leaves.octant(leaf).level);
     let place = format!("{what} {point:?} is in a leaf of level {level} that facets cross");
     Err(match nearest_free_centre(at, leaves.words()) {

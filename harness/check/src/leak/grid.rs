@@ -1,8 +1,8 @@
 //! A cubic grid of points with their distances to the nearest facet.
 
-use super::clearance::{Clearance, Point};
+use super::clearance::{Clearance, Point, ROUNDING};
 use super::search::Graph;
-use crate::geometry::distance::{length, sub};
+use crate::geometry::distance::{Prepared, length, sub};
 
 /// Half of a grid's edge, in steps.
 pub const STEPS: i32 = 16;
@@ -17,11 +17,15 @@ pub struct Grid {
 }
 
 /// Distances from the points of a grid to the nearest facet. The points of a block share the search for facets that can be the
-/// nearest.
+/// nearest, and so do the blocks where these are few.
 #[derive(Debug)]
 pub struct Distances<'a> {
     grid: &'a Grid,
     clearance: &'a Clearance<'a>,
+    /// The facets that can be the nearest of any point; none if they are many. Then those of the blocks.
+    triangles: Vec<Prepared>,
+    /// Number of [`Self::triangles`] that are of the whole grid.
+    shared: usize,
     blocks: Vec<Option<Block>>,
 }
 
@@ -29,7 +33,8 @@ pub struct Distances<'a> {
 #[derive(Clone, Debug)]
 struct Block {
     centre: Point,
-    /// The facets that can be the nearest of its points, with their distances from the centre; none if they are many.
+    /// The triangles that can be the nearest of its points, with their distances from the centre, nearest first; none if they
+    /// are many.
     near: Vec<(u32, f64)>,
 }
 
@@ -39,40 +44,75 @@ const BLOCK: i32 = 4;
 /// Blocks of a grid along an edge.
 const BLOCKS: i32 = (SIDE + BLOCK - 1) / BLOCK;
 
+/// A list of more facets takes longer than a search for the nearest of all.
+const FACETS_FEW: usize = 128;
+
 impl<'a> Distances<'a> {
     /// No distance is known yet.
     pub fn new(grid: &'a Grid, clearance: &'a Clearance<'a>) -> Self {
         let blocks = vec![None; (BLOCKS * BLOCKS * BLOCKS) as usize];
-        Self { grid, clearance, blocks }
+        let mut triangles = clearance.near(grid.centre, 3f64.sqrt() * f64::from(STEPS) * grid.step);
+        if triangles.len() > FACETS_FEW {
+            triangles.clear();
+        }
+        Self { grid, clearance, shared: triangles.len(), triangles, blocks }
     }
 
     /// Distance from a point to the nearest facet; `bound` is an upper bound that the caller knows.
     pub fn at(&mut self, place: u32, bound: f64) -> f64 {
-        let [x, y, z] = Grid::indices(place).map(|i| i / BLOCK);
-        let Self { grid, clearance, blocks } = self;
-        let block = blocks[((z * BLOCKS + y) * BLOCKS + x) as usize]
-            .get_or_insert_with(|| Block::new([x, y, z], grid, clearance));
-        let point = grid.position(place);
-        match block.near.is_empty() {
-            true => clearance.at(point, bound),
-            false => clearance.among(&block.near, point, length(sub(point, block.centre))),
+        let indices = Grid::indices(place).map(|i| i / BLOCK);
+        let [x, y, z] = indices;
+        let block = ((z * BLOCKS + y) * BLOCKS + x) as usize;
+        if self.blocks[block].is_none() {
+            self.blocks[block] = Some(self.block(indices));
+        }
+        let point = self.grid.position(place);
+        match &self.blocks[block] {
+            Some(Block { centre, near }) if !near.is_empty() => {
+                self.among(near, point, length(sub(point, *centre)))
+            }
+            _ => self.clearance.at(point, bound),
         }
     }
-}
 
-impl Block {
-    fn new(indices: [i32; 3], grid: &Grid, clearance: &Clearance) -> Self {
-        /// A list of more facets takes longer than a search for the nearest of all.
-        const FACETS_FEW: usize = 128;
-        let half = f64::from(BLOCK - 1) / 2.0;
-        let centre = std::array::from_fn(|a| {
-            grid.centre[a] + (f64::from(indices[a] * BLOCK - STEPS) + half) * grid.step
-        });
-        let mut near = clearance.near(centre, 3f64.sqrt() * half * grid.step);
-        if near.len() > FACETS_FEW {
-            near = Vec::new();
+    /// Distance from a point to the nearest of the triangles near a centre, which is `offset` from the point.
+    fn among(&self, near: &[(u32, f64)], point: Point, offset: f64) -> f64 {
+        let mut best = f64::INFINITY;
+        for &(triangle, from_centre) in near {
+            let least = from_centre - offset - ROUNDING;
+            if least > 0.0 && least * least > best {
+                break;
+            }
+            best = self.triangles[triangle as usize].squared(point).min(best);
         }
-        Self { centre, near }
+        best.sqrt()
+    }
+
+    fn block(&mut self, indices: [i32; 3]) -> Block {
+        let Grid { centre, step } = *self.grid;
+        let half = f64::from(BLOCK - 1) / 2.0;
+        let centre: Point = std::array::from_fn(|a| {
+            centre[a] + (f64::from(indices[a] * BLOCK - STEPS) + half) * step
+        });
+        let radius = 3f64.sqrt() * half * step;
+        let candidates = if self.shared > 0 {
+            0..self.shared
+        } else {
+            let near = self.clearance.near(centre, radius);
+            if near.len() > FACETS_FEW {
+                return Block { centre, near: Vec::new() };
+            }
+            let first = self.triangles.len();
+            self.triangles.extend(near);
+            first..self.triangles.len()
+        };
+        let from_centre = |i: usize| (i as u32, self.triangles[i].squared(centre).sqrt());
+        let mut near: Vec<(u32, f64)> = candidates.map(from_centre).collect();
+        let least = near.iter().map(|&(_, from)| from).fold(f64::INFINITY, f64::min);
+        // As in `Clearance::near`, which searches for the same among all facets.
+        near.retain(|&(_, from)| from <= least + 2.0 * radius + ROUNDING);
+        near.sort_by(|a, b| a.1.total_cmp(&b.1));
+        Block { centre, near }
     }
 }
 

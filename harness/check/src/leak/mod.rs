@@ -29,7 +29,7 @@ use contract::octant::LEVEL_MAX;
 use ends::Target;
 use leaves::Leaves;
 use report::{Destination, Meshed, Passage, Report, SCHEMA, Spacing};
-use search::Interrupted;
+use search::{Interrupted, Memory};
 
 /// A question.
 #[derive(Clone, Copy, Debug)]
@@ -150,7 +150,7 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
             report.closes = closes.map(spacing);
             report.passage = Some(self.passage(&searched)?);
             searched.words
-        } else if surface::separates(case, self.from, self.to) {
+        } else if self.is_separated(&tree)? {
             report.is_separated = true;
             tree.words
         } else {
@@ -190,7 +190,8 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         let stop = || self.watch.is_interrupted();
         let (is_joined, why) = match ends::in_tree(self.from, self.to, &leaves) {
             Ok((start, goal)) => {
-                (search::widest(&leaves, start, goal, edge, &stop)?.is_some(), None)
+                let mut memory = Memory::default();
+                (search::widest(&leaves, start, goal, edge, &mut memory, &stop)?.is_some(), None)
             }
             Err(why) => (false, Some(why)),
         };
@@ -249,6 +250,13 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         }
         *limit = Some(format!("level {LEVEL_MAX} is the finest"));
         Ok(tree)
+    }
+
+    /// Whether a closed surface separates the centres of the leaves at the ends.
+    fn is_separated(&self, tree: &Tree) -> Result<bool, LeakError<E>> {
+        let leaves = Leaves::new(&tree.words).map_err(LeakError::Input)?;
+        let centre = |at| leaves.octant(leaves.locate(at)).centre();
+        Ok(surface::separates(self.question.case, centre(self.from), self.to.map(centre)))
     }
 
     fn passage(&self, tree: &Tree) -> Result<Passage, LeakError<E>> {

@@ -9,9 +9,9 @@
 
 use super::clearance::Clearance;
 use super::leaves::Leaves;
-use super::path::{Path, Route};
+use super::path::{Path, Route, Scratch};
 use super::report::{Narrowest, Passage, Point, Spacing};
-use super::search::{self, Goal, Graph, Interrupted};
+use super::search::{self, Goal, Graph, Interrupted, Memory};
 use crate::geometry::distance::{dot, sub};
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
@@ -42,22 +42,28 @@ pub fn widest(
     let start = approach[approach.len() - 1];
     let inner_goal = departure.last().map_or(Goal::Far, |&end| Goal::Place(end));
     let mut best: Option<Path> = None;
+    let (mut memory, mut scratch) = (Memory::default(), Scratch::default());
     for _ in 0..OPENINGS_MAX {
-        let radius = |leaf, from| field.radius(leaf, from);
-        let Some(route) = search::widest(leaves, start, inner_goal, radius, stop)? else { break };
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
+        let wanted = WIDER * measured;
+        // A path that is not wider is of no interest, so leaves that are not are not entered.
+        let radius = |leaf, from| match field.radius(leaf, from) {
+            radius if f64::from(radius) > wanted => radius,
+            _ => -1.0,
+        };
+        let route = search::widest(leaves, start, inner_goal, radius, &mut memory, stop)?;
+        let Some(route) = route else { break };
         let narrowest = field.narrowest(&route);
         let radius = f64::from(field.radii[narrowest as usize]);
-        let wanted = WIDER * measured;
         if radius <= wanted {
             break;
         }
-        let inner = field.shortened(&route, narrowest, inner_goal, stop)?;
+        let inner = field.shortened(&route, narrowest, inner_goal, &mut memory, stop)?;
         let on = departure.iter().rev().skip(1);
         let whole: Vec<u32> = approach.iter().chain(&inner[1..]).chain(on).copied().collect();
         let approaches = [approach.len() - 1, departure.len().saturating_sub(1)];
         let route = Route { leaves: &whole, approaches, radius, wanted };
-        let path = Path::through(leaves, &route, goal, &clearance, stop)?;
+        let path = Path::through(leaves, &route, goal, &clearance, &mut scratch, stop)?;
         let is_end = path.is_narrowest_at_end();
         field.close(&path, narrowest);
         if path.throat().clearance > measured {
@@ -136,11 +142,13 @@ impl Field<'_> {
         route: &[u32],
         narrowest: u32,
         goal: Goal,
+        memory: &mut Memory,
         stop: &dyn Fn() -> bool,
     ) -> Result<Vec<u32>, Interrupted> {
         let (leaves, least, start) = (self.leaves, self.radii[narrowest as usize], route[0]);
         let mut to = |goal| {
-            search::shortest(leaves, narrowest, goal, least, |l, from| self.radius(l, from), stop)
+            let radius = |leaf, from| self.radius(leaf, from);
+            search::shortest(leaves, narrowest, goal, least, radius, memory, stop)
         };
         let (Some(mut whole), Some(on)) = (to(Goal::Place(start))?, to(goal)?) else {
             unreachable!("the route itself joins its narrowest leaf with both ends")
@@ -167,7 +175,9 @@ fn described(case: &Case, level: u8, path: &Path, clearance: &Clearance) -> Pass
     /// Facets at the rim, in parts of the ball's radius, and for small balls in lattice units.
     const RIM: (f64, f64) = (0.02, 2.0);
     let scale = case.root.edge / UNITS_PER_EDGE as f64;
-    let user = |at: [f64; 3]| std::array::from_fn(|a| case.root.origin[a] + at[a] * scale);
+    let user = |at: [f64; 3]| {
+        case.root.rounded(std::array::from_fn(|a| case.root.origin[a] + at[a] * scale))
+    };
     let throat = path.throat();
     let width = 2.0 * throat.clearance * scale;
     let rim = clearance.facets_within(throat.at, throat.clearance * (1.0 + RIM.0) + RIM.1);

@@ -8,7 +8,7 @@
 use super::clearance::{Clearance, Point};
 use super::grid::{Distances, Grid, STEPS};
 use super::leaves::{Leaves, shared_face_centre};
-use super::search::{self, Goal, Graph, Interrupted, nearest_boundary};
+use super::search::{self, Goal, Graph, Interrupted, Memory, nearest_boundary};
 use crate::geometry::distance::{length, sub};
 
 /// A point and its distance to the nearest facet, in lattice units.
@@ -63,6 +63,7 @@ impl Path {
         route: &Route,
         goal: Goal,
         clearance: &Clearance,
+        scratch: &mut Scratch,
         stop: &dyn Fn() -> bool,
     ) -> Result<Self, Interrupted> {
         /// Edge of the first grid, in radii.
@@ -84,9 +85,9 @@ impl Path {
                 break;
             }
             let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
-            let Some(narrowest) = path.widen(step, clearance, stop)? else { break };
+            let Some(least) = path.widen(step, clearance, scratch, stop)? else { break };
             // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
-            bound = bound.min(narrowest.clearance + 3f64.sqrt() * narrowest.step);
+            bound = bound.min(least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
         Ok(path)
@@ -135,38 +136,38 @@ impl Path {
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
     }
 
-    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. Returns the narrowest
-    /// point of the grid's path, or `None` if there is no path.
+    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. Returns the least
+    /// clearance of the grid's path, or `None` if there is no path.
     fn widen(
         &mut self,
         step: f64,
         clearance: &Clearance,
+        Scratch { known, memory }: &mut Scratch,
         stop: &dyn Fn() -> bool,
-    ) -> Result<Option<Spot>, Interrupted> {
+    ) -> Result<Option<f64>, Interrupted> {
         let grid = Grid { centre: self.throat().at, step };
         let (first, last) = self.surroundings(f64::from(STEPS) * step);
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
-        let mut known = vec![f32::NAN; grid.count()];
+        known.clear(grid.count());
         let mut distances = Distances::new(&grid, clearance);
         let mut width = |place: u32, near: u32| {
-            if known[place as usize].is_nan() {
+            known.get_or_insert_with(place, |known| {
                 let bound = match known[near as usize] {
                     near if near >= 0.0 => f64::from(near) + 2.0 * step,
                     _ => f64::INFINITY,
                 };
                 let free = distances.at(place, bound);
                 // Balls at neighbours must overlap, so that no facet is between them.
-                known[place as usize] = if free > step { free as f32 } else { -1.0 };
-            }
-            known[place as usize]
+                if free > step { free as f32 } else { -1.0 }
+            })
         };
         let goal = Goal::Place(to);
-        let Some(widest) = search::widest(&grid, from, goal, &mut width, stop)? else {
+        let Some(widest) = search::widest(&grid, from, goal, &mut width, memory, stop)? else {
             return Ok(None);
         };
         // Through a slit the widest path leads to and fro: each of its points is almost the narrowest and would need grids.
         let least = widest.iter().map(|&place| width(place, place)).fold(f32::INFINITY, f32::min);
-        let route = search::shortest(&grid, from, goal, least, &mut width, stop)?;
+        let route = search::shortest(&grid, from, goal, least, &mut width, memory, stop)?;
         let route = route.expect("the widest path is as wide");
         // Points near the grid's edge depend on where the path enters it, so they are not final.
         let coarse = self.spots[first].step.max(self.spots[last].step);
@@ -176,11 +177,42 @@ impl Path {
             step: if Grid::is_inner(place) { step } else { coarse },
         };
         let widened: Vec<Spot> = route.iter().map(spot).collect();
-        let narrowest = widened.iter().copied().min_by(|a, b| a.clearance.total_cmp(&b.clearance));
         let (begin, end) = self.inner();
         let replaced = first + usize::from(first == begin)..last + usize::from(last != end);
         self.spots.splice(replaced, widened);
-        Ok(narrowest)
+        Ok(Some(f64::from(least)))
+    }
+}
+
+/// Memory of searches through grids.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    known: Known,
+    memory: Memory,
+}
+
+/// Distances of the points of a grid, as far as they are known.
+#[derive(Debug, Default)]
+struct Known {
+    /// NaN where unknown.
+    values: Vec<f32>,
+    entered: Vec<u32>,
+}
+
+impl Known {
+    fn clear(&mut self, count: usize) {
+        self.values.resize(count, f32::NAN);
+        for place in self.entered.drain(..) {
+            self.values[place as usize] = f32::NAN;
+        }
+    }
+
+    fn get_or_insert_with(&mut self, place: u32, compute: impl FnOnce(&[f32]) -> f32) -> f32 {
+        if self.values[place as usize].is_nan() {
+            self.values[place as usize] = compute(&self.values);
+            self.entered.push(place);
+        }
+        self.values[place as usize]
     }
 }
 

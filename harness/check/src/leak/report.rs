@@ -115,7 +115,8 @@ pub struct Report {
     pub closes: Option<Spacing>,
     /// The finer level, the nearest to the case's, whose base tree joins the ends.
     pub opens: Option<Spacing>,
-    /// Whether the facets form a closed surface between the ends, so that no spacing joins them.
+    /// Whether the facets are proven to form a closed surface between the ends, so that no spacing joins them. Not examined if
+    /// there is a leak.
     pub is_separated: bool,
     /// The limit at which refinement ended without joining the ends.
     pub limit: Option<String>,

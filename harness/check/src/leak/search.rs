@@ -52,6 +52,46 @@ const STEPS_PER_POLL: usize = 1 << 14;
 
 const NONE: u32 = u32::MAX;
 
+/// Memory of searches in one graph, or in graphs of one size. What a search has not reached costs the next one nothing.
+#[derive(Debug, Default)]
+pub struct Memory {
+    /// The place before each on the best path to it; [`NONE`] for a place that was not reached.
+    via: Vec<u32>,
+    /// The cost of this path, in searches for a short one.
+    costs: Vec<f32>,
+    reached: Vec<u32>,
+}
+
+impl Memory {
+    fn clear(&mut self, count: usize) {
+        if self.via.len() != count {
+            (self.via, self.costs) = (vec![NONE; count], vec![f32::INFINITY; count]);
+        }
+        for place in self.reached.drain(..) {
+            (self.via[place as usize], self.costs[place as usize]) = (NONE, f32::INFINITY);
+        }
+    }
+
+    /// Enters a place into the paths.
+    fn reach(&mut self, place: u32, via: u32, cost: f32) {
+        if self.via[place as usize] == NONE {
+            self.reached.push(place);
+        }
+        (self.via[place as usize], self.costs[place as usize]) = (via, cost);
+    }
+
+    /// The places from the start, which is its own predecessor, to a place.
+    fn path(&self, mut place: u32) -> Vec<u32> {
+        let mut path = vec![place];
+        while self.via[place as usize] != place {
+            place = self.via[place as usize];
+            path.push(place);
+        }
+        path.reverse();
+        path
+    }
+}
+
 /// The path from `start` to the goal whose least `width` is greatest; `None` if there is no path. `width` is called with
 /// a place and a neighbour reached before (`start` itself for the first). A place with a negative width is not entered.
 ///
@@ -66,26 +106,27 @@ pub fn widest(
     start: u32,
     goal: Goal,
     mut width: impl FnMut(u32, u32) -> f32,
+    memory: &mut Memory,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<u32>>, Interrupted> {
-    let mut via = vec![NONE; graph.count()];
+    memory.clear(graph.count());
     let mut heap = BinaryHeap::new();
-    via[start as usize] = start;
+    memory.reach(start, start, 0.0);
     // The bit patterns of floats that are not negative are in the order of the floats.
     let first = width(start, start).to_bits();
     heap.push((first, first, start));
     let mut steps = 0;
     while let Some((least, _, place)) = heap.pop() {
         if goal.is_reached(graph, place) {
-            return Ok(Some(trace(&via, place)));
+            return Ok(Some(memory.path(place)));
         }
         steps += 1;
         if steps % STEPS_PER_POLL == 0 && stop() {
             return Err(Interrupted);
         }
         graph.joined(place, &mut |next| {
-            if via[next as usize] == NONE {
-                via[next as usize] = place;
+            if memory.via[next as usize] == NONE {
+                memory.reach(next, place, 0.0);
                 let own = width(next, place);
                 if own >= 0.0 {
                     heap.push((least.min(own.to_bits()), own.to_bits(), next));
@@ -96,9 +137,9 @@ pub fn widest(
     Ok(None)
 }
 
-/// The path of least cost among the places of at least the width `least`; `None` if there is none. A step costs its
-/// length, and up to twice as much where the place that it enters is narrow, so that the path keeps away from facets
-/// where that is not a detour (the A* algorithm).
+/// A path among the places of at least the width `least`, of at most `GREED` times the least cost; `None` if there is none.
+/// A step costs its length, and up to twice as much where the place that it enters is narrow, so that the path keeps away from
+/// facets where that is not a detour (the A* algorithm).
 ///
 /// # Errors
 /// If `stop` returns true.
@@ -108,33 +149,41 @@ pub fn shortest(
     goal: Goal,
     least: f32,
     mut width: impl FnMut(u32, u32) -> f32,
+    memory: &mut Memory,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<u32>>, Interrupted> {
-    let (mut via, mut costs) = (vec![NONE; graph.count()], vec![f32::INFINITY; graph.count()]);
+    memory.clear(graph.count());
     let at = |place: u32| graph.position(place);
-    let remaining = |place: u32| distance(at(place), goal.nearest(graph, at(place)));
+    let remaining = |place: u32| GREED * distance(at(place), goal.nearest(graph, at(place)));
     let mut heap = BinaryHeap::new();
-    (via[start as usize], costs[start as usize]) = (start, 0.0);
+    memory.reach(start, start, 0.0);
     heap.push((std::cmp::Reverse(remaining(start).to_bits()), 0, start));
     let mut steps = 0;
     while let Some((_, cost, place)) = heap.pop() {
         let cost = f32::from_bits(cost);
         if goal.is_reached(graph, place) {
-            return Ok(Some(trace(&via, place)));
+            return Ok(Some(memory.path(place)));
         }
-        if cost > costs[place as usize] {
+        if cost > memory.costs[place as usize] {
             continue;
         }
         steps += 1;
         if steps % STEPS_PER_POLL == 0 && stop() {
             return Err(Interrupted);
         }
+        let here = at(place);
         graph.joined(place, &mut |next| {
+            if memory.costs[next as usize] <= cost {
+                return;
+            }
             let wide = width(next, place);
+            if wide < least {
+                return;
+            }
             let narrow = least / wide.max(f32::MIN_POSITIVE);
-            let through = cost + distance(at(place), at(next)) * (1.0 + narrow);
-            if wide >= least && through < costs[next as usize] {
-                (via[next as usize], costs[next as usize]) = (place, through);
+            let through = cost + distance(here, at(next)) * (1.0 + narrow);
+            if through < memory.costs[next as usize] {
+                memory.reach(next, place, through);
                 let estimate = through + remaining(next);
                 heap.push((std::cmp::Reverse(estimate.to_bits()), through.to_bits(), next));
             }
@@ -142,6 +191,9 @@ pub fn shortest(
     }
     Ok(None)
 }
+
+/// Factor of the distance to the goal in the estimated cost of a path: the mean cost of a step per length.
+const GREED: f32 = 1.5;
 
 /// The point of the root's boundary nearest to a point of the root, in lattice units.
 pub fn nearest_boundary(at: [f64; 3]) -> [f64; 3] {
@@ -157,17 +209,6 @@ pub fn nearest_boundary(at: [f64; 3]) -> [f64; 3] {
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f32 {
     (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum::<f64>().sqrt() as f32
-}
-
-/// The places from the start, which is its own predecessor, to a place.
-fn trace(via: &[u32], mut leaf: u32) -> Vec<u32> {
-    let mut path = vec![leaf];
-    while via[leaf as usize] != leaf {
-        leaf = via[leaf as usize];
-        path.push(leaf);
-    }
-    path.reverse();
-    path
 }
 
 #[cfg(test)]
@@ -229,15 +270,16 @@ mod tests {
             prop_assume!(!free.is_empty());
             let start = free[seed as usize % free.len()];
             let best = relaxed(&leaves, start);
+            let mut memory = Memory::default();
             for &goal in free.iter().step_by(1 + free.len() / 20) {
-                let found = widest(&leaves, start, Goal::Place(goal), |l, _| width_of(l), NEVER).unwrap();
+                let found = widest(&leaves, start, Goal::Place(goal), |l, _| width_of(l), &mut memory, NEVER).unwrap();
                 prop_assert_eq!(found.is_some(), best[goal as usize] >= 0.0);
                 let Some(path) = found else { continue };
                 prop_assert_eq!((path[0], path[path.len() - 1]), (start, goal));
                 let least = least_width(&path);
                 prop_assert_eq!(least, best[goal as usize]);
-                // The path of least cost has the same ends and is as wide.
-                let short = shortest(&leaves, start, Goal::Place(goal), least, |l, _| width_of(l), NEVER);
+                // A short path has the same ends and is as wide.
+                let short = shortest(&leaves, start, Goal::Place(goal), least, |l, _| width_of(l), &mut memory, NEVER);
                 let short = short.unwrap().unwrap();
                 prop_assert!(short[1..].iter().all(|&l| width_of(l) >= least));
                 for path in [path, short] {

@@ -7,15 +7,49 @@ use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::parity::Parity;
 use std::collections::{BTreeMap, HashMap};
 
-/// Whether a closed surface separates two lattice points off the facets; `to` is `None` for the root's boundary.
+/// Vertices that are nearer than this along each axis, in lattice units, may be taken for one: an eighth of the finest cell.
+const WELD: i64 = 32;
+
+/// Whether a closed surface separates the centres of two free leaves at every spacing; `to` is `None` for the root's boundary.
+///
+/// A gap between vertices that is far narrower than the finest cell does not count. A path of free leaves leads through the
+/// centres of leaves and of shared faces, so it stays half an edge of the finest cell, 128 units, away from all facets. Welding
+/// moves no point of a facet by more than sqrt(3) times `WELD`, 56 units, so the path does not meet the welded surface either.
+pub fn separates(case: &Case, from: [i64; 3], to: Option<[i64; 3]>) -> bool {
+    is_separated(&case.facets_lattice, from, to)
+        || is_separated(&welded(&case.facets_lattice), from, to)
+}
+
+/// The facets with each vertex replaced by an earlier one that is near, without those that lose their area by that.
+fn welded(facets: &[FacetLattice]) -> Vec<FacetLattice> {
+    let mut kept: HashMap<[i64; 3], Vec<[i64; 3]>> = HashMap::new();
+    let mut weld = |vertex: [i64; 3]| {
+        let block = vertex.map(|c| c.div_euclid(WELD));
+        let is_near = |other: &[i64; 3]| (0..3).all(|a| (other[a] - vertex[a]).abs() <= WELD);
+        let around = (0..27).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
+        let near = around.filter_map(|offset| {
+            let of_block = kept.get(&std::array::from_fn(|a| block[a] + offset[a]))?;
+            of_block.iter().copied().find(is_near)
+        });
+        let found = near.min();
+        found.unwrap_or_else(|| {
+            kept.entry(block).or_default().push(vertex);
+            vertex
+        })
+    };
+    let welded = facets.iter().map(|facet| facet.map(&mut weld));
+    welded.filter(|[a, b, c]| a != b && b != c && c != a).collect()
+}
+
+/// Whether a closed surface separates two lattice points off the facets.
 ///
 /// If every edge belongs to an even number of facets, all curves from a point to another one that avoid the facets'
 /// edges cross the same number of facets modulo two. If that number is odd, no curve avoids the facets. This is tried with every
 /// shell, the facets that shared edges connect, because two shells around a point, as of a hollow body, have an even number. The result is
 /// exact, but false does not mean that a path exists: an open sheet or several surfaces together can separate places too.
-pub fn separates(case: &Case, from: [i64; 3], to: Option<[i64; 3]>) -> bool {
+fn is_separated(facets: &[FacetLattice], from: [i64; 3], to: Option<[i64; 3]>) -> bool {
     let interior = 1..UNITS_PER_EDGE;
-    shells(&case.facets_lattice).into_iter().any(|facets| {
+    shells(facets).into_iter().any(|facets| {
         let is_interior = || facets.iter().flatten().flatten().all(|c| interior.contains(c));
         // Without facets at the root's boundary, all of it is outside.
         if (to.is_none() && !is_interior()) || !is_watertight(&facets) {
@@ -67,6 +101,17 @@ mod tests {
         assert!(!separates(&closed, outside, None));
         assert!(!separates(&closed, inside, Some([3 << 23; 3])));
         assert!(!separates(&tetrahedron(3), inside, None));
+    }
+
+    #[test]
+    fn a_crack_far_narrower_than_the_finest_cell_is_closed_at_every_spacing() {
+        let (inside, far) = ([2 << 24; 3], None);
+        for (gap, is_closed) in [(1, true), (WELD, true), (WELD + 1, false)] {
+            let mut cracked = tetrahedron(4);
+            cracked.facets_lattice[3][0][2] += gap;
+            assert!(!is_separated(&cracked.facets_lattice, inside, far));
+            assert_eq!(separates(&cracked, inside, far), is_closed, "{gap}");
+        }
     }
 
     #[test]

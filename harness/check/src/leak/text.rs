@@ -29,7 +29,11 @@ impl fmt::Display for Report {
             }
             (true, None, ..) => writeln!(f, "\n{}, at every spacing", self.verdict())?,
             (false, _, Some(opens), _) => {
-                writeln!(f, "\nno leak; it would open at spacing {}", spacing(opens))?;
+                writeln!(
+                    f,
+                    "\nno leak at this spacing; it would open at spacing {}",
+                    spacing(opens)
+                )?;
             }
             (false, ..) if self.is_separated => {
                 writeln!(
@@ -39,7 +43,10 @@ impl fmt::Display for Report {
             }
             (false, _, _, limit) => {
                 let limit = limit.as_deref().unwrap_or_default();
-                writeln!(f, "\nno leak, and none at any spacing that was tried; {limit}")?;
+                writeln!(
+                    f,
+                    "\nno leak at this spacing, nor at any finer one that was tried; whether one leaks is not known: {limit}"
+                )?;
             }
         }
         self.passage.iter().try_for_each(|passage| describe(passage, f))
@@ -83,7 +90,8 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         )?;
     }
     writeln!(f, "at        {}", point(&narrowest.at))?;
-    writeln!(f, "direction {}", point(&narrowest.direction))?;
+    let [x, y, z] = narrowest.direction;
+    writeln!(f, "direction ({x:.3}, {y:.3}, {z:.3})")?;
     let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
     let listed: Vec<String> = listed.collect();
     let more = match narrowest.facets.len().saturating_sub(FACETS_MAX) {
@@ -129,7 +137,7 @@ fn rounded_up(spacing: f64) -> String {
 }
 
 fn point(at: &[f64; 3]) -> String {
-    let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
+    let [x, y, z] = at;
     format!("({x}, {y}, {z})")
 }
 

@@ -26,7 +26,7 @@ pub struct Place {
     pub path: String,
     /// Its level.
     pub level: u8,
-    /// Minimum corner.
+    /// Minimum corner, with the decimals that the lattice needs.
     pub min: [f64; 3],
     /// Maximum corner.
     pub max: [f64; 3],
@@ -35,17 +35,14 @@ pub struct Place {
 impl Place {
     pub(super) fn new(octant: &Octant, root: &Root) -> Self {
         let (low, high) = octant.bounds();
-        let (min, max) = (root.to_user(low), root.to_user(high));
+        let [min, max] = [low, high].map(|corner| root.rounded(root.to_user(corner)));
         Self { octant: *octant, path: octant.path(), level: octant.level, min, max }
     }
 }
 
 /// A place as text.
 pub(super) fn user_place(place: &Place) -> String {
-    let point = |at: [f64; 3]| {
-        let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
-        format!("({x}, {y}, {z})")
-    };
+    let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z})");
     let Place { path, level, min, max, .. } = place;
     format!("octant {path} (level {level}), {} to {}", point(*min), point(*max))
 }
@@ -87,7 +84,7 @@ pub struct Split {
 }
 
 /// A leaf that forces the previous octant of a chain to split.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinkRecord {
     /// The rule: `extra_layer`, `layer` or `balance`.
     pub rule: &'static str,
@@ -102,7 +99,7 @@ pub struct LinkRecord {
 }
 
 /// A cause in the inputs. Each facet and each box alone is sufficient.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CauseRecord {
     /// Section of reference/DEFINITION.md.
     pub section: &'static str,

@@ -3,15 +3,16 @@
 use std::fmt;
 
 use super::answer::{Answer, CauseRecord, LinkRecord, SideReason, Split, user_place};
+use crate::geometry::meaning::number;
 
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.point;
         match (&self.leaf, self.side, &self.base_leaf) {
             (Some(leaf), Some(side), _) => {
-                let edge = leaf.max[0] - leaf.min[0];
+                let edge = number(leaf.max[0] - leaf.min[0]);
                 writeln!(f, "({x}, {y}, {z}) lies in the {side} leaf {}", user_place(leaf))?;
-                writeln!(f, "  edge {:?}", edge as f32)?;
+                writeln!(f, "  edge {edge}")?;
             }
             (_, _, Some(base)) => {
                 writeln!(f, "({x}, {y}, {z}) lies in a deleted leaf of T0: {}", user_place(base))?;
@@ -26,7 +27,7 @@ impl fmt::Display for Answer {
         for what in &self.left_out {
             write!(f, "\nleft out: {what}")?;
         }
-        Ok(())
+        self.terms(f)
     }
 }
 
@@ -46,21 +47,25 @@ impl Answer {
                 )?,
             }
         }
-        for split in &self.splits[of_base..] {
+        let graded = &self.splits[of_base..];
+        for (i, split) in graded.iter().enumerate() {
             writeln!(f, "  level {}: {} is split", split.octant.level, user_place(&split.octant))?;
             let Some(cause) = &split.cause else {
                 writeln!(f, "    no rule that is known requires it (harness why --unneeded)")?;
                 continue;
             };
-            for (i, link) in split.links.iter().enumerate() {
-                let subject = if i == 0 { "" } else { "its parent is split " };
-                writeln!(f, "    {subject}{}", sentence(link))?;
-            }
-            let subject = match split.links.last() {
-                Some(link) if link.rule == "extra_layer" => "it is crossing by section 4",
-                _ => "its parent is split by section 3",
+            // Chains of successive levels often end alike.
+            let continued = |other: &&Split| {
+                other.links.get(1..) == split.links.get(1..) && other.cause == split.cause
             };
-            writeln!(f, "    {subject}: {}", what(cause))?;
+            match (split.links.first(), graded[..i].iter().find(continued)) {
+                (Some(link), Some(other)) if link.rule != "extra_layer" => {
+                    let level = other.octant.level;
+                    writeln!(f, "    {}", sentence(link))?;
+                    writeln!(f, "    its parent is split as in the chain of level {level}")?;
+                }
+                _ => links(split, cause, f)?,
+            }
             let links = split.links.len();
             let noun = if links == 1 { "leaf" } else { "leaves" };
             match split.is_shortest {
@@ -70,6 +75,24 @@ impl Answer {
         }
         match &self.splits[..] {
             [] if self.leaf.is_some() => writeln!(f, "  the leaf is the root: nothing splits it"),
+            _ => Ok(()),
+        }
+    }
+
+    /// The terms that the answer uses.
+    fn terms(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "\n\nterms\n  section: of reference/DEFINITION.md, the definition of the mesh\n  T0: the base tree, which facets and \
+             boxes alone require; layers and balance refine it\n  octant 3.1.4: the root's child 3, of that the child 1, of \
+             that the child 4; a child in the upper half in x counts 1, in y 2, in z 4"
+        )?;
+        match &self.side_decided_by {
+            SideReason::Component { candidate: Some(_), .. } => write!(
+                f,
+                "\n  component: the leaves of T0 that no facet crosses and that shared faces join; all have one side\n  \
+                 candidate: the leaf of the component from whose centre rays count facets"
+            ),
             _ => Ok(()),
         }
     }
@@ -113,6 +136,19 @@ impl Answer {
             SideReason::Unknown => write!(f, "side\n  not explained"),
         }
     }
+}
+
+/// The links of a chain and the cause at its end.
+fn links(split: &Split, cause: &CauseRecord, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    for (i, link) in split.links.iter().enumerate() {
+        let subject = if i == 0 { "" } else { "its parent is split " };
+        writeln!(f, "    {subject}{}", sentence(link))?;
+    }
+    let subject = match split.links.last() {
+        Some(link) if link.rule == "extra_layer" => "it is crossing by section 4",
+        _ => "its parent is split by section 3",
+    };
+    writeln!(f, "    {subject}: {}", what(cause))
 }
 
 /// A link as a clause.

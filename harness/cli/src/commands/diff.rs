@@ -8,6 +8,11 @@ use std::path::PathBuf;
 
 /// `harness diff`.
 #[derive(Args, Debug)]
+#[command(after_help = "\
+Prints the inputs and counts that differ, the first leaf that differs, and the rule of reference/DEFINITION.md that decides \
+which mesh is right.
+
+Exit codes: 0 the leaves are the same; 1 they differ; 2 invalid input.")]
 pub struct Arguments {
     /// A leaf-set directory
     a: PathBuf,
@@ -29,7 +34,7 @@ pub fn run(Arguments { a, b, case, trust_manifests }: &Arguments) -> u8 {
         .and_then(|case| diff::diff(a, b, case.as_ref(), trust).map_err(|error| error.to_string()))
     {
         Ok(report) => {
-            println!("{report}");
+            println!("A {}\nB {}\n{report}", a.display(), b.display());
             if report.same_leaves() { EXIT_HOLDS } else { EXIT_FAILED }
         }
         Err(error) => {
