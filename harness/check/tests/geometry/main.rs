@@ -1,5 +1,7 @@
 //! Shapes with known defects, and shapes without any.
 
+mod sheets;
+
 use check::geometry::finding::{Kind, Place};
 use check::geometry::input::{Input, Requested};
 use check::geometry::report::Diagnosis;
