@@ -13,26 +13,49 @@ use super::distance::{dot, nearest, sub};
 /// The cosine of 60 degrees.
 const COSINE: f64 = 0.5;
 
-/// What rounding may take from a lower bound on the height of one facet over the other, as a part of their distance.
+/// An upper bound on the rounding error of a cosine.
 const ROUNDING: f64 = 1e-9;
+
+type Corners = [[f64; 3]; 3];
 
 /// A facet on the lattice.
 pub struct Triangle {
-    corners: [[f64; 3]; 3],
+    corners: Corners,
     normal: [f64; 3],
 }
 
 impl Triangle {
     /// A facet with an area.
     pub fn new(facet: &FacetLattice) -> Self {
-        Self { corners: facet.map(|v| v.map(|c| c as f64)), normal: unit_normal(facet) }
+        Self { corners: corners(facet), normal: unit_normal(facet) }
     }
 
-    /// Least and greatest height of the other facet over the plane of this one.
-    fn heights(&self, other: &Self) -> (f64, f64) {
-        let [a, b, c] = other.corners.map(|v| dot(sub(v, self.corners[0]), self.normal));
-        (less(less(a, b), c), greater(greater(a, b), c))
+    /// Whether another facet, whose squared distance is at least `squared_min`, may be a wall or a gap within the squared
+    /// limits, by the heights of its corners over the plane of this one.
+    fn may_oppose(&self, other: &Corners, squared_min: f64, limits: [f64; 2]) -> [bool; 2] {
+        let [a, b, c] = other.map(|v| dot(sub(v, self.corners[0]), self.normal));
+        let (least, greatest) = (less(less(a, b), c), greater(greater(a, b), c));
+        let along = is_along(least, greatest, squared_min);
+        // A facet that is wholly on one side of a plane is no nearer to the other facet than to the plane.
+        [
+            along[0] && (greatest >= 0.0 || greatest * greatest < limits[0]),
+            along[1] && (least <= 0.0 || least * least < limits[1]),
+        ]
     }
+}
+
+fn corners(facet: &FacetLattice) -> Corners {
+    facet.map(|v| v.map(|c| c as f64))
+}
+
+/// Whether a line of at least this squared length may be within 60 degrees of a normal, downward or upward, if it ends
+/// between two heights over the plane where it begins.
+fn is_along(least: f64, greatest: f64, squared_min: f64) -> [bool; 2] {
+    let height_squared = (COSINE - ROUNDING).powi(2) * squared_min;
+    [
+        least <= 0.0 && least * least >= height_squared,
+        greatest >= 0.0 && greatest * greatest >= height_squared,
+    ]
 }
 
 /// Whether normals of two nodes may differ by 120 degrees.
@@ -51,12 +74,11 @@ pub fn may_oppose(a: &Bounds, b: &Bounds, limits: [f64; 2]) -> bool {
     if may == [false; 2] {
         return false;
     }
-    // The shortest line is no shorter than this, and is within 60 degrees of the normals of both: each facet is as far below
-    // the other one, or above it.
-    let height = (COSINE - ROUNDING) * squared.sqrt();
+    // Each facet is as far below the other one, or above it.
     for (from, to) in [(a, b), (b, a)] {
         let (least, greatest) = from.height_range(to);
-        may = [may[0] && least <= -height, may[1] && greatest >= height];
+        let along = is_along(least, greatest, squared);
+        may = [may[0] && along[0], may[1] && along[1]];
         if may == [false; 2] {
             return false;
         }
@@ -68,27 +90,18 @@ pub fn may_oppose(a: &Bounds, b: &Bounds, limits: [f64; 2]) -> bool {
 /// provided that they have no common vertex and do not meet. `squared_min` is a lower bound on their squared distance.
 pub fn opposite(
     f: &Triangle,
-    g: &Triangle,
+    g: &FacetLattice,
     squared_min: f64,
     limits: [f64; 2],
 ) -> Option<(usize, f64)> {
-    if dot(f.normal, g.normal) > -COSINE {
+    let may = f.may_oppose(&corners(g), squared_min, limits);
+    if may == [false; 2] {
         return None;
     }
-    let height = (COSINE - ROUNDING) * squared_min.sqrt();
-    let mut may = limits.map(|limit| squared_min < limit);
-    for (from, to) in [(f, g), (g, f)] {
-        let (least, greatest) = from.heights(to);
-        // A facet that is wholly on one side of a plane is no nearer to the other facet than to the plane.
-        let is_near = [
-            greatest >= 0.0 || greatest * greatest < limits[0],
-            least <= 0.0 || least * least < limits[1],
-        ];
-        may =
-            [may[0] && least <= -height && is_near[0], may[1] && greatest >= height && is_near[1]];
-        if may == [false; 2] {
-            return None;
-        }
+    let g = Triangle::new(g);
+    let back = g.may_oppose(&f.corners, squared_min, limits);
+    if !(may[0] && back[0] || may[1] && back[1]) || dot(f.normal, g.normal) > -COSINE {
+        return None;
     }
     let (squared, p, q) = nearest(&f.corners, &g.corners);
     let line = sub(q, p);

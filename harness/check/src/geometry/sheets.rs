@@ -41,15 +41,9 @@ pub fn sheets(
     let unit = input.root.edge / UNITS_PER_EDGE as f64;
     let none = vec![[None; 2]; boxes.facets.len()];
     let limits = vec![[(cell / unit).powi(2); 2]; none.len()];
-    let mut search = Search {
-        input,
-        edges,
-        boxes,
-        limits,
-        limits_of_nodes: vec![],
-        found: none,
-        is_first: true,
-    };
+    let limits_of_nodes = Vec::new();
+    let mut search =
+        Search { input, edges, boxes, limits, limits_of_nodes, found: none, is_first: true };
     search.run();
     let counts = [0, 1].map(|side| search.found.iter().filter(|f| f[side].is_some()).count());
     let bounds = [0, 1].map(|side| bound(&search.found, side, first));
@@ -127,84 +121,79 @@ impl Search<'_> {
         self.visit(0, 0);
     }
 
-    /// Searches the pairs of a facet of node `a` and a facet of node `b`.
-    fn visit(&mut self, a: usize, b: usize) {
+    /// Searches the pairs of a facet of node `a` and a facet of node `b`. Returns whether a limit fell.
+    fn visit(&mut self, a: usize, b: usize) -> bool {
         let [x, y] = [a, b].map(|node| self.boxes.bounds(node));
         if !may_oppose(x, y, either(self.limits_of_nodes[a], self.limits_of_nodes[b])) {
-            return;
+            return false;
         }
-        match (self.boxes.children(a), self.boxes.children(b)) {
-            (None, None) => {
-                self.visit_leaves(a, b);
-                self.update(b);
-            }
-            (Some([p, q]), _) if a == b => {
-                self.visit(p, p);
-                self.visit(q, q);
-                self.visit(p, q);
-            }
+        let has_fallen = match (self.boxes.children(a), self.boxes.children(b)) {
+            (None, None) => self.visit_leaves(a, b),
+            (Some([p, q]), _) if a == b => self.visit(p, p) | self.visit(q, q) | self.visit(p, q),
             (Some(children), None) => self.visit_children(children, b),
             (Some(children), Some(_)) if size(x) > size(y) => self.visit_children(children, b),
-            (_, Some(children)) => {
-                self.visit_children(children, a);
-                self.update(b);
-                return;
-            }
+            (_, Some(children)) => self.visit_children(children, a),
+        };
+        if has_fallen {
+            self.update(a);
+            self.update(b);
         }
-        self.update(a);
+        has_fallen
     }
 
     /// The nearer child comes first: what it finds lowers the limits for the other one.
-    fn visit_children(&mut self, children: [usize; 2], other: usize) {
+    fn visit_children(&mut self, [a, b]: [usize; 2], other: usize) -> bool {
         let to = self.boxes.bounds(other);
-        let [p, q] = children.map(|child| distance_of_centres(self.boxes.bounds(child), to));
-        let [a, b] = children;
-        for child in if p <= q { [a, b] } else { [b, a] } {
-            self.visit(child, other);
-        }
+        let [p, q] = [a, b].map(|child| distance_of_centres(self.boxes.bounds(child), to));
+        let [near, far] = if p <= q { [a, b] } else { [b, a] };
+        self.visit(near, other) | self.visit(far, other)
     }
 
-    fn visit_leaves(&mut self, a: usize, b: usize) {
+    fn visit_leaves(&mut self, a: usize, b: usize) -> bool {
+        let mut has_fallen = false;
         for i in self.boxes.members(a) {
             let limits = either(self.limits[i], self.limits_of_nodes[b]);
             if a == b || may_oppose(&self.boxes.bounds[i], self.boxes.bounds(b), limits) {
                 let f = self.boxes.facets[i] as usize;
                 let triangle = Triangle::new(&self.input.lattice[f]);
                 for j in self.boxes.members(b).filter(|&j| a != b || i < j) {
-                    self.compare(i, &triangle, j);
+                    has_fallen |= self.compare(i, &triangle, j);
                 }
             }
         }
+        has_fallen
     }
 
-    /// Updates what is known of two facets, at positions `i` and `j`.
-    fn compare(&mut self, i: usize, triangle: &Triangle, j: usize) {
+    /// Updates what is known of two facets, at positions `i` and `j`. Returns whether a limit fell.
+    fn compare(&mut self, i: usize, triangle: &Triangle, j: usize) -> bool {
         let limits = either(self.limits[i], self.limits[j]);
         let [x, y] = [i, j].map(|i| &self.boxes.bounds[i]);
         if limits == [0.0; 2] || !is_averted(x, y) {
-            return;
+            return false;
         }
         let squared_min = x.distance_squared(y);
         if squared_min >= limits[0].max(limits[1]) {
-            return;
+            return false;
         }
         let [f, g] = [i, j].map(|i| self.boxes.facets[i] as usize);
         let [a, b] = [f, g].map(|f| &self.input.lattice[f]);
-        let Some((side, squared)) = opposite(triangle, &Triangle::new(b), squared_min, limits)
-        else {
-            return;
+        let Some((side, squared)) = opposite(triangle, b, squared_min, limits) else {
+            return false;
         };
         let shares_vertex =
             self.edges.corners[f].iter().any(|vertex| self.edges.corners[g].contains(vertex));
         if shares_vertex || relation(a, b, true) != Relation::Disjoint {
-            return;
+            return false;
         }
+        let mut has_fallen = false;
         for (i, facet) in [(i, g), (j, f)] {
             if squared < self.limits[i][side] {
                 self.found[i][side] = Some(Opposite { squared, facet: facet as u32 });
                 self.limits[i][side] = if self.is_first { 0.0 } else { squared };
+                has_fallen = true;
             }
         }
+        has_fallen
     }
 
     /// The limits of a node from those below it.
