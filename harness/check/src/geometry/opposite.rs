@@ -64,26 +64,26 @@ pub fn is_averted(a: &Bounds, b: &Bounds) -> bool {
     f64::from(a.cosine_min(b)) <= 1e-5 - COSINE
 }
 
-/// Whether facets of two nodes may be opposite and nearer than the squared limits.
-pub fn may_oppose(a: &Bounds, b: &Bounds, limits: [f64; 2]) -> bool {
+/// Whether facets of two nodes may be walls, and whether gaps, nearer than the squared limits.
+pub fn may_oppose(a: &Bounds, b: &Bounds, limits: [f64; 2]) -> [bool; 2] {
     if !is_averted(a, b) {
-        return false;
+        return [false; 2];
     }
     let squared = a.distance_squared(b);
     let mut may = limits.map(|limit| squared < limit);
-    if may == [false; 2] {
-        return false;
-    }
     // Each facet is as far below the other one, or above it.
     for (from, to) in [(a, b), (b, a)] {
-        let (least, greatest) = from.height_range(to);
-        let along = is_along(least, greatest, squared);
-        may = [may[0] && along[0], may[1] && along[1]];
         if may == [false; 2] {
-            return false;
+            break;
         }
+        let (least, greatest) = from.height_range(to);
+        may = both(may, is_along(least, greatest, squared));
     }
-    true
+    may
+}
+
+fn both(a: [bool; 2], b: [bool; 2]) -> [bool; 2] {
+    [a[0] && b[0], a[1] && b[1]]
 }
 
 /// The side and the squared distance of two facets if they are opposite and nearer than the squared limit of that side,
@@ -100,7 +100,7 @@ pub fn opposite(
     }
     let g = Triangle::new(g);
     let back = g.may_oppose(&f.corners, squared_min, limits);
-    if !(may[0] && back[0] || may[1] && back[1]) || dot(f.normal, g.normal) > -COSINE {
+    if both(may, back) == [false; 2] || dot(f.normal, g.normal) > -COSINE {
         return None;
     }
     let (squared, p, q) = nearest(&f.corners, &g.corners);

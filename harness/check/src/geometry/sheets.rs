@@ -118,21 +118,26 @@ impl Search<'_> {
         self.limits_of_nodes = vec![[0.0; 2]; self.boxes.nodes()];
         // Children follow their parents.
         (0..self.boxes.nodes()).rev().for_each(|node| self.update(node));
-        self.visit(0, 0);
+        self.visit(0, 0, [true; 2]);
     }
 
-    /// Searches the pairs of a facet of node `a` and a facet of node `b`. Returns whether a limit fell.
-    fn visit(&mut self, a: usize, b: usize) -> bool {
+    /// Searches the pairs of a facet of node `a` and a facet of node `b`, which may be walls, gaps or both. Returns whether a
+    /// limit fell.
+    fn visit(&mut self, a: usize, b: usize, may: [bool; 2]) -> bool {
         let [x, y] = [a, b].map(|node| self.boxes.bounds(node));
-        if !may_oppose(x, y, either(self.limits_of_nodes[a], self.limits_of_nodes[b])) {
+        let limits = either(self.limits_of_nodes[a], self.limits_of_nodes[b]);
+        let may = may_oppose(x, y, only(may, limits));
+        if may == [false; 2] {
             return false;
         }
         let has_fallen = match (self.boxes.children(a), self.boxes.children(b)) {
-            (None, None) => self.visit_leaves(a, b),
-            (Some([p, q]), _) if a == b => self.visit(p, p) | self.visit(q, q) | self.visit(p, q),
-            (Some(children), None) => self.visit_children(children, b),
-            (Some(children), Some(_)) if size(x) > size(y) => self.visit_children(children, b),
-            (_, Some(children)) => self.visit_children(children, a),
+            (None, None) => self.visit_leaves(a, b, may),
+            (Some([p, q]), _) if a == b => {
+                self.visit(p, p, may) | self.visit(q, q, may) | self.visit(p, q, may)
+            }
+            (Some(children), None) => self.visit_children(children, b, may),
+            (Some(children), Some(_)) if size(x) > size(y) => self.visit_children(children, b, may),
+            (_, Some(children)) => self.visit_children(children, a, may),
         };
         if has_fallen {
             self.update(a);
@@ -142,22 +147,29 @@ impl Search<'_> {
     }
 
     /// The nearer child comes first: what it finds lowers the limits for the other one.
-    fn visit_children(&mut self, [a, b]: [usize; 2], other: usize) -> bool {
+    fn visit_children(&mut self, [a, b]: [usize; 2], other: usize, may: [bool; 2]) -> bool {
         let to = self.boxes.bounds(other);
         let [p, q] = [a, b].map(|child| distance_of_centres(self.boxes.bounds(child), to));
         let [near, far] = if p <= q { [a, b] } else { [b, a] };
-        self.visit(near, other) | self.visit(far, other)
+        self.visit(near, other, may) | self.visit(far, other, may)
     }
 
-    fn visit_leaves(&mut self, a: usize, b: usize) -> bool {
+    fn visit_leaves(&mut self, a: usize, b: usize, may: [bool; 2]) -> bool {
         let mut has_fallen = false;
-        for i in self.boxes.members(a) {
-            let limits = either(self.limits[i], self.limits_of_nodes[b]);
-            if a == b || may_oppose(&self.boxes.bounds[i], self.boxes.bounds(b), limits) {
-                let f = self.boxes.facets[i] as usize;
-                let triangle = Triangle::new(&self.input.lattice[f]);
-                for j in self.boxes.members(b).filter(|&j| a != b || i < j) {
-                    has_fallen |= self.compare(i, &triangle, j);
+        for (turn, i) in self.boxes.members(a).enumerate() {
+            let limits = only(may, either(self.limits[i], self.limits_of_nodes[b]));
+            let may = may_oppose(&self.boxes.bounds[i], self.boxes.bounds(b), limits);
+            if may == [false; 2] {
+                continue;
+            }
+            let f = self.boxes.facets[i] as usize;
+            let triangle = Triangle::new(&self.input.lattice[f]);
+            let others = self.boxes.members(b);
+            // Every facet begins with another one, so that most of them find one that is not settled yet.
+            let first = others.start + turn % others.len();
+            for j in (first..others.end).chain(others.start..first) {
+                if a != b || i < j {
+                    has_fallen |= self.compare(i, &triangle, j, may);
                 }
             }
         }
@@ -165,8 +177,8 @@ impl Search<'_> {
     }
 
     /// Updates what is known of two facets, at positions `i` and `j`. Returns whether a limit fell.
-    fn compare(&mut self, i: usize, triangle: &Triangle, j: usize) -> bool {
-        let limits = either(self.limits[i], self.limits[j]);
+    fn compare(&mut self, i: usize, triangle: &Triangle, j: usize, may: [bool; 2]) -> bool {
+        let limits = only(may, either(self.limits[i], self.limits[j]));
         let [x, y] = [i, j].map(|i| &self.boxes.bounds[i]);
         if limits == [0.0; 2] || !is_averted(x, y) {
             return false;
@@ -203,6 +215,11 @@ impl Search<'_> {
             None => self.boxes.members(node).map(|i| self.limits[i]).fold([0.0; 2], either),
         };
     }
+}
+
+/// The limits where facets may be opposite, 0 elsewhere.
+fn only(may: [bool; 2], limits: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|side| if may[side] { limits[side] } else { 0.0 })
 }
 
 fn either(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
