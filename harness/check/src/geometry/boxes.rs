@@ -1,8 +1,11 @@
 //! A binary tree of bounding boxes over facets.
 //!
-//! Facets are sorted along the Morton curve of their centres, after the directions of their normals if asked, and grouped by `GROUP`; the groups are the
-//! leaves of a complete tree. Every node encloses its facets and their unit normals in boxes.
+//! Facets are sorted along the Morton curve of their centres, after the directions of their normals if asked. A node with more
+//! than `GROUP` facets is split where the highest bit changes in which their codes differ, so that the centres of a node are within
+//! one cell of the curve; nodes of equal numbers of facets would contain jumps of the curve, and be many times larger. Every node
+//! encloses its facets and their unit normals in boxes.
 
+use std::num::NonZero;
 use std::ops::Range;
 
 use contract::lattice::FacetLattice;
@@ -11,7 +14,7 @@ use contract::word;
 
 use super::facets::{is_degenerate, normal};
 
-/// Facets per leaf of the tree.
+/// Maximum number of facets per leaf of the tree.
 const GROUP: usize = 8;
 
 /// The extent of some facets and of their normals.
@@ -71,25 +74,25 @@ impl Bounds {
     /// The squared distance of the boxes, in lattice units.
     pub fn distance_squared(&self, other: &Self) -> f64 {
         let along = |a: usize| {
-            let (p, q) = (self.low[a].into(), other.low[a].into());
-            let gap: f64 = (f64::max(p, q)) - f64::from(self.high[a].min(other.high[a]));
-            gap.max(0.0)
+            let gap = i64::from(self.low[a].max(other.low[a]))
+                - i64::from(self.high[a].min(other.high[a]));
+            gap.max(0) as f64
         };
         (0..3).map(|a| along(a) * along(a)).sum()
     }
 
     /// Bounds on the height of a point of the other box over a point of this one, along any normal of this one.
     pub fn height_range(&self, other: &Self) -> (f64, f64) {
-        let (mut least, mut greatest) = (0.0, 0.0);
+        let (mut lowest, mut highest) = (0.0, 0.0);
         for a in 0..3 {
             let from = f64::from(other.low[a]) - f64::from(self.high[a]);
             let to = f64::from(other.high[a]) - f64::from(self.low[a]);
             let (l, h) = (f64::from(self.normal_low[a]), f64::from(self.normal_high[a]));
-            let products = [from * l, from * h, to * l, to * h];
-            least += products.into_iter().fold(f64::INFINITY, f64::min);
-            greatest += products.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            let (p, q, r, s) = (from * l, from * h, to * l, to * h);
+            lowest += less(less(p, q), less(r, s));
+            highest += greater(greater(p, q), greater(r, s));
         }
-        (least, greatest)
+        (lowest, highest)
     }
 
     /// A lower bound on the cosine between any normal of one and any normal of the other.
@@ -97,10 +100,20 @@ impl Bounds {
         let along = |a: usize| {
             let (l, h) = (self.normal_low[a], self.normal_high[a]);
             let (m, n) = (other.normal_low[a], other.normal_high[a]);
-            (l * m).min(l * n).min(h * m).min(h * n)
+            less(less(l * m, l * n), less(h * m, h * n))
         };
         (0..3).map(along).sum()
     }
+}
+
+/// The lesser of two numbers, neither NaN; unlike `min` one instruction.
+pub fn less<T: PartialOrd>(a: T, b: T) -> T {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers, neither NaN; unlike `max` one instruction.
+pub fn greater<T: PartialOrd>(a: T, b: T) -> T {
+    if a > b { a } else { b }
 }
 
 /// The unit normal of a facet; zero if the facet has no area.
@@ -117,6 +130,16 @@ fn direction(facet: &FacetLattice) -> u8 {
     2 * longest as u8 + u8::from(n[longest] > 0)
 }
 
+/// A node: some facets that are contiguous in the order of the tree.
+#[derive(Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Positions of its facets.
+    members: Range<u32>,
+    /// The second child; the first one follows the node. None for a leaf.
+    second: Option<NonZero<u32>>,
+}
+
 /// The tree.
 #[derive(Debug)]
 pub struct Boxes {
@@ -124,9 +147,8 @@ pub struct Boxes {
     pub facets: Vec<u32>,
     /// Bounds of each of [`Self::facets`].
     pub bounds: Vec<Bounds>,
-    /// The nodes in heap order: the children of node i are 2 i and 2 i + 1, and node 1 is the root.
-    nodes: Vec<Bounds>,
-    leaves: usize,
+    /// The nodes, each before those below it; the first one is the root.
+    nodes: Vec<Node>,
 }
 
 impl Boxes {
@@ -161,25 +183,54 @@ impl Boxes {
         let facets: Vec<u32> = keys.iter().map(|&key| key as u32).collect();
         let bounds: Vec<Bounds> =
             facets.iter().map(|&f| Bounds::of(&lattice[f as usize])).collect();
-        let leaves = facets.len().div_ceil(GROUP).next_power_of_two();
-        let mut nodes = vec![Bounds::EMPTY; 2 * leaves];
-        for (group, members) in bounds.chunks(GROUP).enumerate() {
-            nodes[leaves + group] = members.iter().fold(Bounds::EMPTY, |all, b| all.union(b));
-        }
-        for i in (1..leaves).rev() {
-            nodes[i] = nodes[2 * i].union(&nodes[2 * i + 1]);
-        }
-        Self { facets, bounds, nodes, leaves }
+        let mut boxes = Self { facets, bounds, nodes: Vec::with_capacity(keys.len() / 2 + 1) };
+        boxes.add_node(&keys, 0..keys.len());
+        boxes
+    }
+
+    /// Adds the node of a range of positions, and those below it. Returns its bounds.
+    fn add_node(&mut self, keys: &[u128], range: Range<usize>) -> Bounds {
+        let i = self.nodes.len();
+        let members = range.start as u32..range.end as u32;
+        self.nodes.push(Node { bounds: Bounds::EMPTY, members, second: None });
+        let bounds = if range.len() <= GROUP {
+            self.bounds[range].iter().fold(Bounds::EMPTY, |all, b| all.union(b))
+        } else {
+            let bit = (keys[range.start] ^ keys[range.end - 1]).ilog2();
+            let split =
+                range.start + keys[range.clone()].partition_point(|key| key >> bit & 1 == 0);
+            let first = self.add_node(keys, range.start..split);
+            self.nodes[i].second = NonZero::new(self.nodes.len() as u32);
+            first.union(&self.add_node(keys, split..range.end))
+        };
+        self.nodes[i].bounds = bounds;
+        bounds
     }
 
     /// The groups: the bounds of each, and the positions of its facets.
     pub fn groups(&self) -> impl Iterator<Item = (&Bounds, Range<usize>)> {
-        (0..self.facets.len().div_ceil(GROUP))
-            .map(|g| (&self.nodes[self.leaves + g], self.members(g)))
+        let leaves = self.nodes.iter().filter(|node| node.second.is_none());
+        leaves.map(|node| (&node.bounds, members(node)))
     }
 
-    fn members(&self, group: usize) -> Range<usize> {
-        group * GROUP..((group + 1) * GROUP).min(self.facets.len())
+    /// Number of nodes; the root is node 0.
+    pub fn nodes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The bounds of a node.
+    pub fn bounds(&self, node: usize) -> &Bounds {
+        &self.nodes[node].bounds
+    }
+
+    /// The positions of a node's facets.
+    pub fn members(&self, node: usize) -> Range<usize> {
+        members(&self.nodes[node])
+    }
+
+    /// The children of a node; none for a leaf.
+    pub fn children(&self, node: usize) -> Option<[usize; 2]> {
+        self.nodes[node].second.map(|second| [node + 1, second.get() as usize])
     }
 
     /// Depth-first search from the root. `enter` is called with the bounds of a node, and with the positions of its
@@ -190,26 +241,27 @@ impl Boxes {
         mut enter: impl FnMut(&Bounds, Option<Range<usize>>) -> bool,
         order: impl Fn(&Bounds) -> f64,
     ) {
-        let mut stack = [0; 64];
-        stack[0] = 1;
-        let mut size = 1;
+        // A node has fewer than 128 above it, each of which splits its keys at a lower bit.
+        let mut stack = [0; 128];
+        let mut size = usize::from(!self.facets.is_empty());
         while size > 0 {
             size -= 1;
             let i = stack[size];
-            let node = &self.nodes[i];
-            if node.low[0] > node.high[0] {
-                continue;
-            }
-            let is_leaf = i >= self.leaves;
-            let members = is_leaf.then(|| self.members(i - self.leaves));
-            if enter(node, members) && !is_leaf {
-                let (a, b) = (2 * i, 2 * i + 1);
-                let is_a_first = order(&self.nodes[a]) <= order(&self.nodes[b]);
+            let children = self.children(i);
+            let members = children.is_none().then(|| self.members(i));
+            if enter(self.bounds(i), members)
+                && let Some([a, b]) = children
+            {
+                let is_a_first = order(self.bounds(a)) <= order(self.bounds(b));
                 stack[size..size + 2].copy_from_slice(&if is_a_first { [b, a] } else { [a, b] });
                 size += 2;
             }
         }
     }
+}
+
+fn members(node: &Node) -> Range<usize> {
+    node.members.start as usize..node.members.end as usize
 }
 
 /// The Morton code of every facet's centre, in a grid of 2^19 cells along the longest edge of the bounding box.

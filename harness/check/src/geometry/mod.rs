@@ -3,7 +3,7 @@
 //! - [`input`]: the file, its root and the cell's edge length;
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates;
-//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search;
+//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search; [`opposite`]: when two facets are a sheet;
 //! - [`extent`]: the body's position in the root;
 //! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
 //!
@@ -21,6 +21,7 @@ pub mod intersections;
 pub mod junctions;
 pub mod meaning;
 pub mod openings;
+pub mod opposite;
 pub mod report;
 pub mod sheets;
 pub mod shells;

@@ -1,39 +1,33 @@
-//! Thin sheets: opposite facets less than one cell apart.
+//! Thin sheets: [`opposite`] facets less than one cell apart.
 //!
-//! Facet g is opposite to facet f if they have no common vertex and do not meet, their normals differ by at least
-//! 120 degrees, and the shortest line between them is within 60 degrees of both normals. It is a wall if g is on
-//! the inner side of f, and a gap if g is on the outer side, by the winding of the file. Every facet counts once
-//! as a wall and once as a gap, with its nearest opposite facet.
+//! Every facet with an opposite one counts once as a wall and once as a gap. The places are pairs of a facet and its nearest
+//! opposite one.
+//!
+//! Pairs of facets are searched through pairs of nodes of the tree, twice. The first search ends for a facet with its first
+//! opposite one, since the nearest does not matter to the count. It bounds the distances of the narrowest places, and the second
+//! search finds the nearest opposite facets within this bound.
 
 use contract::lattice::UNITS_PER_EDGE;
 
-use super::boxes::{Bounds, Boxes, unit_normal};
-use super::distance::{dot, nearest, sub};
+use super::boxes::{Bounds, Boxes};
+use super::distance::nearest;
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::intersections::{Relation, relation};
+use super::opposite::{Triangle, is_averted, may_oppose, opposite};
 
-/// The cosine of 60 degrees.
-const COSINE: f64 = 0.5;
-
-/// No position.
-const NONE: usize = usize::MAX;
-
-/// The nearest opposite facet on one side, as far as known.
+/// An opposite facet.
 #[derive(Clone, Copy)]
 struct Opposite {
     squared: f64,
-    /// Position in the tree of boxes.
-    position: usize,
-    at: [f64; 3],
+    facet: u32,
 }
 
-/// A facet with its nearest opposite facet.
+/// Two opposite facets, the lower one first.
 struct Sheet {
     squared: f64,
     facets: [u32; 2],
-    at: [f64; 3],
 }
 
 /// Thin walls and thin gaps, narrowest first.
@@ -45,139 +39,200 @@ pub fn sheets(
     first: usize,
 ) -> [Finding; 2] {
     let unit = input.root.edge / UNITS_PER_EDGE as f64;
-    let none = Opposite { squared: (cell / unit).powi(2), position: NONE, at: [0.0; 3] };
-    let mut found: [Vec<Sheet>; 2] = Default::default();
-    let mut best: Vec<[Opposite; 2]> = Vec::new();
-    let mut candidates: Vec<usize> = Vec::new();
-    for (bounds, group) in boxes.groups() {
-        // The opposite facets of the previous group are near this one's, and few others are nearer.
-        candidates.clear();
-        candidates.extend(best.iter().flatten().map(|b| b.position).filter(|&j| j != NONE));
-        candidates.sort_unstable();
-        candidates.dedup();
-        best.clear();
-        best.resize(group.len(), [none; 2]);
-        for (i, best) in group.clone().zip(&mut best) {
-            candidates.iter().for_each(|&j| improve(input, edges, boxes, i, j, best));
+    let none = vec![[None; 2]; boxes.facets.len()];
+    let limits = vec![[(cell / unit).powi(2); 2]; none.len()];
+    let limits_of_nodes = Vec::new();
+    let mut search =
+        Search { input, edges, boxes, limits, limits_of_nodes, found: none, is_first: true };
+    search.run();
+    let counts = [0, 1].map(|side| search.found.iter().filter(|f| f[side].is_some()).count());
+    let bounds = [0, 1].map(|side| bound(&search.found, side, first));
+    for (limits, found) in search.limits.iter_mut().zip(&search.found) {
+        *limits = [0, 1].map(|side| found[side].map_or(0.0, |o| o.squared.min(bounds[side])));
+    }
+    search.is_first = false;
+    search.run();
+    [Kind::ThinWalls, Kind::ThinGaps].map(|kind| {
+        let side = usize::from(kind == Kind::ThinGaps);
+        let places = narrowest(boxes, &search.found, side, bounds[side]);
+        let places = places.iter().take(first).map(|sheet| place(input, sheet, unit)).collect();
+        Finding { count: counts[side] as u64, places, ..Finding::new(kind) }
+    })
+}
+
+/// Exclusive upper bound on the squared distances of the first places. A place is listed for at most two facets.
+fn bound(found: &[[Option<Opposite>; 2]], side: usize, first: usize) -> f64 {
+    let mut squares: Vec<f64> = found.iter().filter_map(|f| Some(f[side]?.squared)).collect();
+    let Some(last) = first.checked_mul(2).filter(|&n| n < squares.len()) else {
+        return f64::INFINITY;
+    };
+    squares.select_nth_unstable_by(last, f64::total_cmp).1.next_up()
+}
+
+/// The pairs of a facet and its nearest opposite one within the bound, narrowest first.
+fn narrowest(
+    boxes: &Boxes,
+    found: &[[Option<Opposite>; 2]],
+    side: usize,
+    bound: f64,
+) -> Vec<Sheet> {
+    let nearest = boxes.facets.iter().zip(found).filter_map(|(&f, found)| {
+        let Opposite { squared, facet: g } = found[side].filter(|o| o.squared < bound)?;
+        Some(Sheet { squared, facets: [f.min(g), f.max(g)] })
+    });
+    let mut sheets: Vec<Sheet> = nearest.collect();
+    sheets.sort_by(|a, b| a.squared.total_cmp(&b.squared).then(a.facets.cmp(&b.facets)));
+    sheets.dedup_by_key(|sheet| sheet.facets);
+    sheets
+}
+
+fn place(input: &Input, sheet: &Sheet, unit: f64) -> Place {
+    let [a, b] = sheet.facets.map(|f| input.lattice[f as usize].map(|v| v.map(|c| c as f64)));
+    let (_, p, q) = nearest(&a, &b);
+    let at = std::array::from_fn(|x| ((p[x] + q[x]) / 2.0).round() as i64);
+    let width = sheet.squared.sqrt() * unit;
+    Place {
+        width: Some(width),
+        width_cells: input.in_cells(width),
+        ..Place::new(sheet.facets.into(), input.root.to_user(at))
+    }
+}
+
+/// A search for opposite facets.
+struct Search<'a> {
+    input: &'a Input,
+    edges: &'a Edges,
+    boxes: &'a Boxes,
+    /// An opposite facet must be nearer than this squared distance, as wall and as gap, by position in the tree.
+    limits: Vec<[f64; 2]>,
+    /// The greatest limits of each node's facets, or greater ones.
+    limits_of_nodes: Vec<[f64; 2]>,
+    /// The nearest opposite facets seen, as wall and as gap, by position in the tree.
+    found: Vec<[Option<Opposite>; 2]>,
+    /// Whether the search ends for a facet with its first opposite one.
+    is_first: bool,
+}
+
+impl Search<'_> {
+    fn run(&mut self) {
+        self.limits_of_nodes = vec![[0.0; 2]; self.boxes.nodes()];
+        // Children follow their parents.
+        (0..self.boxes.nodes()).rev().for_each(|node| self.update(node));
+        self.visit(0, 0, [true; 2]);
+    }
+
+    /// Searches the pairs of a facet of node `a` and a facet of node `b`, which may be walls, gaps or both. Returns whether a
+    /// limit fell.
+    fn visit(&mut self, a: usize, b: usize, may: [bool; 2]) -> bool {
+        let [x, y] = [a, b].map(|node| self.boxes.bounds(node));
+        let limits = either(self.limits_of_nodes[a], self.limits_of_nodes[b]);
+        let may = may_oppose(x, y, only(may, limits));
+        if may == [false; 2] {
+            return false;
         }
-        boxes.search(
-            |node, members| {
-                let limits = [0, 1].map(|s| best.iter().map(|b| b[s].squared).fold(0.0, f64::max));
-                let is_near = may_oppose(bounds, node, limits);
-                if let Some(members) = members.filter(|_| is_near) {
-                    for (i, best) in group.clone().zip(&mut best) {
-                        let limits = [best[0].squared, best[1].squared];
-                        if may_oppose(&boxes.bounds[i], node, limits) {
-                            members.clone().for_each(|j| improve(input, edges, boxes, i, j, best));
-                        }
-                    }
-                }
-                is_near
-            },
-            |node| bounds.distance_squared(node),
-        );
-        for (i, best) in group.zip(&best) {
-            for side in 0..2 {
-                let Opposite { squared, position, at } = best[side];
-                if position != NONE {
-                    found[side].push(Sheet {
-                        squared,
-                        facets: [i, position].map(|i| boxes.facets[i]),
-                        at,
-                    });
+        let has_fallen = match (self.boxes.children(a), self.boxes.children(b)) {
+            (None, None) => self.visit_leaves(a, b, may),
+            (Some([p, q]), _) if a == b => {
+                self.visit(p, p, may) | self.visit(q, q, may) | self.visit(p, q, may)
+            }
+            (Some(children), None) => self.visit_children(children, b, may),
+            (Some(children), Some(_)) if size(x) > size(y) => self.visit_children(children, b, may),
+            (_, Some(children)) => self.visit_children(children, a, may),
+        };
+        if has_fallen {
+            self.update(a);
+            self.update(b);
+        }
+        has_fallen
+    }
+
+    /// The nearer child comes first: what it finds lowers the limits for the other one.
+    fn visit_children(&mut self, [a, b]: [usize; 2], other: usize, may: [bool; 2]) -> bool {
+        let to = self.boxes.bounds(other);
+        let [p, q] = [a, b].map(|child| distance_of_centres(self.boxes.bounds(child), to));
+        let [near, far] = if p <= q { [a, b] } else { [b, a] };
+        self.visit(near, other, may) | self.visit(far, other, may)
+    }
+
+    fn visit_leaves(&mut self, a: usize, b: usize, may: [bool; 2]) -> bool {
+        let mut has_fallen = false;
+        for (turn, i) in self.boxes.members(a).enumerate() {
+            let limits = only(may, either(self.limits[i], self.limits_of_nodes[b]));
+            let may = may_oppose(&self.boxes.bounds[i], self.boxes.bounds(b), limits);
+            if may == [false; 2] {
+                continue;
+            }
+            let f = self.boxes.facets[i] as usize;
+            let triangle = Triangle::new(&self.input.lattice[f]);
+            let others = self.boxes.members(b);
+            // Every facet begins with another one, so that most of them find one that is not settled yet.
+            let first = others.start + turn % others.len();
+            for j in (first..others.end).chain(others.start..first) {
+                if a != b || i < j {
+                    has_fallen |= self.compare(i, &triangle, j, may);
                 }
             }
         }
+        has_fallen
     }
-    let kinds = [Kind::ThinWalls, Kind::ThinGaps];
-    std::array::from_fn(|side| finding(input, kinds[side], &mut found[side], unit, first))
-}
 
-/// Whether the facets of two nodes may be opposite within the given squared distances, as wall or as gap.
-fn may_oppose(group: &Bounds, node: &Bounds, limits: [f64; 2]) -> bool {
-    // Sums of f32 are rounded.
-    if f64::from(group.cosine_min(node)) > 1e-5 - COSINE {
-        return false;
-    }
-    let squared = group.distance_squared(node);
-    if squared >= limits[0].max(limits[1]) {
-        return false;
-    }
-    // The shortest line is no shorter than this, and is within 60 degrees of the normals of both: each facet is as far below
-    // the other one, or above it.
-    let height = (COSINE - 1e-9) * squared.sqrt();
-    let ranges = [group.height_range(node), node.height_range(group)];
-    let is_below = || ranges.iter().all(|&(least, _)| least <= -height);
-    let is_above = || ranges.iter().all(|&(_, greatest)| greatest >= height);
-    (squared < limits[0] && is_below()) || (squared < limits[1] && is_above())
-}
-
-/// Updates the nearest wall and gap of the facet at position `i` with the one at position `j`.
-fn improve(
-    input: &Input,
-    edges: &Edges,
-    boxes: &Boxes,
-    i: usize,
-    j: usize,
-    best: &mut [Opposite; 2],
-) {
-    let limits = [best[0].squared, best[1].squared];
-    if i == j || !may_oppose(&boxes.bounds[i], &boxes.bounds[j], limits) {
-        return;
-    }
-    let (f, g) = (boxes.facets[i], boxes.facets[j]);
-    let (corners_f, corners_g) = (edges.corners[f as usize], edges.corners[g as usize]);
-    if corners_f.iter().any(|v| corners_g.contains(v)) {
-        return;
-    }
-    let (a, b) = (&input.lattice[f as usize], &input.lattice[g as usize]);
-    let (n, m) = (unit_normal(a), unit_normal(b));
-    if dot(n, m) > -COSINE {
-        return;
-    }
-    let [a_float, b_float] = [a, b].map(|t| t.map(|v| v.map(|c| c as f64)));
-    if is_beyond(&a_float, n, &b_float, limits) || is_beyond(&b_float, m, &a_float, limits) {
-        return;
-    }
-    let (squared, p, q) = nearest(&a_float, &b_float);
-    let d = sub(q, p);
-    let (along_n, along_m) = (dot(d, n), dot(d, m));
-    let limit = COSINE * squared.sqrt();
-    let side = usize::from(along_n > 0.0);
-    let is_opposite = along_n.abs() >= limit && along_m.abs() >= limit && along_n * along_m < 0.0;
-    if squared < best[side].squared && is_opposite && relation(a, b, true) == Relation::Disjoint {
-        let at = std::array::from_fn(|x| (p[x] + q[x]) / 2.0);
-        best[side] = Opposite { squared, position: j, at };
-    }
-}
-
-/// Whether a facet is on one side of the plane of another, with unit normal `n`, and as far from it as the limit.
-fn is_beyond(a: &[[f64; 3]; 3], n: [f64; 3], b: &[[f64; 3]; 3], limits: [f64; 2]) -> bool {
-    let heights = b.map(|v| dot(sub(v, a[0]), n));
-    let least = heights.into_iter().fold(f64::INFINITY, f64::min);
-    let greatest = heights.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    (least > 0.0 && least * least >= limits[1])
-        || (greatest < 0.0 && greatest * greatest >= limits[0])
-}
-
-fn finding(input: &Input, kind: Kind, found: &mut Vec<Sheet>, unit: f64, first: usize) -> Finding {
-    let count = found.len() as u64;
-    let pair = |sheet: &Sheet| {
-        let [f, g] = sheet.facets;
-        (f.min(g), f.max(g))
-    };
-    found.sort_by(|a, b| a.squared.total_cmp(&b.squared).then(pair(a).cmp(&pair(b))));
-    found.dedup_by_key(|sheet| pair(sheet));
-    let place = |sheet: &Sheet| {
-        let (f, g) = pair(sheet);
-        let width = sheet.squared.sqrt() * unit;
-        let at = sheet.at.map(|c| c.round() as i64);
-        Place {
-            width: Some(width),
-            width_cells: input.in_cells(width),
-            ..Place::new(vec![f, g], input.root.to_user(at))
+    /// Updates what is known of two facets, at positions `i` and `j`. Returns whether a limit fell.
+    fn compare(&mut self, i: usize, triangle: &Triangle, j: usize, may: [bool; 2]) -> bool {
+        let limits = only(may, either(self.limits[i], self.limits[j]));
+        let [x, y] = [i, j].map(|i| &self.boxes.bounds[i]);
+        if limits == [0.0; 2] || !is_averted(x, y) {
+            return false;
         }
-    };
-    let places = found.iter().take(first).map(place).collect();
-    Finding { count, places, ..Finding::new(kind) }
+        let squared_min = x.distance_squared(y);
+        if squared_min >= limits[0].max(limits[1]) {
+            return false;
+        }
+        let [f, g] = [i, j].map(|i| self.boxes.facets[i] as usize);
+        let [a, b] = [f, g].map(|f| &self.input.lattice[f]);
+        let Some((side, squared)) = opposite(triangle, b, squared_min, limits) else {
+            return false;
+        };
+        let shares_vertex =
+            self.edges.corners[f].iter().any(|vertex| self.edges.corners[g].contains(vertex));
+        if shares_vertex || relation(a, b, true) != Relation::Disjoint {
+            return false;
+        }
+        let mut has_fallen = false;
+        for (i, facet) in [(i, g), (j, f)] {
+            if squared < self.limits[i][side] {
+                self.found[i][side] = Some(Opposite { squared, facet: facet as u32 });
+                self.limits[i][side] = if self.is_first { 0.0 } else { squared };
+                has_fallen = true;
+            }
+        }
+        has_fallen
+    }
+
+    /// The limits of a node from those below it.
+    fn update(&mut self, node: usize) {
+        self.limits_of_nodes[node] = match self.boxes.children(node) {
+            Some([a, b]) => either(self.limits_of_nodes[a], self.limits_of_nodes[b]),
+            None => self.boxes.members(node).map(|i| self.limits[i]).fold([0.0; 2], either),
+        };
+    }
+}
+
+/// The limits where facets may be opposite, 0 elsewhere.
+fn only(may: [bool; 2], limits: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|side| if may[side] { limits[side] } else { 0.0 })
+}
+
+fn either(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|side| a[side].max(b[side]))
+}
+
+/// The sum of a box's edge lengths.
+fn size(a: &Bounds) -> i64 {
+    (0..3).map(|x| i64::from(a.high[x]) - i64::from(a.low[x])).sum()
+}
+
+/// Twice the distance of the boxes' centres, along the axes.
+fn distance_of_centres(a: &Bounds, b: &Bounds) -> i64 {
+    let centre = |bounds: &Bounds, x: usize| i64::from(bounds.low[x]) + i64::from(bounds.high[x]);
+    (0..3).map(|x| (centre(a, x) - centre(b, x)).abs()).sum()
 }

@@ -1,5 +1,7 @@
 //! Shapes with known defects, and shapes without any.
 
+mod sheets;
+
 use check::geometry::finding::{Kind, Place};
 use check::geometry::input::{Input, Requested};
 use check::geometry::report::Diagnosis;
@@ -171,6 +173,8 @@ fn facets_without_area_and_slivers_have_no_effect() {
     facets.push([[9.0, 9.0, 9.0]; 3]);
     let found = diagnosis(facets, Some(0.25));
     assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 2)], false));
+    let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
+    assert_eq!(count(&point, Kind::Degenerate), 1);
     let sliver = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]];
     assert_eq!(count(&diagnosis(vec![sliver], None), Kind::Slivers), 1);
     let thicker = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.015625, 0.0]];

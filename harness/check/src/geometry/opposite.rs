@@ -1,0 +1,113 @@
+//! Whether two facets are opposite, and how far apart.
+//!
+//! Two facets are opposite if they have no common vertex and do not meet, their normals differ by at least 120 degrees,
+//! and the shortest line between them is within 60 degrees of both normals. They are a wall if each is on the inner
+//! side of the other, and a gap if each is on the outer side, by the winding of the file. Limits and other pairs of values
+//! are those of walls, then of gaps.
+
+use contract::lattice::FacetLattice;
+
+use super::boxes::{Bounds, greater, less, unit_normal};
+use super::distance::{dot, nearest, sub};
+
+/// The cosine of 60 degrees.
+const COSINE: f64 = 0.5;
+
+/// An upper bound on the rounding error of a cosine.
+const ROUNDING: f64 = 1e-9;
+
+type Corners = [[f64; 3]; 3];
+
+/// A facet on the lattice.
+pub struct Triangle {
+    corners: Corners,
+    normal: [f64; 3],
+}
+
+impl Triangle {
+    /// A facet with an area.
+    pub fn new(facet: &FacetLattice) -> Self {
+        Self { corners: corners(facet), normal: unit_normal(facet) }
+    }
+
+    /// Whether another facet, whose squared distance is at least `squared_min`, may be a wall or a gap within the squared
+    /// limits, by the heights of its corners over the plane of this one.
+    fn may_oppose(&self, other: &Corners, squared_min: f64, limits: [f64; 2]) -> [bool; 2] {
+        let [a, b, c] = other.map(|v| dot(sub(v, self.corners[0]), self.normal));
+        let (least, greatest) = (less(less(a, b), c), greater(greater(a, b), c));
+        let along = is_along(least, greatest, squared_min);
+        // A facet that is wholly on one side of a plane is no nearer to the other facet than to the plane.
+        [
+            along[0] && (greatest >= 0.0 || greatest * greatest < limits[0]),
+            along[1] && (least <= 0.0 || least * least < limits[1]),
+        ]
+    }
+}
+
+fn corners(facet: &FacetLattice) -> Corners {
+    facet.map(|v| v.map(|c| c as f64))
+}
+
+/// Whether a line of at least this squared length may be within 60 degrees of a normal, downward or upward, if it ends
+/// between two heights over the plane where it begins.
+fn is_along(least: f64, greatest: f64, squared_min: f64) -> [bool; 2] {
+    let height_squared = (COSINE - ROUNDING).powi(2) * squared_min;
+    [
+        least <= 0.0 && least * least >= height_squared,
+        greatest >= 0.0 && greatest * greatest >= height_squared,
+    ]
+}
+
+/// Whether normals of two nodes may differ by 120 degrees.
+pub fn is_averted(a: &Bounds, b: &Bounds) -> bool {
+    // Sums of f32 are rounded.
+    f64::from(a.cosine_min(b)) <= 1e-5 - COSINE
+}
+
+/// Whether facets of two nodes may be walls, and whether gaps, nearer than the squared limits.
+pub fn may_oppose(a: &Bounds, b: &Bounds, limits: [f64; 2]) -> [bool; 2] {
+    if !is_averted(a, b) {
+        return [false; 2];
+    }
+    let squared = a.distance_squared(b);
+    let mut may = limits.map(|limit| squared < limit);
+    // Each facet is as far below the other one, or above it.
+    for (from, to) in [(a, b), (b, a)] {
+        if may == [false; 2] {
+            break;
+        }
+        let (least, greatest) = from.height_range(to);
+        may = both(may, is_along(least, greatest, squared));
+    }
+    may
+}
+
+fn both(a: [bool; 2], b: [bool; 2]) -> [bool; 2] {
+    [a[0] && b[0], a[1] && b[1]]
+}
+
+/// The side and the squared distance of two facets if they are opposite and nearer than the squared limit of that side,
+/// provided that they have no common vertex and do not meet. `squared_min` is a lower bound on their squared distance.
+pub fn opposite(
+    f: &Triangle,
+    g: &FacetLattice,
+    squared_min: f64,
+    limits: [f64; 2],
+) -> Option<(usize, f64)> {
+    let may = f.may_oppose(&corners(g), squared_min, limits);
+    if may == [false; 2] {
+        return None;
+    }
+    let g = Triangle::new(g);
+    let back = g.may_oppose(&f.corners, squared_min, limits);
+    if both(may, back) == [false; 2] || dot(f.normal, g.normal) > -COSINE {
+        return None;
+    }
+    let (squared, p, q) = nearest(&f.corners, &g.corners);
+    let line = sub(q, p);
+    let (along_f, along_g) = (dot(line, f.normal), dot(line, g.normal));
+    let least = COSINE * squared.sqrt();
+    let side = usize::from(along_f > 0.0);
+    let is_along = along_f.abs() >= least && along_g.abs() >= least && along_f * along_g < 0.0;
+    (is_along && squared < limits[side]).then_some((side, squared))
+}
