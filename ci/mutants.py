@@ -309,6 +309,8 @@ def main():
     if listed.returncode != 0:
         fail(2, f"the changes of {given.crate} cannot be listed: {listed.stderr.strip()}")
     every = json.loads(listed.stdout)
+    if not every:
+        fail(2, f"{given.crate} is not a package of this workspace, or has no code")
     mutants = random.Random(given.seed).sample(every, min(given.sample or len(every), len(every)))
     sources = {}
     apart = [mutant for mutant in mutants if needs_own_build(tree, mutant, sources)]

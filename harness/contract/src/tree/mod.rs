@@ -210,6 +210,25 @@ mod tests {
             }
         }
 
+        #[test]
+        fn the_coarsest_leaf_in_a_region_agrees_with_a_linear_search(
+            words in random_words(3), at in any::<prop::sample::Index>(), margins in prop::array::uniform3(0i64..200_000), bound in 1u8..5,
+        ) {
+            prop_assume!(!words.is_empty());
+            let tree = Tree::of_words(&words);
+            let octant = word::octant(words[at.index(words.len())]);
+            let meets = |leaf: &Octant| (0..3).all(|a| {
+                let [from, to] = [octant, *leaf].map(|o| i64::from(o.corner[a]));
+                to < from + i64::from(octant.edge()) + margins[a] && from - margins[a] < to + i64::from(leaf.edge())
+            });
+            let levels = words.iter().map(|&w| word::octant(w)).filter(meets).map(|leaf| leaf.level);
+            let expected = levels.min().unwrap().min(bound);
+            let found = Neighbourhood::root(&tree).coarsest_within(&tree, &Region::along(&octant, margins), bound);
+            prop_assert_eq!(found.level, expected);
+            let leaf = found.leaf(&tree);
+            prop_assert_eq!(leaf.is_some(), expected < bound);
+            prop_assert!(leaf.is_none_or(|leaf| meets(&leaf) && leaf.level == expected));
+        }
 
         #[test]
         fn neighbourhoods_agree_with_a_search_for_each_neighbour(words in random_words(3)) {
