@@ -61,12 +61,19 @@ impl<'a> Clearance<'a> {
         found
     }
 
-    /// The facets that can be the nearest one of a point at most `radius` from `centre`.
-    pub fn near(&self, centre: Point, radius: f64) -> Vec<Prepared> {
+    /// The facets that can be the nearest one of a point at most `radius` from `centre`; none if they are more than `most`.
+    pub fn near(&self, centre: Point, radius: f64, most: usize) -> Vec<Prepared> {
         // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
         let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + ROUNDING;
-        let facets = self.facets_within(centre, reach).into_iter();
-        facets.map(|(facet, _)| Prepared::new(&self.triangle(facet))).collect()
+        let (mut found, mut limit) = (Vec::new(), reach * reach);
+        self.within(centre, &mut limit, &mut |_, facet, limit| {
+            found.push(Prepared::new(&self.triangle(facet)));
+            if found.len() > most {
+                // Nothing is nearer, so the search ends.
+                *limit = 0.0;
+            }
+        });
+        if found.len() > most { Vec::new() } else { found }
     }
 
     /// A nearest point of the nearest facet.

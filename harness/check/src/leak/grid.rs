@@ -51,10 +51,8 @@ impl<'a> Distances<'a> {
     /// No distance is known yet.
     pub fn new(grid: &'a Grid, clearance: &'a Clearance<'a>) -> Self {
         let blocks = vec![None; (BLOCKS * BLOCKS * BLOCKS) as usize];
-        let mut triangles = clearance.near(grid.centre, 3f64.sqrt() * f64::from(STEPS) * grid.step);
-        if triangles.len() > FACETS_FEW {
-            triangles.clear();
-        }
+        let radius = 3f64.sqrt() * f64::from(STEPS) * grid.step;
+        let triangles = clearance.near(grid.centre, radius, FACETS_FEW);
         Self { grid, clearance, shared: triangles.len(), triangles, blocks }
     }
 
@@ -98,10 +96,7 @@ impl<'a> Distances<'a> {
         let candidates = if self.shared > 0 {
             0..self.shared
         } else {
-            let near = self.clearance.near(centre, radius);
-            if near.len() > FACETS_FEW {
-                return Block { centre, near: Vec::new() };
-            }
+            let near = self.clearance.near(centre, radius, FACETS_FEW);
             let first = self.triangles.len();
             self.triangles.extend(near);
             first..self.triangles.len()
