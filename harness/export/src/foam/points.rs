@@ -20,7 +20,7 @@ pub struct Points {
     bits: u32,
 }
 
-/// Points of a set, numbered anew in the order in which they are first asked for.
+/// Points of a set, renumbered in the order in which they are first asked for.
 #[derive(Debug)]
 pub struct Own {
     /// One more than the new number of each point of the set; 0 if it has none.

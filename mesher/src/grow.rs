@@ -1,0 +1,163 @@
+//! Phases 3 to 8: from facets and rules on the lattice to the tree.
+
+use crate::check::{self, debug_check};
+use crate::comm::Comm;
+use crate::error::Error;
+use crate::facet::Facet;
+use crate::kept::Kept;
+use crate::lattice::Rules;
+use crate::mesh::{Mesh, Options};
+use crate::partition::base_leaves::cells_heaviest;
+use crate::partition::initial::{self, Partition};
+use crate::partition::ownership::Ownership;
+use crate::partition::repartition::{self, LeafCounts, Sets};
+use crate::record::Recorder;
+use crate::report::Counters;
+use crate::tree::Tree;
+use crate::voxelise::BinnedFacets;
+use crate::{exposed, grade, refine, sides};
+use std::borrow::Borrow;
+
+/// Phases 3 to 8: from this rank's facets, and the number of all, to the tree. `count` sees the base tree. Collective.
+pub fn grow<F: Borrow<[Facet]>>(
+    (facets, facets_total): (F, u64),
+    rules: Rules,
+    options: &Options,
+    comm: &dyn Comm,
+    record: &mut Recorder,
+    counters: &mut Counters,
+    count: &mut dyn FnMut(&Tree, &Ownership),
+) -> Result<Mesh, Error> {
+    let division = &options.division;
+    let is_parallel = comm.size() > 1;
+
+    // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
+    let mark = |level| {
+        let (tree, work) = refine::refine_top(facets.borrow(), &rules, level);
+        counters.add_voxelised(&work);
+        tree.split
+    };
+    let Partition { mut ownership, base_leaves, level_base } = match is_parallel {
+        false => Partition::solo(),
+        true => record.phase("base tree", comm, || {
+            initial::partition(facets.borrow(), &rules, division, mark, comm)
+        })?,
+    };
+    debug_check(options, comm, || check::ownership(&ownership, comm));
+
+    // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
+    let routed = is_parallel
+        .then(|| record.phase("route", comm, || refine::route(facets.borrow(), &ownership, comm)));
+    if let Some(routed) = &routed {
+        debug_check(options, comm, || check::facets(facets.borrow(), routed, &ownership, comm));
+    }
+    let (mut tree, work) = record.phase("refine", comm, || {
+        let binned = BinnedFacets::new(routed.as_deref().unwrap_or(facets.borrow()));
+        drop(routed);
+        if check::is_on(options) {
+            binned.check_invariants();
+        }
+        refine::refine(&binned, &rules, &ownership)
+    });
+    counters.add_voxelised(&work);
+
+    // 5. Repartition after refinement: by the predicted work on T0. Replicas of bricks become equal.
+    if is_parallel {
+        let name = if division.repartitions() { "rebalance" } else { "share top" };
+        record.phase(name, comm, || {
+            if division.repartitions() {
+                ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);
+            }
+            ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
+        });
+    }
+    debug_check(options, comm, || {
+        check::ownership(&ownership, comm);
+        check::base_tree(&tree, &rules, &ownership, comm);
+    });
+
+    count(&tree, &ownership);
+
+    // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
+    let sides = record.phase("sides", comm, || {
+        sides::decide(&tree, &ownership, facets.borrow(), &rules, options.ungraded, comm)
+    })?;
+    debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
+    drop(facets);
+    let Tree { split, crossing } = tree;
+    let mut mesh = Mesh {
+        facets: facets_total,
+        rules,
+        ownership,
+        level_base,
+        split,
+        crossing,
+        sides,
+        is_base: options.ungraded,
+    };
+    if options.ungraded {
+        return Ok(mesh);
+    }
+
+    // 7. Gradation: layers and 2:1 balance, from the deepest level up.
+    let base = check::is_on(options).then(|| mesh.split.clone());
+    let (split, work) = record.phase("grade", comm, || {
+        let split = std::mem::take(&mut mesh.split);
+        let kept = Kept::new(&mesh.sides.deleted);
+        grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
+    });
+    mesh.split = split;
+    counters.add_graded(&work);
+    debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
+
+    // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
+    let exposed = options.weight_exposed.map(|weight| {
+        let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
+        (faces, weight)
+    });
+    if !(is_parallel && division.is_of_curve()) {
+        counters.base_leaf_cells_max =
+            cells_heaviest(&mesh.split, &mesh.sides.deleted, &base_leaves);
+    } else if !division.repartitions() {
+        counters.base_leaf_cells_max = repartition_by_leaves(&mut mesh, false, None, comm);
+    } else {
+        counters.base_leaf_cells_max = record.phase("rebalance", comm, || {
+            repartition_by_leaves(&mut mesh, true, exposed.as_ref(), comm)
+        });
+    }
+    if is_parallel && division.is_of_curve() {
+        debug_check(options, comm, || {
+            check::ownership(&mesh.ownership, comm);
+            check::graded(&mesh, None, comm);
+        });
+    }
+    if let Some((faces, _)) = exposed {
+        let owned = record.phase("exposed", comm, || exposed::owned(&faces, &mesh.ownership, comm));
+        counters.exposed_faces = Some(owned);
+    }
+    Ok(mesh)
+}
+
+/// Counts the leaves by octants of the base level, and repartitions by these counts if `moves` is true, with the exposed faces and the weight of
+/// each if given. Returns the greatest count of leaves. Collective.
+fn repartition_by_leaves(
+    mesh: &mut Mesh,
+    moves: bool,
+    weighted: Option<&(Vec<exposed::InBrick>, u32)>,
+    comm: &dyn Comm,
+) -> u64 {
+    let (inside, deleted) = (&mut mesh.sides.inside, &mut mesh.sides.deleted);
+    let sets = Sets { split: &mut mesh.split, crossing: &mut mesh.crossing, inside, deleted };
+    let with_crossing = mesh.rules.keep_crossing;
+    let mut counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
+    let max = counts.max();
+    if let Some((faces, weight)) = weighted.filter(|(_, weight)| *weight > 0) {
+        let weights =
+            faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)));
+        counts.add(weights, &mesh.ownership, mesh.level_base);
+    }
+    if moves {
+        mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
+    }
+    max
+}
