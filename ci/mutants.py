@@ -217,7 +217,7 @@ def run(test, scratch, limit_cpu_s, limit_wall_s, **environment):
     child = subprocess.Popen(
         [test["program"], "--exact", test["name"], "--test-threads", "1"],
         cwd=test["package"],
-        env=os.environ | {"TMPDIR": temporary, "CARGO_MANIFEST_DIR": test["package"], "PROPTEST_MAX_SHRINK_ITERS": "0", **environment},
+        env=os.environ | {"TMPDIR": temporary, "CARGO_MANIFEST_DIR": test["package"], "PROPTEST_MAX_SHRINK_ITERS": "0", "RUST_MIN_STACK": str(8 << 20), **environment},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

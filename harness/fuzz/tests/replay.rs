@@ -15,14 +15,8 @@ fn inputs(target: &fuzz::Target) -> Vec<(String, Vec<u8>)> {
     paths.iter().map(named).collect()
 }
 
-/// On as much stack as a program's main thread has: the strategies that draw whole cases fill that of a test in unoptimised builds.
 #[test]
 fn no_committed_input_finds_a_fault() {
-    let replay = std::thread::Builder::new().stack_size(8 << 20).spawn(replay).unwrap();
-    replay.join().expect("no input finds a fault");
-}
-
-fn replay() {
     let mut scratch = Scratch::default();
     for target in TARGETS {
         let inputs = inputs(&target);
