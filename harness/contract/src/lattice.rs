@@ -52,7 +52,7 @@ impl Root {
         std::array::from_fn(|a| self.origin[a] + at[a] as f64 * scale)
     }
 
-    /// A point of the user with the decimals that tell lattice points apart, and without the rounding errors beyond them:
+    /// A point of the user with the decimals that distinguish lattice points, and without the rounding errors beyond them:
     /// what is printed.
     pub fn rounded(&self, at: [f64; 3]) -> [f64; 3] {
         let unit = self.edge / UNITS_PER_EDGE as f64;
