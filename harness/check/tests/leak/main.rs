@@ -9,7 +9,7 @@ use check::leak::{LeakError, Question, Watch, answer};
 use contract::case::{Case, Facet};
 use contract::lattice::Root;
 use contract::testing::base_tree;
-use openings::{Body, ROTATIONS, bodies, two_holes};
+use openings::{Body, ROTATIONS, bodies, pipe, two_holes};
 use std::convert::Infallible;
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
@@ -95,6 +95,29 @@ fn of_several_openings_the_widest_is_reported_even_if_they_differ_little() {
             let body = body.rotated(rotation);
             let report = from_centre(&body.facets, level);
             assert_describes(&report, &body, &format!("level {level}, radius {radius}"));
+        }
+    }
+}
+
+/// Every place of a pipe is equally narrow, and more of them than a search can refine.
+#[test]
+fn a_long_pipe_is_as_wide_as_it_is_wherever_the_lattice_lies() {
+    for rotation in ROTATIONS {
+        for (level, radius, length) in [(7, 0.1, 2.0), (7, 0.13, 1.0)] {
+            let body = pipe(length, radius).rotated(rotation);
+            let what = format!("level {level}, radius {radius}, length {length}");
+            let from_inside = from_centre(&body.facets, level).passage.unwrap().narrowest;
+            let error = from_inside.width / body.width - 1.0;
+            assert!(error.abs() < 0.01 && !from_inside.is_end, "{what}: error {error}");
+            // The start is in the pipe.
+            let case = case(&body.facets, 8);
+            let start = std::array::from_fn(|i| {
+                let mean = body.rim.iter().map(|v| v[i]).sum::<f64>() / body.rim.len() as f64;
+                mean + 0.3 * body.axis()[i]
+            });
+            let in_pipe = ask(&case, start, Target::Far).unwrap().passage.unwrap().narrowest;
+            let error = in_pipe.width / body.width - 1.0;
+            assert!(error.abs() < 0.01, "{what}, from {start:?}: error {error}");
         }
     }
 }
