@@ -26,7 +26,7 @@ MEMORY = 8 << 30
 FILE_SIZE = 2 << 30
 SLOW_S = 6  # A test with more CPU time than this tries no change.
 # Random cases of the tests that read these variables: fewer than usual, and the same for every change.
-DRAWS = {"PROPTEST_CASES": "80", "PROPTEST_MAX_SHRINK_ITERS": "0", "PROPTEST_RNG_SEED": "1"}
+DRAWS = {"PROPTEST_CASES": "128", "PROPTEST_MAX_SHRINK_ITERS": "0", "PROPTEST_RNG_SEED": "1"}
 
 # Appended to the root of every library and program. `at` returns the number of the selected change, 0 for none.
 RUNTIME = """

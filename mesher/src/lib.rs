@@ -292,6 +292,19 @@ mod tests {
     fn two_pilot_runs_predict_the_mesh() {
         let (amounts, cells_boxed) = pilots(1);
         let [coarse, fine, mesh] = amounts[..] else { unreachable!("three runs") };
+        // A single rank has no other phases.
+        assert!(mesh.time_fixed_s.abs() < 1e-9, "{mesh:?}");
+        for time in [mesh.time_refine_s, mesh.time_sides_s, mesh.time_leaves_s] {
+            assert!(time > 0.0 && time < 0.95 * mesh.time_cpu_s(), "{mesh:?}");
+        }
+        let counted = |a: &Amounts| {
+            [a.cells, a.cells_boxed_deleted, a.tests, a.components, a.bytes_sides, a.bytes_graded]
+        };
+        // These repeat exactly: a change of what is counted shows here.
+        assert_eq!(
+            counted(&mesh),
+            [764868.0, 27894.96431997696, 22726.6, 20723.0, 313493.0, 195327.0]
+        );
         assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
         let pilots =
             plan::pilot::Pilots { fine: (1, fine), coarse: Some((2, coarse)), cells_boxed };
