@@ -265,15 +265,19 @@ mod tests {
         }
     }
 
-    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
-    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+    fn options() -> Options {
         let division = Division {
             partitioner: Partitioner::Morton,
             weights: Weights::Rebalance,
             level_base: None,
         };
         let (ungraded, out, check, weight_exposed) = (false, None, false, None);
-        let options = Options { division, ungraded, out, check, weight_exposed, force: true };
+        Options { division, ungraded, out, check, weight_exposed, force: true }
+    }
+
+    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
+    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+        let options = options();
         let on_rank = |comm: &dyn Comm| {
             let quantised = quantised(&case(), &options, comm, &mut Recorder::default()).unwrap();
             let volumes = Volumes::new(&quantised.rules.boxes);
@@ -317,6 +321,18 @@ mod tests {
             let error = predicted / measured - 1.0;
             assert!(error.abs() < 0.2, "{name}: {predicted} for {measured}");
         }
+    }
+
+    #[test]
+    fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
+        let run = |x: f64, shift: Level| {
+            let case = Case { seeds: vec![[x, 0.0, 0.0]], boxes: Vec::new(), ..case() };
+            let quantised = quantised(&case, &options(), &Solo, &mut Recorder::default())?;
+            pilot(&quantised, &Volumes::new(&[]), shift, &options(), &Solo)
+        };
+        // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
+        assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());
+        assert!(matches!(run(0.5, 0), Err(Error::Input(_))));
     }
 
     #[test]

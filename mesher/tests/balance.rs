@@ -31,7 +31,41 @@ fn lambda(all: &[u64]) -> f64 {
 fn mesh(workspace: &Workspace, args: &[&str]) -> Value {
     run(workspace.mesher(&[&["case.toml", "--quiet", "--json", "run.json"], args].concat()))
         .succeeds();
-    workspace.json("run.json")
+    let report = workspace.json("run.json");
+    check_times(&report);
+    report
+}
+
+/// The time in calls is part of that of a phase, the CPU time of a rank part of its wall time, and the slowest rank's phases
+/// are the run.
+fn check_times(report: &Value) {
+    let phases = report["phases"].as_array().expect("phases");
+    let of = |phase: &Value, name: &str| -> Vec<f64> {
+        serde_json::from_value(phase[name].clone()).expect("a time by rank")
+    };
+    let mut totals = vec![0.0; of(&phases[0], "time_wall_s").len()];
+    for phase in phases {
+        let [wall, cpu, comm_wall, comm_cpu] =
+            ["time_wall_s", "time_cpu_s", "time_comm_wall_s", "time_comm_cpu_s"]
+                .map(|name| of(phase, name));
+        for (rank, total) in totals.iter_mut().enumerate() {
+            *total += wall[rank];
+            let parts = [
+                (comm_wall[rank], wall[rank]),
+                (comm_cpu[rank], cpu[rank]),
+                (cpu[rank], wall[rank]),
+            ];
+            // The clocks are read one after the other.
+            let fits =
+                |(part, whole): (f64, f64)| (0.0..20.0).contains(&part) && part < whole + 0.005;
+            assert!(parts.into_iter().all(fits) && wall[rank] > 1e-9, "rank {rank}: {phase}");
+        }
+    }
+    let slowest = totals.into_iter().fold(0.0, f64::max);
+    assert!((report["time_wall_s"].as_f64().unwrap() - slowest).abs() < 1e-9, "{report}");
+    let peak: u64 =
+        serde_json::from_value::<Vec<u64>>(report["peak_rss_bytes"].clone()).unwrap().iter().sum();
+    assert!((1 << 20..1 << 34).contains(&peak), "{peak} bytes");
 }
 
 #[test]

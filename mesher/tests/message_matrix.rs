@@ -56,6 +56,13 @@ fn real_ranks_send_the_same_messages_as_simulated_ones() {
     run(workspace.mesher(&[&args[..], &["sim.json", "--comm", "sim:3"]].concat())).succeeds();
     run(workspace.mpirun(3, &[&args[..], &["mpi.json"]].concat())).succeeds();
     assert_eq!(matrix(&workspace.json("mpi.json")), matrix(&workspace.json("sim.json")));
+    // With a limit, other functions of MPI are called, with the same messages.
+    let limited = ["limited.json", "--stall-limit", "80"];
+    run(workspace.mpirun(3, &[&args[..], &limited].concat())).succeeds();
+    let [limited, free] = ["limited.json", "mpi.json"].map(|name| workspace.json(name));
+    for same in ["message_matrix", "digest", "counters"] {
+        assert_eq!(limited[same], free[same], "{same}");
+    }
 }
 
 #[test]
