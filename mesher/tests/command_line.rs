@@ -44,6 +44,12 @@ fn ranks_of_a_job_are_not_started_without_communication() {
         alone.env(format!("{launcher}_SIZE"), "1").env(format!("{launcher}_RANK"), "0");
         run(alone).succeeds();
     }
+    // The shell of an allocation, or what is left of one, is no job.
+    for left in ["SLURM_PROCID", "PMIX_RANK"] {
+        let mut alone = workspace.mesher(&args[..4]);
+        alone.env(left, "0");
+        run(alone).succeeds();
+    }
 }
 
 /// A build without MPI cannot agree on errors: only the launcher's variables distinguish ranks.
