@@ -294,6 +294,10 @@ mod tests {
                 "geometry = \"a.stl\"\nspacing_min = 0.5\nroot_scale = 2.0\n[root]\norigin = [0,0,0]\nedge = 1\n",
                 "not both",
             ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\n[root]\norigin = [0,0,0]\n",
+                "line 3, [root]: missing field `edge`",
+            ),
             ("geometry = ", "line 1"),
             ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1, geometry: invalid type: map"),
             ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2, [spacing_min]: "),
@@ -301,6 +305,8 @@ mod tests {
             let e = parse(text).unwrap_err();
             assert!(e.contains(expected), "{e}");
         }
+        let whole = parse("geometry = \"a.stl\"\n").unwrap_err();
+        assert!(whole.contains("missing field") && !whole.contains("line"), "{whole}");
     }
 
     #[test]

@@ -341,6 +341,31 @@ mod tests {
     }
 
     #[test]
+    fn vertices_may_be_one_root_edge_outside_the_root() {
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let at = |x: f32| {
+            let facet = [[1.0; 3], [2.0, 1.0, 1.0], [1.0, x, 1.0]];
+            root.facets(vec![facet], &Bounds::of(&[facet]), 7)
+        };
+        let found = |x: f32| at(x).unwrap()[0].v[2][1];
+        assert_eq!((found(-8.0), found(16.0)), (-(1 << 27), 1 << 28));
+        for (x, shown) in [(-8.000001, "-8.000001"), (16.000002, "16.000002")] {
+            assert_eq!(
+                at(x).unwrap_err().to_string(),
+                format!(
+                    "facet 7 has a vertex at (1, {shown}, 1), more than one root edge outside the root: enlarge or move the root"
+                )
+            );
+        }
+        assert_eq!(
+            Root { origin: [1.0, 2.0, -4.0], edge: 8.0 }.locate([1 << 26, 1 << 27, 1 << 25]),
+            [5.0, 10.0, -2.0]
+        );
+        let deepest = root.level_of(1e-9, "spacing").unwrap_err().to_string();
+        assert!(deepest.contains("level 19 has cells of 0.0000152587890625;"), "{deepest}");
+    }
+
+    #[test]
     fn a_root_too_small_for_the_lattice_is_refused() {
         let root = Root { origin: [0.0; 3], edge: 1e-310 };
         let at_origin = [[0.0f32; 3]; 3];

@@ -265,15 +265,19 @@ mod tests {
         }
     }
 
-    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
-    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+    fn options() -> Options {
         let division = Division {
             partitioner: Partitioner::Morton,
             weights: Weights::Rebalance,
             level_base: None,
         };
         let (ungraded, out, check, weight_exposed) = (false, None, false, None);
-        let options = Options { division, ungraded, out, check, weight_exposed, force: true };
+        Options { division, ungraded, out, check, weight_exposed, force: true }
+    }
+
+    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
+    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+        let options = options();
         let on_rank = |comm: &dyn Comm| {
             let quantised = quantised(&case(), &options, comm, &mut Recorder::default()).unwrap();
             let volumes = Volumes::new(&quantised.rules.boxes);
@@ -292,6 +296,19 @@ mod tests {
     fn two_pilot_runs_predict_the_mesh() {
         let (amounts, cells_boxed) = pilots(1);
         let [coarse, fine, mesh] = amounts[..] else { unreachable!("three runs") };
+        // A single rank has no other phases.
+        assert!(mesh.time_fixed_s.abs() < 1e-9, "{mesh:?}");
+        for time in [mesh.time_refine_s, mesh.time_sides_s, mesh.time_leaves_s] {
+            assert!(time > 0.0 && time < 0.95 * mesh.time_cpu_s(), "{mesh:?}");
+        }
+        let counted = |a: &Amounts| {
+            [a.cells, a.cells_boxed_deleted, a.tests, a.components, a.bytes_sides, a.bytes_graded]
+        };
+        // These repeat exactly: a change of what is counted shows here.
+        assert_eq!(
+            counted(&mesh),
+            [764868.0, 27894.96431997696, 22726.6, 20723.0, 313493.0, 195327.0]
+        );
         assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
         let pilots =
             plan::pilot::Pilots { fine: (1, fine), coarse: Some((2, coarse)), cells_boxed };
@@ -307,10 +324,24 @@ mod tests {
     }
 
     #[test]
+    fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
+        let run = |x: f64, shift: Level| {
+            let case = Case { seeds: vec![[x, 0.0, 0.0]], boxes: Vec::new(), ..case() };
+            let quantised = quantised(&case, &options(), &Solo, &mut Recorder::default())?;
+            pilot(&quantised, &Volumes::new(&[]), shift, &options(), &Solo)
+        };
+        // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
+        assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());
+        assert!(matches!(run(0.5, 0), Err(Error::Input(_))));
+    }
+
+    #[test]
     fn pilot_runs_on_several_ranks_have_the_cells_of_one() {
         let [one, three] = [1, 3].map(|ranks| pilots(ranks).0);
         for (one, three) in one.iter().zip(&three) {
             assert_eq!(one.cells, three.cells);
+            // Several ranks also route facets and move boundaries.
+            assert!(three.time_fixed_s > 0.0 && three.time_fixed_s < three.time_cpu_s());
             assert!((one.cells_boxed_deleted - three.cells_boxed_deleted).abs() < 1e-6);
         }
     }

@@ -53,3 +53,36 @@ fn flow_at_boundary(has_seeds: bool) -> String {
         "{cause}; `harness leak` finds openings: close them, increase spacing_min, or enlarge the root"
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sides::EnclosedComponents;
+
+    #[test]
+    fn a_region_without_components_is_empty() {
+        let summary = |outside, inside, count| Summary {
+            outside,
+            inside,
+            enclosed: Some(EnclosedComponents { count, leaves: 9, example: [0; 3] }),
+            ..Summary::default()
+        };
+        for (keep, empty, not_empty) in [
+            (Keep::Outside, summary(2, 1, 2), summary(2, 0, 1)),
+            (Keep::Inside, summary(2, 0, 0), summary(0, 1, 0)),
+            (Keep::All, summary(0, 0, 0), summary(0, 1, 0)),
+        ] {
+            assert!(empty_region(keep, &empty).is_some(), "{keep:?}");
+            assert_eq!(empty_region(keep, &not_empty), None, "{keep:?}");
+        }
+        assert_eq!(empty_region(Keep::All, &summary(1, 0, 0)), None);
+        let says = |keep, word: &str| {
+            assert!(empty_region(keep, &Summary::default()).is_some_and(|w| w.contains(word)));
+        };
+        says(Keep::Outside, "enlarge the root");
+        says(Keep::Inside, "set keep = outside");
+        says(Keep::All, "crosses all leaves");
+        assert!(flow_at_boundary(true).starts_with("the flow reaches"));
+        assert!(flow_at_boundary(false).starts_with("a component that is inside"));
+    }
+}
