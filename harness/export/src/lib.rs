@@ -9,6 +9,7 @@
 
 #![deny(missing_docs)]
 
+mod brick;
 pub mod error;
 pub mod foam;
 pub mod format;

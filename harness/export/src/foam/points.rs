@@ -1,18 +1,16 @@
 //! A set of lattice points, numbered.
 //!
-//! A point belongs to the coarsest grid that has it. Four by four by four points of a grid are a brick: one bit per point
-//! that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 1.3 bytes, and finding its
+//! A [brick](crate::brick) has one bit per point that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 1.3 bytes, and finding its
 //! number is one look into a table that is small enough to stay in the cache.
 
 use std::hash::BuildHasher;
 
-use contract::octant::LEVEL_MAX;
 use hashbrown::HashTable;
 use hashbrown::hash_table::Entry;
 use rustc_hash::FxBuildHasher;
 
-/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
-pub type Point = [u32; 3];
+pub use crate::brick::Point;
+use crate::brick::{place, point};
 
 /// The set.
 #[derive(Debug, Default)]
@@ -41,30 +39,8 @@ struct Brick {
     first: u64,
 }
 
-/// Bits of each coordinate of a brick.
-const BITS: u32 = 18;
-
-/// The brick of a point, and its bit there.
-fn place(point: Point) -> (u64, u32) {
-    let [x, y, z] = point;
-    let zeros = (x | y | z).trailing_zeros().min(u32::from(LEVEL_MAX));
-    let at = |c: u32| u64::from(c >> zeros >> 2);
-    let bit = |c: u32| c >> zeros & 3;
-    let key = at(x) | at(y) << BITS | at(z) << (2 * BITS) | u64::from(zeros) << (3 * BITS);
-    (key, bit(x) | bit(y) << 2 | bit(z) << 4)
-}
-
 fn hash(key: u64) -> u64 {
     FxBuildHasher.hash_one(key)
-}
-
-/// The inverse of [`place`].
-fn point(key: u64, bit: u32) -> Point {
-    let zeros = (key >> (3 * BITS)) as u32;
-    std::array::from_fn(|a| {
-        let at = key >> (BITS * a as u32) & ((1 << BITS) - 1);
-        ((at as u32) << 2 | bit >> (2 * a) & 3) << zeros
-    })
 }
 
 impl Points {

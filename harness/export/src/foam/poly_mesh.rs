@@ -244,7 +244,8 @@ fn write_boundary_faces(
     let boundary = survey.of(domain);
     for (patch, faces) in boundary.by_patch.iter().enumerate() {
         visit_faces(files.model, faces, |face, square| {
-            let owner = domain.number(face.cell).expect("a patch has faces of its directory's cells");
+            let owner =
+                domain.number(face.cell).expect("a patch has faces of its directory's cells");
             files.push(owner, square, survey.start(patch) + face.number, false)
         })?;
     }
@@ -253,7 +254,8 @@ fn write_boundary_faces(
             // Seen from the cell that the directory has.
             let is_turned = domain.number(face.cell).is_none();
             let cell = if is_turned { square.across.as_cell() } else { Some(face.cell) };
-            let owner = cell.and_then(|cell| domain.number(cell)).expect("one of the cells is here");
+            let owner =
+                cell.and_then(|cell| domain.number(cell)).expect("one of the cells is here");
             files.push(owner, &Square { is_high: !is_turned, ..*square }, face.number, is_turned)
         })?;
     }
