@@ -1,6 +1,6 @@
 //! A set of lattice points, numbered.
 //!
-//! A [brick](crate::brick) has one bit per point that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 1.3 bytes, and finding its
+//! A [brick](crate::brick) has one bit per point that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 0.85 bytes, and finding its
 //! number is one look into a table that is small enough to stay in the cache.
 
 use std::hash::BuildHasher;
