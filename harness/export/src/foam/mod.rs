@@ -9,8 +9,9 @@
 //!
 //! - [`tree`]: the cells and what is across their faces; [`faces`]: the faces and their vertices; [`points`]: the numbers of points;
 //! - [`regions`], [`patches`], [`processors`]; [`face_list`]: the faces of a boundary;
-//! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
+//! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`cell_files`]: those with a label for each cell; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
+pub mod cell_files;
 pub mod face_list;
 pub mod faces;
 pub mod lists;

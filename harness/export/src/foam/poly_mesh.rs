@@ -1,18 +1,18 @@
 //! The files of one directory `polyMesh`: all cells, or those of one processor.
 
 use std::fmt::Write as _;
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::path::Path;
 
 use contract::octant::UNITS_PER_CELL;
 
+use super::cell_files::{CellFiles, labels};
 use super::face_list::FaceList;
 use super::faces::Square;
 use super::lists::{self, Faces, List};
 use super::patches::Patches;
 use super::points::{Own, Point};
 use super::survey::{Domain, Model, Survey, owned, visit, visit_faces};
-use super::tree::Around;
 use crate::error::ExportError;
 use crate::options::Style;
 
@@ -150,40 +150,6 @@ impl FaceFiles<'_> {
     }
 }
 
-/// The lists that are written cell by cell: the level of each, and its side and rank where they are known.
-struct CellFiles {
-    level: List,
-    side: Option<List>,
-    rank: Option<List>,
-}
-
-impl CellFiles {
-    fn create(model: &Model, count: u64, dir: &Path) -> Result<Self, ExportError> {
-        let list = |object: &str| labels(model, object, "", count, dir);
-        Ok(Self {
-            level: list("cellLevel")?,
-            side: model.has_sides.then(|| list("side")).transpose()?,
-            rank: model.ranks.is_some().then(|| list("rank")).transpose()?,
-        })
-    }
-
-    fn push(&mut self, model: &Model, cell: u32, around: &Around) -> Result<(), ExportError> {
-        self.level.label(i64::from(around.octant.level))?;
-        if let Some(side) = &mut self.side {
-            side.label(i64::from(around.side()))?;
-        }
-        if let (Some(rank), Some(ranks)) = (&mut self.rank, &model.ranks) {
-            rank.label(i64::from(ranks.place(cell).0))?;
-        }
-        Ok(())
-    }
-
-    fn finish(self) -> Result<(), ExportError> {
-        let all = [Some(self.level), self.side, self.rank];
-        Ok(all.into_iter().flatten().try_for_each(List::finish)?)
-    }
-}
-
 /// Writes the files of faces and cells, and returns the points of a directory that has not all cells; its number of points is known then.
 fn write_faces(
     model: &Model,
@@ -295,11 +261,6 @@ fn write_labels(
         list.label(number)?;
     }
     Ok(list.finish()?)
-}
-
-/// Begins a list of labels.
-fn labels(model: &Model, object: &str, note: &str, count: u64, dir: &Path) -> io::Result<List> {
-    List::create(dir, model.options.foam.style, "labelList", object, note, count)
 }
 
 fn write_boundary(
