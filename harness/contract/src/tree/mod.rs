@@ -75,6 +75,11 @@ impl Handle {
         self.0 >= FIRST_NODE
     }
 
+    /// The index of the node in [`Tree::distinct`], if the octant is split.
+    pub fn as_node(self) -> Option<usize> {
+        self.0.checked_sub(FIRST_NODE).map(|node| node as usize)
+    }
+
     fn index(self) -> usize {
         (self.0 - FIRST_NODE) as usize
     }
@@ -119,6 +124,11 @@ impl Tree {
     /// Number of distinct nodes.
     pub fn nodes(&self) -> usize {
         self.store.len()
+    }
+
+    /// The children of every distinct node. A node follows its children.
+    pub fn distinct(&self) -> &[[Handle; 8]] {
+        self.store.all()
     }
 
     /// The content of a child of an octant with content `of` at this level.
