@@ -56,7 +56,7 @@ impl Coverage {
                 rest.map(|rest| rest + i64::from(cells) * i64::from(CELLS_PER_EDGE >> level))
             };
             let next = std::array::from_fn(|level| {
-                let layer = |level| if n > 1 { after(level, true, n) } else { None };
+                let layer = |level| if n > 1 { after(level, true, n - n % 2) } else { None };
                 let finer = layer(level + 1).max(after(level + 1, false, 2));
                 [finer.max(layer(level)), finer]
             });
@@ -127,7 +127,8 @@ impl Mesh<'_> {
         if let Some(&known) = self.known.distances.borrow().get(&id) {
             return known;
         }
-        let level_last = (octant.level + LEVELS_FINER).min(self.terms.level_surface.saturating_sub(1));
+        let level_last =
+            (octant.level + LEVELS_FINER).min(self.terms.level_surface.saturating_sub(1));
         let mut near = BinaryHeap::from([Reverse((0, Reverse(0), 0))]);
         let mut distance = None;
         while let Some(Reverse((at_least, Reverse(level), key))) = near.pop() {

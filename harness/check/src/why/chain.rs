@@ -4,7 +4,7 @@
 //! The octants whose chains are at best shortest are pursued first, and among them those nearest to a cause. The leaves near
 //! an octant are searched level by level, finest first, because finer ones lead to shorter chains. So near leaves of coarse
 //! levels, of which there are most, are rarely looked at. The chain that is found is the shortest. After
-//! [`SEARCHES_MAX`] searches the octants nearest to a cause are pursued, whatever the length of their chains.
+//! [`SEARCHES_MAX`] searches the octants nearest to a cause are pursued, whatever the length of the chain to them.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -16,8 +16,8 @@ use super::leaves::{id, parent};
 use contract::octant::Octant;
 use rustc_hash::FxHashMap;
 
-/// Searches for leaves near an octant before the first chain that is found is accepted.
-pub const SEARCHES_MAX: usize = 1000;
+/// Searches for leaves near octants for the chains of one answer, before chains that may not be the shortest are accepted.
+pub const SEARCHES_MAX: usize = 3000;
 
 /// A rule of section 6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +80,8 @@ enum Task {
 struct Pending {
     /// Least length of a chain; after [`SEARCHES_MAX`] searches, least number of links that it still needs.
     bound: usize,
+    /// Links before the step: of equal bounds, long chains first.
+    links: Reverse<usize>,
     /// The distance that so many links cover beyond the nearest cause.
     beyond: Reverse<i64>,
     task: Task,
@@ -96,16 +98,15 @@ struct Frontier {
 }
 
 impl Mesh<'_> {
-    /// A chain for an octant; `None` if no rule requires its split.
-    pub(super) fn chain(&self, octant: &Octant) -> Option<Chain> {
+    /// A chain for an octant; `None` if no rule requires its split. Of the searches that are left, those made are subtracted.
+    pub(super) fn chain(&self, octant: &Octant, searches_left: &mut usize) -> Option<Chain> {
         if let Some(cause) = self.base_cause(octant) {
             return Some(Chain { octant: *octant, links: Vec::new(), cause, is_shortest: true });
         }
         let mut frontier = Frontier::default();
         frontier.steps.push(Step { octant: *octant, is_deep: false, links: 0, from: None });
         let task = Task::Search(self.level_deepest, self.level_deepest);
-        frontier.push(Pending { bound: 1, beyond: Reverse(0), task, step: 0 });
-        let mut searches = 0;
+        frontier.push(Pending { bound: 1, links: Reverse(0), beyond: Reverse(0), task, step: 0 });
         // Least length of a chain, once the order no longer guarantees the shortest.
         let mut least = None;
         while let Some(Reverse(pending)) = frontier.pending.pop() {
@@ -115,15 +116,17 @@ impl Mesh<'_> {
                 let is_shortest = least.is_none_or(|least| chain.links.len() <= least);
                 return Some(Chain { is_shortest, ..chain });
             };
-            searches += 1;
-            if searches == SEARCHES_MAX {
+            if least.is_some() && !self.leads_to_cause(&step) {
+                continue;
+            }
+            *searches_left = searches_left.saturating_sub(1);
+            if least.is_none() && *searches_left == 0 {
                 if !self.is_justified(octant) {
                     return None;
                 }
                 least = Some(pending.bound);
+                frontier.push(pending);
                 frontier.forget_lengths();
-            }
-            if least.is_some() && !self.leads_to_cause(&step) {
                 continue;
             }
             self.search(&mut frontier, &pending, first..=last, least.is_none());
@@ -156,46 +159,36 @@ impl Mesh<'_> {
             let bound = pending.bound.max(before + 1 + self.bounds.links_after(next));
             frontier.push(Pending { bound, task: Task::Search(next, next), ..*pending });
         }
-        let mut add = |octant: Octant, is_deep: bool, link: Link, bound: Option<(usize, i64)>| {
-            let step = Step { octant, is_deep, links: links + 1, from: Some((at, link)) };
-            let (task, (more, beyond)) = match bound {
-                None => (Task::Finish, (0, 0)),
-                Some(bound) => {
-                    let known = frontier.reached.entry((id(&octant), is_deep)).or_insert(usize::MAX);
-                    if *known <= links + 1 {
-                        return;
-                    }
-                    *known = links + 1;
-                    (Task::Search(octant.level + 2, self.level_deepest), bound)
-                }
-            };
-            let bound = if counts_links { pending.bound.max(links + 1 + more) } else { more };
-            frontier.steps.push(step);
-            frontier.push(Pending { bound, beyond: Reverse(beyond), task, step: frontier.steps.len() - 1 });
-        };
         if *levels.end() == self.level_deepest
             && let Some(leaf) = self.extra_layer(&octant)
         {
-            add(leaf, false, Link { rule: Rule::ExtraLayer, octant, leaf }, None);
-            return;
+            let link = Link { rule: Rule::ExtraLayer, octant, leaf };
+            let step =
+                Step { octant: leaf, is_deep: false, links: links + 1, from: Some((at, link)) };
+            return frontier.add(step, Task::Finish, pending, counts_links, (0, 0));
         }
         self.any_leaf_near(&octant, levels, &mut |leaf| {
             let next = parent(&leaf);
-            let rules = [
-                (Rule::Layer, true, self.forces_by_layer(&leaf, &octant)),
-                (Rule::Balance, false, self.forces_by_balance(&leaf, &octant)),
-            ];
-            for (rule, is_deep, _) in rules.into_iter().filter(|rule| rule.2) {
-                let link = Link { rule, octant, leaf };
-                if self.base_splits(&next) {
-                    add(next, is_deep, link, None);
-                    return true;
-                }
-                if let Some(bound) = self.links_min(&next, is_deep) {
-                    add(next, is_deep, link, Some(bound));
-                }
+            let by_layer = self.forces_by_layer(&leaf, &octant);
+            let by_balance = self.forces_by_balance(&leaf, &octant);
+            if !by_layer && !by_balance {
+                return false;
             }
-            false
+            let is_cause = self.base_splits(&next);
+            // After balance, any leaf may follow that may follow after a layer.
+            let is_deep = !by_balance;
+            let rule = if by_layer && (is_deep || is_cause) { Rule::Layer } else { Rule::Balance };
+            let link = Link { rule, octant, leaf };
+            let step = Step { octant: next, is_deep, links: links + 1, from: Some((at, link)) };
+            if is_cause {
+                frontier.add(step, Task::Finish, pending, counts_links, (0, 0));
+            } else if frontier.is_shorter(&step)
+                && let Some(bound) = self.links_min(&next, is_deep)
+            {
+                let task = Task::Search(next.level + 2, self.level_deepest);
+                frontier.add(step, task, pending, counts_links, bound);
+            }
+            is_cause
         });
     }
 
@@ -221,6 +214,33 @@ impl Mesh<'_> {
 impl Frontier {
     fn push(&mut self, pending: Pending) {
         self.pending.push(Reverse(pending));
+    }
+
+    /// Whether no chain that is as short is known to reach an octant. Keeps that one now does.
+    fn is_shorter(&mut self, step: &Step) -> bool {
+        let id = id(&step.octant);
+        let links = |is_deep| self.reached.get(&(id, is_deep)).copied().unwrap_or(usize::MAX);
+        let known = if step.is_deep { links(true).min(links(false)) } else { links(false) };
+        if known <= step.links {
+            return false;
+        }
+        self.reached.insert((id, step.is_deep), step.links);
+        true
+    }
+
+    /// Adds a step that is reached from a pending one, with a lower bound of the links that it needs.
+    fn add(
+        &mut self,
+        step: Step,
+        task: Task,
+        from: &Pending,
+        counts_links: bool,
+        (more, beyond): (usize, i64),
+    ) {
+        let bound = if counts_links { from.bound.max(step.links + more) } else { more };
+        let links = Reverse(step.links);
+        self.push(Pending { bound, links, beyond: Reverse(beyond), task, step: self.steps.len() });
+        self.steps.push(step);
     }
 
     /// Orders what is pending by the number of links that are still needed alone.
