@@ -4,7 +4,7 @@
 //! The octants whose chains are at best shortest are pursued first, and among them those nearest to a cause. The leaves near
 //! an octant are searched level by level, finest first, because finer ones lead to shorter chains. So near leaves of coarse
 //! levels, of which there are most, are rarely looked at. The chain that is found is the shortest. After
-//! [`SEARCHES_MAX`] searches the octants nearest to a cause are pursued, whatever the length of the chain to them.
+//! [`SEARCHES_MAX`] searches the links that are still needed count twice in this order, so that a chain is found soon.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -78,7 +78,7 @@ enum Task {
 /// A task at a step, in the order of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Pending {
-    /// Least length of a chain; after [`SEARCHES_MAX`] searches, least number of links that it still needs.
+    /// Links before the step, and [`Frontier::weight`] times the least number of links after it.
     bound: usize,
     /// Links before the step: of equal bounds, long chains first.
     links: Reverse<usize>,
@@ -91,6 +91,8 @@ struct Pending {
 /// The state of the search.
 #[derive(Debug, Default)]
 struct Frontier {
+    /// 1 as long as the shortest chain is searched, then 2.
+    weight: usize,
     steps: Vec<Step>,
     pending: BinaryHeap<Reverse<Pending>>,
     /// Links before an octant and whether it must be deep, at least.
@@ -103,7 +105,7 @@ impl Mesh<'_> {
         if let Some(cause) = self.base_cause(octant) {
             return Some(Chain { octant: *octant, links: Vec::new(), cause, is_shortest: true });
         }
-        let mut frontier = Frontier::default();
+        let mut frontier = Frontier { weight: 1, ..Frontier::default() };
         frontier.steps.push(Step { octant: *octant, is_deep: false, links: 0, from: None });
         let task = Task::Search(self.level_deepest, self.level_deepest);
         frontier.push(Pending { bound: 1, links: Reverse(0), beyond: Reverse(0), task, step: 0 });
@@ -126,10 +128,10 @@ impl Mesh<'_> {
                 }
                 least = Some(pending.bound);
                 frontier.push(pending);
-                frontier.forget_lengths();
+                frontier.prefer_near();
                 continue;
             }
-            self.search(&mut frontier, &pending, first..=last, least.is_none());
+            self.search(&mut frontier, &pending, first..=last);
         }
         None
     }
@@ -143,20 +145,14 @@ impl Mesh<'_> {
     }
 
     /// Adds the octants that leaves of these levels lead to, and the search for leaves of the next coarser level.
-    fn search(
-        &self,
-        frontier: &mut Frontier,
-        pending: &Pending,
-        levels: RangeInclusive<u8>,
-        counts_links: bool,
-    ) {
+    fn search(&self, frontier: &mut Frontier, pending: &Pending, levels: RangeInclusive<u8>) {
         let at = pending.step;
         let Step { octant, is_deep, links, .. } = frontier.steps[at];
         let coarsest = octant.level + if is_deep { 2 } else { 1 };
         let next = levels.start() - 1;
         if next >= coarsest {
-            let before = if counts_links { links } else { 0 };
-            let bound = pending.bound.max(before + 1 + self.bounds.links_after(next));
+            let more = 1 + self.bounds.links_after(next);
+            let bound = pending.bound.max(links + frontier.weight * more);
             frontier.push(Pending { bound, task: Task::Search(next, next), ..*pending });
         }
         if *levels.end() == self.level_deepest
@@ -165,7 +161,7 @@ impl Mesh<'_> {
             let link = Link { rule: Rule::ExtraLayer, octant, leaf };
             let step =
                 Step { octant: leaf, is_deep: false, links: links + 1, from: Some((at, link)) };
-            return frontier.add(step, Task::Finish, pending, counts_links, (0, 0));
+            return frontier.add(step, Task::Finish, pending, (0, 0));
         }
         self.any_leaf_near(&octant, levels, &mut |leaf| {
             let next = parent(&leaf);
@@ -181,12 +177,12 @@ impl Mesh<'_> {
             let link = Link { rule, octant, leaf };
             let step = Step { octant: next, is_deep, links: links + 1, from: Some((at, link)) };
             if is_cause {
-                frontier.add(step, Task::Finish, pending, counts_links, (0, 0));
+                frontier.add(step, Task::Finish, pending, (0, 0));
             } else if frontier.is_shorter(&step)
                 && let Some(bound) = self.links_min(&next, is_deep)
             {
                 let task = Task::Search(next.level + 2, self.level_deepest);
-                frontier.add(step, task, pending, counts_links, bound);
+                frontier.add(step, task, pending, bound);
             }
             is_cause
         });
@@ -229,27 +225,22 @@ impl Frontier {
     }
 
     /// Adds a step that is reached from a pending one, with a lower bound of the links that it needs.
-    fn add(
-        &mut self,
-        step: Step,
-        task: Task,
-        from: &Pending,
-        counts_links: bool,
-        (more, beyond): (usize, i64),
-    ) {
-        let bound = if counts_links { from.bound.max(step.links + more) } else { more };
+    fn add(&mut self, step: Step, task: Task, from: &Pending, (more, beyond): (usize, i64)) {
+        let at_least = if self.weight == 1 { from.bound } else { 0 };
+        let bound = at_least.max(step.links + self.weight * more);
         let links = Reverse(step.links);
         self.push(Pending { bound, links, beyond: Reverse(beyond), task, step: self.steps.len() });
         self.steps.push(step);
     }
 
-    /// Orders what is pending by the number of links that are still needed alone.
-    fn forget_lengths(&mut self) {
+    /// Counts the links that are still needed twice in the order of what is pending, so that it leads to a cause soon.
+    fn prefer_near(&mut self) {
+        self.weight = 2;
         let all = std::mem::take(&mut self.pending).into_iter();
-        let without_lengths = |Reverse(pending): Reverse<Pending>| {
-            let bound = pending.bound - self.steps[pending.step].links;
+        let twice = |Reverse(pending): Reverse<Pending>| {
+            let bound = 2 * pending.bound - self.steps[pending.step].links;
             Reverse(Pending { bound, ..pending })
         };
-        self.pending = all.map(without_lengths).collect();
+        self.pending = all.map(twice).collect();
     }
 }
