@@ -25,7 +25,7 @@ use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant, UNITS_PER_CELL};
 const LINKS_MAX: usize = 2 * (LEVEL_MAX as usize + 1);
 
 /// Levels by which the octants are finer whose distance stands for that of the facets in them.
-const LEVELS_FINER: u8 = 2;
+const LEVELS_FINER: u8 = 3;
 
 /// Lower bounds of the number of links.
 #[derive(Debug)]
