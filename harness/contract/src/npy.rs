@@ -174,6 +174,12 @@ impl MappedPart {
         self.len == 0
     }
 
+    /// Announces that few words will be read, at random places. Has an effect on speed alone.
+    pub fn expect_few_reads(&self) {
+        // An error means that the system does not know this kind of advice.
+        let _ = self.bytes.advise(memmap2::Advice::Random);
+    }
+
     /// The word with this index. Panics if there is none.
     pub fn word(&self, index: usize) -> u64 {
         assert!(index < self.len, "word {index} of {}", self.len);

@@ -3,7 +3,7 @@
 //! - [`leaves`]: the leaves on disk; [`crossings`]: the facets of an octant;
 //! - [`base`](mod@base): T0 where it is needed, octant by octant (section 3 of reference/DEFINITION.md);
 //! - [`gradation`]: the leaves that force an octant to split (section 6);
-//! - [`chain`]: the shortest chain of them to a cause of T0; [`side`]: the rays or the seed of a component (section 4);
+//! - [`chain`]: the shortest chain of them to a cause of T0, and [`bound`] of its length; [`side`]: the rays or the seed of a component (section 4);
 //! - [`answer`]: the result as data, [`text`]: for people; [`unneeded`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
@@ -22,6 +22,7 @@ use crate::checks::Terms;
 
 pub mod answer;
 pub mod base;
+pub mod bound;
 pub mod chain;
 pub mod crossings;
 pub mod gradation;
@@ -31,6 +32,7 @@ pub mod text;
 pub mod unneeded;
 
 use base::Surface;
+use bound::Bounds;
 use crossings::Crossings;
 use leaves::Leaves;
 
@@ -46,6 +48,8 @@ pub struct Mesh<'a> {
     distrusts: bool,
     /// Deepest level of a leaf that can force an octant to split; no search goes deeper.
     level_deepest: u8,
+    /// What the search for a chain expects.
+    bounds: Bounds,
     /// Answers for octants that were asked about before.
     known: Known,
 }
@@ -53,7 +57,8 @@ pub struct Mesh<'a> {
 /// Answers by [`leaves::id`].
 #[derive(Debug, Default)]
 struct Known {
-    base_splits: RefCell<FxHashMap<u64, bool>>,
+    crossed: RefCell<FxHashMap<u64, bool>>,
+    distances: RefCell<FxHashMap<u64, Option<i64>>>,
     deep: RefCell<FxHashMap<u64, bool>>,
     justified: RefCell<FxHashMap<u64, bool>>,
 }
@@ -85,7 +90,8 @@ impl<'a> Mesh<'a> {
             leaves.manifest.leaves_by_level.iter().rposition(|&n| n > 0).unwrap_or(0) as u8;
         let level_deepest = of_mesh.max(required(&terms));
         let known = Known::default();
-        Ok(Self { leaves, terms, surface, is_base, distrusts: false, level_deepest, known })
+        let bounds = Bounds::new(&terms);
+        Ok(Self { leaves, terms, surface, is_base, distrusts: false, level_deepest, bounds, known })
     }
 
     /// The same mesh, in which needless splits justify nothing.
