@@ -70,7 +70,7 @@ pub struct Args {
     /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
     #[arg(long)]
     pub force: bool,
-    /// Each rank keeps the name of its current phase in DIR/rank-00000.txt
+    /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
     /// End the job if ranks of MPI wait for another one for longer than this, and name it; greater than the time of the longest phase

@@ -1,6 +1,6 @@
 //! `harness export` as a command. `harness/oracles/test_vtu.py` reads its files back.
 
-use contract::testing::{leaf_set, words_with_sides};
+use contract::testing::{leaf_set, words_of, words_with_sides};
 use contract::word::Side;
 use std::fs;
 use std::path::Path;
@@ -193,6 +193,30 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
     assert_eq!((code, error.as_str()), (0, ""));
     assert!(output.contains("148 cells of levels 1 to 3, sides known; they fill 100"), "{output}");
     assert_eq!(harness(&["diff", "mesh", "again"]).0, 0);
+
+    // A directory with the tree alone is compared like one with leaf words.
+    fs::create_dir(place.path().join("tree")).unwrap();
+    fs::copy(place.path().join("mesh.vtkhdf"), place.path().join("tree/mesh.vtkhdf")).unwrap();
+    let mut manifest = contract::leafset::read_manifest(&place.path().join("mesh")).unwrap();
+    (manifest.parts, manifest.hyper_tree_grid) = (Vec::new(), Some("mesh.vtkhdf".to_owned()));
+    let write = |manifest: &contract::manifest::Manifest| {
+        fs::write(place.path().join("tree/mesh.json"), serde_json::to_vec(manifest).unwrap())
+            .unwrap();
+    };
+    write(&manifest);
+    let (code, output, _) = harness(&["diff", "mesh", "tree"]);
+    assert_eq!(code, 0, "{output}");
+    assert!(output.ends_with("the leaves are the same (148 compared)\n"), "{output}");
+    leaf_set(vec![words_of(|o| o.level < 2)]).create(&place.path().join("other")).unwrap();
+    let of_words = harness(&["diff", "mesh", "other"]);
+    let of_tree = harness(&["diff", "tree", "other"]);
+    assert_eq!((of_words.0, of_tree.0), (1, 1));
+    let differences = |output: &str| output.split_once("B other\n").unwrap().1.to_owned();
+    assert_eq!(differences(&of_tree.1), differences(&of_words.1));
+    manifest.leaves += 1;
+    write(&manifest);
+    assert!(harness(&["diff", "mesh", "tree"]).1.contains("manifest of B contradicts"));
+
     let (code, output, error) = harness(&["audit", "mesh.vtkhdf", "--sides", "side"]);
     assert_eq!(error, "");
     assert!(code < 2 && output.contains("manifest   holds, 148 examined"), "{output}");
@@ -210,5 +234,5 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
             assert!(error.contains("mesh.vtkhdf: is damaged: "), "{error}");
         }
     }
-    assert_eq!(names(place.path()), ["again", "mesh", "mesh.vtkhdf"]);
+    assert_eq!(names(place.path()), ["again", "mesh", "mesh.vtkhdf", "other", "tree"]);
 }

@@ -1,10 +1,11 @@
 //! The differences of two meshes: of their inputs and counts, and of the leaves in the first octant that differs. If the sides of
 //! one are unknown, only the cells are compared.
 //!
-//! All leaves are read once, to count and digest them, with memory for one buffer. A comparison that trusts the digests in the
+//! All leaves are read once, to count and digest them, with memory for one buffer, from the parts or the tree. A comparison that trusts the digests in the
 //! manifests reads only the first octant that differs.
 
 mod fields;
+mod mesh;
 mod region;
 pub mod rule;
 mod witness;
@@ -14,15 +15,16 @@ use std::path::Path;
 
 use crate::checks::Terms;
 use contract::case::Case;
-use contract::leafset::{self, LeafDir, ReadError};
-use contract::manifest::{Manifest, Sides, Tally, octant_index};
+use contract::leafset::ReadError;
+use contract::manifest::{Manifest, Sides, Tally};
 use contract::octant::Octant;
 use contract::word;
+use mesh::Mesh;
 
 /// What a comparison trusts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trust {
-    /// The leaves in the part files.
+    /// The leaves in the files.
     #[default]
     Leaves,
     /// The counts and digests in the manifests.
@@ -96,7 +98,7 @@ impl fmt::Display for DiffReport {
     }
 }
 
-/// Compares two leaf-set directories. If their common case is given, facets and rays help to decide which is right.
+/// Compares two leaf-set directories, each with leaf words or the tree. If their common case is given, facets and rays help to decide which is right.
 ///
 /// # Errors
 /// If a directory cannot be read.
@@ -106,24 +108,24 @@ pub fn diff(
     case: Option<&Case>,
     trust: Trust,
 ) -> Result<DiffReport, ReadError> {
-    let mut sets = [leafset::open(a)?, leafset::open(b)?];
-    let unknown = |set: &LeafDir| set.manifest.sides == Sides::Unknown;
-    let without_sides = NAMES.into_iter().zip(&sets).find(|(_, set)| unknown(set));
+    let mut meshes = [Mesh::open(a)?, Mesh::open(b)?];
+    let unknown = |mesh: &Mesh| mesh.manifest.sides == Sides::Unknown;
+    let without_sides = NAMES.into_iter().zip(&meshes).find(|(_, set)| unknown(set));
     let without_sides = without_sides.map(|(name, _)| name);
     // The digests in the manifests include the sides.
     let trust = if without_sides.is_some() { Trust::Leaves } else { trust };
     let mask = if without_sides.is_some() { !word::SIDE_BITS } else { u64::MAX };
     let mut contradictions = Vec::new();
     if trust == Trust::Leaves {
-        for (name, set) in NAMES.into_iter().zip(&mut sets) {
-            if recount(set, mask)? {
+        for (name, mesh) in NAMES.into_iter().zip(&mut meshes) {
+            if recount(mesh, mask)? {
                 contradictions.push(format!(
                     "the manifest of {name} contradicts its leaves: run harness audit on the directory"
                 ));
             }
         }
     }
-    let [a, b] = sets;
+    let [a, b] = meshes;
     let of_manifests = manifests(&a.manifest, &b.manifest);
     let mut report = DiffReport { compared: trust, without_sides, contradictions, ..of_manifests };
     for i in octants_differing(&a.manifest, &b.manifest) {
@@ -155,31 +157,23 @@ pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
     }
 }
 
-/// Number of words that are read at once.
-const CHUNK: u64 = 1 << 16;
-
 /// Replaces the counts and digests in a manifest by those of the leaves, of whose words only the bits of `mask` count. Returns
 /// whether the manifest contradicts the whole words.
-fn recount(set: &mut LeafDir, mask: u64) -> Result<bool, ReadError> {
+fn recount(mesh: &mut Mesh, mask: u64) -> Result<bool, ReadError> {
     let (mut whole, mut masked) = (Tally::default(), Tally::default());
-    for part in &set.parts {
-        let mut words = Vec::new();
-        for first in (0..part.len()).step_by(CHUNK as usize) {
-            words.resize(CHUNK.min(part.len() - first) as usize, 0);
-            part.read_at(first, &mut words).map_err(|error| ReadError::part(part, error))?;
-            words.iter().for_each(|&word| whole.add(word));
-            if mask != u64::MAX {
-                words.iter().for_each(|&word| masked.add(word & mask));
-            }
+    mesh.visit(|words| {
+        words.iter().for_each(|&word| whole.add(word));
+        if mask != u64::MAX {
+            words.iter().for_each(|&word| masked.add(word & mask));
         }
-    }
+    })?;
     whole.finish();
-    let stated = set.manifest.clone();
-    set.manifest.set_tally(whole);
-    let contradicts = set.manifest != stated;
+    let stated = mesh.manifest.clone();
+    mesh.manifest.set_tally(whole);
+    let contradicts = mesh.manifest != stated;
     if mask != u64::MAX {
         masked.finish();
-        set.manifest.set_tally(masked);
+        mesh.manifest.set_tally(masked);
     }
     Ok(contradicts)
 }
@@ -200,13 +194,13 @@ type Differing = (Option<u64>, Option<u64>);
 
 /// The first words that differ in a level-3 octant, in the bits of `mask`; `None` if the leaves are the same.
 fn first_difference(
-    a: &LeafDir,
-    b: &LeafDir,
+    a: &Mesh,
+    b: &Mesh,
     index: usize,
     mask: u64,
 ) -> Result<Option<Differing>, ReadError> {
-    let words = |set| -> Result<Vec<u64>, ReadError> {
-        let mut words = octant_words(set, index)?;
+    let words = |mesh: &Mesh| -> Result<Vec<u64>, ReadError> {
+        let mut words = mesh.octant(index)?;
         words.iter_mut().for_each(|word| *word &= mask);
         Ok(words)
     };
@@ -220,8 +214,8 @@ fn first_difference(
 
 /// The rules that decide which mesh is right.
 fn rules(
-    a: &LeafDir,
-    b: &LeafDir,
+    a: &Mesh,
+    b: &Mesh,
     case: Option<&Case>,
     x: Option<u64>,
     y: Option<u64>,
@@ -236,40 +230,9 @@ fn rules(
     if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
         return undecided("unknown: the meshes are too large to be held in memory");
     }
-    let (words_a, words_b) = (all_words(a)?, all_words(b)?);
+    let (words_a, words_b) = (a.words()?, b.words()?);
     let terms = Terms::of_manifest(&a.manifest);
     Ok(rule::Dispute { a: &words_a, b: &words_b, terms: &terms, case }.rule(x, y))
-}
-
-/// All words of a mesh, sorted.
-fn all_words(set: &LeafDir) -> Result<Vec<u64>, ReadError> {
-    let mut words = Vec::new();
-    for part in &set.parts {
-        words.extend(part.read_all().map_err(|error| ReadError::part(part, error))?);
-    }
-    words.sort_unstable();
-    Ok(words)
-}
-
-/// All words of a level-3 octant, from all parts, sorted.
-fn octant_words(set: &LeafDir, index: usize) -> Result<Vec<u64>, ReadError> {
-    let mut words = Vec::new();
-    for part in &set.parts {
-        let read = || -> std::io::Result<Vec<u64>> {
-            let from = part.lower_bound(0..part.len(), (index as u64) << 55)?;
-            // One past the last octant does not fit a word.
-            let end = (index as u64 + 1).checked_mul(1 << 55);
-            let until = end.map_or(Ok(part.len()), |end| part.lower_bound(0..part.len(), end))?;
-            let count = usize::try_from(until - from).expect("an octant fits the address space");
-            let mut words = vec![0; count];
-            part.read_at(from, &mut words)?;
-            Ok(words)
-        };
-        words.extend(read().map_err(|error| ReadError::part(part, error))?);
-    }
-    debug_assert!(words.iter().all(|&w| octant_index(w) == index));
-    words.sort_unstable();
-    Ok(words)
 }
 
 #[cfg(test)]

@@ -50,11 +50,14 @@ pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
         return false;
     }
     let (mesher, reference, harness) = (by_mesher(&path), by_reference(&path), by_harness(&path));
-    assert_eq!(mesher.as_ref().ok(), reference.as_ref().ok(), "{mesher:?}\n{reference:?}");
+    // The reference alone refuses a box whose cells would not fit into memory.
+    if !matches!(reference, Err(reference::Error::TooManyCells { .. })) {
+        assert_eq!(mesher.as_ref().ok(), reference.as_ref().ok(), "{mesher:?}\n{reference:?}");
+    }
     // Here only the harness looks whether a seed lies in the flow.
-    let has_seeds = reference.as_ref().is_ok_and(|case| case.seeds > 0);
+    let has_seeds = mesher.as_ref().is_ok_and(|case| case.seeds > 0);
     if !(has_seeds && harness.is_err()) {
-        assert_eq!(reference.as_ref().ok(), harness.as_ref().ok(), "{reference:?}\n{harness:?}");
+        assert_eq!(mesher.as_ref().ok(), harness.as_ref().ok(), "{mesher:?}\n{harness:?}");
     }
     mesher.is_ok()
 }
@@ -85,22 +88,19 @@ fn by_mesher(path: &std::path::Path) -> Result<Meaning, String> {
     meaning().map_err(|error: mesher::error::Error| error.to_string())
 }
 
-fn by_reference(path: &std::path::Path) -> Result<Meaning, String> {
-    let meaning = || {
-        let input = reference::lattice::Input::new(&reference::case_file::read(path)?)?;
-        Ok(Meaning {
-            facets: input.facets,
-            root: bits(input.root.origin, input.root.edge),
-            level_surface: input.level_surface,
-            layer_cells_min: input.layer_cells_min,
-            keep: format!("{:?}", input.keep),
-            keep_crossing: input.keep_crossing,
-            enclosed: format!("{:?}", input.enclosed),
-            boxes: input.boxes.iter().map(|b| (b.extent.min, b.extent.max, b.level)).collect(),
-            seeds: input.seeds.len(),
-        })
-    };
-    meaning().map_err(|error: reference::Error| error.to_string())
+fn by_reference(path: &std::path::Path) -> Result<Meaning, reference::Error> {
+    let input = reference::lattice::Input::new(&reference::case_file::read(path)?)?;
+    Ok(Meaning {
+        facets: input.facets,
+        root: bits(input.root.origin, input.root.edge),
+        level_surface: input.level_surface,
+        layer_cells_min: input.layer_cells_min,
+        keep: format!("{:?}", input.keep),
+        keep_crossing: input.keep_crossing,
+        enclosed: format!("{:?}", input.enclosed),
+        boxes: input.boxes.iter().map(|b| (b.extent.min, b.extent.max, b.level)).collect(),
+        seeds: input.seeds.len(),
+    })
 }
 
 fn by_harness(path: &std::path::Path) -> Result<Meaning, String> {
