@@ -222,7 +222,7 @@ fn an_incomplete_file_is_an_error() {
     }
 }
 
-/// No change of bytes causes a panic, a hang, or an allocation that a count alone determines.
+/// No change of bytes causes a panic, a hang, or an allocation that a count alone determines; what it causes is listed.
 #[test]
 fn no_damage_is_fatal() {
     let mut state = 1u64;
@@ -236,10 +236,10 @@ fn no_damage_is_fatal() {
         .iter()
         .filter(|(name, _, _)| !name.starts_with("foam"))
         .map(|&(name, _, _)| (name, ""));
-    let mut refused = 0;
+    let (mut refused, mut outcomes) = (0, String::new());
     for (name, file) in foam.chain(single) {
         for round in 0..30 {
-            let (_place, copy) = edited(name, file, |bytes| {
+            let (place, copy) = edited(name, file, |bytes| {
                 let begin = random(bytes.len() - 8);
                 match round % 3 {
                     0 => bytes[begin] = random(256) as u8,
@@ -247,10 +247,27 @@ fn no_damage_is_fatal() {
                     _ => drop(bytes.drain(begin..begin + 1 + random(7))),
                 }
             });
-            refused += usize::from(imported(&copy, &Request::default()).is_err());
+            let outcome = imported(&copy, &Request::default());
+            refused += usize::from(outcome.is_err());
+            let outcome = match outcome {
+                Ok(set) => format!("{} leaves {}", set.manifest.leaves, set.manifest.digest),
+                Err(why) => why.to_string().replace(&*place.path().to_string_lossy(), ""),
+            };
+            outcomes += &format!("{name} {file} {round}: {outcome}\n");
         }
     }
     assert!(refused > 250, "{refused}");
+    assert_text(&outcomes, "damage.txt");
+}
+
+/// Compares a text with that of a file beside this one. If it differs as intended, copy the file that the message names.
+fn assert_text(text: &str, file: &str) {
+    let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/expected").join(file);
+    if text != fs::read_to_string(&expected).unwrap_or_default() {
+        let found = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
+        fs::write(&found, text).unwrap();
+        panic!("{} differs from {}", found.display(), expected.display());
+    }
 }
 
 #[test]

@@ -21,16 +21,6 @@ fn case(index: usize) -> SelftestCase {
     support::selftest_case(name, text)
 }
 
-/// Compares a text with that of a file beside this one. If it differs as intended, copy the file that the message names.
-fn assert_text(text: &str, file: &str) {
-    let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/checks/expected").join(file);
-    if text != std::fs::read_to_string(&expected).unwrap_or_default() {
-        let found = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
-        std::fs::write(&found, text).unwrap();
-        panic!("{} differs from {}", found.display(), expected.display());
-    }
-}
-
 /// Every corruption that applies to a case is reported, by the checks and with the findings of the expected table, and the correct
 /// mesh is not.
 fn assert_reported(index: usize) {
@@ -40,7 +30,7 @@ fn assert_reported(index: usize) {
     println!("{text}");
     report.unused.clear();
     assert!(report.holds());
-    assert_text(&text, &format!("{}.txt", CASES[index].0));
+    support::assert_text(&text, &format!("{}.txt", CASES[index].0));
 }
 
 #[test]
@@ -87,7 +77,7 @@ fn every_corruption_changes_the_leaves_and_files_that_are_listed() {
         }
         assert!(lines.len() > before, "{} applies to no case", mutant.name);
     }
-    assert_text(&(lines.join("\n") + "\n"), "corruptions.txt");
+    support::assert_text(&(lines.join("\n") + "\n"), "corruptions.txt");
 }
 
 /// What a corruption changes: leaves, keys of the manifest, leaves of T0, files.
