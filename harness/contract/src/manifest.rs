@@ -439,6 +439,9 @@ mod tests {
         let mut counted = Tally::default();
         counted.count(words[1], 5);
         assert_eq!((counted.leaves, counted.by_side.inside, counted.by_level[3]), (5, 5, 5));
-        assert_eq!((part_name(0), part_name(123_456)), ("leaves-00000.npy".to_owned(), "leaves-123456.npy".to_owned()));
+        assert_eq!(
+            (part_name(0), part_name(123_456)),
+            ("leaves-00000.npy".to_owned(), "leaves-123456.npy".to_owned())
+        );
     }
 }

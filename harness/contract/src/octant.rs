@@ -166,7 +166,8 @@ mod tests {
             for b in &all {
                 let ((low, high), (low_b, high_b)) = (a.bounds(), b.bounds());
                 let gap = |i: usize| {
-                    let apart = [low_b[i] - high[i], low[i] - high_b[i]].into_iter().find(|&gap| gap > 0);
+                    let apart =
+                        [low_b[i] - high[i], low[i] - high_b[i]].into_iter().find(|&gap| gap > 0);
                     apart.unwrap_or(0) / UNITS_PER_CELL
                 };
                 assert_eq!(a.distance(b), gap(0).max(gap(1)).max(gap(2)), "{a}, {b}");

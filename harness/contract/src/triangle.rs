@@ -178,7 +178,8 @@ mod tests {
         let mixed = (0..9).map(|i| cross(unit(i / 3), edges[i % 3]));
         let mut normals = (0..3).map(unit).chain([cross(edges[0], edges[1])]).chain(mixed);
         normals.all(|n| {
-            let of_box = (0..8).map(|i| dot(n, std::array::from_fn(|a| [low, high][i >> a & 1][a])));
+            let of_box =
+                (0..8).map(|i| dot(n, std::array::from_fn(|a| [low, high][i >> a & 1][a])));
             let (from, to) = of_box.fold((i128::MAX, i128::MIN), |(l, h), x| (l.min(x), h.max(x)));
             let of_corners = t.map(|v| dot(n, v));
             of_corners.iter().any(|&x| x <= to) && of_corners.iter().any(|&x| x >= from)

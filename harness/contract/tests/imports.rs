@@ -303,6 +303,86 @@ fn counts_beyond_the_file_are_errors() {
             replace(bytes, "\n256\n(", &format!("\n{count}{{0}}\n("))
         });
     }
+    // An item takes two bytes at least.
+    let half = fs::read(sample("foam-ascii").join("owner")).unwrap().len() / 2;
+    let why =
+        refusal("foam-ascii", "owner", |bytes| replace(bytes, "\n960\n(", &format!("\n{half}\n(")));
+    assert!(why.ends_with(&format!("owner: states {half} items: it is incomplete")), "{why}");
+}
+
+/// The number at this place in the header of a connectivity.
+fn head_of_forest(bytes: &[u8], number: usize) -> usize {
+    u64::from_le_bytes(bytes[32 + 8 * number..][..8].try_into().unwrap()) as usize
+}
+
+/// Tables that the reader skips have the lengths that p4est gives them: with edges, corners and attributes in the connectivity, the
+/// cells are the same.
+#[test]
+fn edges_corners_and_attributes_of_a_connectivity_are_skipped() {
+    let expected = imported(&sample("brick.p8est"), &Request::default()).unwrap().words;
+    for (edges, corners, attributes) in [(0, 0, 0), (1, 0, 0), (3, 0, 5), (0, 1, 0), (2, 4, 3)] {
+        let (_place, copy) = edited("brick.p8est", "", |bytes| {
+            let head = [2, 3, 4, 6, 8].map(|number| head_of_forest(bytes, number));
+            let [vertices, trees, own_edges, own_corners, own_attributes] = head;
+            assert_eq!((own_edges, own_attributes), (0, 0));
+            let own_pairs = head_of_forest(bytes, 7);
+            let mut at = 32 + 80 + 24 * vertices;
+            let mut whole = bytes[..at].to_vec();
+            let mut take = |whole: &mut Vec<u8>, count: usize| {
+                whole.extend(&bytes[at..at + count]);
+                at += count;
+            };
+            let put = |whole: &mut Vec<u8>, count: usize| whole.resize(whole.len() + count, 7);
+            let corners = own_corners + corners;
+            for (number, value) in [
+                (4, edges),
+                (5, 2 * edges),
+                (6, corners),
+                (7, own_pairs + 3 * corners),
+                (8, attributes),
+            ] {
+                whole[32 + 8 * number..][..8].copy_from_slice(&(value as u64).to_le_bytes());
+            }
+            put(&mut whole, if edges > 0 { 48 * trees } else { 0 });
+            take(&mut whole, 32 * trees);
+            let own = if own_corners > 0 { 32 * trees } else { 0 };
+            take(&mut whole, own);
+            put(&mut whole, if corners > 0 { 32 * trees - own } else { 0 });
+            take(&mut whole, 30 * trees);
+            put(&mut whole, attributes * trees);
+            take(&mut whole, 4);
+            put(&mut whole, 4 * edges + 5 * 2 * edges);
+            take(
+                &mut whole,
+                4 * (own_corners + 1) + if own_corners > 0 { 5 * own_pairs } else { 0 },
+            );
+            let added = corners - own_corners;
+            let pairs = if corners > 0 { 5 * (own_pairs + 3 * corners) } else { 0 };
+            put(&mut whole, 4 * added + pairs - if own_corners > 0 { 5 * own_pairs } else { 0 });
+            at = at.next_multiple_of(32);
+            whole.resize(whole.len().next_multiple_of(32), 0);
+            whole.extend(&bytes[at..]);
+            *bytes = whole;
+        });
+        let found = imported(&copy, &Request::default()).unwrap().words;
+        assert_eq!(found, expected, "{edges} edges, {corners} corners, {attributes} bytes");
+    }
+}
+
+#[test]
+fn trees_are_cubes_up_to_rounding() {
+    let with = |by: f64| {
+        let (_place, copy) = edited("brick.p8est", "", |bytes| {
+            let x = &mut bytes[32 + 80..][..8];
+            let moved = f64::from_le_bytes((&*x).try_into().unwrap()) + by;
+            x.copy_from_slice(&moved.to_le_bytes());
+        });
+        imported(&copy, &Request::default())
+    };
+    assert!(with(1e-11).is_ok() && with(-1e-11).is_ok());
+    for by in [1e-6, -1e-6, 0.25] {
+        assert!(with(by).unwrap_err().to_string().contains("is not a cube along x, y and z"));
+    }
 }
 
 #[test]

@@ -124,7 +124,10 @@ mod tests {
         assert_eq!(result.to_string(), "balance    1 finding, 7 examined; a note\n    first");
         (1..FINDINGS_LISTED).for_each(|i| result.report(format!("finding {i}")));
         let listed = result.to_string();
-        assert!(listed.starts_with("balance    20 findings, ") && listed.ends_with("\n    finding 19"), "{listed}");
+        assert!(
+            listed.starts_with("balance    20 findings, ") && listed.ends_with("\n    finding 19"),
+            "{listed}"
+        );
         result.report_with(|| unreachable!("this text is not listed"));
         assert!(!result.holds());
         assert!(result.to_string().ends_with("\n    finding 19\n    and 1 more"));

@@ -113,7 +113,10 @@ mod tests {
             (|m| m.enclosed = Enclosed::Keep, "enclosed: delete in A; keep in B"),
             (|m| m.leaves = 7, "leaves: 8 in A; 7 in B"),
             (
-                |m| m.components = Some(Components { outside: 3, inside: 2, ..Components::default() }),
+                |m| {
+                    m.components =
+                        Some(Components { outside: 3, inside: 2, ..Components::default() })
+                },
                 "components: not stated in A; 3 outside (0 enclosed, of 0 leaves), 2 inside in B",
             ),
             (

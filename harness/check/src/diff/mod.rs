@@ -269,7 +269,8 @@ mod tests {
     #[test]
     fn the_octants_that_differ_are_listed_up_to_eight() {
         let octants: Vec<Octant> = (0..8).map(level_3).collect();
-        let mut report = DiffReport { octants, leaf: Some("a leaf".to_owned()), ..DiffReport::default() };
+        let mut report =
+            DiffReport { octants, leaf: Some("a leaf".to_owned()), ..DiffReport::default() };
         report.rules = vec!["one".to_owned(), "two".to_owned()];
         report.fields = vec!["a field".to_owned()];
         let eight = "0.0.0, 0.0.1, 0.0.2, 0.0.3, 0.0.4, 0.0.5, 0.0.6, 0.0.7";
@@ -280,11 +281,15 @@ mod tests {
         report.octants.push(level_3(511));
         report.leaf = None;
         let contradiction = "but the leaves in them are the same: a manifest contradicts its files";
-        let expected =
-            format!("a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\n{contradiction}");
+        let expected = format!(
+            "a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\n{contradiction}"
+        );
         assert_eq!(report.to_string(), expected);
         let same = DiffReport { compared: Trust::Manifests, leaves: 5, ..DiffReport::default() };
-        assert_eq!(same.to_string(), "the leaves are the same (5, by the digests in the manifests)");
+        assert_eq!(
+            same.to_string(),
+            "the leaves are the same (5, by the digests in the manifests)"
+        );
     }
 
     #[test]
@@ -303,9 +308,14 @@ mod tests {
                 assert_eq!((found.octants, found.leaves), (vec![level_3(index)], 512));
                 let octant = word::octant(words[index]);
                 let leaf = leaf_set(vec![]).manifest.root.describe(&octant);
-                let text = format!("first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}");
+                let text = format!(
+                    "first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}"
+                );
                 assert_eq!(found.leaf, Some(text));
-                assert_eq!(found.rules, ["section 4 (side): give the case file (--case) to decide it"]);
+                assert_eq!(
+                    found.rules,
+                    ["section 4 (side): give the case file (--case) to decide it"]
+                );
                 assert_eq!(found.contradictions, [""; 0]);
             }
         }
@@ -326,7 +336,10 @@ mod tests {
             diff(a.path(), b.path(), None, Trust::Leaves).unwrap().rules.concat()
         };
         assert!(rules(|_| ()).starts_with("section 4"));
-        assert!(rules(|m| m.tree = contract::manifest::Tree::Base).starts_with("none: one is a base tree"));
+        assert!(
+            rules(|m| m.tree = contract::manifest::Tree::Base)
+                .starts_with("none: one is a base tree")
+        );
         assert!(rules(|m| m.layer_cells_min = 2).starts_with("none: the inputs differ"));
     }
 

@@ -342,14 +342,17 @@ mod tests {
 
     #[test]
     fn a_leaf_requires_a_split_up_to_the_distance_of_its_rule() {
-        let octant = |path: &[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
+        let octant =
+            |path: &[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
         let requires = |n: u32, source: &[u8], target: &[u8]| {
             let terms = terms(n);
             let dispute = Dispute { a: &[], b: &[], terms: &terms, case: None };
             dispute.requires(&octant(source), &octant(target))
         };
         // Octant 0.0.1 of level 3 is two of its cells away from octant 1, 0.1.0 one, and 0.1.1 touches it.
-        for (source, touching, cells) in [(&[0, 0, 1], false, 2), (&[0, 1, 0], false, 1), (&[0, 1, 1], true, 0)] {
+        for (source, touching, cells) in
+            [(&[0, 0, 1], false, 2), (&[0, 1, 0], false, 1), (&[0, 1, 1], true, 0)]
+        {
             for n in 1..=4 {
                 let text = requires(n, source, &[1]);
                 if cells + 1 < n {
@@ -367,7 +370,9 @@ mod tests {
             }
         }
         // One level finer than a leaf that it touches, as fine, coarser, and within it.
-        for (source, target) in [(&[0, 1][..], &[1][..]), (&[0], &[1]), (&[0], &[1, 0]), (&[1, 0, 0], &[1])] {
+        for (source, target) in
+            [(&[0, 1][..], &[1][..]), (&[0], &[1]), (&[0], &[1, 0]), (&[1, 0, 0], &[1])]
+        {
             assert_eq!(requires(1, source, target), None);
         }
         for (source, target) in [(&[0][..], &[1][..]), (&[0], &[1, 0]), (&[1, 0, 0], &[1])] {
@@ -380,8 +385,10 @@ mod tests {
         let words = mesh(&[&[0], &[1, 0], &[1, 7], &[3]]);
         let terms = terms(1);
         let dispute = Dispute { a: &words, b: &[], terms: &terms, case: None };
-        let octant = |path: &[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
-        let ancestor = |path: &[u8]| dispute.ancestor_leaf(Mesh::A, &octant(path)).map(|leaf| leaf.octant);
+        let octant =
+            |path: &[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
+        let ancestor =
+            |path: &[u8]| dispute.ancestor_leaf(Mesh::A, &octant(path)).map(|leaf| leaf.octant);
         let within = |path: &[u8]| dispute.has_within(Mesh::A, &octant(path));
         assert_eq!(ancestor(&[0, 0]), Some(octant(&[0])));
         assert_eq!(ancestor(&[0, 7, 7]), Some(octant(&[0])));
@@ -389,9 +396,16 @@ mod tests {
         for path in [&[0][..], &[1], &[1, 0], &[2, 0], &[7]] {
             assert_eq!(ancestor(path), None, "{path:?}");
         }
-        for (path, expected) in
-            [(&[0][..], true), (&[1], true), (&[1, 0], true), (&[1, 1], false), (&[1, 6], false), (&[2], false), (&[7], false), (&[], true)]
-        {
+        for (path, expected) in [
+            (&[0][..], true),
+            (&[1], true),
+            (&[1, 0], true),
+            (&[1, 1], false),
+            (&[1, 6], false),
+            (&[2], false),
+            (&[7], false),
+            (&[], true),
+        ] {
             assert_eq!(within(path), expected, "{path:?}");
         }
         assert!(!dispute.has_within(Mesh::B, &Octant::ROOT));
@@ -415,9 +429,14 @@ mod tests {
             "section 5: keep is outside, so B must not have a leaf that is inside"
         );
         let lost = "is kept; B lost the leaf, or gave its component another side (section 4)";
-        for (side, keep) in [(Side::Crossing, Keep::Inside), (Side::Inside, Keep::Inside), (Side::Outside, Keep::All)] {
+        for (side, keep) in [
+            (Side::Crossing, Keep::Inside),
+            (Side::Inside, Keep::Inside),
+            (Side::Outside, Keep::All),
+        ] {
             let keep_name = format!("{keep:?}").to_lowercase();
-            let expected = format!("section 5: keep is {keep_name}, so a leaf that is {side} {lost}");
+            let expected =
+                format!("section 5: keep is {keep_name}, so a leaf that is {side} {lost}");
             assert_eq!(absence(Mesh::A, side, keep, true), expected);
         }
     }
@@ -436,8 +455,14 @@ mod tests {
         for case in [None, Some(&case)] {
             assert!(caveat(Keep::All, false, case).contains("deleted afterwards"));
         }
-        assert_eq!(caveat(Keep::Outside, true, None), ", unless a facet does (give the case file: --case)");
-        assert_eq!((caveat(Keep::All, true, None), caveat(Keep::Outside, true, Some(&case))), ("", ""));
+        assert_eq!(
+            caveat(Keep::Outside, true, None),
+            ", unless a facet does (give the case file: --case)"
+        );
+        assert_eq!(
+            (caveat(Keep::All, true, None), caveat(Keep::Outside, true, Some(&case))),
+            ("", "")
+        );
     }
 
     #[test]
@@ -466,7 +491,10 @@ mod tests {
         assert!(rule(&[coarse[0] | 2], &coarse).contains("crossing: A is right"));
         let far = mesh(&[&[7]]);
         assert!(rule(&[far[0] | 1], &far).contains("0 of its 6 rays are inside: B is right"));
-        assert!(rule(&[far[0] | 1], &[far[0] | 2]).contains("0 of its 6 rays are inside: neither is right"));
+        assert!(
+            rule(&[far[0] | 1], &[far[0] | 2])
+                .contains("0 of its 6 rays are inside: neither is right")
+        );
         assert!(rule(&coarse, &[coarse[0] | 2]).contains("crossing: B is right"));
     }
 }

@@ -167,8 +167,12 @@ mod tests {
     /// The meaning of places of which the first is this wide.
     fn of_width(kind: Kind, width: f64, changing: u64, with_cell: bool) -> String {
         let place = Place { width: Some(width), ..Place::new(vec![0], [0.0; 3]) };
-        let finding =
-            Finding { count: 3, count_changing: changing, places: vec![place], ..Finding::new(kind) };
+        let finding = Finding {
+            count: 3,
+            count_changing: changing,
+            places: vec![place],
+            ..Finding::new(kind)
+        };
         meaning(&finding, &input(with_cell))
     }
 
@@ -178,8 +182,18 @@ mod tests {
         for (width, changing, with_cell, beginning) in [
             (0.0, 0, true, "All have no width"),
             (0.99, 0, true, "All are narrower than the finest cell"),
-            (1.0, 0, true, "All are narrower than a cell, so crossing leaves close them; at a spacing of 1.00 or less"),
-            (1.0, 3, false, "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less"),
+            (
+                1.0,
+                0,
+                true,
+                "All are narrower than a cell, so crossing leaves close them; at a spacing of 1.00 or less",
+            ),
+            (
+                1.0,
+                3,
+                false,
+                "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
+            ),
             (13.9, 3, true, "All are at least one cell wide and may leak"),
             (14.0, 3, true, "All are at least one cell wide, and the widest leaks unless"),
             (14.0, 1, true, "One is at least one cell wide, and"),
@@ -198,7 +212,10 @@ mod tests {
             let narrow = of_width(kind, 1.99, 3, true);
             assert!(narrow.ends_with("too narrow for the finest cell of the root."), "{narrow}");
             let wide = of_width(kind, 2.0, 3, true);
-            assert!(wide.ends_with(" A spacing below 1.00 would resolve the narrowest place."), "{wide}");
+            assert!(
+                wide.ends_with(" A spacing below 1.00 would resolve the narrowest place."),
+                "{wide}"
+            );
         }
     }
 
@@ -230,12 +247,20 @@ mod tests {
         assert_eq!(meanings.len(), kinds.len() + 1);
         let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.title()).collect();
         assert_eq!(titles.len(), kinds.len());
-        let changing = |keep| kinds.into_iter().filter(move |&kind| changes_region(kind, keep)).collect::<Vec<_>>();
+        let changing = |keep| {
+            kinds.into_iter().filter(move |&kind| changes_region(kind, keep)).collect::<Vec<_>>()
+        };
         let always = [Kind::NonManifoldOdd, Kind::Duplicates];
         let all = [always[0], always[1], Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot];
         assert_eq!(changing(Keep::All), all);
-        assert_eq!(changing(Keep::Outside), [always[0], always[1], Kind::ThinGaps, Kind::OutsideRoot]);
-        assert_eq!(changing(Keep::Inside), [always[0], always[1], Kind::ThinWalls, Kind::OutsideRoot]);
+        assert_eq!(
+            changing(Keep::Outside),
+            [always[0], always[1], Kind::ThinGaps, Kind::OutsideRoot]
+        );
+        assert_eq!(
+            changing(Keep::Inside),
+            [always[0], always[1], Kind::ThinWalls, Kind::OutsideRoot]
+        );
     }
 
     #[test]

@@ -184,10 +184,19 @@ mod tests {
             facets: 30,
             vertices: 17,
             solids: vec![solid(Some("wing"), 20), solid(None, 10)],
-            shells: Shells { count: 3, closed: 2, largest: vec![shell(0, 16, true), shell(16, 8, false)] },
+            shells: Shells {
+                count: 3,
+                closed: 2,
+                largest: vec![shell(0, 16, true), shell(16, 8, false)],
+            },
             root: Root { origin: [-8.0; 3], edge: 16.0 },
             cell: Some(0.25),
-            extent: Extent { low: [-1.0; 3], high: [1.0, 1.0, 2.5], margin: 5.5, margin_cells: Some(22.0) },
+            extent: Extent {
+                low: [-1.0; 3],
+                high: [1.0, 1.0, 2.5],
+                margin: 5.5,
+                margin_cells: Some(22.0),
+            },
             findings: vec![
                 finding(Kind::Openings, 2, 1, vec![hole]),
                 finding(Kind::Junctions, 3, 0, one(4..5)),
@@ -233,7 +242,8 @@ mod tests {
         let mut plain = diagnosis();
         (plain.cell, plain.changes_region) = (None, false);
         (plain.solids, plain.findings) = (Vec::new(), Vec::new());
-        plain.shells = Shells { count: 1, closed: 1, largest: vec![plain.shells.largest[0].clone()] };
+        plain.shells =
+            Shells { count: 1, closed: 1, largest: vec![plain.shells.largest[0].clone()] };
         let expected = "facets    30, with 17 distinct vertices\nshells    1, 1 closed\n\
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\

@@ -115,8 +115,14 @@ mod tests {
         let words = words_with_sides(|o| o.level < 1, |o| Some(crossing(o.digit())));
         let leaves = Leaves::new(&words).unwrap();
         let (crossed, free) = ([UNITS_PER_EDGE / 4; 3], [3 * UNITS_PER_EDGE / 4; 3]);
-        assert_eq!(in_tree(crossed, None, &leaves).err(), Some("facets cross the leaf of the start"));
-        assert_eq!(in_tree(free, Some(crossed), &leaves).err(), Some("facets cross the leaf of the end"));
+        assert_eq!(
+            in_tree(crossed, None, &leaves).err(),
+            Some("facets cross the leaf of the start")
+        );
+        assert_eq!(
+            in_tree(free, Some(crossed), &leaves).err(),
+            Some("facets cross the leaf of the end")
+        );
         assert!(matches!(in_tree(free, None, &leaves), Ok((7, Goal::Far))));
         assert!(matches!(in_tree(free, Some(free), &leaves), Ok((7, Goal::Place(7)))));
     }

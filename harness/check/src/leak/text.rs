@@ -248,10 +248,14 @@ mod tests {
         let unknown = "no leak at this spacing, nor at any finer one that was tried; whether one leaks is not known: the limit\n";
         assert_eq!(verdict(&report), unknown);
         report.is_separated = true;
-        let never = "no leak at any spacing: the facets form a closed surface between start and end\n";
+        let never =
+            "no leak at any spacing: the facets form a closed surface between start and end\n";
         assert_eq!(verdict(&report), never);
         report.opens = Some(Spacing::of(5, &report.root));
-        assert_eq!(verdict(&report), "no leak at this spacing; it would open at spacing 0.250 (level 5)\n");
+        assert_eq!(
+            verdict(&report),
+            "no leak at this spacing; it would open at spacing 0.250 (level 5)\n"
+        );
     }
 
     #[test]

@@ -81,7 +81,12 @@ mod tests {
             finding: None,
         };
         let mut report = SelftestReport::default();
-        report.kills.push(kill("leaf removed", "complete", &["complete", "identical"], &["complete"]));
+        report.kills.push(kill(
+            "leaf removed",
+            "complete",
+            &["complete", "identical"],
+            &["complete"],
+        ));
         report.kills[0].finding = Some("two\nlines".to_owned());
         report.kills.push(kill("leaf removed", "complete", &["balance"], &[]));
         report.kills.push(kill("side", "sides", &["sides"], &[]));

@@ -216,7 +216,14 @@ mod tests {
 
     fn cause(digits: &[u8], facets: &[u32], count: u64, boxes: &[usize]) -> CauseRecord {
         let (facets, boxes) = (facets.to_vec(), boxes.to_vec());
-        CauseRecord { section: "3", octant: place(digits), facets, facets_count: count, is_crossed: count > 0, boxes }
+        CauseRecord {
+            section: "3",
+            octant: place(digits),
+            facets,
+            facets_count: count,
+            is_crossed: count > 0,
+            boxes,
+        }
     }
 
     fn link(rule: &'static str, octant: &[u8], leaf: &[u8], distance_cells: i64) -> LinkRecord {
@@ -251,14 +258,19 @@ mod tests {
     fn sizes(splits: Vec<Split>) -> String {
         let text = answer(splits).to_string();
         let text = text.strip_prefix(HEAD).unwrap_or_else(|| panic!("{text}"));
-        text.strip_suffix(&format!("side\n  not explained{TERMS}")).unwrap_or_else(|| panic!("{text}")).to_owned()
+        text.strip_suffix(&format!("side\n  not explained{TERMS}"))
+            .unwrap_or_else(|| panic!("{text}"))
+            .to_owned()
     }
 
     #[test]
     fn splits_of_the_base_tree_share_the_cause_of_the_finest() {
         assert_eq!(sizes(vec![]), "  the leaf is the root: nothing splits it\n");
         let root = split(&[], vec![], Some(cause(&[], &[7], 1, &[])));
-        assert_eq!(sizes(vec![root.clone()]), "  level 0: the root is split by section 3: facet 7 crosses it\n");
+        assert_eq!(
+            sizes(vec![root.clone()]),
+            "  level 0: the root is split by section 3: facet 7 crosses it\n"
+        );
         let finest = split(&[0], vec![], Some(cause(&[0], &[1, 2], 2, &[])));
         let expected = "  levels 0 to 1: octant 0 (level 1), (0, 0, 0) to (8, 8, 8) and its ancestors are split by section 3: \
             facets 1, 2 cross it, each of which suffices\n";
@@ -274,7 +286,10 @@ mod tests {
         assert_eq!(of(&[4, 5], 9, &[]), "facets 4, 5 and 7 more cross it, each of which suffices");
         assert_eq!(of(&[4], 1, &[0]), "facet 4 crosses it; box 0 meets it, each of which suffices");
         assert_eq!(of(&[], 0, &[2]), "box 2 meets it");
-        assert_eq!(what(&CauseRecord { is_crossed: true, ..cause(&[], &[], 0, &[]) }), "the surface crosses it");
+        assert_eq!(
+            what(&CauseRecord { is_crossed: true, ..cause(&[], &[], 0, &[]) }),
+            "the surface crosses it"
+        );
         let both = CauseRecord { is_crossed: true, ..cause(&[], &[], 0, &[1]) };
         assert_eq!(what(&both), "the surface crosses it; box 1 meets it, each of which suffices");
     }
@@ -285,9 +300,11 @@ mod tests {
         let shared = || link("balance", &[1, 0], &[1, 0, 0, 0], 0);
         let first = split(&[0], vec![link("layer", &[0], &[1, 0, 0], 1), shared()], end());
         let second = split(&[0, 3], vec![link("layer", &[0, 3], &[1, 0, 2], 2), shared()], end());
-        let mut third = split(&[0, 3, 1], vec![link("extra_layer", &[0, 3, 1], &[1, 0, 3, 0], 0)], end());
+        let mut third =
+            split(&[0, 3, 1], vec![link("extra_layer", &[0, 3, 1], &[1, 0, 3, 0], 0)], end());
         third.is_shortest = false;
-        let touching = split(&[0], vec![link("layer", &[0], &[1, 0, 0], 0)], Some(cause(&[1], &[], 0, &[3])));
+        let touching =
+            split(&[0], vec![link("layer", &[0], &[1, 0, 0], 0)], Some(cause(&[1], &[], 0, &[3])));
         let text = sizes(vec![first, second, third, touching]);
         let expected = "  level 1: octant 0 (level 1), (0, 0, 0) to (8, 8, 8) is split\n    \
             by section 6 (layer): only 1 cell of level 3 away is the leaf octant 1.0.0 (level 3), (8, 0, 0) to (10, 2, 2)\n    \
@@ -308,7 +325,10 @@ mod tests {
     #[test]
     fn only_a_chain_with_the_same_end_and_cause_is_referred_to() {
         let other = |from: &[u8], facet| {
-            let links = vec![link("layer", from, &[1, 0, 0], 1), link("balance", &[1, 0], &[1, 0, 0, 0], 0)];
+            let links = vec![
+                link("layer", from, &[1, 0, 0], 1),
+                link("balance", &[1, 0], &[1, 0, 0, 0], 0),
+            ];
             split(from, links, Some(cause(&[1, 0], &[facet], 1, &[])))
         };
         let by_reference = "as in the chain of level 1";
@@ -341,7 +361,11 @@ mod tests {
         );
         assert_eq!(side, "  not explained\nleft out: one thing\nleft out: another");
         deleted.base_leaf = None;
-        assert!(ends(&deleted).0.starts_with("(1, 2, 0.5) lies in a part of the root that was deleted\n"));
+        assert!(
+            ends(&deleted)
+                .0
+                .starts_with("(1, 2, 0.5) lies in a part of the root that was deleted\n")
+        );
         assert!(!deleted.to_string().contains("nothing splits it"));
     }
 
@@ -367,7 +391,10 @@ mod tests {
             is_proven: true,
         };
         component.side_decided_by = reason(Side::Outside, None, true);
-        assert_eq!(ends(&component).1, "  outside by section 4: the decision\n  the component has 5 leaves of T0");
+        assert_eq!(
+            ends(&component).1,
+            "  outside by section 4: the decision\n  the component has 5 leaves of T0"
+        );
         component.side_decided_by = reason(Side::Inside, Some(place(&[2])), false);
         let side = "  inside by section 4: the decision\n  candidate: octant 2 (level 1), (0, 8, 0) to (8, 16, 8)\n  \
             the component has at least 5 leaves of T0\n  but the mesh has the side outside here";

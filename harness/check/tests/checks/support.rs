@@ -36,16 +36,6 @@ pub fn meshes_of_facets(
     }
 }
 
-/// Compares a text with that of a file beside this one. If it differs as intended, copy the file that the message names.
-pub fn assert_text(text: &str, file: &str) {
-    let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/checks/expected").join(file);
-    if text != std::fs::read_to_string(&expected).unwrap_or_default() {
-        let found = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
-        std::fs::write(&found, text).unwrap();
-        panic!("{} differs from {}", found.display(), expected.display());
-    }
-}
-
 fn read_meshes(path: &Path, dir: &Path) -> SelftestCase {
     let given = reference::case_file::read(path).unwrap();
     let write = |which, name: &str, mesh| {

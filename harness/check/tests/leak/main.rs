@@ -8,7 +8,7 @@ use check::leak::report::Report;
 use check::leak::{LeakError, Question, Watch, answer};
 use contract::case::{Case, Facet};
 use contract::lattice::Root;
-use contract::testing::base_tree;
+use contract::testing::{assert_text, base_tree};
 use openings::{Body, ROTATIONS, bodies, two_holes};
 use std::convert::Infallible;
 
@@ -102,6 +102,17 @@ fn the_widest_path_leads_through_a_crack() {
 #[test]
 fn the_widest_path_leads_through_a_missing_facet() {
     assert_passage(&bodies()[3]);
+}
+
+#[test]
+fn the_answer_about_a_slit_and_a_crack_is_the_expected_text() {
+    for body in &bodies()[1..3] {
+        let wide = ROOT.level_for(body.width / 12f64.sqrt()).unwrap();
+        for (level, what) in [(wide, "open"), (wide - 3, "closed")] {
+            let text = from_centre(&body.facets, level).to_string();
+            assert_text(&text, &format!("tests/leak/expected/{}-{what}.txt", body.name));
+        }
+    }
 }
 
 #[test]

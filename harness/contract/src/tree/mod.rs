@@ -191,19 +191,31 @@ mod tests {
     #[test]
     fn a_handle_is_a_leaf_part_of_a_coarser_one_a_node_or_neither() {
         for handle in [Handle::HOLE, Handle::OUTSIDE_ROOT] {
-            assert_eq!((handle.as_leaf(), handle.as_coarser_leaf(), handle.is_node()), (None, None, false));
+            assert_eq!(
+                (handle.as_leaf(), handle.as_coarser_leaf(), handle.is_node()),
+                (None, None, false)
+            );
         }
         for kind in 0..=DELETED {
             let leaf = Handle::leaf(kind);
-            assert_eq!((leaf.as_leaf(), leaf.as_coarser_leaf(), leaf.is_node()), (Some(kind), None, false));
+            assert_eq!(
+                (leaf.as_leaf(), leaf.as_coarser_leaf(), leaf.is_node()),
+                (Some(kind), None, false)
+            );
             for level in 0..=crate::octant::LEVEL_MAX {
                 let part = Handle::coarser_leaf(kind, level);
-                assert_eq!((part.as_leaf(), part.as_coarser_leaf(), part.is_node()), (None, Some((kind, level)), false));
+                assert_eq!(
+                    (part.as_leaf(), part.as_coarser_leaf(), part.is_node()),
+                    (None, Some((kind, level)), false)
+                );
             }
         }
         for index in [0, 1, 1 << 30] {
             let node = Handle::node(index);
-            assert_eq!((node.as_leaf(), node.as_coarser_leaf(), node.is_node()), (None, None, true));
+            assert_eq!(
+                (node.as_leaf(), node.as_coarser_leaf(), node.is_node()),
+                (None, None, true)
+            );
             assert_eq!(node.index(), index);
         }
     }
@@ -211,7 +223,9 @@ mod tests {
     #[test]
     fn summaries_of_holes_leaves_and_parts_of_leaves_agree() {
         let tree = Tree::default();
-        let of = |handle| (tree.finest_level(handle, 7), tree.coarsest_level(handle, 7), tree.kinds(handle));
+        let of = |handle| {
+            (tree.finest_level(handle, 7), tree.coarsest_level(handle, 7), tree.kinds(handle))
+        };
         assert_eq!(of(Handle::HOLE), (0, NO_LEAF, HOLES));
         assert_eq!(of(Handle::OUTSIDE_ROOT), (0, NO_LEAF, 0));
         for kind in 0..=DELETED {
@@ -233,7 +247,8 @@ mod tests {
         for digit in 0..8 {
             let child = Octant::ROOT.child(digit);
             let kind = if digit == 2 { DELETED } else { 0 };
-            let octants = if digit == 5 { (0..8).map(|d| child.child(d)).collect() } else { vec![child] };
+            let octants =
+                if digit == 5 { (0..8).map(|d| child.child(d)).collect() } else { vec![child] };
             for octant in octants {
                 builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
             }
@@ -242,7 +257,10 @@ mod tests {
         assert_eq!(builder.push(25 << 2), Err(Refusal::Fault(word::WordError::LevelTooDeep(25))));
         let tree = builder.finish();
         let root = tree.root();
-        assert_eq!((tree.finest_level(root, 0), tree.coarsest_level(root, 0), tree.kinds(root)), (2, 1, 1 | 1 << DELETED));
+        assert_eq!(
+            (tree.finest_level(root, 0), tree.coarsest_level(root, 0), tree.kinds(root)),
+            (2, 1, 1 | 1 << DELETED)
+        );
         let deleted = tree.child(root, 2, 0);
         assert_eq!((deleted.as_leaf(), tree.coarsest_level(deleted, 1)), (Some(DELETED), NO_LEAF));
         let only = Tree::of_words(&[0]);
@@ -258,7 +276,10 @@ mod tests {
         let tree = Tree::of_words(&words);
         assert!(tree.nodes() > 2048);
         for &w in words.iter().step_by(11) {
-            assert_eq!(tree.locate(word::octant(w).corner), Some((word::octant(w), (w & 3) as Kind)));
+            assert_eq!(
+                tree.locate(word::octant(w).corner),
+                Some((word::octant(w), (w & 3) as Kind))
+            );
         }
     }
 
@@ -329,6 +350,12 @@ mod tests {
             // The margin is within the octant's neighbours.
             prop_assert_eq!(Neighbourhood::of(&tree, octant).coarsest_within(&tree, &region, NO_LEAF).level, expected);
         }
+
+    }
+
+    proptest! {
+        // Each case searches among all leaves for every neighbour of every octant.
+        #![proptest_config(ProptestConfig::with_cases(32))]
 
         #[test]
         fn a_walk_visits_every_leaf_with_its_neighbourhood(words in random_words(3)) {
