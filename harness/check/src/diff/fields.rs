@@ -98,7 +98,8 @@ mod tests {
         let a = leaf_set(vec![words_of(|o| o.level < 1)]).manifest;
         assert_eq!(differing(&a, &a), [""; 0]);
         let enclosed = EnclosedComponents { count: 1, leaves: 9, example: Some([0.5, 1.0, 2.0]) };
-        let cases: [(fn(&mut Manifest), &str); 14] = [
+        type Change = fn(&mut Manifest);
+        let cases: [(Change, &str); 14] = [
             (|m| m.tree = Tree::Base, "tree: final in A; base in B"),
             (|m| m.root.edge = 3.0, "root: (0, 0, 0) with edge 8 in A; (0, 0, 0) with edge 3 in B"),
             (|m| m.level_surface = 4, "level of the surface (from spacing_min): 0 in A; 4 in B"),
