@@ -255,6 +255,18 @@ mod tests {
         assert_eq!(Parity::new(&[facet, facet]).inside([2, 2, 3]), [false; 6]);
     }
 
+    /// The point is moved by eps to the right and by eps squared upwards.
+    #[test]
+    fn a_ray_through_an_edge_or_a_corner_is_decided_by_the_perturbation() {
+        let facet = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
+        for (x, y, crosses) in
+            [(0, 2, true), (2, 0, true), (4, 4, false), (0, 0, true), (8, 0, false), (0, 8, false)]
+        {
+            let found = Parity::new(&[facet]).inside([x, y, -3]);
+            assert_eq!(found, [false, false, false, false, crosses, false], "({x}, {y})");
+        }
+    }
+
     #[test]
     fn degenerate_facets_are_not_crossed() {
         let segment = [[0, 0, 0], [8, 8, 8], [4, 4, 4]];

@@ -125,6 +125,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_text_must_be_that_of_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("expected.txt").to_string_lossy().into_owned();
+        fs::write(&path, "text").unwrap();
+        assert_text("text", &path);
+        assert!(std::panic::catch_unwind(|| assert_text("other", &path)).is_err());
+    }
+
+    #[test]
     fn pseudorandom_numbers_differ_by_octant_seed_and_salt() {
         let octants = octants_of(&words_of(|o| o.level < 2));
         let numbers = |seed, salt| octants.iter().map(move |o| pick(seed, o, salt));

@@ -303,6 +303,8 @@ fn counts_beyond_the_file_are_errors() {
             replace(bytes, "\n256\n(", &format!("\n{count}{{0}}\n("))
         });
     }
+    let why = refusal("foam-binary", "points", |bytes| replace(bytes, "\n462\n", "\n600\n"));
+    assert!(why.contains("points: states 600 items, but has only "), "{why}");
     // An item takes two bytes at least.
     let half = fs::read(sample("foam-ascii").join("owner")).unwrap().len() / 2;
     let why =
@@ -419,6 +421,33 @@ fn each_error_of_a_mesh_names_its_cell() {
     assert!(overlap.contains("cell 1 ") && overlap.contains("overlaps cell 0 "), "{overlap}");
     let index = refusal("cube.json", "", |bytes| replace(bytes, "[[2, 2, 2], ", "[[2, 2, 1], "));
     assert!(index.contains("cell 0 (corner"), "{index}");
+}
+
+#[test]
+fn lists_of_other_meshes_and_absurd_sizes_are_refused() {
+    // One neighbour more than there are faces.
+    let why = refusal("foam-ascii", "neighbour", |bytes| {
+        let at = bytes.windows(6).position(|w| w == b"\n720\n(").unwrap();
+        bytes.truncate(at);
+        bytes.extend(format!("\n961\n({})", "0 ".repeat(961)).bytes());
+    });
+    assert!(
+        why.contains(
+            "960 faces with 960 owners and 961 neighbours: its files belong to different meshes"
+        ),
+        "{why}"
+    );
+    for size in [1 << 20, u64::MAX / 2] {
+        let why = refusal("brick.p8est", "", |bytes| {
+            let format = 0x0300_0009u64.to_le_bytes();
+            let at = bytes.windows(8).rposition(|w| w == format).unwrap();
+            bytes[at + 24..at + 32].copy_from_slice(&size.to_le_bytes());
+        });
+        assert!(why.contains(&format!("it states {size} bytes of data per quadrant")), "{why}");
+    }
+    let close =
+        refusal("cube.json", "", |bytes| replace(bytes, "[[0.125, 0.125", "[[0.125, 0.1250005"));
+    assert!(close.contains("widths 0.125 and 0.1250005 along axis 1"), "{close}");
 }
 
 #[test]
