@@ -97,6 +97,12 @@ def update(tree, repository):
             shutil.copymode(repository / name, tree / name)
 
 
+def rename(tree):
+    """Gives the crates of the copy another version: with the same one, cargo would take their programs for those of the repository."""
+    manifest = tree / "Cargo.toml"
+    manifest.write_text(re.sub(r'^(version = "[^"+]+)"', r'\1+mutants"', manifest.read_text(), count=1, flags=re.MULTILINE))
+
+
 def described(mutant):
     """The change without its line, which moves with every edit."""
     return re.sub(r"^([^:]*):\d+:\d+: ", r"\1: ", mutant["name"])
@@ -305,6 +311,7 @@ def main():
     given = parser.parse_args()
     tree = given.tree
     update(tree, given.repository)
+    rename(tree)
     known = {line for line in given.known.read_text().splitlines() if line and line[0] not in "#[ "}
 
     listed = subprocess.run(["cargo", "mutants", "--list", "--json", "--package", given.crate], cwd=tree, capture_output=True, text=True)

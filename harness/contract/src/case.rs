@@ -402,6 +402,70 @@ mod tests {
     }
 
     #[test]
+    fn the_manifest_of_a_case_has_all_its_inputs() {
+        let text = "spacing_min = 1.0\nlayer_cells_min = 2\nkeep = 'inside'\nkeep_crossing = false\nenclosed = 'keep'\n\
+                    seeds = [[5.5, 5.5, 5.5]]\n[root]\norigin = [-1.0, -1.0, -1.0]\nedge = 8.0\n\
+                    [[box]]\nmin = [0.0, 1.0, 2.0]\nmax = [4.0, 6.0, 3.0]\nspacing = 0.3";
+        let case = Case::from_parts(text, vec![UNIT]).unwrap();
+        let manifest = case.manifest(Tree::Base, "a program".to_owned());
+        assert_eq!(
+            (manifest.tree, manifest.program.as_str(), manifest.root),
+            (Tree::Base, "a program", case.root)
+        );
+        assert_eq!((manifest.level_surface, manifest.layer_cells_min), (3, 2));
+        assert_eq!(
+            (manifest.keep, manifest.keep_crossing, manifest.enclosed),
+            (Keep::Inside, false, Enclosed::Keep)
+        );
+        assert_eq!((manifest.boxes, manifest.seeds), (case.boxes.clone(), vec![[13 << 23; 3]]));
+        assert_eq!((case.boxes.len(), manifest.leaves), (1, 0));
+    }
+
+    #[test]
+    fn a_box_has_positive_extent_and_spacing() {
+        let with = |min: &str, max: &str, spacing: &str| {
+            let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0";
+            let text = format!(
+                "spacing_min = 1.0\n{root}\n[[box]]\nmin = {min}\nmax = {max}\nspacing = {spacing}"
+            );
+            Case::from_parts(&text, vec![]).err()
+        };
+        assert_eq!(with("[0, 0, 0]", "[1, 1, 1]", "0.5"), None);
+        let wrong = Some("box 0: min must be below max in every axis, and finite".to_owned());
+        for (min, max) in [
+            ("[0, 1, 0]", "[1, 1, 1]"),
+            ("[0, 0, 2]", "[1, 1, 1]"),
+            ("[-inf, 0, 0]", "[1, 1, 1]"),
+            ("[0, 0, 0]", "[1, nan, 1]"),
+            ("[0, 0, 0]", "[1, 1, inf]"),
+        ] {
+            assert_eq!(with(min, max, "0.5"), wrong, "{min} {max}");
+        }
+        assert!(
+            with("[0, 0, 0]", "[1, 1, 1]", "0.0").unwrap().starts_with("box spacing = 0 must be")
+        );
+        assert!(with("[0, 0, 0]", "[1, 1, 1]", "1e-9").unwrap().contains("deeper than 19"));
+    }
+
+    #[test]
+    fn an_error_of_the_file_has_a_line_and_one_of_the_whole_has_none() {
+        let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
+        assert_eq!(why("layer_cells_min = 3"), "missing field `spacing_min`");
+        let text = "spacing_min = 1.0\n\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 'long'";
+        assert!(why(text).starts_with("line 5, edge: invalid type: string"), "{}", why(text));
+        let without_edge = why("spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]");
+        assert_eq!(without_edge, "line 2, [root]: missing field `edge`");
+        assert_eq!(place("a = 1\nb c\n= 2", 8), ("line 2".to_owned(), String::new()));
+        assert_eq!(place("a = 1\n= 2", 7), ("line 2".to_owned(), String::new()));
+        assert_eq!(place("a = 1\n  b.\"c\" = 2", 6), ("line 2".to_owned(), ", b.\"c\"".to_owned()));
+        let both = "spacing_min = 1.0\nroot_scale = inf";
+        assert_eq!(why(both), "root_scale = inf must be finite and greater than zero");
+        let root = "spacing_min = 1.0\n[root]\norigin = [0.0, nan, 0.0]\nedge = 8.0";
+        assert_eq!(why(root), "the root's origin is not finite");
+        assert!(why("spacing_min = 0.0").starts_with("spacing_min = 0 must be finite"));
+    }
+
+    #[test]
     fn errors_name_the_cause() {
         let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
         assert!(

@@ -234,6 +234,28 @@ mod tests {
     }
 
     #[test]
+    fn a_name_that_is_a_geometry_or_another_file_is_explained() {
+        let stl = select(&["wing.STL"], &[]).unwrap_err();
+        assert!(stl.starts_with("wing.STL is a geometry: give a case file, CASE.toml"), "{stl}");
+        let other = select(&["HERE/jet.txt"], &[]).unwrap_err();
+        assert!(
+            other.starts_with("no case ") && other.ends_with("which has cube_small, jet"),
+            "{other}"
+        );
+        let existing = select(&["HERE"], &[]).unwrap_err();
+        assert!(
+            existing.ends_with(
+                "is neither the name of a case nor a case file: its name must end in .toml"
+            ),
+            "{existing}"
+        );
+        let three = ["cube_small", "cube_small", "HERE/cube_small.toml"];
+        let expected = [("cube_small", false), ("cube_small-2", false), ("cube_small-3", false)];
+        assert_eq!(select(&three, &[]), cases(&expected));
+        assert_eq!(select(&[], &[Size::Large, Size::Medium]), cases(&[("jet", true)]));
+    }
+
+    #[test]
     fn a_path_needs_no_catalogue_and_a_name_does() {
         let catalogue = Catalogue::new("nowhere/catalogue.toml".into());
         let path = catalogue.case_file("case.toml", Path::new("there"));

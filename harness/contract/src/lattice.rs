@@ -127,6 +127,13 @@ mod tests {
     }
 
     #[test]
+    fn an_octant_is_described_by_path_lattice_and_user_coordinates() {
+        let text = "octant 3.1 (level 2), lattice [100663296, 67108864, 0] to [134217728, 100663296, 33554432], \
+            user [2.0, 2.0, 2.0] to [3.0, 3.0, 3.0]";
+        assert_eq!(ROOT.describe(&Octant::ROOT.child(3).child(1)), text);
+    }
+
+    #[test]
     fn ties_are_rounded_to_even() {
         let root = Root { origin: [0.0; 3], edge: UNITS_PER_EDGE as f64 };
         assert_eq!(root.quantise([0.5, 1.5, 2.5]), Some([0, 2, 2]));

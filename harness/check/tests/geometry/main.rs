@@ -8,6 +8,7 @@ use check::geometry::report::Diagnosis;
 use check::geometry::{Options, diagnose};
 use contract::case::Facet;
 use contract::lattice::Root;
+use contract::testing::assert_text;
 use geometries::{Generator, Shape};
 use proptest::prelude::*;
 
@@ -169,10 +170,11 @@ fn edges_with_more_than_two_facets_are_even_or_odd() {
 #[test]
 fn facets_without_area_and_slivers_have_no_effect() {
     let mut facets = cube();
-    facets.push([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]);
+    // A copy of one is no duplicate.
+    facets.extend([[[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]; 2]);
     facets.push([[9.0, 9.0, 9.0]; 3]);
     let found = diagnosis(facets, Some(0.25));
-    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 2)], false));
+    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 3)], false));
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
     assert_eq!(count(&point, Kind::Degenerate), 1);
     let sliver = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]];
@@ -219,6 +221,59 @@ fn json_has_the_schema_and_text_has_every_kind() {
         assert!(text.contains(finding.kind.title()), "{text}");
     }
     assert!(text.contains("2.00 wide (4.00 cells)"), "{text}");
+}
+
+/// Every kind of finding at a place of its own.
+#[test]
+fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
+    let at = |[x, y, z]: [f32; 3], facets: Vec<Facet>| -> Vec<Facet> {
+        facets
+            .iter()
+            .map(|facet| facet.map(|v| [v[0] / 2.0 + x, v[1] / 2.0 + y, v[2] / 2.0 + z]))
+            .collect()
+    };
+    let mut without_two = cube();
+    without_two.drain(2..4);
+    let mut junction = cube();
+    let [a, b, c] = junction[0];
+    let middle = std::array::from_fn(|x| (b[x] + c[x]) / 2.0);
+    junction[0] = [a, b, middle];
+    junction.push([a, middle, c]);
+    let mut with_fin = cube();
+    let [a, b, _] = with_fin[0];
+    with_fin.push([a, b, [-1.0; 3]]);
+    with_fin.push([b, a, [1.0, -1.0, -2.0]]);
+    let mut odd = cube();
+    odd.push([a, b, [-1.0; 3]]);
+    let mut flipped = cube();
+    flipped[7].swap(0, 1);
+    let mut copied = cube();
+    copied.extend([flipped[0], flipped[0]]);
+    let plates =
+        [cuboid([0.0; 3], [4.0, 4.0, 0.375]), cuboid([0.0, 0.0, 0.75], [4.0, 4.0, 4.0])].concat();
+    let facets = [
+        at([-12.0; 3], cube_with_hole([1.0, 1.0], [2.0, 3.0])),
+        at([-8.0, -12.0, -12.0], without_two),
+        at([-4.0, -12.0, -12.0], junction),
+        at([0.0, -12.0, -12.0], with_fin),
+        at([4.0, -12.0, -12.0], odd),
+        at([8.0, -12.0, -12.0], flipped),
+        at([-12.0, -8.0, -12.0], copied),
+        at([-8.0, -8.0, -12.0], [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat()),
+        at([-4.0, -8.0, -12.0], [cube(), cuboid([4.0, 1.0, 1.0], [6.0, 3.0, 3.0])].concat()),
+        at([4.0, -8.0, -12.0], plates),
+        at([-12.0, -4.0, -12.0], vec![[[0.0; 3], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]]]),
+        at([-12.0, 0.0, -12.0], vec![[[1.0; 3], [2.0; 3], [1.0; 3]], [[9.0; 3]; 3]]),
+        at([-16.0, 4.0, 0.0], cube()),
+        at([15.0, 8.0, 0.0], cube()),
+    ]
+    .concat();
+    for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no-cells")] {
+        let requested = Requested { spacing_min: spacing, root: Some(ROOT), root_scale: None };
+        let input = Input::new(facets.clone(), &requested).unwrap();
+        let text = diagnose(&input, &Options { first, ..Options::default() }).to_string();
+        assert_text(&text, &format!("tests/geometry/expected/{name}.txt"));
+    }
 }
 
 /// Closed shapes at random sizes and places.
