@@ -208,13 +208,13 @@ fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
         (
             open_box(),
             &["--keep", "inside", "--seed", "32,32,32"],
-            "reaches the root's boundary from its seeds",
+            "reaches the root's boundary from its seeds: right if the root cuts an open end",
         ),
         (cuboid([-1.0; 3], [65.0; 3]), &["--keep", "outside"], "nothing is outside the geometry"),
         (
             cuboid([-1.0; 3], [65.0; 3]),
             &["--keep", "inside"],
-            "inside by its rays reaches the root's boundary",
+            "inside by its rays reaches the root's boundary: right if the root cuts the geometry",
         ),
     ] {
         let (report, stderr) = meshed(&facets, options);

@@ -41,17 +41,19 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
 }
 
 fn flow_at_boundary(has_seeds: bool) -> String {
-    let cause = match has_seeds {
+    let warning = match has_seeds {
         true => {
-            "the flow reaches the root's boundary from its seeds through an opening that is wider than a cell"
+            "the flow reaches the root's boundary from its seeds: right if the root cuts an open end of a duct; otherwise it leaks \
+             through an opening that is wider than a cell: close the openings that `harness leak` finds, increase spacing_min, or \
+             choose a root that cuts the open ends"
         }
         false => {
-            "a component that is inside by its rays reaches the root's boundary: the geometry is open or extends beyond the root"
+            "a component that is inside by its rays reaches the root's boundary: right if the root cuts the geometry on purpose; \
+             otherwise close the openings that `harness leak` finds, increase spacing_min, or enlarge the root if the geometry \
+             extends beyond it"
         }
     };
-    format!(
-        "{cause}; `harness leak` finds openings: close them, increase spacing_min, or enlarge the root"
-    )
+    warning.to_owned()
 }
 
 #[cfg(test)]

@@ -103,6 +103,7 @@ pub fn write(
         Ok::<(), ExportError>(())
     })?;
     let mut notes = notes::notes(&counts, &regions, options.foam.regions);
+    notes.extend(notes::crossing(mesh, selection));
     if counts.len() > 1 && !survey.has_addressing(&model) {
         notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
     }
