@@ -117,7 +117,7 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         }
     }
     if every > 1 {
-        writeln!(f, "              every {every}th point is printed; --json and --vtk write all")?;
+        writeln!(f, "              one in {every} points is printed; --json and --vtk write all")?;
     }
     Ok(())
 }
