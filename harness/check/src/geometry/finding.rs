@@ -16,9 +16,9 @@ pub enum Kind {
     NonManifoldEven,
     /// Pairs of facets that traverse their common edge, which has no other facet, in the same direction.
     Winding,
-    /// Closed shells that enclose a negative volume by the winding of their facets, and cannot lie in another closed shell.
+    /// Closed shells of consistent winding that enclose a negative volume, and cannot lie in another closed shell.
     InsideOut,
-    /// Closed shells that enclose a negative volume, within the bounding box of another closed shell.
+    /// Closed shells of consistent winding that enclose a negative volume, within the bounding box of another closed shell.
     Cavities,
     /// Facets with the three vertices of an earlier facet, in any order.
     Duplicates,

@@ -16,7 +16,10 @@ pub struct Shell {
     pub facets: u32,
     /// Whether an even number of facets meets at every edge, so that rays agree about the inside.
     pub is_closed: bool,
-    /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning if the shell is open.
+    /// Whether as many facets traverse every edge in one direction as in the other.
+    #[serde(skip)]
+    is_oriented: bool,
+    /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
     #[serde(skip)]
     volume_sixfold: i128,
     /// Least coordinates on the lattice.
@@ -30,7 +33,15 @@ pub struct Shell {
 impl Shell {
     fn new(facet_first: u32) -> Self {
         let (low, high) = ([i64::MAX; 3], [i64::MIN; 3]);
-        Self { facet_first, facets: 0, is_closed: true, volume_sixfold: 0, low, high }
+        Self {
+            facet_first,
+            facets: 0,
+            is_closed: true,
+            is_oriented: true,
+            volume_sixfold: 0,
+            low,
+            high,
+        }
     }
 
     fn add(&mut self, facet: &FacetLattice) {
@@ -48,7 +59,7 @@ impl Shell {
     }
 
     fn is_wound_inward(&self) -> bool {
-        self.is_closed && self.volume_sixfold < 0
+        self.is_oriented && self.volume_sixfold < 0
     }
 
     /// Whether the bounding box lies in the interior of that of the other shell.
@@ -89,12 +100,16 @@ impl Shells {
             of[facet] = of[first as usize];
             all[of[facet] as usize].add(&lattice[facet]);
         }
-        for (_, mut uses) in edges.iter() {
-            if uses.len() % 2 == 1
-                && let Some(first) = uses.next()
-            {
-                all[of[first.facet as usize] as usize].is_closed = false;
+        for (_, uses) in edges.iter() {
+            let count = uses.len();
+            let (mut facet, mut down) = (0, 0);
+            for one in uses {
+                facet = one.facet as usize;
+                down += usize::from(one.is_down);
             }
+            let shell = &mut all[of[facet] as usize];
+            shell.is_closed &= count % 2 == 0;
+            shell.is_oriented &= 2 * down == count;
         }
         let mut order: Vec<u32> = (0..all.len() as u32).collect();
         order.sort_by_key(|&i| {
