@@ -41,6 +41,11 @@ impl Bounds {
         Self { lo: of(lo, f32::min), hi: of(hi, f32::max) }
     }
 
+    /// Whether these bounds extend beyond the root, after rounding to its lattice.
+    pub fn exceed(&self, root: &Root) -> bool {
+        (0..3).any(|a| root.quantise(a, self.lo[a]) < 0 || root.quantise(a, self.hi[a]) > ROOT_EDGE)
+    }
+
     /// Bounds of the union of both sets.
     pub fn union(self, other: Self) -> Self {
         Self {

@@ -48,14 +48,14 @@ use case::Case;
 use check::debug_check;
 use comm::Comm;
 use error::Error;
-use facet::Facet;
 use grow::grow;
-use lattice::{Bounds, Rules};
+use lattice::Rules;
 use octant::Level;
 use partition::cost::Counts;
 use partition::ownership::Ownership;
 use plan::pilot::{Amounts, Collector};
 use plan::{Plan, Volumes};
+use quantise::Quantised;
 use record::Recorder;
 use report::{Counters, Report};
 use tree::Tree;
@@ -142,14 +142,6 @@ pub fn plan(
     })
 }
 
-/// The result of phases 1 and 2 on a rank.
-struct Quantised {
-    rules: Rules,
-    bounds: Bounds,
-    facets: Vec<Facet>,
-    facets_total: u64,
-}
-
 impl Quantised {
     fn problem<'a>(
         &'a self,
@@ -162,7 +154,7 @@ impl Quantised {
             rules: &self.rules,
             bounds: &self.bounds,
             facets: &self.facets,
-            facets_total: self.facets_total,
+            facets_total: self.counts.total,
             spacing_min: case.spacing_min,
             volumes,
             time_cpu_s: record.phases().iter().map(|p| p.time_cpu_s).sum(),
@@ -181,13 +173,11 @@ fn quantised(
     // 1. Read: each rank reads its slice of the facets.
     let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
     debug_check(options, comm, || check::slices(&slice, comm));
-    let facets_total = slice.total;
 
     // 2. Quantise: the facets and the rules on the lattice.
-    let (rules, bounds, facets) =
-        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
-    debug_check(options, comm, || check::rules(&rules, comm));
-    Ok(Quantised { rules, bounds, facets, facets_total })
+    let quantised = record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
+    debug_check(options, comm, || check::rules(&quantised.rules, comm));
+    Ok(quantised)
 }
 
 /// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
@@ -205,7 +195,7 @@ fn pilot(
         let count = &mut |tree: &Tree, ownership: &Ownership| {
             collector.base_tree(tree, &Counts::of_rank(tree, ownership));
         };
-        let facets = (&quantised.facets[..], quantised.facets_total);
+        let facets = (&quantised.facets[..], quantised.counts);
         let mesh = grow(facets, rules, &options, comm, &mut record, &mut counters, count)?;
         let (_, written) = record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
         Ok(collector.finish(&mesh, written.leaves, &counters, &record, volumes))
@@ -237,8 +227,8 @@ fn make(
     if let Some(plan) = planned {
         record.report_plan(&plan.line());
     }
-    let Quantised { rules, facets, facets_total, .. } = quantised;
-    grow((facets, facets_total), rules, options, comm, record, counters, &mut |_, _| {})
+    let Quantised { rules, facets, counts, .. } = quantised;
+    grow((facets, counts), rules, options, comm, record, counters, &mut |_, _| {})
 }
 
 #[cfg(test)]

@@ -115,8 +115,13 @@ impl Catalogue {
             if Path::new(name).exists() {
                 return format!("{name} is neither the name of a case nor a case file: its name must end in .toml");
             }
-            let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
-            format!("no case {name} in the catalogue, which has {}", names.join(", "))
+            let alike = |case: &&Selected| strsim::jaro_winkler(name, &case.name);
+            let near = cases.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
+            let near = near.map_or(String::new(), |near| format!("; the most similar name there is {}", near.name));
+            format!(
+                "{name}: no such file or directory exists, nor a case of this name in {}{near}",
+                self.path.display()
+            )
         })
     }
 
@@ -229,7 +234,14 @@ mod tests {
     #[test]
     fn an_unknown_name_and_a_missing_file_are_errors() {
         let unknown = select(&["cub"], &[]).unwrap_err();
-        assert_eq!(unknown, "no case cub in the catalogue, which has cube_small, jet");
+        assert!(
+            unknown.starts_with("cub: no such file or directory exists, nor a case"),
+            "{unknown}"
+        );
+        assert!(
+            unknown.ends_with("catalogue.toml; the most similar name there is cube_small"),
+            "{unknown}"
+        );
         assert!(select(&["HERE/none.toml"], &[]).unwrap_err().contains("none.toml"));
     }
 

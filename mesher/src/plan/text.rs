@@ -70,7 +70,11 @@ impl fmt::Display for Plan {
         }
         writeln!(f, "cells          {}", self.about())?;
         if let Some(time) = self.time_cpu_s {
-            writeln!(f, "time           {} of CPU time over {} ranks", seconds(time), self.ranks)?;
+            let ranks = match self.ranks {
+                1 => "on one rank".to_owned(),
+                ranks => format!("over {ranks} ranks"),
+            };
+            writeln!(f, "time           {} of CPU time {ranks}", seconds(time))?;
         }
         let all: u64 = self.memory_peak_bytes.iter().sum();
         writeln!(

@@ -11,9 +11,15 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     }
     let has_seeds = !mesh.rules.seeds.is_empty();
     let summary = &mesh.sides.summary;
+    let empty = empty_region(mesh.rules.keep, summary);
+    // These two already advise to enlarge the root.
+    let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
+    let facets_cut = if explains_cut { 0 } else { mesh.facets.beyond_root };
     let warnings = [
-        empty_region(mesh.rules.keep, summary),
+        empty,
         summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
+        summary.flow_misses_boundary.then(flow_without_far_field),
+        (facets_cut > 0).then(|| body_cut(facets_cut, mesh.facets.total)),
     ];
     warnings.into_iter().flatten().collect()
 }
@@ -87,4 +93,18 @@ mod tests {
         assert!(flow_at_boundary(true).starts_with("the flow reaches"));
         assert!(flow_at_boundary(false).starts_with("a component that is inside"));
     }
+}
+
+fn flow_without_far_field() -> String {
+    "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
+     to the far field, or set keep = inside if the flow is internal"
+        .to_owned()
+}
+
+fn body_cut(facets: u64, total: u64) -> String {
+    let verb = if facets == 1 { "lies" } else { "lie" };
+    format!(
+        "{facets} of {total} facets {verb} wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the \
+         root unless the body is meant to extend beyond it"
+    )
 }

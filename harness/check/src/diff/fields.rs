@@ -5,15 +5,11 @@ use contract::manifest::{BySide, Components, ExtentBox, Manifest, Sides};
 use serde::Serialize;
 use std::fmt::Display;
 
-/// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
-pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
+/// The differences of inputs, one line each, with names for the owners of both manifests.
+pub fn differing_inputs(a: (&str, &Manifest), b: (&str, &Manifest)) -> Vec<String> {
     let mut fields = Vec::new();
-    let mut same = |name: &str, of: &dyn Fn(&Manifest) -> String| {
-        let (x, y) = (of(a), of(b));
-        if x != y {
-            fields.push(format!("{name}: {x} in A; {y} in B"));
-        }
-    };
+    let mut same =
+        |name: &str, of: &dyn Fn(&Manifest) -> String| fields.extend(difference(name, a, b, of));
     same("tree", &|m| key(&m.tree));
     same("root", &|m| root(&m.root));
     same("level of the surface (from spacing_min)", &|m| m.level_surface.to_string());
@@ -25,6 +21,15 @@ pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
         list(m.seeds.iter().map(|&seed| point(m.root.rounded(m.root.to_user(seed)))))
     });
     same("enclosed", &|m| key(&m.enclosed));
+    fields
+}
+
+/// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
+pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
+    let mut fields = differing_inputs(("A", a), ("B", b));
+    let mut same = |name: &str, of: &dyn Fn(&Manifest) -> String| {
+        fields.extend(difference(name, ("A", a), ("B", b), of));
+    };
     same("leaves", &|m| m.leaves.to_string());
     if a.sides == Sides::Known && b.sides == Sides::Known {
         same("components", &|m| components(m.components.as_ref()));
@@ -37,6 +42,16 @@ pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
         same(&format!("leaves of level {level}"), &|m| m.leaves_by_level[level].to_string());
     }
     fields
+}
+
+fn difference(
+    name: &str,
+    (owner_a, a): (&str, &Manifest),
+    (owner_b, b): (&str, &Manifest),
+    of: &dyn Fn(&Manifest) -> String,
+) -> Option<String> {
+    let (x, y) = (of(a), of(b));
+    (x != y).then(|| format!("{name}: {x} in {owner_a}; {y} in {owner_b}"))
 }
 
 /// The word of the case file for a value.

@@ -4,7 +4,7 @@
 //! All leaves are read once, to count and digest them, with memory for one buffer, from the parts or the tree. A comparison that trusts the digests in the
 //! manifests reads only the first octant that differs.
 
-mod fields;
+pub mod fields;
 mod mesh;
 mod region;
 pub mod rule;

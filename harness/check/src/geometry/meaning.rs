@@ -17,6 +17,8 @@ pub fn changes_region(kind: Kind, keep: Keep) -> bool {
         | Kind::Junctions
         | Kind::NonManifoldEven
         | Kind::Winding
+        | Kind::InsideOut
+        | Kind::Cavities
         | Kind::Degenerate
         | Kind::Slivers
         | Kind::Intersections
@@ -40,6 +42,16 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         }
         Kind::Winding => "No effect on the mesh: no decision uses a facet's orientation. Thin walls and thin gaps \
                           may be confused with each other or missed at these facets."
+            .into(),
+        Kind::InsideOut => "No effect on the mesh: no decision uses a facet's orientation. The facets of such a closed shell \
+                            are wound so that their normals point inward: thin walls and thin gaps are confused with each \
+                            other there, and other programs may exchange inside and outside. Reverse all its facets. The \
+                            first facet of each is listed."
+            .into(),
+        Kind::Cavities => "A closed shell whose normals point inward, within the bounding box of another \
+                           closed shell, is a cavity if it lies in that solid. Rays count both surfaces, so its interior is \
+                           outside. If the outside is kept, it is deleted, unless enclosed = keep. If seeds are given, it is \
+                           flow only if a seed lies in it. The first facet of each is listed."
             .into(),
         Kind::Duplicates => "A ray counts every copy: an even number of copies is passed as if the surface were \
                              open there, so a component's side may be wrong. Remove the copies."
@@ -65,7 +77,8 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
             resolved(finding, input)
         ),
         Kind::ThinGaps => format!(
-            "No cell fits into the gap: crossing leaves fill it, and no flow passes. {}",
+            "No cell fits into the gap: crossing leaves fill it, and no flow passes. The wedge along the line where two \
+             shells intersect is a gap, too. {}",
             resolved(finding, input)
         ),
         Kind::OutsideRoot => "The root cuts the body: no leaf exists beyond its boundary. Rays still count these \

@@ -15,6 +15,8 @@ impl Kind {
             Self::NonManifoldOdd => "edges with 3, 5, ... facets",
             Self::NonManifoldEven => "edges with 4, 6, ... facets",
             Self::Winding => "neighbours, opposite winding",
+            Self::InsideOut => "closed shells inside out",
+            Self::Cavities => "closed shells, likely cavities",
             Self::Duplicates => "duplicate facets",
             Self::Degenerate => "facets without area",
             Self::Slivers => "slivers",

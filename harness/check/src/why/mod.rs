@@ -19,6 +19,7 @@ use contract::octant::Octant;
 use rustc_hash::FxHashMap;
 
 use crate::checks::Terms;
+use crate::diff::fields::differing_inputs;
 
 pub mod answer;
 pub mod base;
@@ -71,11 +72,8 @@ impl<'a> Mesh<'a> {
     pub fn open(dir: &Path, case: Option<&'a Case>) -> Result<Self, String> {
         let leaves = Leaves::open(dir).map_err(|error| error.to_string())?;
         let mut terms = Terms::of_manifest(&leaves.manifest);
-        if case.is_some_and(|case| Terms::of_case(case) != terms) {
-            let dir = dir.display();
-            return Err(format!(
-                "{dir} was made from other inputs than the case; give the case file from which the mesh was made"
-            ));
+        if let Some(case) = case.filter(|case| Terms::of_case(case) != terms) {
+            return Err(other_inputs(dir, &leaves.manifest, case));
         }
         let is_base = leaves.manifest.tree == manifest::Tree::Base;
         if is_base {
@@ -114,6 +112,20 @@ impl<'a> Mesh<'a> {
     fn place(&self, octant: &Octant) -> answer::Place {
         answer::Place::new(octant, &self.terms.root)
     }
+}
+
+/// The error of a case that is not that of a mesh, with the inputs that differ.
+fn other_inputs(dir: &Path, of_mesh: &manifest::Manifest, case: &Case) -> String {
+    let of_case = case.manifest(of_mesh.tree, String::new());
+    let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &of_case));
+    if of_mesh.sides == manifest::Sides::Unknown {
+        differing.push("the sides of the mesh are unknown".to_owned());
+    }
+    format!(
+        "{} was made from other inputs than the case ({}); give the case file from which the mesh was made",
+        dir.display(),
+        differing.join("; ")
+    )
 }
 
 /// The deepest level that the surface or a box requires.

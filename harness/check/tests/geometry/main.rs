@@ -124,6 +124,41 @@ fn a_flipped_facet_disagrees_with_three_neighbours() {
 }
 
 #[test]
+fn a_closed_shell_that_is_wound_inward_is_inside_out_or_a_cavity() {
+    let inward = |low, high| {
+        let mut facets = cuboid(low, high);
+        facets.iter_mut().for_each(|f| f.swap(0, 1));
+        facets
+    };
+    let small = inward([1.0; 3], [2.0; 3]);
+    let beside = diagnosis([cube(), inward([5.0; 3], [6.0; 3])].concat(), Some(0.25));
+    assert_eq!(counts(&beside), [(Kind::InsideOut, 1)]);
+    assert_eq!(first(&beside, Kind::InsideOut).facets, [12]);
+    assert!(!beside.changes_region);
+    assert_eq!(
+        counts(&diagnosis([cube(), small.clone()].concat(), Some(0.25))),
+        [(Kind::Cavities, 1)]
+    );
+    // An open shell has no volume.
+    assert_eq!(counts(&diagnosis(small[1..].to_vec(), None)), [(Kind::Openings, 1)]);
+    let far = [inward([-15.0; 3], [-14.0; 3]), cuboid([14.0; 3], [15.0; 3])].concat();
+    assert_eq!(counts(&diagnosis(far, Some(0.25))), [(Kind::InsideOut, 1)]);
+}
+
+#[test]
+fn an_overlap_of_two_solids_is_not_a_thin_wall_but_the_wall_of_a_cavity_is() {
+    // The lower face of the upper box is a quarter below the upper face of the lower one.
+    let overlap =
+        [cuboid([0.0; 3], [4.0, 4.0, 4.0]), cuboid([1.0, 1.0, 3.75], [3.0, 3.0, 8.0])].concat();
+    let overlap = diagnosis(overlap, Some(0.5));
+    assert!(count(&overlap, Kind::Intersections) > 0);
+    assert_eq!(count(&overlap, Kind::ThinWalls), 0);
+    let mut cavity = cuboid([0.25; 3], [3.75; 3]);
+    cavity.iter_mut().for_each(|f| f.swap(0, 1));
+    assert_eq!(count(&diagnosis([cube(), cavity].concat(), Some(0.5)), Kind::ThinWalls), 24);
+}
+
+#[test]
 fn overlapping_boxes_intersect_along_six_segments() {
     // Each segment of the hexagon lies in one facet of each box.
     let facets = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat();
@@ -290,8 +325,11 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn closed_shapes_have_no_findings(facets in shape()) {
-        prop_assert_eq!(counts(&diagnosis(facets, Some(0.002))), []);
+    fn closed_shapes_have_no_findings_but_a_cavity(facets in shape()) {
+        let found = diagnosis(facets, Some(0.002));
+        // The inner one of two spheres is a cavity.
+        let cavity = (found.shells.count == 2).then_some((Kind::Cavities, 1));
+        prop_assert_eq!(counts(&found), Vec::from_iter(cavity));
     }
 
     /// Defects at random: some facets removed, repeated, flipped, and a second shape put over the first.

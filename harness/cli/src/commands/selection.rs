@@ -53,8 +53,10 @@ impl SelectionArguments {
         let root = &mesh.manifest.root;
         let slice = self.slice.map(|plane| plane.of(root)).transpose()?;
         if let Some(rank) = self.rank.filter(|&rank| rank as usize >= mesh.parts()) {
-            let ranks = mesh.parts();
-            return Err(format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"));
+            return Err(match mesh.parts() {
+                1 => format!("--rank {rank}: the mesh has one rank, number 0"),
+                ranks => format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"),
+            });
         }
         if self.side.is_some() && mesh.manifest.sides == Sides::Unknown {
             return Err("--side: the sides of this mesh are unknown, so omit it".to_owned());
