@@ -13,6 +13,7 @@ use report::leak::{picture, polyline};
 use run::base_tree::BaseTrees;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
+use run::engine::runner::Engine;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -31,8 +32,8 @@ Examples:
   harness leak car.toml --from 0,0,1 --picture leak.svg --vtk leak.vtp
 
 Exit codes: 0 no path at the case's spacing, whatever a finer one would do; 1 a path was found, or with --closed the facets \
-are not proven to be a closed surface between the two places; 2 invalid input; 3 mesher and reference are missing; 130 \
-interrupted.")]
+are not proven to be a closed surface between the two places; 2 invalid input; 3 mesher and reference are missing, or one \
+that was given; 130 interrupted.")]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
@@ -88,15 +89,7 @@ fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
     let from = arguments.from.or(case.seeds.first().copied()).ok_or_else(|| {
         input("the case has no seeds: give a start with --from X,Y,Z, in the space that should be closed".into())
     })?;
-    let engine =
-        [&programs.mesher, &programs.reference].into_iter().find(|e| e.program().is_file());
-    let engine = engine.ok_or_else(|| {
-        let path = programs.mesher.program().display();
-        (
-            EXIT_MISSING,
-            format!("the mesher is missing: build {path}, or give another path with --mesher"),
-        )
-    })?;
+    let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, case.root, limit).map_err(input)?;
     let question =
@@ -105,14 +98,41 @@ fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
     let answer = answer(&question, |level| trees.at(level), &progress);
     progress.0.finish_and_clear();
     let answer = answer.map_err(|error| match error {
-        LeakError::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
-        LeakError::Source(failure) if failure.is_interrupt() => {
-            (EXIT_INTERRUPTED, "interrupted by the user".to_owned())
-        }
+        LeakError::Interrupted => interrupted(),
+        LeakError::Source(failure) if failure.is_interrupt() => interrupted(),
         LeakError::Source(failure) => (EXIT_INPUT, failure.to_string()),
         LeakError::Input(why) => (EXIT_INPUT, why),
     })?;
-    Ok((case, answer))
+    // The search does not notice an interrupt in its last step.
+    if interrupt::requested() { Err(interrupted()) } else { Ok((case, answer)) }
+}
+
+/// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.
+fn engine<'a>(
+    programs: &'a Programs,
+    given: &ProgramArguments,
+) -> Result<&'a Engine, (u8, String)> {
+    let all = [
+        (&programs.mesher, given.mesher.is_some(), "mesher"),
+        (&programs.reference, given.reference.is_some(), "reference"),
+    ];
+    let exists = |engine: &Engine| engine.program().is_file();
+    let found = all.iter().find(|(engine, ..)| exists(engine)).map(|(engine, ..)| *engine);
+    let wrong = all.iter().find(|(engine, is_given, _)| *is_given && !exists(engine));
+    match (found, wrong) {
+        (Some(engine), None) => Ok(engine),
+        (_, wrong) => {
+            let (engine, _, name) = wrong.unwrap_or(&all[0]);
+            let path = engine.program().display();
+            let why =
+                format!("the {name} is missing: build {path}, or give another path with --{name}");
+            Err((EXIT_MISSING, why))
+        }
+    }
+}
+
+fn interrupted() -> (u8, String) {
+    (EXIT_INTERRUPTED, "interrupted".to_owned())
 }
 
 /// Writes the requested files. Without a path there is none to draw.

@@ -129,7 +129,7 @@ fn read<'a>(
             "the mesh has another root than the case: give the case that was meshed".to_owned(),
         ));
     }
-    let has_ranks = mesh.manifest.parts.len() > 1;
+    let has_ranks = mesh.leaves_by_rank()?.len() > 1;
     let (mut builder, mut words, mut ranks) = (Builder::default(), Vec::new(), Vec::new());
     let mut visited = 0u64;
     mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
@@ -140,7 +140,7 @@ fn read<'a>(
         let is_exported = selection.has(&leaf);
         if is_exported {
             words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
-            ranks.extend(has_ranks.then_some(leaf.part));
+            ranks.extend(has_ranks.then_some(leaf.rank));
         }
         if words.len() as u64 > CELLS_MAX {
             return Err(ExportError::Request(format!(
@@ -210,9 +210,10 @@ fn distribute(
                 "{cells} cells are too few for {count} processors: choose fewer"
             )));
         }
+        Some(Processors::Ranks) if !mesh.has_ranks() => return Err(mesh.ranks_unknown()),
         Some(Processors::Ranks) if model.ranks.is_empty() => Distribution::equal(cells, 1),
         Some(Processors::Ranks) => {
-            Distribution::new(model.ranks.clone(), mesh.manifest.parts.len() as u32)
+            Distribution::new(model.ranks.clone(), mesh.leaves_by_rank()?.len() as u32)
         }
     };
     match (0..distribution.processors()).find(|&p| distribution.cells(p).is_empty()) {
