@@ -5,11 +5,11 @@ use crate::unfinished::{self, Output, Unfinished};
 use rustix::fs::{RenameFlags, renameat, renameat_with};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
-use std::fs::{self, File, Metadata, OpenOptions, Permissions};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use tempfile::{Builder, TempPath};
@@ -55,8 +55,10 @@ impl Draft {
 
     fn beside(path: PathBuf) -> io::Result<Self> {
         // As for any other file, the user's umask decides who may read it.
-        let permissions = Permissions::from_mode(0o666);
-        let file = Builder::new().permissions(permissions).tempfile_in(folder_of(&path))?;
+        let mut options = OpenOptions::new();
+        options.write(true).create_new(true).mode(0o666);
+        // An error from here names no temporary file, unlike those of `tempfile_in`.
+        let file = Builder::new().make_in(folder_of(&path), |draft| options.open(draft))?;
         let (file, draft) = file.into_parts();
         let (from, to) = (c_string(&draft)?, c_string(&path)?);
         let output = Output::File { draft: from, name: to, file: file.as_raw_fd() };

@@ -169,7 +169,7 @@ fn an_interrupted_export_leaves_no_file() {
         assert!(Command::new("kill").args(interrupt).status().unwrap().success());
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{file}");
-        assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted by the user\n");
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted\n");
         assert_eq!(names(place.path()), ["mesh"], "{file}");
     }
 }
@@ -199,6 +199,15 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
     fs::copy(place.path().join("mesh.vtkhdf"), place.path().join("tree/mesh.vtkhdf")).unwrap();
     let mut manifest = contract::leafset::read_manifest(&place.path().join("mesh")).unwrap();
     (manifest.parts, manifest.hyper_tree_grid) = (Vec::new(), Some("mesh.vtkhdf".to_owned()));
+    // It has the ranks of the parts.
+    fs::write(place.path().join("tree/mesh.json"), serde_json::to_vec(&manifest).unwrap()).unwrap();
+    for (rank, cells) in [("0", 49), ("1", 99)] {
+        let (code, output, error) = harness(&["export", "tree", "tree.vtu", "--rank", rank]);
+        assert_eq!((code, error.as_str()), (0, ""));
+        assert!(output.starts_with(&format!("tree.vtu: {cells} cells, ")), "{output}");
+    }
+    assert!(harness(&["export", "tree", "tree.vtu", "--rank", "2"]).2.contains("has 2 ranks"));
+    fs::remove_file(place.path().join("tree.vtu")).unwrap();
     let write = |manifest: &contract::manifest::Manifest| {
         fs::write(place.path().join("tree/mesh.json"), serde_json::to_vec(manifest).unwrap())
             .unwrap();

@@ -42,6 +42,33 @@ fn a_surface_is_measured_and_written_or_refused_in_one_sentence() {
     );
     let (code, output, _) = near_body(place.path(), &["mesh", "--case", "case.toml"]);
     assert!(code == 0 && output.contains("gap to the wall"), "{output}");
+    // The same mesh as a tree, whose ranks nobody knows.
+    fs::create_dir(place.path().join("tree")).unwrap();
+    let export = |file: &str, options: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(["export", if file.starts_with("tree/") { "mesh" } else { "tree" }, file]);
+        let output = command.args(options).current_dir(place.path()).output().unwrap();
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(export("tree/mesh.vtkhdf", &[]).0, 0);
+    let mut manifest = contract::leafset::read_manifest(&place.path().join("mesh")).unwrap();
+    (manifest.parts, manifest.hyper_tree_grid) = (Vec::new(), Some("mesh.vtkhdf".to_owned()));
+    manifest.write(&place.path().join("tree")).unwrap();
+    let (code, of_tree, error) = near_body(place.path(), &["tree", "--case", "case.toml"]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    let ranks = of_tree.lines().last().unwrap();
+    assert_eq!(ranks, "the ranks of the cells are unknown");
+    assert!(output.starts_with(of_tree.strip_suffix(&format!("{ranks}\n")).unwrap()), "{of_tree}");
+    for (file, options) in
+        [("a.vtu", ["--rank", "0"]), ("case/constant/polyMesh", ["--processors", "ranks"])]
+    {
+        let (code, error) = export(file, &options);
+        assert!(code == 2 && error.contains("the ranks of this mesh are unknown"), "{error}");
+    }
+    assert_eq!(export("a.vtu", &[]).0, 0);
+    let vtu = fs::read(place.path().join("a.vtu")).unwrap();
+    let header = String::from_utf8_lossy(&vtu[..4096]);
+    assert!(header.contains("\"side\"") && !header.contains("\"rank\""), "{header}");
     let refused = |arguments: &[&str], why: &str| {
         let (code, output, error) = near_body(place.path(), arguments);
         assert_eq!((code, output.as_str(), error.lines().count()), (2, "", 1), "{error}");
@@ -51,4 +78,8 @@ fn a_surface_is_measured_and_written_or_refused_in_one_sentence() {
     refused(&["absent"], "mesh.json");
     refused(&["mesh", "--stl", "absent/a.stl"], "absent/a.stl");
     refused(&["mesh", "--case", "absent.toml"], "absent.toml");
+    let other = fs::read_to_string(place.path().join("case.toml")).unwrap().replace("8.0", "4.0");
+    fs::write(place.path().join("other.toml"), other).unwrap();
+    let roots = "a root of edge 8 at (0, 0, 0) and surface level 0, the case a root of edge 4 at";
+    refused(&["mesh", "--case", "other.toml"], roots);
 }

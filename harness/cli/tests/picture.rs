@@ -2,12 +2,14 @@
 
 use contract::case::Case;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Tree};
+use contract::manifest::Tree;
 use contract::testing::base_tree;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Copies the mesh, and keeps its arguments.
@@ -35,7 +37,7 @@ impl Fixture {
         let case = Case::read(&fixture.path("case.toml")).unwrap();
         let words = base_tree(&case.facets_lattice, case.level_surface);
         let (half, rest) = words.split_at(words.len() / 2);
-        let empty = Manifest::without_leaves(Tree::Base, case.root, "test".to_owned());
+        let empty = case.manifest(Tree::Base, "test".to_owned());
         let set = LeafSet::new(empty, Vec::new()).with_parts(vec![half.to_vec(), rest.to_vec()]);
         fs::create_dir(fixture.path("mesh")).unwrap();
         set.write(&fixture.path("mesh")).unwrap();
@@ -90,6 +92,7 @@ fn a_mesh_on_disk_is_drawn_without_geometry_unless_its_case_is_given() {
 #[test]
 fn impossible_requests_are_one_sentence_and_leave_no_file() {
     let fixture = Fixture::new();
+    fs::write(fixture.path("other.toml"), CASE.replace("0.25", "0.5")).unwrap();
     let requests = [
         ("mesh --out a.vtu", 2, "must end in .svg"),
         ("mesh --out no/a.svg", 2, "no is not a directory"),
@@ -97,6 +100,8 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         ("mesh --out a.svg --ranks 2", 2, "are for a case"),
         ("mesh --out a.svg --slice z=9", 2, "--slice z=9"),
         ("mesh --out a.svg --slice z=0 --level-max 0", 2, "no leaf of the selection"),
+        ("mesh --out a.html --level-max 0", 2, "no leaf of the selection"),
+        ("mesh --out a.svg --case other.toml", 2, "the mesh is not of the case other"),
         ("mesh --out a.svg --zoom 0", 2, "from 1 to 1e6"),
         ("nowhere.toml --out a.svg", 2, "nowhere.toml"),
         ("case.toml --out a.svg --case case.toml", 2, "is not a leaf-set directory"),
@@ -106,8 +111,35 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         let (code, text) = fixture.picture(arguments);
         assert!(code == expected && text.contains(why), "{arguments}: {code} {text}");
         let created = |name: &str| fixture.path(name).exists();
-        assert!(!["a.svg", "a.csv", "a.png", "a.vtu"].into_iter().any(created), "{arguments}");
+        assert!(
+            !["a.svg", "a.csv", "a.png", "a.html", "a.vtu"].into_iter().any(created),
+            "{arguments}"
+        );
     }
+}
+
+/// A FIFO keeps the picture from being written before the interrupt.
+#[test]
+fn an_interrupted_picture_is_not_written() {
+    let fixture = Fixture::new();
+    let [temporary, fifo] = ["tmp", "a.svg"].map(|name| fixture.path(name));
+    fs::create_dir(&temporary).unwrap();
+    assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.args(["picture", "mesh", "--out", "a.svg"]).current_dir(fixture.0.path());
+    let child = command.env("TMPDIR", &temporary).stderr(Stdio::piped()).spawn().unwrap();
+    // This directory is made once signals are handled.
+    while fs::read_dir(&temporary).unwrap().next().is_none() {
+        sleep(Duration::from_millis(1));
+    }
+    let interrupt = ["-INT".to_owned(), child.id().to_string()];
+    assert!(Command::new("kill").args(interrupt).status().unwrap().success());
+    sleep(Duration::from_millis(100));
+    let _reader = fs::OpenOptions::new().read(true).write(true).open(&fifo).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted\n");
+    assert!(!fixture.path("a.csv").exists());
 }
 
 #[test]

@@ -21,7 +21,7 @@ use level::LevelReader;
 use std::path::{Path, PathBuf};
 use vtkhdf::format::{Chunked, Group, Kind, Member, ReadError, Value};
 use vtkhdf::read::File;
-use vtkhdf::tree::{CELL_DATA, COORDINATES, EDGE, GROUP, TYPE};
+use vtkhdf::tree::{CELL_DATA, COORDINATES, EDGE, GROUP, RANK, TYPE};
 
 /// Number of words that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
@@ -43,6 +43,7 @@ pub struct TreeFile {
     split: Chunked,
     masked: Option<Chunked>,
     sides: Option<Chunked>,
+    ranks: Option<Chunked>,
 }
 
 /// Why a file is not a usable hyper-tree grid: the predicate of a sentence whose subject is the file.
@@ -112,7 +113,15 @@ impl TreeFile {
                 None => return layout(format!("it has no cell data {name} of unsigned bytes")),
             },
         };
-        Ok(Self { path: path.to_owned(), root: root_of(grid)?, file, nodes, split, masked, sides })
+        // Cell data of another type are not those of this repository, and no fault of the tree.
+        let ranks = match data.member(RANK) {
+            Some(Member::Chunked(array)) if array.kind == Kind::Int32 && array.len == total => {
+                Some(array.clone())
+            }
+            _ => None,
+        };
+        let (path, root) = (path.to_owned(), root_of(grid)?);
+        Ok(Self { path, root, file, nodes, split, masked, sides, ranks })
     }
 
     /// Its path.
@@ -125,13 +134,20 @@ impl TreeFile {
         self.sides.is_some()
     }
 
+    /// Whether its leaves have ranks.
+    pub fn has_ranks(&self) -> bool {
+        self.ranks.is_some()
+    }
+
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
     ///
     /// # Errors
     /// If the file is damaged.
     pub fn words(&self, run: &mut dyn FnMut(&[u64]) -> bool) -> Result<()> {
-        let levels = (0..self.nodes.len()).map(|level| self.level(level)).collect();
-        let mut walk = Walk { levels, words: Vec::with_capacity(RUN + 8), run };
+        let levels = (0..self.nodes.len()).map(|level| self.level(level, None)).collect();
+        let run = &mut |words: &[u64], _: &[u32]| run(words);
+        let (words, ranks) = (Vec::with_capacity(RUN + 8), Vec::new());
+        let mut walk = Walk { levels, words, ranks, run };
         if !(walk.siblings(0, 0, 1)? && walk.flush()) {
             return Ok(());
         }
@@ -151,12 +167,14 @@ impl TreeFile {
         Index::new(&self.file, [described, total], &self.split, self.masked.as_ref())
     }
 
-    fn level(&self, level: usize) -> LevelReader<'_> {
+    /// A reader of a level, with ranks if they are given.
+    fn level<'a>(&'a self, level: usize, ranks: Option<&'a Chunked>) -> LevelReader<'a> {
         let begin = self.nodes[..level].iter().sum();
         let is_last = level + 1 == self.nodes.len();
         let split = (!is_last).then_some(&self.split);
         let end = begin + self.nodes[level];
-        LevelReader::new(&self.file, begin..end, split, self.masked.as_ref(), self.sides.as_ref())
+        let arrays = [split, self.masked.as_ref(), self.sides.as_ref(), ranks];
+        LevelReader::new(&self.file, begin..end, arrays)
     }
 }
 
@@ -164,7 +182,9 @@ impl TreeFile {
 struct Walk<'a, 'r> {
     levels: Vec<LevelReader<'a>>,
     words: Vec<u64>,
-    run: &'r mut dyn FnMut(&[u64]) -> bool,
+    /// The rank of each word; none if the readers have no ranks.
+    ranks: Vec<u32>,
+    run: &'r mut dyn FnMut(&[u64], &[u32]) -> bool,
 }
 
 impl Walk<'_, '_> {
@@ -183,14 +203,16 @@ impl Walk<'_, '_> {
                 }
             } else if siblings.masked >> i & 1 == 0 {
                 self.words.push(key << 7 | code | u64::from(siblings.sides[i as usize]));
+                self.ranks.extend(siblings.ranks.map(|ranks| ranks[i as usize]));
             }
         }
         Ok(self.words.len() < RUN || self.flush())
     }
 
     fn flush(&mut self) -> bool {
-        let goes_on = (self.run)(&self.words);
+        let goes_on = (self.run)(&self.words, &self.ranks);
         self.words.clear();
+        self.ranks.clear();
         goes_on
     }
 }

@@ -35,7 +35,7 @@ pub enum ExportError {
     #[error("{0}: choose another file")]
     Write(#[from] io::Error),
     /// The user interrupted the export.
-    #[error("interrupted by the user")]
+    #[error("interrupted")]
     Interrupted,
     /// A request that cannot be fulfilled, as one sentence.
     #[error("{0}")]

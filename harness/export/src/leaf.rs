@@ -10,8 +10,8 @@ pub struct Leaf {
     pub octant: Octant,
     /// Its side.
     pub side: Side,
-    /// Index of its part, which is the rank that wrote it.
-    pub part: u32,
+    /// The rank that owns it: that of the tree, or the index of its part; 0 if it is unknown.
+    pub rank: u32,
     /// Index among all leaves of the mesh, in Morton order.
     pub index: u64,
 }

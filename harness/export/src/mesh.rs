@@ -6,8 +6,10 @@
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
+use contract::case::Case;
+use contract::lattice::Root;
 use contract::leafset::{self, LeafDir, Leaves};
 use contract::manifest::Manifest;
 use contract::octant::{LEVEL_MAX, Octant};
@@ -36,6 +38,7 @@ pub struct Mesh {
     /// Its manifest.
     pub manifest: Manifest,
     parts: Vec<Part>,
+    leaves_by_rank: OnceLock<Vec<u64>>,
 }
 
 /// Leaves of an octant in one part: an interval of indices.
@@ -101,15 +104,34 @@ impl Mesh {
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, ExportError> {
-        Ok(match leafset::open_any(path)? {
+        let (manifest, parts) = match leafset::open_any(path)? {
             Leaves::Words(words) => {
                 let LeafDir { manifest, parts } = *words;
-                Self { manifest, parts: parts.into_iter().map(Part::Words).collect() }
+                (manifest, parts.into_iter().map(Part::Words).collect())
             }
-            Leaves::Tree(tree, manifest) => {
-                Self { manifest: *manifest, parts: vec![Part::of_tree(*tree)?] }
-            }
-        })
+            Leaves::Tree(tree, manifest) => (*manifest, vec![Part::of_tree(*tree)?]),
+        };
+        Ok(Self { manifest, parts, leaves_by_rank: OnceLock::new() })
+    }
+
+    /// Refuses a case that was not meshed here, by its root and its surface level.
+    ///
+    /// # Errors
+    /// If the mesh cannot be one of the case.
+    pub fn require_case(&self, case: &Case) -> Result<(), ExportError> {
+        let stated = |root: Root, level: u8| {
+            let Root { origin: [x, y, z], edge } = root;
+            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}")
+        };
+        let of_mesh = stated(self.manifest.root, self.manifest.level_surface);
+        let of_case = stated(case.root, case.level_surface);
+        if of_mesh == of_case {
+            return Ok(());
+        }
+        Err(ExportError::Request(format!(
+            "the mesh is not of the case {}: the mesh has {of_mesh}, the case {of_case}; give the case that was meshed",
+            case.name
+        )))
     }
 
     /// Number of leaves in all parts.
@@ -122,9 +144,41 @@ impl Mesh {
         self.len() == 0
     }
 
-    /// Number of parts.
-    pub fn parts(&self) -> usize {
-        self.parts.len()
+    /// Whether the rank of each leaf is known: a tree may have been written without ranks.
+    pub fn has_ranks(&self) -> bool {
+        self.parts.iter().all(Part::has_ranks)
+    }
+
+    /// The error of a request that needs them.
+    pub fn ranks_unknown(&self) -> ExportError {
+        ExportError::Request(
+            "the ranks of this mesh are unknown, because its tree was written without --cell-ranks"
+                .to_owned(),
+        )
+    }
+
+    /// Number of leaves of each rank; nothing if the ranks are unknown. All leaves of a tree are read, the first time.
+    ///
+    /// # Errors
+    /// If the tree cannot be read.
+    pub fn leaves_by_rank(&self) -> Result<&[u64], ExportError> {
+        if let Some(known) = self.leaves_by_rank.get() {
+            return Ok(known);
+        }
+        let mut leaves = Vec::new();
+        match &self.parts[..] {
+            _ if !self.has_ranks() => {}
+            [Part::Tree(_)] => {
+                self.visit(Self::ALL, &Selection::default(), &mut |leaf: Leaf| {
+                    let rank = leaf.rank as usize;
+                    leaves.resize(leaves.len().max(rank + 1), 0);
+                    leaves[rank] += 1;
+                    Ok::<(), ExportError>(())
+                })?
+            }
+            parts => leaves.extend(parts.iter().map(Part::len)),
+        }
+        Ok(self.leaves_by_rank.get_or_init(|| leaves))
     }
 
     /// Visits the selected leaves whose Morton codes are in `keys`, in Morton order.
@@ -241,7 +295,8 @@ impl Mesh {
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
         let file = &self.parts[part];
-        let words = readers.words(part, &octant, interval.clone())?;
+        let (words, ranks) = readers.words(part, &octant, interval.clone())?;
+        let mut ranks = ranks.into_iter();
         // Leaves that ascend and do not overlap begin where the one before ends, or later.
         let mut key_min = word::key_of(octant.corner);
         let key_end = key_min + word::span(octant.level);
@@ -256,9 +311,9 @@ impl Mesh {
                 return Err(self.order(part, index).into());
             }
             key_min = end;
-            let part = part as u32;
+            let rank = ranks.next().unwrap_or(part as u32);
             let index_in_mesh = before + (index - interval.start);
-            let leaf = Leaf { octant: leaf.octant, side: leaf.side, part, index: index_in_mesh };
+            let leaf = Leaf { octant: leaf.octant, side: leaf.side, rank, index: index_in_mesh };
             if selection.has(&leaf) {
                 visit(leaf)?;
             }

@@ -101,7 +101,7 @@ fn quadrants(
     visit: &mut impl FnMut(Quadrant) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let (mut next, mut part_last) = (0, 0);
-    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, part, .. }| {
+    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, rank: part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(ExportError::Request(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
@@ -142,7 +142,8 @@ struct Counts {
 
 impl Counts {
     fn of(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Self, ExportError> {
-        let mut counts = Self { leaves: 0, by_part: vec![0; mesh.parts().max(1)] };
+        let parts = mesh.leaves_by_rank()?.len().max(1);
+        let mut counts = Self { leaves: 0, by_part: vec![0; parts] };
         let mut done = 0;
         quadrants(mesh, selection, &mut |quadrant| {
             if done % STEP == 0 {

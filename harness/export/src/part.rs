@@ -34,6 +34,14 @@ impl Part {
         }
     }
 
+    /// Whether it states the rank of each leaf: a file of words is that of one rank, but a tree may have none.
+    pub(crate) fn has_ranks(&self) -> bool {
+        match self {
+            Self::Words(_) => true,
+            Self::Tree(tree) => tree.0.has_ranks(),
+        }
+    }
+
     /// Number of leaves.
     pub(crate) fn len(&self) -> u64 {
         match self {
@@ -82,14 +90,14 @@ impl<'a> Readers<'a> {
         }
     }
 
-    /// The words at these indices, which are leaves of the octant.
+    /// The words at these indices, which are leaves of the octant, and their ranks if the part is a tree with ranks.
     pub(crate) fn words(
         &mut self,
         part: usize,
         octant: &Octant,
         interval: Range<u64>,
-    ) -> Result<Vec<u64>, ExportError> {
-        let mut words = Vec::new();
+    ) -> Result<(Vec<u64>, Vec<u32>), ExportError> {
+        let (mut words, mut ranks) = (Vec::new(), Vec::new());
         match &mut self.0[part] {
             Reader::Words(file) => {
                 words.resize((interval.end - interval.start) as usize, 0);
@@ -97,11 +105,11 @@ impl<'a> Readers<'a> {
                 read.map_err(|error| ReadError::part(file, error))?;
             }
             Reader::Tree(tree, cursor) => {
-                let read = append(cursor, octant, &interval, &mut words);
+                let read = append(cursor, octant, &interval, &mut words, &mut ranks);
                 read.map_err(|error| ReadError::tree(tree, error))?;
             }
         }
-        Ok(words)
+        Ok((words, ranks))
     }
 }
 
@@ -111,6 +119,7 @@ fn append(
     octant: &Octant,
     interval: &Range<u64>,
     words: &mut Vec<u64>,
+    ranks: &mut Vec<u32>,
 ) -> Result<(), TreeError> {
     let key = word::key_of(octant.corner);
     let first = cursor.leaves_before(key)?;
@@ -119,7 +128,7 @@ fn append(
         return Ok(());
     }
     if interval.start <= first && end <= interval.end {
-        return cursor.words(key, octant.level, words);
+        return cursor.words_and_ranks(key, octant.level, words, ranks);
     }
-    (0..8).try_for_each(|digit| append(cursor, &octant.child(digit), interval, words))
+    (0..8).try_for_each(|digit| append(cursor, &octant.child(digit), interval, words, ranks))
 }

@@ -15,7 +15,7 @@ pub struct Selection {
     pub level_max: Option<u8>,
     /// Leaves of this side.
     pub side: Option<Side>,
-    /// Leaves of this part, which is the rank that wrote them.
+    /// Leaves of this rank.
     pub rank: Option<u32>,
     /// Leaves that a plane normal to an axis cuts.
     pub slice: Option<Slice>,
@@ -58,7 +58,7 @@ impl Selection {
         self.meets(&leaf.octant)
             && self.level_max.is_none_or(|level| leaf.octant.level <= level)
             && self.side.is_none_or(|side| leaf.side == side)
-            && self.rank.is_none_or(|rank| leaf.part == rank)
+            && self.rank.is_none_or(|rank| leaf.rank == rank)
     }
 
     /// Whether an octant may contain selected leaves, by its position.

@@ -63,16 +63,16 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     Some((dir, mesh))
 }
 
-/// Words and indices of the selected leaves.
-fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
+/// Words, indices and ranks of the selected leaves.
+fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64, u32)> {
     leaves_within(mesh, Mesh::ALL, selection)
 }
 
 /// Those with these Morton codes.
-fn leaves_within(mesh: &Mesh, keys: Range<u64>, selection: &Selection) -> Vec<(u64, u64)> {
+fn leaves_within(mesh: &Mesh, keys: Range<u64>, selection: &Selection) -> Vec<(u64, u64, u32)> {
     let mut leaves = Vec::new();
-    mesh.visit(keys, selection, &mut |Leaf { octant, side, index, .. }| {
-        leaves.push((word::encode(&WordLeaf { octant, side }), index));
+    mesh.visit(keys, selection, &mut |Leaf { octant, side, index, rank }| {
+        leaves.push((word::encode(&WordLeaf { octant, side }), index, rank));
         Ok::<(), ExportError>(())
     })
     .unwrap();
@@ -107,13 +107,21 @@ proptest! {
                 continue;
             };
             // A file of part of a mesh counts only that part.
-            let expected: Vec<u64> = expected.into_iter().map(|(word, _)| word).collect();
+            let expected: Vec<u64> = expected.into_iter().map(|(word, ..)| word).collect();
             let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), Some(SIDE)).unwrap();
             prop_assert_eq!(file.root, ROOT);
             prop_assert_eq!(&words(&file).unwrap(), &expected);
             prop_assert_eq!(tree.len(), expected.len() as u64);
             if selection == Selection::default() {
                 prop_assert_eq!(leaves(&tree, &cut), leaves(&mesh, &cut));
+                prop_assert_eq!(tree.has_ranks(), parts > 1);
+                // The last parts may have no leaves, which a tree does not show.
+                let by_rank = |mesh: &Mesh| {
+                    let filled = mesh.leaves_by_rank().unwrap().iter().filter(|&&leaves| leaves > 0);
+                    filled.copied().collect::<Vec<u64>>()
+                };
+                let expected = if parts > 1 { by_rank(&mesh) } else { Vec::new() };
+                prop_assert_eq!(by_rank(&tree), expected);
                 let blocks = |mesh: &Mesh| mesh.blocks(&selection, max + 1).unwrap();
                 prop_assert_eq!(blocks(&tree), blocks(&mesh));
                 for block in blocks(&mesh) {

@@ -31,7 +31,8 @@ pub struct Shell {
 }
 
 impl Shell {
-    fn new(facet_first: u32) -> Self {
+    /// A shell without facets yet.
+    pub(super) fn new(facet_first: u32) -> Self {
         let (low, high) = ([i64::MAX; 3], [i64::MIN; 3]);
         Self {
             facet_first,

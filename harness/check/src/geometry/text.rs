@@ -173,7 +173,11 @@ mod tests {
         };
         let sheet = Place { width: Some(0.125), ..Place::new(vec![1, 2], at) };
         let one = |facets: std::ops::Range<u32>| vec![Place::new(facets.collect(), at)];
-        let shell = |facet_first, facets, is_closed| Shell { facet_first, facets, is_closed };
+        let shell = |facet_first, facets, is_closed| {
+            let mut shell = Shell::new(facet_first);
+            (shell.facets, shell.is_closed) = (facets, is_closed);
+            shell
+        };
         let solid = |name: Option<&str>, facets| Solid {
             name: name.map(str::to_owned),
             facet_first: 3,

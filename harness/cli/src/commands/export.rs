@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> u8 {
             let file = arguments.file.display();
             let per_cell = bytes as f64 / leaves as f64;
             let files = if files == 1 { String::new() } else { format!(" in {files} files") };
-            println!("{file}: {leaves} cells, {bytes} bytes{files} ({per_cell:.1} per cell)");
+            println!("{file}: {leaves} cells, {bytes} bytes{files} ({} per cell)", brief(per_cell));
             notes.iter().for_each(|note| println!("  {note}"));
             EXIT_HOLDS
         }
@@ -71,12 +71,18 @@ pub fn run(arguments: &Arguments) -> u8 {
     }
 }
 
+/// A number with one decimal, or with two significant digits if it is less than 1.
+fn brief(number: f64) -> String {
+    let decimals = (1.0 - number.log10().floor()).clamp(1.0, 9.0) as usize;
+    format!("{number:.decimals$}")
+}
+
 fn write(arguments: &Arguments) -> Result<Summary, ExportError> {
     let Arguments { mesh, file, jobs, selection, foam } = arguments;
     let format = format::of(file)?;
     let case = foam.case(format.ending).map_err(ExportError::Request)?;
     let mesh = Mesh::open(mesh)?;
-    let selection = selection.of(&mesh).map_err(ExportError::Request)?;
+    let selection = selection.of(&mesh)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
     let progress = Progress::new();
     let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
@@ -108,5 +114,16 @@ impl Watch for Progress {
 
     fn is_interrupted(&self) -> bool {
         interrupt::requested()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_below_one_have_two_significant_digits() {
+        let expected = [(16.94, "16.9"), (1.0, "1.0"), (0.26, "0.26"), (0.0415, "0.042")];
+        assert!(expected.iter().all(|&(number, text)| brief(number) == text));
     }
 }

@@ -110,7 +110,7 @@ impl Source {
         let cells = cells.map_err(|why| match why {
             Refusal::Input(error) => input(error),
             Refusal::Missing(why) => (EXIT_MISSING, why),
-            Refusal::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+            Refusal::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
         })?;
         let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
         if root.is_none() && cells.root.is_none() {

@@ -7,13 +7,16 @@ use check::leak::report::Report;
 use check::leak::{Answer, LeakError, Question, Watch, answer};
 use clap::Args;
 use contract::case::Case;
-use contract::files::{named, write_atomically};
+use contract::files::{Content, named, write_together};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use report::json::pretty;
 use report::leak::{picture, polyline};
 use run::base_tree::BaseTrees;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
+use run::engine::runner::Engine;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -31,8 +34,8 @@ Examples:
   harness leak car.toml --from 0,0,1 --picture leak.svg --vtk leak.vtp
 
 Exit codes: 0 no path at the case's spacing, whatever a finer one would do; 1 a path was found, or with --closed the facets \
-are not proven to be a closed surface between the two places; 2 invalid input; 3 mesher and reference are missing; 130 \
-interrupted.")]
+are not proven to be a closed surface between the two places; 2 invalid input; 3 mesher and reference are missing, or one \
+that was given; 130 interrupted.")]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
@@ -68,8 +71,8 @@ pub struct Arguments {
 /// Searches, prints and writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
     let answered = answered(arguments).and_then(|(case, answer)| {
+        write(arguments, &case, &answer)?;
         print!("{}", answer.report);
-        write(arguments, &case, &answer).map_err(|why| (EXIT_INPUT, why))?;
         let Report { is_leak, is_separated, .. } = answer.report;
         let holds = !is_leak && (is_separated || !arguments.closed);
         Ok(if holds { EXIT_HOLDS } else { EXIT_FAILED })
@@ -88,15 +91,7 @@ fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
     let from = arguments.from.or(case.seeds.first().copied()).ok_or_else(|| {
         input("the case has no seeds: give a start with --from X,Y,Z, in the space that should be closed".into())
     })?;
-    let engine =
-        [&programs.mesher, &programs.reference].into_iter().find(|e| e.program().is_file());
-    let engine = engine.ok_or_else(|| {
-        let path = programs.mesher.program().display();
-        (
-            EXIT_MISSING,
-            format!("the mesher is missing: build {path}, or give another path with --mesher"),
-        )
-    })?;
+    let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, case.root, limit).map_err(input)?;
     let question =
@@ -105,43 +100,70 @@ fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
     let answer = answer(&question, |level| trees.at(level), &progress);
     progress.0.finish_and_clear();
     let answer = answer.map_err(|error| match error {
-        LeakError::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
-        LeakError::Source(failure) if failure.is_interrupt() => {
-            (EXIT_INTERRUPTED, "interrupted by the user".to_owned())
-        }
+        LeakError::Interrupted => interrupted(),
+        LeakError::Source(failure) if failure.is_interrupt() => interrupted(),
         LeakError::Source(failure) => (EXIT_INPUT, failure.to_string()),
         LeakError::Input(why) => (EXIT_INPUT, why),
     })?;
     Ok((case, answer))
 }
 
-/// Writes the requested files. Without a path there is none to draw.
-fn write(arguments: &Arguments, case: &Case, answer: &Answer) -> Result<(), String> {
-    let Answer { report, words } = answer;
-    if let Some(file) = &arguments.json {
-        write_json(report, file)?;
-    }
-    let Some(passage) = &report.passage else {
-        if arguments.vtk.is_some() || arguments.picture.is_some() {
-            eprintln!(
-                "harness: there is no path to draw, so --vtk and --picture write nothing: files of these names are from an earlier run"
-            );
+/// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.
+fn engine<'a>(
+    programs: &'a Programs,
+    given: &ProgramArguments,
+) -> Result<&'a Engine, (u8, String)> {
+    let all = [
+        (&programs.mesher, given.mesher.is_some(), "mesher"),
+        (&programs.reference, given.reference.is_some(), "reference"),
+    ];
+    let exists = |engine: &Engine| engine.program().is_file();
+    let found = all.iter().find(|(engine, ..)| exists(engine)).map(|(engine, ..)| *engine);
+    let wrong = all.iter().find(|(engine, is_given, _)| *is_given && !exists(engine));
+    match (found, wrong) {
+        (Some(engine), None) => Ok(engine),
+        (_, wrong) => {
+            let (engine, _, name) = wrong.unwrap_or(&all[0]);
+            let path = engine.program().display();
+            let why =
+                format!("the {name} is missing: build {path}, or give another path with --{name}");
+            Err((EXIT_MISSING, why))
         }
-        return Ok(());
-    };
-    if let Some(file) = &arguments.vtk {
-        polyline::vtp(passage, file).map_err(|error| error.to_string())?;
     }
-    if let Some(file) = &arguments.picture {
-        picture::write(case, words, passage, file).map_err(|error| error.to_string())?;
-    }
-    Ok(())
 }
 
-fn write_json(report: &Report, file: &Path) -> Result<(), String> {
-    let json = serde_json::to_string_pretty(report).map_err(|error| error.to_string())? + "\n";
-    let written = write_atomically(file, |out| out.write_all(json.as_bytes()));
-    written.map_err(|error| named(file, &error).to_string())
+fn interrupted() -> (u8, String) {
+    (EXIT_INTERRUPTED, "interrupted".to_owned())
+}
+
+/// Writes the requested files, unless the user interrupts before they are complete. Without a path there is none to draw.
+fn write(arguments: &Arguments, case: &Case, answer: &Answer) -> Result<(), (u8, String)> {
+    let Answer { report, words } = answer;
+    let passage = report.passage.as_ref();
+    let complete = |written: io::Result<()>| match interrupt::requested() {
+        true => Err(ErrorKind::Interrupted.into()),
+        false => written,
+    };
+    let json: Content<'_> = &|out| complete(out.write_all(pretty(report).as_bytes()));
+    let vtk: Content<'_> = &|out| complete(passage.map_or(Ok(()), |p| polyline::vtp(p, out)));
+    let svg = |passage| picture::svg(case, words, passage);
+    let picture: Content<'_> =
+        &|out| complete(passage.map_or(Ok(()), |p| out.write_all(svg(p).as_bytes())));
+    let of_path = [(&arguments.vtk, vtk), (&arguments.picture, picture)];
+    if passage.is_none() && of_path.iter().any(|(file, _)| file.is_some()) {
+        eprintln!(
+            "harness: there is no path to draw, so --vtk and --picture write nothing: files of these names are from an earlier run"
+        );
+    }
+    let of_path = of_path.into_iter().filter(|_| passage.is_some());
+    let all = [(&arguments.json, json)].into_iter().chain(of_path);
+    let files: Vec<_> = all.filter_map(|(file, fill)| Some((file.as_deref()?, fill))).collect();
+    let failed = |path: &Path, error: io::Error| match error.kind() {
+        ErrorKind::Interrupted => interrupted(),
+        _ => (EXIT_INPUT, named(path, &error).to_string()),
+    };
+    write_together(&files, failed)?;
+    if files.is_empty() && interrupt::requested() { Err(interrupted()) } else { Ok(()) }
 }
 
 /// A line on standard error that names the current step, only if that is a terminal.

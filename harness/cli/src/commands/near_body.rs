@@ -6,11 +6,11 @@ use contract::case::Case;
 use contract::files::{Content, write_together};
 use export::error::ExportError;
 use export::mesh::Mesh;
+use export::near_body::files;
 use export::near_body::front::{Face, front};
 use export::near_body::gap::{Gap, gaps};
 use export::near_body::polygons::Polygons;
 use export::near_body::report::Report;
-use export::near_body::{files, of_case};
 use run::engine::interrupt;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
@@ -69,7 +69,7 @@ fn found(arguments: &Arguments) -> Result<Report, ExportError> {
     let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
     let mesh = Mesh::open(&arguments.mesh)?;
     let case = arguments.case.as_deref().map(|name| read_case(name, &mesh)).transpose()?;
-    let selection = arguments.selection.of(&mesh).map_err(ExportError::Request)?;
+    let selection = arguments.selection.of(&mesh)?;
     let faces = front(&mesh, &selection, &check)?;
     if faces.is_empty() {
         let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface to hand over";
@@ -77,7 +77,7 @@ fn found(arguments: &Arguments) -> Result<Report, ExportError> {
     }
     let gaps = case.map(|case| gaps(&case, &faces, &check)).transpose()?;
     let polygons = Polygons::new(&faces);
-    let report = Report::new(&mesh, &faces, &polygons, gaps.as_deref());
+    let report = Report::new(&mesh, &faces, &polygons, gaps.as_deref())?;
     write(arguments, &mesh, &faces, &polygons, gaps.as_deref(), &report)?;
     Ok(report)
 }
@@ -87,7 +87,7 @@ fn read_case(name: &str, mesh: &Mesh) -> Result<Case, ExportError> {
     let path =
         Paths::find().catalogue.case_file(name, Path::new("")).map_err(ExportError::Request)?;
     let case = Case::read(&path).map_err(|error| ExportError::Request(error.to_string()))?;
-    of_case(mesh, &case)?;
+    mesh.require_case(&case)?;
     Ok(case)
 }
 
@@ -101,7 +101,7 @@ fn write(
 ) -> Result<(), ExportError> {
     let root = &mesh.manifest.root;
     let stl: Content<'_> = &|out| files::stl(root, faces, polygons, out);
-    let vtp: Content<'_> = &|out| files::vtp(root, faces, polygons, gaps, out);
+    let vtp: Content<'_> = &|out| files::vtp(root, faces, polygons, gaps, mesh.has_ranks(), out);
     let json: Content<'_> = &|out| {
         serde_json::to_writer_pretty(&mut *out, report)?;
         out.write_all(b"\n")

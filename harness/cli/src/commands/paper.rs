@@ -1,7 +1,7 @@
 //! `harness picture --paper`: the pictures of the paper, made of one case.
 
 use super::meshed::{Failure, MeshArguments, Meshed, input};
-use super::view::{command, unread, write_view};
+use super::view::{command, unread, unwritten, write_view};
 use contract::files::{Staging, nearest_directory};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
@@ -53,7 +53,7 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
     }
     let pictures: Vec<_> = MEMBERS.into_iter().zip(drawn.into_iter().flatten()).collect();
     let text = page(&source.mesh, &command(), &pictures);
-    put(&staging.path().join(INDEX), text.as_bytes()).map_err(|error| input(error.to_string()))?;
+    put(&staging.path().join(INDEX), text.as_bytes()).map_err(unwritten)?;
     staging.publish(|staged| publish(staged, out)).map_err(named)?;
     println!("{} pictures; the page is {}", pictures.len(), out.join(INDEX).display());
     Ok(())
@@ -115,8 +115,8 @@ fn draw_member(
     let collect =
         |format: Format| Picture::collect(&mesh, &request, &format.detail()).map_err(unread);
     let tex = tikz(&collect(Format::Tikz)?);
-    put(&file("tex"), tex.as_bytes()).map_err(|error| failed(&error))?;
+    put(&file("tex"), tex.as_bytes()).map_err(unwritten)?;
     let picture = collect(Format::Svg)?;
-    write(&picture, Format::Svg, &file("svg")).map_err(|error| failed(&error))?;
+    write(&picture, Format::Svg, &file("svg")).map_err(unwritten)?;
     Ok(Drawn::Slice(svg(&picture)))
 }

@@ -3,7 +3,7 @@
 use super::meshed::{Failure, MeshArguments, Meshed, input};
 use super::paper;
 use super::selection::SelectionArguments;
-use super::view::{command, unread, write_view};
+use super::view::{command, unread, unwritten, write_view};
 use clap::{Args, ValueEnum};
 use contract::octant::LEVEL_MAX;
 use export::mesh::Mesh;
@@ -118,13 +118,16 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
     };
     let meshed = source.open(&layout, *ungraded)?;
     let mesh = Mesh::open(&meshed.dir).map_err(unread)?;
+    if let (Some(_), Some(case)) = (&source.case, &meshed.case) {
+        mesh.require_case(case).map_err(unread)?;
+    }
     let request = request(arguments, &meshed, &mesh)?;
     if arguments.view || format == Format::Html {
         let scene = Scene::collect(&mesh, &request).map_err(unread)?;
         write_view(&scene, out, &Paths::find(), source)?;
     } else {
         let picture = Picture::collect(&mesh, &request, &format.detail()).map_err(unread)?;
-        write(&picture, format, out).map_err(|error| input(error.to_string()))?;
+        write(&picture, format, out).map_err(unwritten)?;
         println!("{}", picture.title());
     }
     println!("{}", out.display());
@@ -154,7 +157,7 @@ fn request<'a>(
     mesh: &Mesh,
 ) -> Result<Request<'a>, Failure> {
     Ok(Request {
-        selection: arguments.selection.of(mesh).map_err(input)?,
+        selection: arguments.selection.of(mesh).map_err(unread)?,
         body: meshed.case.as_ref().map(|case| &case.facets[..]),
         colour: arguments.colour.into(),
         zoom: arguments.zoom,

@@ -5,6 +5,7 @@ use contract::lattice::Root;
 use contract::manifest::Sides;
 use contract::octant::LEVEL_MAX;
 use contract::word;
+use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
 
@@ -48,19 +49,12 @@ impl SelectionArguments {
     /// The selection in the units of this mesh.
     ///
     /// # Errors
-    /// If no leaf of such a mesh can satisfy a condition, in one sentence.
-    pub fn of(&self, mesh: &Mesh) -> Result<Selection, String> {
+    /// If no leaf of such a mesh can satisfy a condition, or if its ranks are needed and it cannot be read.
+    pub fn of(&self, mesh: &Mesh) -> Result<Selection, ExportError> {
+        self.check(mesh)?;
         let root = &mesh.manifest.root;
-        let slice = self.slice.map(|plane| plane.of(root)).transpose()?;
-        if let Some(rank) = self.rank.filter(|&rank| rank as usize >= mesh.parts()) {
-            return Err(match mesh.parts() {
-                1 => format!("--rank {rank}: the mesh has one rank, number 0"),
-                ranks => format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"),
-            });
-        }
-        if self.side.is_some() && mesh.manifest.sides == Sides::Unknown {
-            return Err("--side: the sides of this mesh are unknown, so omit it".to_owned());
-        }
+        let slice =
+            self.slice.map(|plane| plane.of(root)).transpose().map_err(ExportError::Request)?;
         let side = self.side.map(|side| match side {
             Side::Outside => word::Side::Outside,
             Side::Inside => word::Side::Inside,
@@ -68,6 +62,28 @@ impl SelectionArguments {
         });
         let clip = self.clip.map(|corners| corners.map(|corner| root.quantise_clamped(corner)));
         Ok(Selection { clip, level_max: self.level_max, side, rank: self.rank, slice })
+    }
+
+    /// Refuses conditions on what the mesh does not have.
+    fn check(&self, mesh: &Mesh) -> Result<(), ExportError> {
+        if let Some(rank) = self.rank {
+            let ranks = mesh.leaves_by_rank()?.len();
+            if !mesh.has_ranks() {
+                return Err(mesh.ranks_unknown());
+            }
+            if rank as usize >= ranks {
+                let why = match ranks {
+                    1 => format!("--rank {rank}: the mesh has one rank, number 0"),
+                    _ => format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"),
+                };
+                return Err(ExportError::Request(why));
+            }
+        }
+        if self.side.is_some() && mesh.manifest.sides == Sides::Unknown {
+            let why = "--side: the sides of this mesh are unknown, so omit it";
+            return Err(ExportError::Request(why.to_owned()));
+        }
+        Ok(())
     }
 }
 

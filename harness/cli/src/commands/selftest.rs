@@ -135,7 +135,7 @@ fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
     let report = scale::run(&sources, &options, scratch.path(), &progress);
     bar.finish_and_clear();
     let report = report.map_err(|error| match error.kind() {
-        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
         _ => input(error),
     })?;
     println!("{report}");
@@ -169,7 +169,7 @@ fn source(arguments: &Arguments, path: &Path, made: &Path) -> Result<Source, Fai
     let place = made.join(format!("{}", fs::read_dir(made).map_or(0, Iterator::count)));
     fs::create_dir(&place).map_err(|error| (EXIT_INPUT, error.to_string()))?;
     made_by_mesher(&programs, path, arguments.cells, &place, limit).map_err(|why| match why {
-        Failed::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+        Failed::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
         Failed::Reason(why) => (EXIT_INPUT, format!("{}: {why}", path.display())),
     })
 }
@@ -208,7 +208,7 @@ fn mesh_case(
         };
         programs.reference.run(path, &SERIAL, &options).map_err(|failure| match &failure.end {
             End::Missing(_) => (EXIT_MISSING, failure.to_string()),
-            End::Interrupted => (EXIT_INTERRUPTED, "interrupted by the user".to_owned()),
+            End::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
             End::Exited { code: 2, error } => (EXIT_INPUT, error.clone()),
             _ => (EXIT_FAILED, format!("{failure}, on {}", path.display())),
         })?;

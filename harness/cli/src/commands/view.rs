@@ -7,6 +7,7 @@ use report::picture::scene::{Scene, html};
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_INTERRUPTED, EXIT_MISSING};
 use run::view;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 /// A mesh of which no picture could be made.
@@ -36,7 +37,15 @@ pub fn write_view(
         }
         _ => html(scene).into_bytes(),
     };
-    put(out, &bytes).map_err(|error| input(error.to_string()))
+    put(out, &bytes).map_err(unwritten)
+}
+
+/// A file of a picture that was not written.
+pub fn unwritten(error: io::Error) -> Failure {
+    match error.kind() {
+        ErrorKind::Interrupted => unread(ExportError::Interrupted),
+        _ => input(error.to_string()),
+    }
 }
 
 /// The command line, as it can be entered again.

@@ -1,4 +1,4 @@
-//! The bytes and bits of an array, of which one chunk is in memory.
+//! The bytes, bits and integers of an array, of which one chunk is in memory.
 
 use super::Result;
 use vtkhdf::format::Chunked;
@@ -35,15 +35,30 @@ impl<'a> Bytes<'a> {
         if let Some(&byte) = self.chunk.get(position.wrapping_sub(self.start) as usize) {
             return Ok(byte);
         }
-        self.load(position)
+        let at = self.load(position)?;
+        Ok(self.chunk[at])
     }
 
-    fn load(&mut self, position: u64) -> Result<u8> {
+    /// The element at a position of an array of i32.
+    pub(super) fn int(&mut self, position: u64) -> Result<i32> {
+        let at = |chunk: &[u8], element: usize| {
+            let bytes = chunk.get(element.checked_mul(4)?..)?;
+            bytes.first_chunk().map(|bytes| i32::from_le_bytes(*bytes))
+        };
+        if let Some(int) = at(&self.chunk, position.wrapping_sub(self.start) as usize) {
+            return Ok(int);
+        }
+        let element = self.load(position)?;
+        Ok(at(&self.chunk, element).expect("chunks have whole elements"))
+    }
+
+    /// Reads the chunk with a position; returns the number of that element in the chunk.
+    fn load(&mut self, position: u64) -> Result<usize> {
         let chunk_len = u64::from(self.array.chunk_len);
         let index = position / chunk_len;
         self.file.read_chunk(self.array, index as usize, &mut self.chunk)?;
         self.start = index * chunk_len;
-        Ok(self.chunk[(position - self.start) as usize])
+        Ok((position - self.start) as usize)
     }
 
     /// Up to eight bits from a position on, which the file has from the most significant one; the first becomes the lowest.

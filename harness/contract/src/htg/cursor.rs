@@ -13,6 +13,7 @@ pub struct Cursor<'a> {
     index: &'a Index,
     levels: Vec<LevelReader<'a>>,
     words: Vec<u64>,
+    ranks: Vec<u32>,
 }
 
 /// A descent from the root.
@@ -28,8 +29,9 @@ struct Descent {
 impl<'a> Cursor<'a> {
     /// A cursor for a tree and its index.
     pub fn new(tree: &'a TreeFile, index: &'a Index) -> Self {
-        let levels = (0..tree.nodes.len()).map(|level| tree.level(level)).collect();
-        Self { index, levels, words: Vec::new() }
+        let ranks = tree.ranks.as_ref();
+        let levels = (0..tree.nodes.len()).map(|level| tree.level(level, ranks)).collect();
+        Self { index, levels, words: Vec::new(), ranks: Vec::new() }
     }
 
     /// Number of leaves whose Morton codes are less than `key`.
@@ -46,6 +48,20 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If the file is damaged.
     pub fn words(&mut self, key: u64, level: u8, into: &mut Vec<u64>) -> Result<()> {
+        self.words_and_ranks(key, level, into, &mut Vec::new())
+    }
+
+    /// The same, and the rank of each leaf, if the tree has ranks.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn words_and_ranks(
+        &mut self,
+        key: u64,
+        level: u8,
+        into: &mut Vec<u64>,
+        ranks_into: &mut Vec<u32>,
+    ) -> Result<()> {
         let Descent { next, leaf, .. } = self.descend(key)?;
         let from = leaf.min(usize::from(level));
         for (reader, next) in self.levels.iter_mut().zip(next).skip(from) {
@@ -55,14 +71,16 @@ impl<'a> Cursor<'a> {
             return Ok(());
         }
         let (levels, words) = (std::mem::take(&mut self.levels), std::mem::take(&mut self.words));
-        let mut run = |words: &[u64]| {
+        let mut run = |words: &[u64], ranks: &[u32]| {
             into.extend_from_slice(words);
+            ranks_into.extend_from_slice(ranks);
             true
         };
-        let mut walk = Walk { levels, words, run: &mut run };
+        let ranks = std::mem::take(&mut self.ranks);
+        let mut walk = Walk { levels, words, ranks, run: &mut run };
         let result = walk.siblings(from, key, 1);
         walk.flush();
-        (self.levels, self.words) = (walk.levels, walk.words);
+        (self.levels, self.words, self.ranks) = (walk.levels, walk.words, walk.ranks);
         result.map(drop)
     }
 

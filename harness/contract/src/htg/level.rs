@@ -14,7 +14,12 @@ pub(super) struct Siblings {
     pub(super) masked: u8,
     /// Sides of those that are neither split nor masked.
     pub(super) sides: [u8; 8],
+    /// Ranks of the same nodes, if the reader has ranks.
+    pub(super) ranks: Option<[u32; 8]>,
 }
+
+/// The least number that is no rank, so that counting leaves by rank takes little memory whatever a file contains.
+const RANKS_MAX: u32 = 1 << 24;
 
 /// A reader of one level.
 pub(super) struct LevelReader<'a> {
@@ -24,30 +29,22 @@ pub(super) struct LevelReader<'a> {
     split: Option<Bytes<'a>>,
     masked: Option<Bytes<'a>>,
     sides: Option<Bytes<'a>>,
+    ranks: Option<Bytes<'a>>,
     /// The numbers of split nodes and of masked ones before the first node, when they are known.
     before: Option<[u64; 2]>,
 }
 
 impl<'a> LevelReader<'a> {
-    /// A reader of these nodes; without an array, its bits and bytes are zero.
+    /// A reader of these nodes. The arrays are the split nodes, the masked ones, sides and ranks; without one of the first three,
+    /// its bits and bytes are zero.
     pub(super) fn new(
         file: &'a File,
-        range: Range<u64>,
-        split: Option<&'a Chunked>,
-        masked: Option<&'a Chunked>,
-        sides: Option<&'a Chunked>,
+        Range { start: begin, end }: Range<u64>,
+        arrays: [Option<&'a Chunked>; 4],
     ) -> Self {
-        let bytes = |array: Option<&'a Chunked>| array.map(|array| Bytes::new(file, array));
-        let Range { start: begin, end } = range;
-        Self {
-            begin,
-            next: begin,
-            end,
-            split: bytes(split),
-            masked: bytes(masked),
-            sides: bytes(sides),
-            before: None,
-        }
+        let [split, masked, sides, ranks] =
+            arrays.map(|array| array.map(|array| Bytes::new(file, array)));
+        Self { begin, next: begin, end, split, masked, sides, ranks, before: None }
     }
 
     pub(super) fn is_at_end(&self) -> bool {
@@ -113,8 +110,8 @@ impl<'a> LevelReader<'a> {
         }
         let mut sides = [0; 8];
         let exist = ((1u16 << count) - 1) as u8;
-        if let Some(bytes) = self.sides.as_mut().filter(|_| split | masked != exist) {
-            let leaves = !(split | masked) & exist;
+        let leaves = !(split | masked) & exist;
+        if let Some(bytes) = self.sides.as_mut().filter(|_| leaves != 0) {
             for (i, side) in sides.iter_mut().enumerate().filter(|(i, _)| leaves >> i & 1 == 1) {
                 *side = bytes.at(first + i as u64)?;
                 if *side > 2 {
@@ -122,6 +119,17 @@ impl<'a> LevelReader<'a> {
                 }
             }
         }
-        Ok(Siblings { split, masked, sides })
+        let mut ranks = self.ranks.as_ref().map(|_| [0; 8]);
+        if let (Some(ints), Some(ranks)) = (&mut self.ranks, &mut ranks) {
+            for (i, rank) in ranks.iter_mut().enumerate().filter(|(i, _)| leaves >> i & 1 == 1) {
+                let node = first + i as u64;
+                let found = ints.int(node)?;
+                match u32::try_from(found).ok().filter(|&rank| rank < RANKS_MAX) {
+                    Some(found) => *rank = found,
+                    None => return nodes(format!("node {node} has the rank {found}")),
+                }
+            }
+        }
+        Ok(Siblings { split, masked, sides, ranks })
     }
 }

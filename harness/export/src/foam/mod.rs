@@ -64,7 +64,7 @@ pub fn write(
 ) -> Result<Summary, ExportError> {
     let mut model = read(mesh, selection, options)?;
     let regions = connect(&mut model, options.foam.regions)?;
-    let distribution = distribute(&model, options.foam.processors)?;
+    let distribution = distribute(&model, mesh, options.foam.processors)?;
     let targets = targets(path, distribution.as_ref().map(Distribution::processors))?;
     let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
         .map_err(ExportError::Request)?;
@@ -134,8 +134,8 @@ fn read<'a>(
             "the mesh has another root than the case: give the case that was meshed".to_owned(),
         ));
     }
-    let parts = mesh.manifest.parts.len();
-    let mut ranks = (parts > 1).then(|| Distribution::new(parts as u32));
+    let ranks = mesh.leaves_by_rank()?.len();
+    let mut ranks = (ranks > 1).then(|| Distribution::new(ranks as u32));
     let (mut builder, mut visited, mut cells) = (Builder::default(), 0u64, 0);
     mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
         visited += 1;
@@ -150,7 +150,7 @@ fn read<'a>(
             )));
         }
         if let Some(ranks) = &mut ranks {
-            ranks.push(leaf.part, u32::from(is_exported));
+            ranks.push(leaf.rank, u32::from(is_exported));
         }
         let kind = if is_exported { leaf.side as u8 } else { DELETED };
         let pushed = builder.push_leaf(word::key_of(leaf.octant.corner), leaf.octant.level, kind);
@@ -197,6 +197,7 @@ fn connect(model: &mut Model, keep: options::Regions) -> Result<Vec<Size>, Expor
 /// The cells of each processor directory.
 fn distribute(
     model: &Model,
+    mesh: &Mesh,
     processors: Option<Processors>,
 ) -> Result<Option<Distribution>, ExportError> {
     let cells = model.tree.cells();
@@ -208,6 +209,7 @@ fn distribute(
                 "{cells} cells are too few for {count} processors: choose fewer"
             )));
         }
+        Some(Processors::Ranks) if !mesh.has_ranks() => return Err(mesh.ranks_unknown()),
         Some(Processors::Ranks) => {
             model.ranks.clone().unwrap_or_else(|| Distribution::equal(cells, 1))
         }

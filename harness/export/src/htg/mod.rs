@@ -28,7 +28,7 @@ use windows::Windows;
 /// Leaves between two reports of progress.
 const REPORT: u64 = 1 << 16;
 
-/// Writes the file. With more than one part, cells have the part's index as `rank`.
+/// Writes the file. With more than one rank, cells have it as `rank`.
 ///
 /// # Errors
 /// If no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
@@ -50,7 +50,7 @@ pub fn write(
     }
     let root = mesh.manifest.root;
     let shape = Shape { origin: root.origin, edge: root.edge, nodes };
-    let with_ranks = mesh.parts() > 1;
+    let with_ranks = mesh.leaves_by_rank()?.len() > 1;
     let named = |error| ExportError::write(path, error);
     let bytes = files::fill_atomically(path, named, |file: &mut File| {
         let out = BufWriter::with_capacity(1 << 20, file);

@@ -56,7 +56,7 @@ impl Open {
             Side::Inside if with_sides => siblings.inside |= 1 << digit,
             _ => {}
         }
-        parts[digit] = leaf.part as i32;
+        parts[digit] = leaf.rank as i32;
         Ok(())
     }
 

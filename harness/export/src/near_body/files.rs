@@ -42,8 +42,8 @@ pub fn stl(root: &Root, faces: &[Face], polygons: &Polygons, out: impl Write) ->
     write_stl_binary(&triangles, out)
 }
 
-/// Writes the polygons, counterclockwise as seen from the mesh, with the cell data `level`, `side` and `rank` of the leaf, its `spacing`,
-/// and with gaps also `gap`, the least distance of the face, `gap_centre`, that of its centre, and `gap_cells`, the least distance in edges of
+/// Writes the polygons, counterclockwise as seen from the mesh, with the cell data `level` and `side` of the leaf, its `spacing`, its `rank`
+/// if ranks are known, and with gaps also `gap`, the least distance of the face, `gap_centre`, that of its centre, and `gap_cells`, the least distance in edges of
 /// the leaf.
 ///
 /// # Errors
@@ -53,6 +53,7 @@ pub fn vtp(
     faces: &[Face],
     polygons: &Polygons,
     gaps: Option<&[Gap]>,
+    has_ranks: bool,
     out: impl Write,
 ) -> io::Result<()> {
     let point = |at: &[u32; 3]| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
@@ -60,9 +61,11 @@ pub fn vtp(
     let mut cell = vec![
         array("level", faces.iter().map(|face| face.leaf_level).collect::<Vec<u8>>()),
         array("side", faces.iter().map(|face| face.side as u8).collect::<Vec<u8>>()),
-        array("rank", faces.iter().map(|face| face.part).collect::<Vec<u32>>()),
         array("spacing", faces.iter().map(spacing).collect::<Vec<f64>>()),
     ];
+    if has_ranks {
+        cell.push(array("rank", faces.iter().map(|face| face.rank).collect::<Vec<u32>>()));
+    }
     if let Some(gaps) = gaps {
         let cells = gaps.iter().zip(faces).map(|(gap, face)| gap.least / spacing(face));
         cell.push(array("gap_cells", cells.collect::<Vec<f64>>()));

@@ -37,8 +37,8 @@ pub struct Face {
     pub leaf_level: u8,
     /// Side of the leaf, which is not crossing.
     pub side: Side,
-    /// Part of the leaf.
-    pub part: u32,
+    /// Rank of the leaf; 0 if it is unknown.
+    pub rank: u32,
 }
 
 impl Face {
@@ -279,9 +279,9 @@ impl Found<'_> {
         else {
             return;
         };
-        let Leaf { octant: Octant { level: leaf_level, .. }, side, part, .. } = leaf;
+        let Leaf { octant: Octant { level: leaf_level, .. }, side, rank, .. } = leaf;
         let (Octant { corner, level }, axis) = (*above, axis as u8);
-        self.faces.push(Face { corner, level, axis, is_leaf_above, leaf_level, side, part });
+        self.faces.push(Face { corner, level, axis, is_leaf_above, leaf_level, side, rank });
     }
 }
 

@@ -56,10 +56,10 @@ pub fn gaps(
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
+    use crate::near_body::files;
     use crate::near_body::front::front;
     use crate::near_body::polygons::Polygons;
     use crate::near_body::report::Report;
-    use crate::near_body::{files, of_case};
     use crate::selection::Selection;
     use crate::testing::{in_root, on_disk};
     use contract::lattice::Root;
@@ -94,15 +94,16 @@ mod tests {
             assert!((gap.least - expected).abs() < 1e-6 && (gap.centre - expected).abs() < 1e-6);
         }
         let polygons = Polygons::new(&faces);
-        let report = Report::new(&mesh, &faces, &polygons, Some(&gaps));
+        let report = Report::new(&mesh, &faces, &polygons, Some(&gaps)).unwrap();
+        let ranks = report.ranks.as_ref().unwrap();
         let gap = report.gap.as_ref().unwrap();
         for (found, expected) in [
             (gap.least.min, 0.3),
             (gap.least_cells.max, 0.7),
             (gap.centre.p95, 0.7),
             (report.area, 128.0),
-            (report.ranks.lambda_faces, 80.0 / 64.0),
-            (report.ranks.lambda_cells, 1.0 + 64.0 / 448.0),
+            (ranks.lambda_faces, 80.0 / 64.0),
+            (ranks.lambda_cells, 1.0 + 64.0 / 448.0),
         ] {
             assert!((found - expected).abs() < 1e-6, "{found} is not {expected}: {report:?}");
         }
@@ -116,7 +117,7 @@ mod tests {
     fn a_case_of_another_mesh_is_refused() {
         let (case, words) = plate();
         let mesh = |root| in_root(&words, 1, |_| 0, root).1;
-        let check = |mesh: Mesh| of_case(&mesh, &case);
+        let check = |mesh: Mesh| mesh.require_case(&case);
         assert!(check(mesh(case.root)).is_ok());
         let other = mesh(Root { edge: 4.0, ..case.root });
         assert!(check(other).unwrap_err().to_string().contains("the mesh is not of the case"));
@@ -152,7 +153,7 @@ mod tests {
         assert!(edges.values().all(|count| count % 2 == 0));
         assert!((volume - 0.125).abs() < 1e-6, "{volume}");
         let mut text = Vec::new();
-        files::vtp(&mesh.manifest.root, &faces, &polygons, None, &mut text).unwrap();
+        files::vtp(&mesh.manifest.root, &faces, &polygons, None, true, &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert!(text.contains("PolyData") && text.contains("Name=\"rank\""));
     }

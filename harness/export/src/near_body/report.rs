@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::front::Face;
 use super::gap::Gap;
 use super::polygons::Polygons;
+use crate::error::ExportError;
 use crate::mesh::Mesh;
 
 /// Schema of the report as JSON.
@@ -29,8 +30,8 @@ pub struct Report {
     pub faces_by_level: [u64; LEVEL_MAX as usize + 1],
     /// The gap to the wall; `None` without a case.
     pub gap: Option<GapStatistics>,
-    /// The distribution of the mesh to ranks.
-    pub ranks: Ranks,
+    /// The distribution of the mesh to ranks; `None` if they are unknown.
+    pub ranks: Option<Ranks>,
 }
 
 /// Statistics of the gap to the wall, over the faces.
@@ -74,26 +75,40 @@ pub struct Ranks {
 
 impl Report {
     /// A report on the front of a mesh; `gaps` are those of its faces.
-    pub fn new(mesh: &Mesh, faces: &[Face], polygons: &Polygons, gaps: Option<&[Gap]>) -> Self {
+    ///
+    /// # Errors
+    /// If the mesh cannot be read.
+    pub fn new(
+        mesh: &Mesh,
+        faces: &[Face],
+        polygons: &Polygons,
+        gaps: Option<&[Gap]>,
+    ) -> Result<Self, ExportError> {
         let root = &mesh.manifest.root;
         let area = |face: &Face| edge_of_level(root, face.level).powi(2);
         let mut faces_by_level = [0; LEVEL_MAX as usize + 1];
-        let cells: Vec<u64> = mesh.manifest.parts.iter().map(|part| part.leaves).collect();
-        let mut by_rank = vec![0; cells.len()];
         for face in faces {
             faces_by_level[face.leaf_level as usize] += 1;
-            by_rank[face.part as usize] += 1;
         }
-        let (lambda_cells, lambda_faces) = (lambda(&cells), lambda(&by_rank));
-        Self {
+        let cells = mesh.leaves_by_rank()?;
+        Ok(Self {
             schema: SCHEMA,
             faces: faces.len() as u64,
             area: faces.iter().map(area).sum(),
             edges_open: edges_open(polygons),
             faces_by_level,
             gap: gaps.and_then(|gaps| GapStatistics::of(root, faces, gaps)),
-            ranks: Ranks { cells, faces: by_rank, lambda_cells, lambda_faces },
-        }
+            ranks: mesh.has_ranks().then(|| Ranks::of(cells.to_vec(), faces)),
+        })
+    }
+}
+
+impl Ranks {
+    fn of(cells: Vec<u64>, faces: &[Face]) -> Self {
+        let mut by_rank = vec![0; cells.len()];
+        faces.iter().for_each(|face| by_rank[face.rank as usize] += 1);
+        let (lambda_cells, lambda_faces) = (lambda(&cells), lambda(&by_rank));
+        Self { cells, faces: by_rank, lambda_cells, lambda_faces }
     }
 }
 
@@ -171,7 +186,9 @@ impl fmt::Display for Report {
                 writeln!(f, "  {name:<18} {min:>12.6} {median:>12.6} {p95:>12.6} {max:>12.6}")?;
             }
         }
-        let Ranks { cells, lambda_cells, lambda_faces, .. } = &self.ranks;
+        let Some(Ranks { cells, lambda_cells, lambda_faces, .. }) = &self.ranks else {
+            return writeln!(f, "the ranks of the cells are unknown");
+        };
         match cells.len() {
             1 => writeln!(f, "one rank, which has all cells and exposed faces"),
             ranks => writeln!(

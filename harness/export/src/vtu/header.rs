@@ -25,7 +25,7 @@ const fn array(section: &'static str, name: &'static str, kind: &'static str) ->
     Array { section, name, kind }
 }
 
-/// The arrays of a piece, in the order in which they are written. The last one is missing if sides are unknown.
+/// The arrays of a piece, in the order in which they are written. Ranks or sides are missing if they are unknown.
 const ARRAYS: [Array; 9] = [
     array("Points", "Points", "Float64"),
     array("Cells", "connectivity", "Int64"),
@@ -43,6 +43,8 @@ const ARRAYS: [Array; 9] = [
 pub struct Content {
     /// The root of the mesh.
     pub root: Root,
+    /// Whether cells have ranks.
+    pub with_ranks: bool,
     /// Whether cells have sides.
     pub with_sides: bool,
     /// Digest of the leaves in the file.
@@ -74,8 +76,13 @@ impl Place {
 }
 
 impl Content {
-    fn arrays(&self) -> &'static [Array] {
-        &ARRAYS[..ARRAYS.len() - usize::from(!self.with_sides)]
+    fn arrays(&self) -> impl Iterator<Item = &'static Array> {
+        let Self { with_ranks, with_sides, .. } = *self;
+        ARRAYS.iter().filter(move |array| match array.name {
+            "rank" => with_ranks,
+            "side" => with_sides,
+            _ => true,
+        })
     }
 
     /// A `.vtu` file up to the appended data, filled up with blanks to `length` bytes.
@@ -132,7 +139,7 @@ impl Content {
             }
             let scalars = if section == "CellData" { " Scalars=\"level\"" } else { "" };
             xml += &format!("      <{prefix}{section}{scalars}>\n");
-            for (index, array) in self.arrays().iter().enumerate() {
+            for (index, array) in self.arrays().enumerate() {
                 if array.section == section {
                     let Array { name, kind, .. } = array;
                     let components =

@@ -71,7 +71,7 @@ fn encode(
     options: &Options<'_>,
     mut take: impl FnMut(usize, Encoded) -> Result<(), ExportError> + Send,
 ) -> Result<(), ExportError> {
-    let Content { root, with_sides, .. } = content(mesh);
+    let content = content(mesh);
     let visitor = mesh.visitor();
     let make = |index: usize| {
         options.check()?;
@@ -83,7 +83,7 @@ fn encode(
                 Ok::<(), ExportError>(())
             })?;
             options.check()?;
-            Ok(encoder.encode(&root, with_sides))
+            Ok(encoder.encode(&content))
         })
     };
     let total = leaves(pieces);
@@ -98,8 +98,12 @@ fn encode(
 
 /// What files of this mesh state about themselves before they have leaves.
 fn content(mesh: &Mesh) -> Content {
-    let with_sides = mesh.manifest.sides == Sides::Known;
-    Content { root: mesh.manifest.root, with_sides, digest: Digest::default() }
+    Content {
+        root: mesh.manifest.root,
+        with_ranks: mesh.has_ranks(),
+        with_sides: mesh.manifest.sides == Sides::Known,
+        digest: Digest::default(),
+    }
 }
 
 fn leaves(pieces: &[Piece]) -> u64 {

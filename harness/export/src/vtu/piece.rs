@@ -7,6 +7,7 @@ use contract::lattice::Root;
 use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
+use super::header::Content;
 use super::points::{Points, unpacked};
 use super::zlib::{Known, Zlib};
 use crate::leaf::Leaf;
@@ -41,8 +42,9 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Encodes the leaves; `with_sides` is whether their sides are known.
-    pub fn encode(&mut self, root: &Root, with_sides: bool) -> Encoded {
+    /// Encodes the leaves with the arrays that the content has.
+    pub fn encode(&mut self, content: &Content) -> Encoded {
+        let Content { root, with_ranks, with_sides, .. } = content;
         let Self { leaves, points, zlib, offsets, types } = self;
         points.set(leaves);
         let cells = leaves.len();
@@ -64,10 +66,12 @@ impl Encoder {
         to.begin_array();
         zlib.append_known(cells, |_| [HEXAHEDRON], types, &mut to.bytes);
         to.push(zlib, cells, leaves.iter().map(|leaf| [leaf.octant.level]));
-        to.push(zlib, cells, leaves.iter().map(|leaf| leaf.part.to_le_bytes()));
+        if *with_ranks {
+            to.push(zlib, cells, leaves.iter().map(|leaf| leaf.rank.to_le_bytes()));
+        }
         to.push(zlib, cells, leaves.iter().map(|leaf| edges(leaf).to_le_bytes()));
         to.push(zlib, cells, leaves.iter().map(|leaf| leaf.index.to_le_bytes()));
-        if with_sides {
+        if *with_sides {
             to.push(zlib, cells, leaves.iter().map(|leaf| [leaf.side as u8]));
         }
         to

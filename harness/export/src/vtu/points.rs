@@ -121,7 +121,7 @@ mod tests {
     /// Every vertex of a cell is the point at that corner of its leaf, and no two points coincide.
     fn check(words: &[u64]) -> Points {
         let leaf =
-            |&w: &u64| Leaf { octant: word::octant(w), side: word::side(w), part: 0, index: 0 };
+            |&w: &u64| Leaf { octant: word::octant(w), side: word::side(w), rank: 0, index: 0 };
         let leaves: Vec<Leaf> = words.iter().map(leaf).collect();
         let mut points = Points::default();
         // What is left of another piece has no effect.

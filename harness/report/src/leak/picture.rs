@@ -8,10 +8,7 @@ use check::geometry::distance::{cross, dot, sub};
 use check::geometry::meaning::number;
 use check::leak::report::Passage;
 use contract::case::Case;
-use contract::files::{named, write_atomically};
 use contract::word::{self, Side};
-use std::io;
-use std::path::Path;
 
 /// Half of the window's edge, in widths of the narrowest place and in cells; the larger one counts.
 const HALF: (f64, f64) = (2.0, 6.0);
@@ -22,16 +19,7 @@ const SIDES: f64 = 40.0;
 /// Fill of crossing leaves.
 const CROSSING: &str = "#D9D9D9";
 
-/// Writes the slice; `words` are the leaves of the base tree that the path leads through.
-///
-/// # Errors
-/// If the file cannot be written; the message names it.
-pub fn write(case: &Case, words: &[u64], passage: &Passage, path: &Path) -> io::Result<()> {
-    let text = svg(case, words, passage);
-    write_atomically(path, |out| out.write_all(text.as_bytes())).map_err(|e| named(path, &e))
-}
-
-/// The slice as an SVG document.
+/// The slice as an SVG document; `words` are the leaves of the base tree that the path leads through.
 pub fn svg(case: &Case, words: &[u64], passage: &Passage) -> String {
     let window = window(passage);
     let mut canvas = Canvas::new("leak");

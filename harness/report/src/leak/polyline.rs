@@ -1,9 +1,7 @@
 //! The widest path of a leak as a VTK polyline with the free width at each point.
 
 use check::leak::report::Passage;
-use contract::files::{named, write_atomically};
-use std::io;
-use std::path::Path;
+use std::io::{self, Write};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, DataArray, DataSet, PolyDataPiece, Version, VertexNumbers,
     Vtk,
@@ -12,8 +10,8 @@ use vtkio::model::{
 /// Writes the path as `.vtp`: one line with the point data `width`, and the cell data `narrowest_width`.
 ///
 /// # Errors
-/// If the file cannot be written; the message names it.
-pub fn vtp(passage: &Passage, path: &Path) -> io::Result<()> {
+/// If writing fails.
+pub fn vtp(passage: &Passage, out: impl Write) -> io::Result<()> {
     let points = &passage.points;
     let scalars = |name: &str, data: Vec<f64>| {
         Attribute::DataArray(DataArray::scalars(name, 1).with_vec(data))
@@ -37,6 +35,5 @@ pub fn vtp(passage: &Passage, path: &Path) -> io::Result<()> {
         data: DataSet::inline(piece),
         file_path: None,
     };
-    let invalid = |error| io::Error::other(format!("{error:?}"));
-    write_atomically(path, |out| line.write_xml(out).map_err(invalid)).map_err(|e| named(path, &e))
+    line.write_xml(out).map_err(|error| io::Error::other(format!("{error:?}")))
 }

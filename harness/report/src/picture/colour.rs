@@ -60,7 +60,7 @@ impl Colour {
     pub fn value(self, leaf: &Leaf) -> u32 {
         match self {
             Self::Level | Self::Spacing => u32::from(leaf.octant.level),
-            Self::Rank => leaf.part,
+            Self::Rank => leaf.rank,
             Self::Side => leaf.side as u32,
         }
     }

@@ -3,7 +3,8 @@
 use super::squares::Detail;
 use super::{Picture, TEX, VECTOR, csv, svg, tikz};
 use contract::files::{Content, named, write_atomically, write_together};
-use std::io;
+use run::engine::interrupt;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// A format.
@@ -75,7 +76,7 @@ pub fn write(picture: &Picture, format: Format, path: &Path) -> io::Result<()> {
     let drawn = format.draw(picture).map_err(io::Error::other)?;
     let (table, data) = (path.with_extension("csv"), csv(picture));
     let content: [(&Path, Content<'_>); 2] =
-        [(path, &|out| out.write_all(&drawn)), (&table, &|out| out.write_all(data.as_bytes()))];
+        [(path, &|out| fill(out, &drawn)), (&table, &|out| fill(out, data.as_bytes()))];
     write_together(&content, |path, error| named(path, &error))
 }
 
@@ -84,5 +85,11 @@ pub fn write(picture: &Picture, format: Format, path: &Path) -> io::Result<()> {
 /// # Errors
 /// If it cannot be written; the message names it.
 pub fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    write_atomically(path, |out| out.write_all(bytes)).map_err(|error| named(path, &error))
+    write_atomically(path, |out| fill(out, bytes)).map_err(|error| named(path, &error))
+}
+
+/// Fills a file, which is not published if the user has interrupted the drawing.
+fn fill(out: &mut dyn Write, bytes: &[u8]) -> io::Result<()> {
+    out.write_all(bytes)?;
+    if interrupt::requested() { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
 }

@@ -56,7 +56,10 @@ impl Request<'_> {
             let why = "the sides of this mesh are unknown: choose another colour";
             return Err(ExportError::Request(why.to_owned()));
         }
-        Ok(())
+        match self.colour == Colour::Rank && !mesh.has_ranks() {
+            true => Err(mesh.ranks_unknown()),
+            false => Ok(()),
+        }
     }
 }
 

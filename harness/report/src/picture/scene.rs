@@ -81,7 +81,7 @@ impl Scene {
     /// Reads what the view shows: the requested slice and those of the other axes, and the body.
     ///
     /// # Errors
-    /// If the mesh cannot be read.
+    /// If the mesh cannot be read, or no slice has a leaf.
     pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, ExportError> {
         request.check(mesh)?;
         let root = mesh.manifest.root;
@@ -102,6 +102,11 @@ impl Scene {
             let page = root.edge / edge * PAGE;
             slices
                 .push((slice, Squares::collect(mesh, &selection, request.colour, page, &detail)?));
+        }
+        if slices.iter().all(|(_, squares)| squares.squares.is_empty()) {
+            let why =
+                "no leaf of the selection is in any slice: give another --slice or a larger --clip";
+            return Err(ExportError::Request(why.to_owned()));
         }
         let surface = request.body.map(Surface::of);
         let ranks = match (&surface, request.colour) {

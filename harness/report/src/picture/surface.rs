@@ -116,7 +116,7 @@ pub fn ranks_at(mesh: &Mesh, points: &[[f64; 3]]) -> Result<Vec<Option<u32>>, Ex
             let start = word::key_of(leaf.octant.corner);
             let end = start + word::span(leaf.octant.level);
             while let Some((&(key, point), rest)) = next.split_first().filter(|(n, _)| n.0 < end) {
-                ranks[point] = (key >= start).then_some(leaf.part);
+                ranks[point] = (key >= start).then_some(leaf.rank);
                 next = rest;
             }
             Ok::<(), ExportError>(())
