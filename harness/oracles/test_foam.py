@@ -1,14 +1,16 @@
 """OpenFOAM accepts the meshes of `harness export`, and solves on them. Run with: python -m unittest discover harness/oracles
 
-Needs target/debug/{harness,reference}, which `cargo test --workspace` builds, and OpenFOAM (ci/peers snappy)."""
+Needs target/debug/{harness,mesher,reference}, which `cargo test --workspace` builds, and OpenFOAM (ci/peers snappy)."""
 
 import os
 import pathlib
 import random
 import re
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
 import numpy as np
@@ -201,6 +203,98 @@ class FoamTest(unittest.TestCase):
         self.assertEqual(sorted(cells), list(range(len(cells))))
         self.assertEqual(len(cells), len(whole["cellLevel"]))
         self.assertTrue(((seen == 1) | (seen == 2)).all())
+
+
+@unittest.skipUnless(
+    all((PROGRAMS / name).is_file() for name in ("harness", "mesher")),
+    f"harness or mesher is not built in {PROGRAMS}: run cargo build -p harness -p mesher",
+)
+@unittest.skipUnless(shutil.which("potentialFoam"), "OpenFOAM is not installed: run ci/peers snappy")
+class RunTest(unittest.TestCase):
+    """The script `run`, with the programs of the tests."""
+
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.at = pathlib.Path(temporary.name)
+        (self.at / "target").mkdir()
+        (self.at / "target/release").symlink_to(PROGRAMS)
+        (self.at / "duct.stl").write_text(duct())
+        self.case = (
+            'geometry = "duct.stl"\nspacing_min = 0.25\nkeep = "inside"\nkeep_crossing = false\nseeds = [[0, 0, 0]]\n'
+            "[root]\norigin = [-2, -2, -2]\nedge = 4\n"
+        )
+
+    def start(self, *arguments, environment=None):
+        environment = ENVIRONMENT | {"CARGO_TARGET_DIR": str(self.at / "target")} | (environment or {})
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        return subprocess.Popen([TEMPLATE.parent / "run", *arguments], cwd=self.at, env=environment, **pipes)
+
+    def run_with(self, *arguments):
+        process = self.start(*arguments)
+        output, error = process.communicate()
+        return process.returncode, output, error
+
+    def refused(self, expected, *arguments):
+        code, _, error = self.run_with(*arguments)
+        self.assertEqual(code, 2, error)
+        self.assertIn(expected, error)
+        self.assertFalse((self.at / "out").exists())
+
+    def test_a_flow_needs_an_inlet_and_an_outlet(self):
+        """The root cuts the duct at yMin and yMax, and the template's inlet xMin has no face."""
+        (self.at / "duct.toml").write_text(self.case)
+        self.refused("choose an inlet and an outlet", "duct.toml", "-", "out")
+        self.refused("choose two patches", "duct.toml", "-", "out", "--inlet", "yMin", "--outlet", "yMin")
+        code, _, error = self.run_with("duct.toml", "-", "out", "--inlet", "yMin", "--outlet", "yMax")
+        self.assertEqual(code, 0, error)
+        self.assertIn("the flow reaches the root's boundary", error)
+        data = (self.at / "out/case/0/U").read_bytes()
+        count = re.search(rb"internalField +nonuniform List<vector> *\n(\d+)\n\(", data)
+        velocity = np.frombuffer(data, "<f8", 3 * int(count[1]), count.end()).reshape(-1, 3)
+        np.testing.assert_allclose(velocity, np.broadcast_to([0, 1, 0], velocity.shape), atol=1e-6)
+
+    def test_crossing_cells_and_the_spacing_of_a_case_are_refused(self):
+        (self.at / "duct.toml").write_text(self.case.replace("false", "true"))
+        self.refused("set keep_crossing = false", "duct.toml", "-", "out")
+        self.refused("give - in place of 4", "duct.toml", "4", "out")
+
+    def test_a_geometry_that_is_none_is_named_and_can_be_corrected(self):
+        (self.at / "page.stl").write_text("<html></html>\n")
+        self.refused("page.stl: is neither a binary STL nor a text STL", "page.stl", "1", "out")
+
+    def test_a_signal_ends_the_program_that_is_running(self):
+        """A program in place of checkMesh waits, so that the signal always arrives while it runs."""
+        (self.at / "duct.toml").write_text(self.case)
+        (self.at / "bin").mkdir()
+        wait = self.at / "bin/checkMesh"
+        wait.write_text(f"#!/bin/sh\necho $$ >{self.at}/pid.part\nmv {self.at}/pid.part {self.at}/pid\nexec sleep 60\n")
+        wait.chmod(0o755)
+        environment = {"PATH": f"{self.at}/bin:{os.environ['PATH']}"}
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            patches = ["--inlet", "yMin", "--outlet", "yMax"]
+            process = self.start("duct.toml", "-", f"out{code}", *patches, environment=environment)
+            while not (self.at / "pid").exists():
+                self.assertIsNone(process.poll())
+                time.sleep(0.01)
+            process.send_signal(number)
+            _, error = process.communicate(timeout=30)
+            self.assertEqual(process.returncode, code, error)
+            with self.assertRaises(ProcessLookupError):
+                os.kill(int((self.at / "pid").read_text()), 0)
+            (self.at / "pid").unlink()
+
+
+def duct():
+    """A duct along y with a square section of edge 2, open at y = -3 and y = 3."""
+    section = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    facets = []
+    for (x0, z0), (x1, z1) in zip(section, section[1:] + section[:1]):
+        a, b, c, d = (x0, -3, z0), (x1, -3, z1), (x1, 3, z1), (x0, 3, z0)
+        facets += [(a, b, c), (a, c, d)]
+    vertices = lambda facet: "".join(f"vertex {x} {y} {z}\n" for x, y, z in facet)
+    text = "".join(f"facet normal 0 0 0\nouter loop\n{vertices(f)}endloop\nendfacet\n" for f in facets)
+    return f"solid duct\n{text}endsolid duct\n"
 
 
 def lists(path):

@@ -169,5 +169,12 @@ mod tests {
         assert_eq!(content(&path("a.stl")), content(&path("b.stl")));
         assert_ne!(content(&path("a.stl")), content(&path("c.stl")));
         assert!(content(&path("absent")).contains("absent"));
+        assert!(content(&path("a.stl")).starts_with("of 5 bytes, digest "));
+        std::fs::write(path("large.stl"), vec![7; (2 << 20) + 3]).unwrap();
+        assert!(content(&path("large.stl")).starts_with("of 2097155 bytes, digest "));
+        assert_eq!(
+            content(place.path()),
+            format!("of 0 bytes, digest {:016x}", DefaultHasher::new().finish())
+        );
     }
 }

@@ -240,7 +240,17 @@ fn explain(text: &str, e: &toml::de::Error) -> String {
         }
         // Of the file as a whole.
         None if begin == 0 && message.starts_with("missing") => message,
-        None => format!("{line}{}: {message}", key(&text[begin..])),
+        None => format!("{line}{}: {message}{}", key(&text[begin..]), advice(&text[begin..])),
+    }
+}
+
+/// The way to write the path if a text begins with the key of one, as part of a message: double quotes make a backslash special.
+fn advice(text: &str) -> &'static str {
+    match text.lines().next().and_then(|line| line.split_once('=')) {
+        Some((key, value)) if key.trim() == "geometry" && !value.trim().starts_with('\'') => {
+            ": put the path in single quotes, geometry = 'DIRECTORY/FILE.stl'"
+        }
+        _ => "",
     }
 }
 
@@ -294,13 +304,21 @@ mod tests {
                 "geometry = \"a.stl\"\nspacing_min = 0.5\nroot_scale = 2.0\n[root]\norigin = [0,0,0]\nedge = 1\n",
                 "not both",
             ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\n[root]\norigin = [0,0,0]\n",
+                "line 3, [root]: missing field `edge`",
+            ),
             ("geometry = ", "line 1"),
             ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1, geometry: invalid type: map"),
+            (r#"geometry = "C:\Users\me\a.stl""#, "put the path in single quotes"),
+            ("geometry = a/b.stl", "put the path in single quotes"),
             ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2, [spacing_min]: "),
         ] {
             let e = parse(text).unwrap_err();
             assert!(e.contains(expected), "{e}");
         }
+        let whole = parse("geometry = \"a.stl\"\n").unwrap_err();
+        assert!(whole.contains("missing field") && !whole.contains("line"), "{whole}");
     }
 
     #[test]

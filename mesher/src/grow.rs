@@ -11,6 +11,7 @@ use crate::partition::base_leaves::cells_heaviest;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition::{self, LeafCounts, Sets};
+use crate::quantise::FacetCounts;
 use crate::record::Recorder;
 use crate::report::Counters;
 use crate::tree::Tree;
@@ -18,9 +19,9 @@ use crate::voxelise::BinnedFacets;
 use crate::{exposed, grade, refine, sides};
 use std::borrow::Borrow;
 
-/// Phases 3 to 8: from this rank's facets, and the number of all, to the tree. `count` sees the base tree. Collective.
+/// Phases 3 to 8: from this rank's facets, and the numbers of all, to the tree. `count` sees the base tree. Collective.
 pub fn grow<F: Borrow<[Facet]>>(
-    (facets, facets_total): (F, u64),
+    (facets, counts): (F, FacetCounts),
     rules: Rules,
     options: &Options,
     comm: &dyn Comm,
@@ -86,7 +87,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     drop(facets);
     let Tree { split, crossing } = tree;
     let mut mesh = Mesh {
-        facets: facets_total,
+        facets: counts,
         rules,
         ownership,
         level_base,

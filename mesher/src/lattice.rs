@@ -41,6 +41,11 @@ impl Bounds {
         Self { lo: of(lo, f32::min), hi: of(hi, f32::max) }
     }
 
+    /// Whether these bounds extend beyond the root, after rounding to its lattice.
+    pub fn exceed(&self, root: &Root) -> bool {
+        (0..3).any(|a| root.quantise(a, self.lo[a]) < 0 || root.quantise(a, self.hi[a]) > ROOT_EDGE)
+    }
+
     /// Bounds of the union of both sets.
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -338,6 +343,31 @@ mod tests {
                 .to_string()
                 .contains("facet 41")
         );
+    }
+
+    #[test]
+    fn vertices_may_be_one_root_edge_outside_the_root() {
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let at = |x: f32| {
+            let facet = [[1.0; 3], [2.0, 1.0, 1.0], [1.0, x, 1.0]];
+            root.facets(vec![facet], &Bounds::of(&[facet]), 7)
+        };
+        let found = |x: f32| at(x).unwrap()[0].v[2][1];
+        assert_eq!((found(-8.0), found(16.0)), (-(1 << 27), 1 << 28));
+        for (x, shown) in [(-8.000001, "-8.000001"), (16.000002, "16.000002")] {
+            assert_eq!(
+                at(x).unwrap_err().to_string(),
+                format!(
+                    "facet 7 has a vertex at (1, {shown}, 1), more than one root edge outside the root: enlarge or move the root"
+                )
+            );
+        }
+        assert_eq!(
+            Root { origin: [1.0, 2.0, -4.0], edge: 8.0 }.locate([1 << 26, 1 << 27, 1 << 25]),
+            [5.0, 10.0, -2.0]
+        );
+        let deepest = root.level_of(1e-9, "spacing").unwrap_err().to_string();
+        assert!(deepest.contains("level 19 has cells of 0.0000152587890625;"), "{deepest}");
     }
 
     #[test]

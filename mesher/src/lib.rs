@@ -48,14 +48,14 @@ use case::Case;
 use check::debug_check;
 use comm::Comm;
 use error::Error;
-use facet::Facet;
 use grow::grow;
-use lattice::{Bounds, Rules};
+use lattice::Rules;
 use octant::Level;
 use partition::cost::Counts;
 use partition::ownership::Ownership;
 use plan::pilot::{Amounts, Collector};
 use plan::{Plan, Volumes};
+use quantise::Quantised;
 use record::Recorder;
 use report::{Counters, Report};
 use tree::Tree;
@@ -142,14 +142,6 @@ pub fn plan(
     })
 }
 
-/// The result of phases 1 and 2 on a rank.
-struct Quantised {
-    rules: Rules,
-    bounds: Bounds,
-    facets: Vec<Facet>,
-    facets_total: u64,
-}
-
 impl Quantised {
     fn problem<'a>(
         &'a self,
@@ -162,7 +154,7 @@ impl Quantised {
             rules: &self.rules,
             bounds: &self.bounds,
             facets: &self.facets,
-            facets_total: self.facets_total,
+            facets_total: self.counts.total,
             spacing_min: case.spacing_min,
             volumes,
             time_cpu_s: record.phases().iter().map(|p| p.time_cpu_s).sum(),
@@ -181,13 +173,11 @@ fn quantised(
     // 1. Read: each rank reads its slice of the facets.
     let slice = record.phase("read", comm, || ingest::read(&case.source, comm))?;
     debug_check(options, comm, || check::slices(&slice, comm));
-    let facets_total = slice.total;
 
     // 2. Quantise: the facets and the rules on the lattice.
-    let (rules, bounds, facets) =
-        record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
-    debug_check(options, comm, || check::rules(&rules, comm));
-    Ok(Quantised { rules, bounds, facets, facets_total })
+    let quantised = record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
+    debug_check(options, comm, || check::rules(&quantised.rules, comm));
+    Ok(quantised)
 }
 
 /// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
@@ -205,7 +195,7 @@ fn pilot(
         let count = &mut |tree: &Tree, ownership: &Ownership| {
             collector.base_tree(tree, &Counts::of_rank(tree, ownership));
         };
-        let facets = (&quantised.facets[..], quantised.facets_total);
+        let facets = (&quantised.facets[..], quantised.counts);
         let mesh = grow(facets, rules, &options, comm, &mut record, &mut counters, count)?;
         let (_, written) = record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
         Ok(collector.finish(&mesh, written.leaves, &counters, &record, volumes))
@@ -237,8 +227,8 @@ fn make(
     if let Some(plan) = planned {
         record.report_plan(&plan.line());
     }
-    let Quantised { rules, facets, facets_total, .. } = quantised;
-    grow((facets, facets_total), rules, options, comm, record, counters, &mut |_, _| {})
+    let Quantised { rules, facets, counts, .. } = quantised;
+    grow((facets, counts), rules, options, comm, record, counters, &mut |_, _| {})
 }
 
 #[cfg(test)]
@@ -265,15 +255,19 @@ mod tests {
         }
     }
 
-    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
-    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+    fn options() -> Options {
         let division = Division {
             partitioner: Partitioner::Morton,
             weights: Weights::Rebalance,
             level_base: None,
         };
         let (ungraded, out, check, weight_exposed) = (false, None, false, None);
-        let options = Options { division, ungraded, out, check, weight_exposed, force: true };
+        Options { division, ungraded, out, check, weight_exposed, force: true }
+    }
+
+    /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.
+    fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
+        let options = options();
         let on_rank = |comm: &dyn Comm| {
             let quantised = quantised(&case(), &options, comm, &mut Recorder::default()).unwrap();
             let volumes = Volumes::new(&quantised.rules.boxes);
@@ -292,6 +286,19 @@ mod tests {
     fn two_pilot_runs_predict_the_mesh() {
         let (amounts, cells_boxed) = pilots(1);
         let [coarse, fine, mesh] = amounts[..] else { unreachable!("three runs") };
+        // A single rank has no other phases.
+        assert!(mesh.time_fixed_s.abs() < 1e-9, "{mesh:?}");
+        for time in [mesh.time_refine_s, mesh.time_sides_s, mesh.time_leaves_s] {
+            assert!(time > 0.0 && time < 0.95 * mesh.time_cpu_s(), "{mesh:?}");
+        }
+        let counted = |a: &Amounts| {
+            [a.cells, a.cells_boxed_deleted, a.tests, a.components, a.bytes_sides, a.bytes_graded]
+        };
+        // These repeat exactly: a change of what is counted shows here.
+        assert_eq!(
+            counted(&mesh),
+            [764868.0, 27894.96431997696, 22726.6, 20723.0, 313493.0, 195327.0]
+        );
         assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
         let pilots =
             plan::pilot::Pilots { fine: (1, fine), coarse: Some((2, coarse)), cells_boxed };
@@ -307,10 +314,24 @@ mod tests {
     }
 
     #[test]
+    fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
+        let run = |x: f64, shift: Level| {
+            let case = Case { seeds: vec![[x, 0.0, 0.0]], boxes: Vec::new(), ..case() };
+            let quantised = quantised(&case, &options(), &Solo, &mut Recorder::default())?;
+            pilot(&quantised, &Volumes::new(&[]), shift, &options(), &Solo)
+        };
+        // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
+        assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());
+        assert!(matches!(run(0.5, 0), Err(Error::Input(_))));
+    }
+
+    #[test]
     fn pilot_runs_on_several_ranks_have_the_cells_of_one() {
         let [one, three] = [1, 3].map(|ranks| pilots(ranks).0);
         for (one, three) in one.iter().zip(&three) {
             assert_eq!(one.cells, three.cells);
+            // Several ranks also route facets and move boundaries.
+            assert!(three.time_fixed_s > 0.0 && three.time_fixed_s < three.time_cpu_s());
             assert!((one.cells_boxed_deleted - three.cells_boxed_deleted).abs() < 1e-6);
         }
     }

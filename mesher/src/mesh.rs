@@ -4,6 +4,7 @@ use crate::lattice::Rules;
 use crate::octant::Level;
 use crate::partition::Division;
 use crate::partition::ownership::Ownership;
+use crate::quantise::FacetCounts;
 use crate::sides::Sides;
 use crate::stream::Leaves;
 use crate::tree::PerLevel;
@@ -28,8 +29,8 @@ pub struct Options {
 
 /// A mesh as one rank holds it.
 pub struct Mesh {
-    /// Number of facets on all ranks.
-    pub facets: u64,
+    /// The facets of all ranks, in numbers.
+    pub facets: FacetCounts,
     /// The rules on the lattice.
     pub rules: Rules,
     /// The ranks that own and hold bricks.

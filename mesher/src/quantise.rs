@@ -6,16 +6,34 @@ use crate::error::Error;
 use crate::facet::Facet;
 use crate::ingest::Slice;
 use crate::lattice::{Bounds, Rules};
+use crate::octant::ROOT_EDGE;
 
-/// The rules and the bounds of all facets, the same on all ranks, and this rank's facets on the lattice, in their order. Collective.
+/// Numbers of facets on all ranks.
+#[derive(Clone, Copy, Debug)]
+pub struct FacetCounts {
+    /// All facets.
+    pub total: u64,
+    /// Those with a point beyond the root.
+    pub beyond_root: u64,
+}
+
+/// The result of the phase on a rank.
+pub struct Quantised {
+    /// The rules, the same on all ranks.
+    pub rules: Rules,
+    /// The bounds of all facets, the same on all ranks.
+    pub bounds: Bounds,
+    /// This rank's facets on the lattice, in their order.
+    pub facets: Vec<Facet>,
+    /// The same on all ranks.
+    pub counts: FacetCounts,
+}
+
+/// The rules of a case, and its facets on the lattice. Collective.
 ///
 /// # Errors
 /// If the case has no valid rules for these facets, or a facet is too far from the root.
-pub fn quantise(
-    case: &Case,
-    slice: Slice,
-    comm: &dyn Comm,
-) -> Result<(Rules, Bounds, Vec<Facet>), Error> {
+pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised, Error> {
     let local = Bounds::of(&slice.facets);
     let words: Vec<u64> = local.lo.iter().chain(&local.hi).map(|c| c.to_bits()).collect();
     let bounds = comm.all_gather(&words).messages().fold(Bounds::EMPTY, |b, (_, w)| {
@@ -24,5 +42,12 @@ pub fn quantise(
     });
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
-    Ok((rules, bounds, facets))
+    let beyond_root = if bounds.exceed(&rules.root) { comm.sum(beyond_root(&facets)) } else { 0 };
+    let counts = FacetCounts { total: slice.total, beyond_root };
+    Ok(Quantised { rules, bounds, facets, counts })
+}
+
+fn beyond_root(facets: &[Facet]) -> u64 {
+    let is_in_root = |c: &i32| (0..=ROOT_EDGE).contains(&i64::from(*c));
+    facets.iter().filter(|f| !f.v.as_flattened().iter().all(is_in_root)).count() as u64
 }

@@ -98,3 +98,51 @@ pub fn peak_rss_bytes() -> u64 {
     let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
     kib.unwrap_or(0) * 1024
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::sim;
+
+    #[test]
+    fn phases_of_one_name_add_up_with_their_messages() {
+        let folder = tempfile::tempdir().expect("a temporary directory");
+        sim::run(2, 1, |comm| {
+            let status = folder.path().join(comm.rank().to_string());
+            let mut record = Recorder::new(Some(status.clone()), false);
+            comm.sum(1);
+            let before = comm.traffic();
+            let work = |calls: usize| {
+                let since = ThreadTime::now();
+                while since.elapsed().as_millis() < 4 {}
+                (0..calls).for_each(|_| comm.barrier());
+                calls
+            };
+            let results = [("a", 1), ("b", 0), ("a", 2)]
+                .map(|(name, calls)| record.phase(name, comm, || work(calls)));
+            assert_eq!(results, [1, 0, 2]);
+            let [a, b] = record.phases() else { panic!("two names: {record:?}") };
+            assert_eq!((a.name, b.name), ("a", "b"));
+            let after = comm.traffic();
+            assert_eq!(a.traffic.messages, after.messages - before.messages);
+            assert_eq!(a.traffic.bytes, after.bytes - before.bytes);
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+            assert!(near(a.traffic.time_wall_s, after.time_wall_s - before.time_wall_s));
+            assert!(near(a.traffic.time_cpu_s, after.time_cpu_s - before.time_cpu_s));
+            assert_eq!((b.traffic, b.traffic.messages), (Traffic::default(), 0));
+            assert!(
+                (0.004..0.008).contains(&b.time_cpu_s) && (0.008..0.016).contains(&a.time_cpu_s),
+                "{a:?} {b:?}"
+            );
+            assert!(a.time_wall_s >= a.time_cpu_s * 0.99 && b.time_wall_s >= b.time_cpu_s * 0.99);
+            assert_eq!(std::fs::read_to_string(&status).expect("a status"), "a\n");
+            assert!(!record.shows_progress() && Recorder::new(None, true).shows_progress());
+        });
+        let peak = peak_rss_bytes();
+        assert!(
+            peak.is_multiple_of(1024)
+                && (cfg!(not(target_os = "linux")) || (1 << 20..1 << 37).contains(&peak)),
+            "{peak}"
+        );
+    }
+}

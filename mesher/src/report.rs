@@ -200,7 +200,7 @@ impl Report {
         Self {
             schema: "octree-mesher-run/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
-            facets: mesh.facets,
+            facets: mesh.facets.total,
             cells: counts.total(),
             cells_by_level: counts.by_level[..=LEVEL_MAX as usize]
                 .iter()

@@ -372,7 +372,7 @@ fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
     while containing.get(step).is_some_and(|h| *h < end) {
         step *= 2;
     }
-    let near = &containing[step / 2..containing.len().min(step + 1)];
+    let near = &containing[step / 2..containing.len().min(step)];
     step / 2 + near.partition_point(|h| *h < end)
 }
 
@@ -406,5 +406,17 @@ mod tests {
         let mut binned = BinnedFacets::new(&[facet(9000), facet(100)]);
         binned.facets[1] = facet(20_000);
         binned.check_invariants();
+    }
+
+    #[test]
+    fn runs_of_every_length_end_before_their_end() {
+        let all: Vec<ContainingOctant> = (0..40).map(|i| ContainingOctant(i / 2)).collect();
+        for length in 0..all.len() {
+            for end in 0..22 {
+                let containing = &all[..length];
+                let want = containing.iter().take_while(|h| h.0 < end).count();
+                assert_eq!(run_length(containing, ContainingOctant(end)), want, "{length}, {end}");
+            }
+        }
     }
 }

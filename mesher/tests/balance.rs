@@ -1,5 +1,5 @@
-//! Load balance by counters, which repeat exactly: repartitioning balances the leaves on any number of ranks, and no
-//! split is counted twice or missed.
+//! Load balance by counters, which repeat exactly: repartitioning balances the leaves on any number of ranks, no split is counted twice
+//! or missed, and no counter changes unnoticed.
 #![allow(missing_docs)]
 
 #[path = "support/process.rs"]
@@ -31,7 +31,41 @@ fn lambda(all: &[u64]) -> f64 {
 fn mesh(workspace: &Workspace, args: &[&str]) -> Value {
     run(workspace.mesher(&[&["case.toml", "--quiet", "--json", "run.json"], args].concat()))
         .succeeds();
-    workspace.json("run.json")
+    let report = workspace.json("run.json");
+    check_times(&report);
+    report
+}
+
+/// The time in calls is part of that of a phase, the CPU time of a rank part of its wall time, and the slowest rank's phases
+/// are the run.
+fn check_times(report: &Value) {
+    let phases = report["phases"].as_array().expect("phases");
+    let of = |phase: &Value, name: &str| -> Vec<f64> {
+        serde_json::from_value(phase[name].clone()).expect("a time by rank")
+    };
+    let mut totals = vec![0.0; of(&phases[0], "time_wall_s").len()];
+    for phase in phases {
+        let [wall, cpu, comm_wall, comm_cpu] =
+            ["time_wall_s", "time_cpu_s", "time_comm_wall_s", "time_comm_cpu_s"]
+                .map(|name| of(phase, name));
+        for (rank, total) in totals.iter_mut().enumerate() {
+            *total += wall[rank];
+            let parts = [
+                (comm_wall[rank], wall[rank]),
+                (comm_cpu[rank], cpu[rank]),
+                (cpu[rank], wall[rank]),
+            ];
+            // The clocks are read one after the other.
+            let fits =
+                |(part, whole): (f64, f64)| (0.0..20.0).contains(&part) && part < whole + 0.005;
+            assert!(parts.into_iter().all(fits) && wall[rank] > 1e-9, "rank {rank}: {phase}");
+        }
+    }
+    let slowest = totals.into_iter().fold(0.0, f64::max);
+    assert!((report["time_wall_s"].as_f64().unwrap() - slowest).abs() < 1e-9, "{report}");
+    let peak: u64 =
+        serde_json::from_value::<Vec<u64>>(report["peak_rss_bytes"].clone()).unwrap().iter().sum();
+    assert!((1 << 20..1 << 34).contains(&peak), "{peak} bytes");
 }
 
 #[test]
@@ -82,4 +116,57 @@ fn splits_of_gradation_are_counted_once() {
             assert_eq!(sum(&ranks, "octants_split_graded"), split, "{weights} {comm}");
         }
     }
+}
+
+/// Runs whose counters are recorded: the case by its layers and crossing leaves, and options. Without METIS, whose arithmetic may depend
+/// on the machine.
+const RECORDED: [(&str, &str, &str); 11] = [
+    ("1", "false", "--comm solo"),
+    ("4", "true", "--comm solo --weight-exposed 0"),
+    ("2", "true", "--comm sim:2 --ungraded"),
+    ("1", "false", "--comm sim:3"),
+    ("3", "true", "--comm sim:5 --weight-exposed 7"),
+    ("3", "true", "--comm sim:5 --weights area"),
+    ("2", "false", "--comm sim:6 --weights unit"),
+    ("2", "false", "--comm sim:4 --weights unit --level-base 3"),
+    ("2", "true", "--comm sim:7 --weights area --level-base 4"),
+    ("1", "true", "--comm sim:24 --level-base 0"),
+    ("4", "true", "--comm sim:40"),
+];
+
+/// The numbers of a run that repeat exactly: one line for each counter, and one for the messages of each phase, by rank.
+fn numbers(report: &Value) -> String {
+    let mut lines = format!("digest {}\nlevel_base {}\n", report["digest"], report["level_base"]);
+    let mut line = |name: &str, by_rank: &Value| lines += &format!("{name} {by_rank}\n");
+    let counters = report["counters"].as_object().expect("counters");
+    counters.iter().for_each(|(name, by_rank)| line(name, by_rank));
+    for phase in report["phases"].as_array().expect("phases") {
+        for number in ["messages", "message_bytes"] {
+            line(&format!("{} {number}", phase["name"]), &phase[number]);
+        }
+    }
+    lines
+}
+
+/// A change of estimates, boundaries or messages leaves the mesh as it is, and shows here. If it is intended, UPDATE_COUNTERS=1 writes
+/// the new numbers.
+#[test]
+fn the_counters_of_recorded_runs_are_the_same() {
+    let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/balance.counters");
+    let workspace = Workspace::new();
+    let mut got = String::new();
+    for (n, crossing, args) in RECORDED {
+        workspace.write("case.toml", CASE.replace("{n}", n).replace("{c}", crossing));
+        let report = mesh(&workspace, &args.split(' ').collect::<Vec<_>>());
+        got += &format!("{n} {crossing} {args}\n{}\n", numbers(&report));
+    }
+    if std::env::var_os("UPDATE_COUNTERS").is_some() {
+        std::fs::write(recorded, &got).expect("the source tree is writable");
+    }
+    let want = std::fs::read_to_string(recorded).expect("recorded counters");
+    let difference = got.lines().zip(want.lines()).find(|(got, want)| got != want);
+    assert!(
+        got == want,
+        "first difference: {difference:?}; UPDATE_COUNTERS=1 writes the new numbers"
+    );
 }

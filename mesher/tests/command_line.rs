@@ -30,6 +30,28 @@ fn help_is_printed_once_per_job() {
     }
 }
 
+/// Several ranks that were told not to communicate would each mesh the case; a single one may.
+#[test]
+fn ranks_of_a_job_are_not_started_without_communication() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    let args = ["body.stl", "--spacing-min", "0.5", "--quiet", "--comm", "solo"];
+    for launcher in ["OMPI_COMM_WORLD", "PMI", "PMIX"] {
+        run_as_rank(&workspace, &args, launcher, 0).refuses(2, &["--comm", "on its own"]);
+        let second = run_as_rank(&workspace, &args, launcher, 1);
+        assert_eq!((second.code, second.stderr.as_str()), (Some(2), ""));
+        let mut alone = workspace.mesher(&args);
+        alone.env(format!("{launcher}_SIZE"), "1").env(format!("{launcher}_RANK"), "0");
+        run(alone).succeeds();
+    }
+    // The shell of an allocation, or what is left of one, is no job.
+    for left in ["SLURM_PROCID", "PMIX_RANK"] {
+        let mut alone = workspace.mesher(&args[..4]);
+        alone.env(left, "0");
+        run(alone).succeeds();
+    }
+}
+
 /// A build without MPI cannot agree on errors: only the launcher's variables distinguish ranks.
 #[cfg(not(feature = "mpi"))]
 #[test]

@@ -1,4 +1,4 @@
-//! `--message-matrix`: included on request only, and equal for simulated and real ranks.
+//! `--message-matrix`: included on request only, and equal for simulated and real ranks; and the time of a message.
 #![allow(missing_docs)]
 
 #[path = "support/process.rs"]
@@ -56,4 +56,31 @@ fn real_ranks_send_the_same_messages_as_simulated_ones() {
     run(workspace.mesher(&[&args[..], &["sim.json", "--comm", "sim:3"]].concat())).succeeds();
     run(workspace.mpirun(3, &[&args[..], &["mpi.json"]].concat())).succeeds();
     assert_eq!(matrix(&workspace.json("mpi.json")), matrix(&workspace.json("sim.json")));
+    // With a limit, other functions of MPI are called, with the same messages.
+    let limited = ["limited.json", "--stall-limit", "80"];
+    run(workspace.mpirun(3, &[&args[..], &limited].concat())).succeeds();
+    let [limited, free] = ["limited.json", "mpi.json"].map(|name| workspace.json(name));
+    for same in ["message_matrix", "digest", "counters"] {
+        assert_eq!(limited[same], free[same], "{same}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn large_messages_take_longer_than_small_ones() {
+    let workspace = Workspace::new();
+    let pingpong = env!("CARGO_BIN_EXE_pingpong");
+    let measured = run(workspace.mpirun_of(2, pingpong, &[]));
+    assert_eq!(measured.code, Some(0), "{measured:?}");
+    let report: Value = serde_json::from_str(&measured.stdout).expect("JSON");
+    assert_eq!(report["schema"], "octree-pingpong/1");
+    let points = report["points"].as_array().expect("a list");
+    let of = |name: &str| points.iter().filter_map(|p| p[name].as_f64()).collect::<Vec<_>>();
+    assert_eq!(of("bytes"), [0.0, 8.0, 1024.0, 65536.0, 1048576.0, 8388608.0]);
+    let times = of("time_s");
+    // Memory is copied at 1 MB/s at least and 1 TB/s at most.
+    assert!((8e-6..8.0).contains(&times[5]) && times[5] > times[1] && times[1] > 0.0, "{times:?}");
+    let alone = run(workspace.mpirun_of(1, pingpong, &[]));
+    assert_eq!((alone.code, alone.stdout.as_str()), (Some(2), ""), "{alone:?}");
+    assert!(alone.stderr.contains("start it on two ranks"), "{alone:?}");
 }

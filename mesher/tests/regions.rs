@@ -208,14 +208,16 @@ fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
         (
             open_box(),
             &["--keep", "inside", "--seed", "32,32,32"],
-            "reaches the root's boundary from its seeds",
+            "reaches the root's boundary from its seeds: right if the root cuts an open end",
         ),
         (cuboid([-1.0; 3], [65.0; 3]), &["--keep", "outside"], "nothing is outside the geometry"),
         (
             cuboid([-1.0; 3], [65.0; 3]),
             &["--keep", "inside"],
-            "inside by its rays reaches the root's boundary",
+            "inside by its rays reaches the root's boundary: right if the root cuts the geometry",
         ),
+        (box_in_box(), &["--seed", "16,32,32"], "the flow of no seed reaches the root's boundary"),
+        (cuboid([-8.0, 8.0, 8.0], [56.0; 3]), &[], "10 of 12 facets lie wholly or partly beyond"),
     ] {
         let (report, stderr) = meshed(&facets, options);
         let warnings = report["warnings"].as_array().expect("a list");
@@ -223,6 +225,16 @@ fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
         let warning = warnings[0].as_str().expect("a sentence");
         assert!(warning.contains(expected), "{warning}");
         assert_eq!(stderr.trim_end(), format!("mesher: warning: {warning}"));
+    }
+}
+
+#[test]
+fn a_seed_in_the_far_field_and_a_body_that_ends_at_the_root_produce_no_warnings() {
+    for (facets, options) in [
+        (box_in_box(), &["--seed", "2,2,2", "--seed", "16,32,32"][..]),
+        (cuboid([32.0; 3], [64.0; 3]), &[]),
+    ] {
+        assert_eq!(meshed(&facets, options).0["warnings"], json!([]), "{options:?}");
     }
 }
 

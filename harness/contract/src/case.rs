@@ -191,8 +191,9 @@ impl Case {
             if let (leaf, Some(facet)) = base.leaf_at(seed) {
                 let leaf = self.root.describe(&leaf);
                 return Err(format!(
-                    "seed {i} at {at:?} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
-                     from the surface"
+                    "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
+                     from the surface",
+                    shown(*at)
                 ));
             }
         }
@@ -256,7 +257,7 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     for (i, facet) in facets.iter().enumerate() {
         for vertex in facet {
             if !vertex.iter().all(|c| c.is_finite()) {
-                return Err(format!("facet {i} has a vertex that is not finite"));
+                return Err(not_finite(i, vertex));
             }
             for a in 0..3 {
                 low[a] = low[a].min(f64::from(vertex[a]));
@@ -278,22 +279,38 @@ fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String
     for (i, facet) in facets.iter().enumerate() {
         let mut on = [[0; 3]; 3];
         for (q, vertex) in on.iter_mut().zip(facet) {
-            let far = || {
-                format!("facet {i} is not finite, or lies more than one root edge outside the root")
+            let [x, y, z] = vertex;
+            let why = || match vertex.iter().all(|c| c.is_finite()) {
+                true => format!(
+                    "facet {i} has a vertex at ({x}, {y}, {z}), more than one root edge outside the root: enlarge or move the root"
+                ),
+                false => not_finite(i, vertex),
             };
-            *q = root.quantise(vertex.map(f64::from)).ok_or_else(far)?;
+            *q = root.quantise(vertex.map(f64::from)).ok_or_else(why)?;
         }
         all.push(on);
     }
     Ok(all)
 }
 
+/// A point as text.
+fn shown([x, y, z]: [f64; 3]) -> String {
+    format!("({x}, {y}, {z})")
+}
+
+fn not_finite(facet: usize, [x, y, z]: &[f32; 3]) -> String {
+    format!("facet {facet} has a vertex that is not finite, ({x}, {y}, {z}): repair the geometry")
+}
+
 fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {
     let on_lattice = |(i, &seed): (usize, &[f64; 3])| {
-        let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
         let outside = || {
+            let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
             format!(
-                "seed {i} at {seed:?} lies outside the root, from {from:?} to {to:?}; move it into the flow"
+                "seed {i} at {} lies outside the root, from {} to {}; move it into the flow",
+                shown(seed),
+                shown(root.rounded(from)),
+                shown(root.rounded(to))
             )
         };
         root.quantise_seed(seed).ok_or_else(outside)
@@ -325,7 +342,19 @@ fn explain(text: &str, error: &toml::de::Error) -> String {
         }
         // Of the file as a whole.
         (false, _) if at == 0 && message.starts_with("missing") => message.clone(),
-        _ => format!("{line}{key}: {}", message.replace('\n', " ")),
+        _ => format!("{line}{key}: {}{}", message.replace('\n', " "), advice(text, at)),
+    }
+}
+
+/// How to write a path, if a key whose value is one has another value: a backslash in double quotes, or no quotes at all.
+fn advice(text: &str, at: usize) -> &'static str {
+    let begin = text[..at].rfind('\n').map_or(0, |at| at + 1);
+    let line = text[begin..].lines().next().unwrap_or_default();
+    match line.split_once('=') {
+        Some((key, value)) if key.trim() == "geometry" && !value.trim().starts_with('\'') => {
+            "; put the path in single quotes: geometry = 'DIRECTORY/FILE.stl'"
+        }
+        _ => "",
     }
 }
 
@@ -383,7 +412,12 @@ mod tests {
         assert_eq!(case.seeds_lattice, [[4 << 24, 11 << 23, 0], [5 << 24; 3]]);
         assert_eq!(case.enclosed, Enclosed::Keep);
         let why = with("seeds = [[0, 0, 0], [4, 0, 0]]").unwrap_err();
-        assert!(why.starts_with("seed 1 at [4.0, 0.0, 0.0] lies outside the root"), "{why}");
+        assert!(
+            why.starts_with(
+                "seed 1 at (4, 0, 0) lies outside the root, from (-4, -4, -4) to (4, 4, 4);"
+            ),
+            "{why}"
+        );
         assert!(with("seeds = [[0, 0, nan]]").unwrap_err().contains("seed 0"));
         assert!(with("enclosed = 'drop'").is_err());
     }
@@ -402,6 +436,70 @@ mod tests {
     }
 
     #[test]
+    fn the_manifest_of_a_case_has_all_its_inputs() {
+        let text = "spacing_min = 1.0\nlayer_cells_min = 2\nkeep = 'inside'\nkeep_crossing = false\nenclosed = 'keep'\n\
+                    seeds = [[5.5, 5.5, 5.5]]\n[root]\norigin = [-1.0, -1.0, -1.0]\nedge = 8.0\n\
+                    [[box]]\nmin = [0.0, 1.0, 2.0]\nmax = [4.0, 6.0, 3.0]\nspacing = 0.3";
+        let case = Case::from_parts(text, vec![UNIT]).unwrap();
+        let manifest = case.manifest(Tree::Base, "a program".to_owned());
+        assert_eq!(
+            (manifest.tree, manifest.program.as_str(), manifest.root),
+            (Tree::Base, "a program", case.root)
+        );
+        assert_eq!((manifest.level_surface, manifest.layer_cells_min), (3, 2));
+        assert_eq!(
+            (manifest.keep, manifest.keep_crossing, manifest.enclosed),
+            (Keep::Inside, false, Enclosed::Keep)
+        );
+        assert_eq!((manifest.boxes, manifest.seeds), (case.boxes.clone(), vec![[13 << 23; 3]]));
+        assert_eq!((case.boxes.len(), manifest.leaves), (1, 0));
+    }
+
+    #[test]
+    fn a_box_has_positive_extent_and_spacing() {
+        let with = |min: &str, max: &str, spacing: &str| {
+            let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0";
+            let text = format!(
+                "spacing_min = 1.0\n{root}\n[[box]]\nmin = {min}\nmax = {max}\nspacing = {spacing}"
+            );
+            Case::from_parts(&text, vec![]).err()
+        };
+        assert_eq!(with("[0, 0, 0]", "[1, 1, 1]", "0.5"), None);
+        let wrong = Some("box 0: min must be below max in every axis, and finite".to_owned());
+        for (min, max) in [
+            ("[0, 1, 0]", "[1, 1, 1]"),
+            ("[0, 0, 2]", "[1, 1, 1]"),
+            ("[-inf, 0, 0]", "[1, 1, 1]"),
+            ("[0, 0, 0]", "[1, nan, 1]"),
+            ("[0, 0, 0]", "[1, 1, inf]"),
+        ] {
+            assert_eq!(with(min, max, "0.5"), wrong, "{min} {max}");
+        }
+        assert!(
+            with("[0, 0, 0]", "[1, 1, 1]", "0.0").unwrap().starts_with("box spacing = 0 must be")
+        );
+        assert!(with("[0, 0, 0]", "[1, 1, 1]", "1e-9").unwrap().contains("deeper than 19"));
+    }
+
+    #[test]
+    fn an_error_of_the_file_has_a_line_and_one_of_the_whole_has_none() {
+        let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
+        assert_eq!(why("layer_cells_min = 3"), "missing field `spacing_min`");
+        let text = "spacing_min = 1.0\n\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 'long'";
+        assert!(why(text).starts_with("line 5, edge: invalid type: string"), "{}", why(text));
+        let without_edge = why("spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]");
+        assert_eq!(without_edge, "line 2, [root]: missing field `edge`");
+        assert_eq!(place("a = 1\nb c\n= 2", 8), ("line 2".to_owned(), String::new()));
+        assert_eq!(place("a = 1\n= 2", 7), ("line 2".to_owned(), String::new()));
+        assert_eq!(place("a = 1\n  b.\"c\" = 2", 6), ("line 2".to_owned(), ", b.\"c\"".to_owned()));
+        let both = "spacing_min = 1.0\nroot_scale = inf";
+        assert_eq!(why(both), "root_scale = inf must be finite and greater than zero");
+        let root = "spacing_min = 1.0\n[root]\norigin = [0.0, nan, 0.0]\nedge = 8.0";
+        assert_eq!(why(root), "the root's origin is not finite");
+        assert!(why("spacing_min = 0.0").starts_with("spacing_min = 0 must be finite"));
+    }
+
+    #[test]
     fn errors_name_the_cause() {
         let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
         assert!(
@@ -417,6 +515,14 @@ mod tests {
         );
         let table = why("spacing_min = 1.0\n[layer_cells_min]\na = 1");
         assert!(table.contains("line 2, [layer_cells_min]: invalid type: map"), "{table}");
+        for path in [r#""C:\Users\me\a.stl""#, "parts/a.stl", "12"] {
+            let why = why(&format!("spacing_min = 1.0\ngeometry = {path}"));
+            assert!(
+                why.starts_with("line 2, geometry: ") && why.contains("single quotes"),
+                "{why}"
+            );
+        }
+        assert!(!why("spacing_min = 1.0\ngeometry = 'a.stl'\nkeep = 1").contains("single quotes"));
         assert!(why("spacing_min = -1.0").contains("spacing_min"));
         assert!(why("spacing_min = 1e-9").contains("deeper"));
         assert!(why("spacing_min = 1.0\nlayer_cells_min = 0").contains("layer_cells_min"));
@@ -426,6 +532,10 @@ mod tests {
         );
         assert!(Case::from_parts("spacing_min = 1.0", vec![]).unwrap_err().contains("extent"));
         let far = "spacing_min = 1.0\n[root]\norigin = [9.0, 9.0, 9.0]\nedge = 2.0";
-        assert!(why(far).contains("facet 0"));
+        let why = why(far);
+        assert!(
+            why.starts_with("facet 0 has a vertex at (0, 0, 0), more than one root edge"),
+            "{why}"
+        );
     }
 }

@@ -115,8 +115,13 @@ impl Catalogue {
             if Path::new(name).exists() {
                 return format!("{name} is neither the name of a case nor a case file: its name must end in .toml");
             }
-            let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
-            format!("no case {name} in the catalogue, which has {}", names.join(", "))
+            let alike = |case: &&Selected| strsim::jaro_winkler(name, &case.name);
+            let near = cases.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
+            let near = near.map_or(String::new(), |near| format!("; the most similar name there is {}", near.name));
+            format!(
+                "{name}: no such file or directory exists, nor a case of this name in {}{near}",
+                self.path.display()
+            )
         })
     }
 
@@ -229,8 +234,37 @@ mod tests {
     #[test]
     fn an_unknown_name_and_a_missing_file_are_errors() {
         let unknown = select(&["cub"], &[]).unwrap_err();
-        assert_eq!(unknown, "no case cub in the catalogue, which has cube_small, jet");
+        assert!(
+            unknown.starts_with("cub: no such file or directory exists, nor a case"),
+            "{unknown}"
+        );
+        assert!(
+            unknown.ends_with("catalogue.toml; the most similar name there is cube_small"),
+            "{unknown}"
+        );
         assert!(select(&["HERE/none.toml"], &[]).unwrap_err().contains("none.toml"));
+    }
+
+    #[test]
+    fn a_name_that_is_a_geometry_or_another_file_is_explained() {
+        let stl = select(&["wing.STL"], &[]).unwrap_err();
+        assert!(stl.starts_with("wing.STL is a geometry: give a case file, CASE.toml"), "{stl}");
+        let other = select(&["HERE/jet.txt"], &[]).unwrap_err();
+        assert!(
+            other.starts_with("no case ") && other.ends_with("which has cube_small, jet"),
+            "{other}"
+        );
+        let existing = select(&["HERE"], &[]).unwrap_err();
+        assert!(
+            existing.ends_with(
+                "is neither the name of a case nor a case file: its name must end in .toml"
+            ),
+            "{existing}"
+        );
+        let three = ["cube_small", "cube_small", "HERE/cube_small.toml"];
+        let expected = [("cube_small", false), ("cube_small-2", false), ("cube_small-3", false)];
+        assert_eq!(select(&three, &[]), cases(&expected));
+        assert_eq!(select(&[], &[Size::Large, Size::Medium]), cases(&[("jet", true)]));
     }
 
     #[test]

@@ -181,6 +181,10 @@ mod tests {
 
     #[test]
     fn a_staged_directory_is_removed_unless_it_is_moved() {
+        assert_eq!(
+            ["a/b", "b", "/b"].map(|path| directory_of(Path::new(path))),
+            ["a", ".", "/"].map(Path::new)
+        );
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("absent/target");
         assert_eq!(nearest_directory(&target), place.path());

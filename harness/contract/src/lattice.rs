@@ -52,13 +52,25 @@ impl Root {
         std::array::from_fn(|a| self.origin[a] + at[a] as f64 * scale)
     }
 
-    /// A point of the user with the decimals that distinguish lattice points, and without the rounding errors beyond them:
-    /// what is printed.
+    /// A point of the user with as few decimals as its lattice point needs, and without the rounding errors beyond them: what
+    /// is printed. A lattice point next to 24900 is printed as 24900.
     pub fn rounded(&self, at: [f64; 3]) -> [f64; 3] {
         let unit = self.edge / UNITS_PER_EDGE as f64;
-        let decimals = (-unit.log10().floor()).clamp(0.0, 300.0) as usize;
-        // Adding 0 makes -0 positive.
-        at.map(|x| format!("{x:.decimals$}").parse().map_or(x, |rounded: f64| rounded + 0.0))
+        let decimals_max = (-unit.log10().floor()).clamp(0.0, 300.0) as usize;
+        let with_decimals = |at: [f64; 3], decimals: usize| {
+            // Adding 0 makes -0 positive.
+            at.map(|x| format!("{x:.decimals$}").parse().map_or(x, |rounded: f64| rounded + 0.0))
+        };
+        let exact = self.units(at);
+        let mut rounded = with_decimals(at, decimals_max);
+        for decimals in (0..decimals_max).rev() {
+            let shorter = with_decimals(at, decimals);
+            let units = self.units(shorter);
+            for a in (0..3).filter(|&a| units[a] == exact[a]) {
+                rounded[a] = shorter[a];
+            }
+        }
+        rounded
     }
 
     /// The coarsest level whose cells are at most `spacing` wide; `None` if it is deeper than 19.
@@ -119,11 +131,22 @@ mod tests {
         assert!(ROOT.rounded(at)[1].is_sign_positive());
         let wide = Root { origin: [0.0; 3], edge: 1e12 };
         assert_eq!(wide.rounded([1234.5678, 0.0, 1e11]), [1235.0, 0.0, 1e11]);
+        // The root of a body far from the origin.
+        let far = Root { origin: [22191.242, -14722.031, 689.93], edge: 5553.0 };
+        let q = far.quantise([24900.0, -12000.0, 3400.0]).unwrap();
+        assert_eq!(far.rounded(far.to_user(q)), [24900.0, -12000.0, 3400.0]);
         // Lattice points stay apart.
         for q in [0i64, 1, 99_999_999, UNITS_PER_EDGE - 1] {
             let at = ROOT.rounded(ROOT.to_user([q; 3]));
             assert_eq!(ROOT.quantise(at), Some([q; 3]));
         }
+    }
+
+    #[test]
+    fn an_octant_is_described_by_path_lattice_and_user_coordinates() {
+        let text = "octant 3.1 (level 2), lattice [100663296, 67108864, 0] to [134217728, 100663296, 33554432], \
+            user [2.0, 2.0, 2.0] to [3.0, 3.0, 3.0]";
+        assert_eq!(ROOT.describe(&Octant::ROOT.child(3).child(1)), text);
     }
 
     #[test]

@@ -305,3 +305,83 @@ impl LeafSet {
         self.manifest.write(dir)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{leaf_set, words_of};
+
+    #[test]
+    fn arrays_without_a_manifest_are_read_in_the_order_of_their_names() {
+        let dir = tempfile::tempdir().unwrap();
+        let why = read_parts(dir.path()).unwrap_err().to_string();
+        assert!(why.ends_with("it has neither mesh.json nor an array of leaves"), "{why}");
+        npy::write(&dir.path().join("b.npy"), &[7]).unwrap();
+        npy::write(&dir.path().join("a.npy"), &[8, 9]).unwrap();
+        fs::write(dir.path().join("c.txt"), "").unwrap();
+        let parts = [("a.npy".to_owned(), vec![8, 9]), ("b.npy".to_owned(), vec![7])];
+        assert_eq!(read_parts(dir.path()).unwrap(), parts);
+        fs::write(dir.path().join("d.npy"), "").unwrap();
+        assert!(matches!(read_parts(dir.path()), Err(ReadError::Part { .. })));
+    }
+
+    #[test]
+    fn a_directory_that_is_no_leaf_set_is_explained() {
+        let set = leaf_set(vec![words_of(|o| o.level < 1), vec![]]);
+        let dir = tempfile::tempdir().unwrap();
+        set.write(dir.path()).unwrap();
+        let found = read(dir.path()).unwrap();
+        assert_eq!(
+            (&found.manifest, &found.parts, &found.words),
+            (&set.manifest, &set.parts, &set.words)
+        );
+        assert!(matches!(open_tree(dir.path(), &set.manifest), Ok(None)));
+        let why = |change: &dyn Fn(&mut Manifest)| {
+            let mut manifest = set.manifest.clone();
+            change(&mut manifest);
+            manifest.write(dir.path()).unwrap();
+            open(dir.path()).unwrap_err().to_string()
+        };
+        assert!(why(&|m| m.schema = "other".to_owned()).contains("its schema is \"other\", not"));
+        assert!(
+            why(&|m| m.layer_cells_min = 0)
+                .ends_with("layer_cells_min: a layer has at least one cell")
+        );
+        for name in ["../leaves-00000.npy", "/tmp/leaves.npy"] {
+            let found = why(&|m| m.parts[0].file = name.to_owned());
+            assert!(found.ends_with(&format!("{name:?} is not a plain file name")), "{found}");
+        }
+        assert!(
+            why(&|m| m.hyper_tree_grid = Some("a/b".to_owned()))
+                .ends_with("is not a plain file name")
+        );
+        assert!(
+            why(&|m| drop(m.parts.pop())).ends_with("a part file that the manifest does not name")
+        );
+        assert!(
+            why(&|m| m.parts[1].file = "absent.npy".to_owned())
+                .contains("absent.npy: the part cannot be read")
+        );
+        fs::write(dir.path().join("mesh.json"), "{}").unwrap();
+        assert!(matches!(read_manifest(dir.path()), Err(ReadError::Manifest { .. })));
+        assert!(matches!(
+            read_manifest(&dir.path().join("mesh.json")),
+            Err(ReadError::NotADirectory(_))
+        ));
+        fs::remove_file(dir.path().join("mesh.json")).unwrap();
+        assert!(matches!(read_manifest(dir.path()), Err(ReadError::Io { .. })));
+    }
+
+    #[test]
+    fn a_mesh_is_created_complete_in_a_new_or_empty_directory_only() {
+        let set = leaf_set(vec![words_of(|o| o.level < 1), vec![]]);
+        let place = tempfile::tempdir().unwrap();
+        let dir = place.path().join("new/mesh");
+        set.create(&dir).unwrap();
+        assert_eq!(read(&dir).unwrap().words, set.words);
+        assert_eq!(fs::read_dir(&dir).unwrap().count(), 3);
+        let why = set.create(&dir).unwrap_err().to_string();
+        assert!(why.starts_with(&format!("{}: ", dir.display())), "{why}");
+        assert_eq!(read(&dir).unwrap().words, set.words);
+    }
+}

@@ -404,4 +404,44 @@ mod tests {
         }
         assert!(faulty(&|m| m.root.origin[2] = f64::INFINITY).starts_with("root"));
     }
+
+    #[test]
+    fn numbers_at_the_ends_of_their_ranges_are_no_faults() {
+        let mut manifest = crate::testing::leaf_set(vec![vec![0]]).manifest;
+        (manifest.level_surface, manifest.layer_cells_min) = (LEVEL_MAX, 1);
+        manifest.boxes.push(ExtentBox { min: [5; 3], max: [5; 3], level: 0 });
+        manifest.seeds = vec![[0; 3], [UNITS_PER_EDGE; 3]];
+        for (origin, edge) in [(-9.9e99, 1e-100), (9.9e99, 9.9e99)] {
+            manifest.root = Root { origin: [origin; 3], edge };
+            assert_eq!(manifest.fault(), None);
+        }
+        manifest.root.origin[0] = -1e100;
+        assert!(manifest.fault().is_some_and(|fault| fault.starts_with("root")));
+        manifest.root = Root { origin: [0.0; 3], edge: 1e100 };
+        assert!(manifest.fault().is_some_and(|fault| fault.starts_with("root")));
+        manifest.root.edge = 1.0;
+        manifest.seeds = vec![[0, 0, UNITS_PER_EDGE + 1]];
+        assert!(manifest.fault().is_some_and(|fault| fault.starts_with("seeds")));
+        manifest.seeds = vec![[0, -1, 0]];
+        assert!(manifest.fault().is_some_and(|fault| fault.starts_with("seeds")));
+    }
+
+    #[test]
+    fn a_tally_counts_words_by_level_side_and_octant() {
+        let words = [0, 3 << 2 | 1, 511 << 55 | 3 << 2 | 2, 25 << 2 | 3];
+        let tally = Tally::of(&words);
+        let mut by_level = [0; LEVEL_MAX as usize + 1];
+        (by_level[0], by_level[3]) = (1, 2);
+        assert_eq!((tally.leaves, tally.by_level), (4, by_level));
+        assert_eq!(tally.by_side, BySide { outside: 1, inside: 1, crossing: 1 });
+        assert_eq!(tally.digest, Digest::of(&words));
+        assert_eq!(tally.octants[511], Digest::of(&words[2..3]));
+        let mut counted = Tally::default();
+        counted.count(words[1], 5);
+        assert_eq!((counted.leaves, counted.by_side.inside, counted.by_level[3]), (5, 5, 5));
+        assert_eq!(
+            (part_name(0), part_name(123_456)),
+            ("leaves-00000.npy".to_owned(), "leaves-123456.npy".to_owned())
+        );
+    }
 }

@@ -174,6 +174,12 @@ impl MappedPart {
         self.len == 0
     }
 
+    /// Announces that few words will be read, at random places. Has an effect on speed alone.
+    pub fn expect_few_reads(&self) {
+        // An error means that the system does not know this kind of advice.
+        let _ = self.bytes.advise(memmap2::Advice::Random);
+    }
+
     /// The word with this index. Panics if there is none.
     pub fn word(&self, index: usize) -> u64 {
         assert!(index < self.len, "word {index} of {}", self.len);
@@ -294,6 +300,19 @@ mod tests {
         }
         let mapped = part.map().unwrap();
         assert!((0..mapped.len()).all(|i| mapped.word(i) == words[i]));
+        assert!(!part.is_empty() && !mapped.is_empty() && part.path() == file.path());
+        assert!(std::panic::catch_unwind(|| mapped.word(100)).is_err());
+    }
+
+    #[test]
+    fn a_header_ends_with_a_line_end_at_a_multiple_of_64_bytes() {
+        for digits in 0..70 {
+            let header = header("<u8", &format!("({},)", "1".repeat(digits)));
+            assert!(header.len().is_multiple_of(64) && header.len() <= 192, "{digits} digits");
+            assert!(header.ends_with(b"\n") && header.starts_with(b"\x93NUMPY\x01\x00"));
+            let stated = usize::from(u16::from_le_bytes([header[8], header[9]]));
+            assert_eq!(stated + 10, header.len());
+        }
     }
 
     #[test]
@@ -302,6 +321,7 @@ mod tests {
         write(file.path(), &[]).unwrap();
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!((part.len(), part.read_all().unwrap()), (0, Vec::new()));
+        assert!(part.is_empty() && part.map().unwrap().is_empty());
     }
 
     #[test]

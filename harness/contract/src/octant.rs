@@ -159,6 +159,32 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_distance_is_the_largest_gap_along_an_axis() {
+        let all = all_down_to(2);
+        for a in &all {
+            for b in &all {
+                let ((low, high), (low_b, high_b)) = (a.bounds(), b.bounds());
+                let gap = |i: usize| {
+                    let apart =
+                        [low_b[i] - high[i], low[i] - high_b[i]].into_iter().find(|&gap| gap > 0);
+                    apart.unwrap_or(0) / UNITS_PER_CELL
+                };
+                assert_eq!(a.distance(b), gap(0).max(gap(1)).max(gap(2)), "{a}, {b}");
+                let within = (0..3).all(|i| low[i] <= low_b[i] && high_b[i] <= high[i]);
+                assert_eq!(a.contains(b), within, "{a}, {b}");
+            }
+            let (low, high) = a.bounds();
+            assert_eq!(a.centre().map(|c| 2 * c), std::array::from_fn(|i| low[i] + high[i]));
+            assert_eq!(a.to_string(), format!("octant {} (level {})", a.path(), a.level));
+        }
+        let finest = Octant { corner: [1, 2, 3], level: LEVEL_MAX };
+        assert_eq!(finest.bounds(), ([256, 512, 768], [512, 768, 1024]));
+        assert!(std::panic::catch_unwind(|| finest.child(0)).is_err());
+        assert!(std::panic::catch_unwind(|| Octant::ROOT.child(8)).is_err());
+        assert!(std::panic::catch_unwind(|| Octant::ROOT.ancestor(1)).is_err());
+    }
+
     /// All triples of numbers of a range.
     fn triples(range: std::ops::RangeInclusive<i32>) -> Vec<[i32; 3]> {
         let mut all = Vec::new();

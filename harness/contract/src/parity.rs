@@ -209,6 +209,42 @@ mod tests {
         }
     }
 
+    proptest! {
+        /// The grid of a single facet is one cell.
+        #[test]
+        fn the_grid_leaves_out_no_facet_that_a_ray_crosses(
+            facets in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-40i64..40)), 0..60),
+            point in prop::array::uniform3(-42i64..42),
+        ) {
+            let mut expected = [false; 6];
+            for facet in &facets {
+                let single = Parity::new(&[*facet]).inside(point);
+                (0..6).for_each(|ray| expected[ray] ^= single[ray]);
+            }
+            prop_assert_eq!(Parity::new(&facets).inside(point), expected);
+        }
+
+        /// A point that a facet's projection contains strictly is on one of its sides, or in its plane.
+        #[test]
+        fn a_line_through_the_interior_of_a_facet_crosses_it(
+            facet in prop::array::uniform3(prop::array::uniform3(-9i64..9)), point in prop::array::uniform3(-9i64..9), axis in 0usize..3,
+        ) {
+            let [a, b, c] = facet.map(|v| project(v, axis));
+            let turn = |p: [i64; 2], q: [i64; 2], r: [i64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+            let at = project(point, axis);
+            let turns = [turn(a, b, at), turn(b, c, at), turn(c, a, at)];
+            let inside = turns.iter().all(|&t| t > 0) || turns.iter().all(|&t| t < 0);
+            let beyond = turns.iter().any(|&t| t > 0) && turns.iter().any(|&t| t < 0);
+            prop_assume!(inside || beyond);
+            // The facet's coordinate along the axis at the point, times twice the area of the projection.
+            let along = (0..3).map(|i| turns[(i + 1) % 3] * facet[i][axis]).sum::<i64>() * turns[0].signum();
+            let height = along - point[axis] * turns.iter().sum::<i64>().abs();
+            let expected = if inside { [height > 0, height < 0] } else { [false; 2] };
+            let found = Parity::new(&[facet]).inside(point);
+            prop_assert_eq!([found[2 * axis], found[2 * axis + 1]], expected);
+        }
+    }
+
     #[test]
     fn only_the_ray_towards_a_single_facet_is_odd() {
         let facet = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
@@ -217,6 +253,18 @@ mod tests {
         assert_eq!(parity.inside([2, 2, 3]), [false, false, false, false, false, true]);
         // Two copies of a facet cancel.
         assert_eq!(Parity::new(&[facet, facet]).inside([2, 2, 3]), [false; 6]);
+    }
+
+    /// The point is moved by eps to the right and by eps squared upwards.
+    #[test]
+    fn a_ray_through_an_edge_or_a_corner_is_decided_by_the_perturbation() {
+        let facet = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
+        for (x, y, crosses) in
+            [(0, 2, true), (2, 0, true), (4, 4, false), (0, 0, true), (8, 0, false), (0, 8, false)]
+        {
+            let found = Parity::new(&[facet]).inside([x, y, -3]);
+            assert_eq!(found, [false, false, false, false, crosses, false], "({x}, {y})");
+        }
     }
 
     #[test]

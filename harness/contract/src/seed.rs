@@ -73,4 +73,17 @@ mod tests {
         assert!(!is_crossing([0.1, 1.5, 1.5], true));
         assert!(is_crossing([0.4, 1.5, 1.5], true));
     }
+
+    #[test]
+    fn a_leaf_has_the_level_of_the_surface_or_of_the_finest_box_that_it_meets() {
+        let on_lattice = |p: [f64; 3]| p.map(|c| (c * UNIT) as i64);
+        let facet = [[0.5, 1.0, 1.0], [0.5, 3.0, 1.0], [0.5, 1.0, 3.0]].map(on_lattice);
+        let extent =
+            |level| ExtentBox { min: on_lattice([6.0; 3]), max: on_lattice([7.0; 3]), level };
+        let boxes = [extent(4), extent(2)];
+        let base = BaseTree { facets: &[facet], level: 3, boxes: &boxes };
+        let level = |at| base.leaf_at(on_lattice(at)).0.level;
+        assert_eq!([level([0.4, 1.5, 1.5]), level([6.1; 3]), level([5.9; 3])], [3, 4, 2]);
+        assert_eq!(base.leaf_at(on_lattice([6.1; 3])).0.corner, [12 << 15; 3]);
+    }
 }

@@ -52,6 +52,9 @@ pub fn read(path: &Path) -> Result<Body, StlError> {
 /// # Errors
 /// If they are not an STL file.
 pub fn parse(bytes: &[u8]) -> Result<Body, StlError> {
+    if bytes.is_empty() {
+        return Err(wrong("it is empty"));
+    }
     match binary(bytes) {
         Some(facets) => {
             let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
@@ -64,8 +67,7 @@ pub fn parse(bytes: &[u8]) -> Result<Body, StlError> {
 /// The facets of a binary file; `None` if the length of the file contradicts its facet count. The header cannot
 /// decide, because that of some binary files begins with "solid".
 fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
-    let count = u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?);
-    if bytes.len() as u64 != 84 + 50 * u64::from(count) {
+    if bytes.len() as u64 != length(facet_count(bytes)?) {
         return None;
     }
     let number = |b: &[u8]| f32::from_le_bytes(b.try_into().expect("four bytes"));
@@ -78,6 +80,31 @@ fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
         })
     };
     Some(bytes[84..].chunks_exact(50).map(facet).collect())
+}
+
+/// The facet count in the header of a binary file; `None` if the bytes end before it.
+fn facet_count(bytes: &[u8]) -> Option<u32> {
+    Some(u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?))
+}
+
+/// The length of a binary file in bytes.
+fn length(facets: u32) -> u64 {
+    84 + 50 * u64::from(facets)
+}
+
+/// Bytes that are neither text nor a binary file: probably a binary file that is truncated.
+fn damaged(bytes: &[u8]) -> StlError {
+    let found = bytes.len();
+    match facet_count(bytes) {
+        Some(count) => wrong(&format!(
+            "its header promises {count} facets, which take {} bytes, but the file has {found}: it is truncated, or not an STL file; \
+             export it again",
+            length(count)
+        )),
+        None => wrong(&format!(
+            "it is not text, and its {found} bytes are fewer than the header of a binary file: it is truncated; export it again"
+        )),
+    }
 }
 
 /// A word, and the number of line ends before it.
@@ -96,7 +123,7 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
 /// The solids of an ASCII file (reference/DEFINITION.md, section 10).
 fn ascii(bytes: &[u8]) -> Result<Body, StlError> {
     if bytes.contains(&0) {
-        return Err(wrong("it is not binary, and text has no zero bytes"));
+        return Err(damaged(bytes));
     }
     let mut words = words(bytes);
     let mut body = Body::default();
@@ -235,6 +262,20 @@ mod tests {
         bytes.extend([0; 2]);
         assert_eq!(of(&bytes).unwrap(), [EXPECTED]);
         assert!(of(&bytes[..bytes.len() - 1]).is_err());
+    }
+
+    #[test]
+    fn a_truncated_binary_file_and_an_empty_one_are_called_so() {
+        let mut bytes = vec![0; 80];
+        bytes.extend(3u32.to_le_bytes());
+        bytes.extend([0; 120]);
+        let why = of(&bytes).unwrap_err().to_string();
+        assert!(
+            why.contains("promises 3 facets, which take 234 bytes, but the file has 204"),
+            "{why}"
+        );
+        assert!(of(&bytes[..60]).unwrap_err().to_string().contains("60 bytes are fewer"));
+        assert_eq!(of(b"").unwrap_err().to_string(), "is not an STL file: it is empty");
     }
 
     #[test]

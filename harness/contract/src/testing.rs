@@ -1,6 +1,8 @@
 //! Small meshes for tests, explicit or random.
 
 use proptest::prelude::*;
+use std::fs;
+use std::path::Path;
 
 use crate::lattice::{FacetLattice, Root};
 use crate::leafset::LeafSet;
@@ -89,6 +91,17 @@ fn pick(seed: u64, octant: &Octant, salt: u32) -> u64 {
     (crate::digest::mix(word ^ seed.rotate_left(salt * 8)) >> 100) as u64
 }
 
+/// Compares a text with that of a file, given relative to the package. If it differs as intended, copy the file that the message
+/// names.
+pub fn assert_text(text: &str, expected: &str) {
+    let name = Path::new(expected).file_name().expect("the path of a file");
+    if text != fs::read_to_string(expected).unwrap_or_default() {
+        let found = std::env::temp_dir().join(name);
+        fs::write(&found, text).expect("the directory of temporary files is writable");
+        panic!("{} differs from {expected}", found.display());
+    }
+}
+
 /// A mesh of these parts with a correct manifest. Its inputs delete nothing and require no refinement.
 pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
     let root = Root { origin: [0.0; 3], edge: 8.0 };
@@ -105,4 +118,30 @@ pub fn octants_of(words: &[u64]) -> Vec<Octant> {
     all.sort_unstable_by_key(|o| (o.level, o.corner));
     all.dedup();
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_must_be_that_of_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("expected.txt").to_string_lossy().into_owned();
+        fs::write(&path, "text").unwrap();
+        assert_text("text", &path);
+        assert!(std::panic::catch_unwind(|| assert_text("other", &path)).is_err());
+    }
+
+    #[test]
+    fn pseudorandom_numbers_differ_by_octant_seed_and_salt() {
+        let octants = octants_of(&words_of(|o| o.level < 2));
+        let numbers = |seed, salt| octants.iter().map(move |o| pick(seed, o, salt));
+        let seeds = [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03];
+        let mut all: Vec<u64> = (0..4).flat_map(|i| numbers(seeds[i / 2], i as u32 % 2)).collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 4 * (1 + 8 + 64));
+        assert!(all.iter().all(|&number| number < 1 << 28));
+    }
 }

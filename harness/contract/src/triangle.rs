@@ -171,6 +171,21 @@ mod tests {
         assert!(!triangle.meets([0; 3], [(1 << 27) - 1; 3]));
     }
 
+    /// Whether no plane separates the triangle from the box: normal to an axis, to the triangle, or to an axis and an edge.
+    fn is_not_separated(t: &FacetLattice, low: [i64; 3], high: [i64; 3]) -> bool {
+        let unit = |axis: usize| -> [i64; 3] { std::array::from_fn(|a| i64::from(a == axis)) };
+        let edges = [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])];
+        let mixed = (0..9).map(|i| cross(unit(i / 3), edges[i % 3]));
+        let mut normals = (0..3).map(unit).chain([cross(edges[0], edges[1])]).chain(mixed);
+        normals.all(|n| {
+            let of_box =
+                (0..8).map(|i| dot(n, std::array::from_fn(|a| [low, high][i >> a & 1][a])));
+            let (from, to) = of_box.fold((i128::MAX, i128::MIN), |(l, h), x| (l.min(x), h.max(x)));
+            let of_corners = t.map(|v| dot(n, v));
+            of_corners.iter().any(|&x| x <= to) && of_corners.iter().any(|&x| x >= from)
+        })
+    }
+
     proptest! {
         /// A point that lies in the triangle and in the box proves that they meet.
         #[test]
@@ -182,6 +197,20 @@ mod tests {
             let twelfths = |a: usize| corners[0][a] * (12 - i - j) + corners[1][a] * i + corners[2][a] * j;
             let within = (0..3).all(|a| (12 * LOW[a]..=12 * HIGH[a]).contains(&twelfths(a)));
             prop_assert!(!within || meets(corners));
+        }
+
+        #[test]
+        fn they_meet_iff_no_plane_separates_them(
+            corners in prop::array::uniform3(prop::array::uniform3(-6i64..=10)), kind in 0..6,
+        ) {
+            let [a, b, c] = corners;
+            let corners = match kind {
+                0 => [a, a, a],
+                1 => [a, b, a],
+                2 => [a, b, std::array::from_fn(|i| 2 * b[i] - a[i])],
+                _ => [a, b, c],
+            };
+            prop_assert_eq!(meets(corners), is_not_separated(&corners, LOW, HIGH));
         }
 
         #[test]

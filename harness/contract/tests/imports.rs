@@ -222,7 +222,7 @@ fn an_incomplete_file_is_an_error() {
     }
 }
 
-/// No change of bytes causes a panic, a hang, or an allocation that a count alone determines.
+/// No change of bytes causes a panic, a hang, or an allocation that a count alone determines; what it causes is listed.
 #[test]
 fn no_damage_is_fatal() {
     let mut state = 1u64;
@@ -236,10 +236,10 @@ fn no_damage_is_fatal() {
         .iter()
         .filter(|(name, _, _)| !name.starts_with("foam"))
         .map(|&(name, _, _)| (name, ""));
-    let mut refused = 0;
+    let (mut refused, mut outcomes) = (0, String::new());
     for (name, file) in foam.chain(single) {
         for round in 0..30 {
-            let (_place, copy) = edited(name, file, |bytes| {
+            let (place, copy) = edited(name, file, |bytes| {
                 let begin = random(bytes.len() - 8);
                 match round % 3 {
                     0 => bytes[begin] = random(256) as u8,
@@ -247,10 +247,27 @@ fn no_damage_is_fatal() {
                     _ => drop(bytes.drain(begin..begin + 1 + random(7))),
                 }
             });
-            refused += usize::from(imported(&copy, &Request::default()).is_err());
+            let outcome = imported(&copy, &Request::default());
+            refused += usize::from(outcome.is_err());
+            let outcome = match outcome {
+                Ok(set) => format!("{} leaves {}", set.manifest.leaves, set.manifest.digest),
+                Err(why) => why.to_string().replace(&*place.path().to_string_lossy(), ""),
+            };
+            outcomes += &format!("{name} {file} {round}: {outcome}\n");
         }
     }
     assert!(refused > 250, "{refused}");
+    assert_text(&outcomes, "damage.txt");
+}
+
+/// Compares a text with that of a file beside this one. If it differs as intended, copy the file that the message names.
+fn assert_text(text: &str, file: &str) {
+    let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/expected").join(file);
+    if text != fs::read_to_string(&expected).unwrap_or_default() {
+        let found = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
+        fs::write(&found, text).unwrap();
+        panic!("{} differs from {}", found.display(), expected.display());
+    }
 }
 
 #[test]
@@ -285,6 +302,88 @@ fn counts_beyond_the_file_are_errors() {
         refusal("foam-ascii", "cellLevel", |bytes| {
             replace(bytes, "\n256\n(", &format!("\n{count}{{0}}\n("))
         });
+    }
+    let why = refusal("foam-binary", "points", |bytes| replace(bytes, "\n462\n", "\n600\n"));
+    assert!(why.contains("points: states 600 items, but has only "), "{why}");
+    // An item takes two bytes at least.
+    let half = fs::read(sample("foam-ascii").join("owner")).unwrap().len() / 2;
+    let why =
+        refusal("foam-ascii", "owner", |bytes| replace(bytes, "\n960\n(", &format!("\n{half}\n(")));
+    assert!(why.ends_with(&format!("owner: states {half} items: it is incomplete")), "{why}");
+}
+
+/// The number at this place in the header of a connectivity.
+fn head_of_forest(bytes: &[u8], number: usize) -> usize {
+    u64::from_le_bytes(bytes[32 + 8 * number..][..8].try_into().unwrap()) as usize
+}
+
+/// Tables that the reader skips have the lengths that p4est gives them: with edges, corners and attributes in the connectivity, the
+/// cells are the same.
+#[test]
+fn edges_corners_and_attributes_of_a_connectivity_are_skipped() {
+    let expected = imported(&sample("brick.p8est"), &Request::default()).unwrap().words;
+    for (edges, corners, attributes) in [(0, 0, 0), (1, 0, 0), (3, 0, 5), (0, 1, 0), (2, 4, 3)] {
+        let (_place, copy) = edited("brick.p8est", "", |bytes| {
+            let head = [2, 3, 4, 6, 8].map(|number| head_of_forest(bytes, number));
+            let [vertices, trees, own_edges, own_corners, own_attributes] = head;
+            assert_eq!((own_edges, own_attributes), (0, 0));
+            let own_pairs = head_of_forest(bytes, 7);
+            let mut at = 32 + 80 + 24 * vertices;
+            let mut whole = bytes[..at].to_vec();
+            let mut take = |whole: &mut Vec<u8>, count: usize| {
+                whole.extend(&bytes[at..at + count]);
+                at += count;
+            };
+            let put = |whole: &mut Vec<u8>, count: usize| whole.resize(whole.len() + count, 7);
+            let corners = own_corners + corners;
+            for (number, value) in [
+                (4, edges),
+                (5, 2 * edges),
+                (6, corners),
+                (7, own_pairs + 3 * corners),
+                (8, attributes),
+            ] {
+                whole[32 + 8 * number..][..8].copy_from_slice(&(value as u64).to_le_bytes());
+            }
+            put(&mut whole, if edges > 0 { 48 * trees } else { 0 });
+            take(&mut whole, 32 * trees);
+            let own = if own_corners > 0 { 32 * trees } else { 0 };
+            take(&mut whole, own);
+            put(&mut whole, if corners > 0 { 32 * trees - own } else { 0 });
+            take(&mut whole, 30 * trees);
+            put(&mut whole, attributes * trees);
+            take(&mut whole, 4);
+            put(&mut whole, 4 * edges + 5 * 2 * edges);
+            take(
+                &mut whole,
+                4 * (own_corners + 1) + if own_corners > 0 { 5 * own_pairs } else { 0 },
+            );
+            let added = corners - own_corners;
+            let pairs = if corners > 0 { 5 * (own_pairs + 3 * corners) } else { 0 };
+            put(&mut whole, 4 * added + pairs - if own_corners > 0 { 5 * own_pairs } else { 0 });
+            at = at.next_multiple_of(32);
+            whole.resize(whole.len().next_multiple_of(32), 0);
+            whole.extend(&bytes[at..]);
+            *bytes = whole;
+        });
+        let found = imported(&copy, &Request::default()).unwrap().words;
+        assert_eq!(found, expected, "{edges} edges, {corners} corners, {attributes} bytes");
+    }
+}
+
+#[test]
+fn trees_are_cubes_up_to_rounding() {
+    let with = |by: f64| {
+        let (_place, copy) = edited("brick.p8est", "", |bytes| {
+            let x = &mut bytes[32 + 80..][..8];
+            let moved = f64::from_le_bytes((&*x).try_into().unwrap()) + by;
+            x.copy_from_slice(&moved.to_le_bytes());
+        });
+        imported(&copy, &Request::default())
+    };
+    assert!(with(1e-11).is_ok() && with(-1e-11).is_ok());
+    for by in [1e-6, -1e-6, 0.25] {
+        assert!(with(by).unwrap_err().to_string().contains("is not a cube along x, y and z"));
     }
 }
 
@@ -322,6 +421,33 @@ fn each_error_of_a_mesh_names_its_cell() {
     assert!(overlap.contains("cell 1 ") && overlap.contains("overlaps cell 0 "), "{overlap}");
     let index = refusal("cube.json", "", |bytes| replace(bytes, "[[2, 2, 2], ", "[[2, 2, 1], "));
     assert!(index.contains("cell 0 (corner"), "{index}");
+}
+
+#[test]
+fn lists_of_other_meshes_and_absurd_sizes_are_refused() {
+    // One neighbour more than there are faces.
+    let why = refusal("foam-ascii", "neighbour", |bytes| {
+        let at = bytes.windows(6).position(|w| w == b"\n720\n(").unwrap();
+        bytes.truncate(at);
+        bytes.extend(format!("\n961\n({})", "0 ".repeat(961)).bytes());
+    });
+    assert!(
+        why.contains(
+            "960 faces with 960 owners and 961 neighbours: its files belong to different meshes"
+        ),
+        "{why}"
+    );
+    for size in [1 << 20, u64::MAX / 2] {
+        let why = refusal("brick.p8est", "", |bytes| {
+            let format = 0x0300_0009u64.to_le_bytes();
+            let at = bytes.windows(8).rposition(|w| w == format).unwrap();
+            bytes[at + 24..at + 32].copy_from_slice(&size.to_le_bytes());
+        });
+        assert!(why.contains(&format!("it states {size} bytes of data per quadrant")), "{why}");
+    }
+    let close =
+        refusal("cube.json", "", |bytes| replace(bytes, "[[0.125, 0.125", "[[0.125, 0.1250005"));
+    assert!(close.contains("widths 0.125 and 0.1250005 along axis 1"), "{close}");
 }
 
 #[test]

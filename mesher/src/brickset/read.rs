@@ -75,7 +75,7 @@ fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
     while low.get(step).is_some_and(|&low| leads(low)) {
         step *= 2;
     }
-    let near = &low[step / 2..low.len().min(step + 1)];
+    let near = &low[step / 2..low.len().min(step)];
     step / 2 + near.partition_point(|&low| leads(low))
 }
 
@@ -175,5 +175,19 @@ impl<'a> Cursor<'a> {
         self.end = after.first().map_or(self.set.len(), |r| r.start);
         self.low = &self.set.low[run.start..self.end];
         self.runs = after;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::leading;
+
+    #[test]
+    fn leading_elements_are_counted_for_every_length() {
+        let all: Vec<u32> = (0..40).collect();
+        for (length, end) in (0..40).flat_map(|length| (0..42).map(move |end| (length, end))) {
+            let found = leading(&all[..length], |low| low < end);
+            assert_eq!(found, length.min(end as usize), "{length}, {end}");
+        }
     }
 }

@@ -286,6 +286,27 @@ fn imbalance_is_found_over_corners_and_not_in_deleted_leaves() {
     assert!(!touching(&deleted));
 }
 
+/// For each octant of level 2, and two levels deeper each octant in it, and all of them.
+#[test]
+fn octants_touched_are_those_with_a_common_point() {
+    for code in 0..64 {
+        let p = position(code);
+        for inner in (0..64).map(|bit| 1 << bit).chain([0, u64::MAX]) {
+            let touch = |q: u64| {
+                let q = position(q);
+                crate::brickset::ones(inner).any(|bit| {
+                    let fine = position(u64::from(bit));
+                    let at: [u32; 3] = std::array::from_fn(|a| 4 * p[a] + fine[a]);
+                    (0..3).all(|a| at[a] <= 4 * q[a] + 4 && at[a] + 1 >= 4 * q[a])
+                })
+            };
+            let want: BTreeSet<u64> = (0..64).filter(|&q| q != code && touch(q)).collect();
+            let got: BTreeSet<u64> = octants_touched(2, code, inner).collect();
+            assert_eq!(got, want, "octant {code}, inner {inner:#x}");
+        }
+    }
+}
+
 #[test]
 #[should_panic(expected = "leaves must be in order and must not overlap")]
 fn overlapping_leaves_are_found() {

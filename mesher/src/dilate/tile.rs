@@ -299,4 +299,20 @@ mod tests {
             assert_eq!(dilate_row(1 << 32, r), want);
         }
     }
+
+    #[test]
+    fn a_parent_is_set_if_any_of_its_children_is() {
+        let (side, y, z, x) = (4, 1, 2, 5);
+        for children in 0..256u64 {
+            let (mut rows, mut half) = (vec![0; 4 * side * side], vec![0; side * side]);
+            for child in (0..8).filter(|child| children >> child & 1 == 1) {
+                let row = (2 * z + (child >> 2)) * 2 * side + 2 * y + (child >> 1 & 1);
+                rows[row] |= 1 << (2 * x + (child & 1));
+            }
+            halve(&rows, &mut half, side, &[2 * y..2 * y + 2, 2 * z..2 * z + 2]);
+            let mut want = vec![0; side * side];
+            want[z * side + y] = u64::from(children != 0) << x;
+            assert_eq!(half, want, "children {children:#b}");
+        }
+    }
 }

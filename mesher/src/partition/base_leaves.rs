@@ -199,3 +199,59 @@ fn assign_metis(_: &[Subtree], _: &[u64], _: usize) -> Result<Vec<usize>, Error>
         "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::Solo;
+    use crate::lattice::{Enclosed, Keep, Root};
+    use crate::octant::ROOT_EDGE;
+    use crate::refine::refine_top;
+
+    const LEVEL: Level = 5;
+
+    #[test]
+    fn base_leaves_are_as_deep_as_the_division_asks_for() {
+        let rules = Rules {
+            root: Root { origin: [0.0; 3], edge: 1.0 },
+            level_surface: 9,
+            layer_cells_min: 4,
+            keep: Keep::All,
+            keep_crossing: true,
+            boxes: Vec::new(),
+            seeds: Vec::new(),
+            enclosed: Enclosed::Delete,
+        };
+        let h = ROOT_EDGE as i32;
+        let facets = [Facet { v: [[1, 1, 5], [h / 2, 1, 5], [1, h / 4, h / 8]] }];
+        let marked = refine_top(&facets, &rules, LEVEL).0.split;
+        let leaves = |weights, level_base| {
+            let division = Division { partitioner: Partitioner::Morton, weights, level_base };
+            partition(&facets, &marked, &rules, &division, LEVEL, &Solo).expect("no METIS")
+        };
+        let survey = Survey::gather(&facets, &marked, &rules, LEVEL, Weights::Area, &Solo);
+        let is_split = |b: &BaseLeaf| marked[b.level as usize].contains(b.code);
+        let weight = |level: Level, code: u64| {
+            let areas = survey.areas.within(&survey.areas.all(), span(level, code));
+            survey.weight(level, code, &areas)
+        };
+        let heavy = weight(0, 0) / SUBTREES_PER_RANK;
+        let by_weight = leaves(Weights::Area, None);
+        let depth = |leaves: &[BaseLeaf]| leaves.iter().map(|b| b.level).max();
+        assert!((2..LEVEL).contains(&depth(&by_weight).unwrap()), "{by_weight:?}");
+        for b in &by_weight {
+            assert!(!is_split(b) || weight(b.level, b.code) <= heavy, "{b:?} is too heavy");
+            assert!(weight(b.level - 1, b.code >> 3) > heavy, "{b:?} need not be so deep");
+        }
+        // Every split octant above the level is divided.
+        let all = leaves(Weights::Area, Some(LEVEL));
+        let splits: u64 = (0..LEVEL).map(|l| marked[l as usize].count()).sum();
+        assert_eq!(all.len() as u64, 1 + 7 * splits);
+        // The first level with enough split octants is that of the deepest base leaves.
+        let enough = (0..LEVEL).find(|&l| marked[l as usize].count() >= SPLIT_LEAVES_PER_RANK);
+        let unit = leaves(Weights::Unit, None);
+        assert_eq!(depth(&unit), enough);
+        let above: u64 = (0..enough.unwrap()).map(|l| marked[l as usize].count()).sum();
+        assert_eq!(unit.len() as u64, 1 + 7 * above);
+    }
+}

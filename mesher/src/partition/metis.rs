@@ -92,6 +92,22 @@ mod tests {
     }
 
     #[test]
+    fn few_leaves_and_few_heavy_ones_are_divided_along_the_curve() {
+        let is_of_curve = |weights: &[u64]| {
+            let leaves: Vec<(Level, u64)> = (0..weights.len() as u64).map(|c| (3, c)).collect();
+            // The graph needs all neighbours.
+            let leaves = [leaves, (weights.len() as u64..512).map(|c| (3, c)).collect()].concat();
+            let weights = [weights, &vec![0; 512 - weights.len()]].concat();
+            assign(&leaves, &weights, 4).unwrap() == assign_morton(&weights, 4)
+        };
+        // As many equal leaves as 8 for each rank suffice.
+        assert!(is_of_curve(&[7; 31]) && !is_of_curve(&[7; 512]));
+        let mut heavy = [7; 512];
+        heavy[99] = 512 * 7;
+        assert!(is_of_curve(&heavy), "half of the weight is in one leaf");
+    }
+
+    #[test]
     fn a_uniform_base_tree_has_three_pairs_per_octant_but_for_its_faces() {
         let leaves: Vec<(Level, u64)> = (0..64).map(|code| (2, code)).collect();
         let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);

@@ -151,4 +151,57 @@ mod tests {
         assert_eq!(ranks.tightest(&[60.0, 60.0]).unwrap().needed_bytes, 120);
         assert_eq!(ranks.peaks(&[60.0, 60.0]), [85, 85]);
     }
+
+    #[test]
+    fn sets_grow_with_holes_and_reuse_what_facets_leave() {
+        let one = |bytes: f64, facets: f64| {
+            let amounts = Amounts { bytes_graded: bytes, ..Amounts::default() };
+            Ranks { all: vec![Rank { amounts, facets, ..rank(1, 0.0, 0.0) }], in_process: 1.0 }
+        };
+        let growth = |ranks: Ranks, bytes: f64| {
+            ranks.growth(&Amounts { bytes_sides: bytes, ..Amounts::default() })
+        };
+        // Holes of 0.3e6 bytes, of which 1000 facets leave 6e4.
+        assert_eq!(growth(one(1e6, 1000.0), 2e6), [1.24e6]);
+        assert_eq!(growth(one(1e6, 1e5), 2e6), [1e6]);
+        assert_eq!(growth(one(1e6, 1000.0), 101e6), [1e8 + 5e6 - 6e4]);
+        assert_eq!(growth(one(1e6, 1000.0), 0.5e6), [0.0]);
+        assert_eq!(growth(one(0.5, 0.0), 3.0), [1.3], "less than a byte counts as one");
+    }
+
+    #[test]
+    fn ranks_gather_what_each_one_has() {
+        crate::comm::sim::run(3, 1, |comm| {
+            let mine = comm.rank() as f64;
+            let amounts = Amounts::from_array(std::array::from_fn(|i| mine * 10.0 + i as f64));
+            let ranks = Ranks::gather(comm, amounts, 100 + comm.rank());
+            assert_eq!((ranks.count(), ranks.in_process), (3, 3.0));
+            assert_eq!(ranks.total().to_array(), std::array::from_fn(|i| 30.0 + 3.0 * i as f64));
+            let here = Room::read();
+            for (number, rank) in (0..).zip(&ranks.all) {
+                let number = f64::from(number);
+                assert_eq!((rank.amounts.cells, rank.facets), (10.0 * number, 100.0 + number));
+                assert_eq!(rank.room.node, here.node);
+                let room = |room: Room| {
+                    [room.resident, room.address_space, room.control_group, room.machine]
+                };
+                // Other programs take memory meanwhile.
+                let near = |(a, b): (f64, f64)| a == b || (a - b).abs() < 0.2 * b;
+                let mut pairs = room(rank.room).into_iter().zip(room(here));
+                assert!(pairs.all(near), "{:?} for {here:?}", rank.room);
+                assert!((rank.room.resident..1e11).contains(&rank.peak), "{}", rank.peak);
+            }
+        });
+    }
+
+    #[test]
+    fn a_limit_that_leaves_nothing_is_the_tightest() {
+        let mut one = rank(1, 900.0, 1000.0);
+        one.room.control_group = 0.0;
+        let tightest = Ranks { all: vec![one], in_process: 1.0 }.tightest(&[2.0]).unwrap();
+        assert_eq!(
+            tightest,
+            Tightest { limit: Limit::ControlGroup, left_bytes: 0, needed_bytes: 2 }
+        );
+    }
 }

@@ -70,7 +70,11 @@ impl fmt::Display for Plan {
         }
         writeln!(f, "cells          {}", self.about())?;
         if let Some(time) = self.time_cpu_s {
-            writeln!(f, "time           {} of CPU time over {} ranks", seconds(time), self.ranks)?;
+            let ranks = match self.ranks {
+                1 => "on one rank".to_owned(),
+                ranks => format!("over {ranks} ranks"),
+            };
+            writeln!(f, "time           {} of CPU time {ranks}", seconds(time))?;
         }
         let all: u64 = self.memory_peak_bytes.iter().sum();
         writeln!(
@@ -124,11 +128,118 @@ fn seconds(s: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::bytes;
+    use super::*;
+    use crate::plan::{PilotEntry, Tightest};
 
     #[test]
     fn bytes_have_units() {
-        let shown = [0.0, 999.0, 1500.0, 448e6, 2.5e13, 5e22].map(bytes);
-        assert_eq!(shown, ["0 bytes", "999 bytes", "1.5 kB", "448 MB", "25.0 TB", "50000 EB"]);
+        let shown = [0.0, 999.0, 1500.0, 99.9e3, 100e3, 448e6, 2.5e13, 5e22].map(bytes);
+        assert_eq!(
+            shown,
+            [
+                "0 bytes",
+                "999 bytes",
+                "1.5 kB",
+                "99.9 kB",
+                "100 kB",
+                "448 MB",
+                "25.0 TB",
+                "50000 EB"
+            ]
+        );
+    }
+
+    #[test]
+    fn short_times_have_hundredths_of_a_second() {
+        assert_eq!([9.75, 10.0, 12.6].map(seconds), ["9.75 s", "10 s", "13 s"]);
+    }
+
+    fn plan() -> Plan {
+        let pilot = |spacing_factor| PilotEntry { spacing_factor, cells: 12_345, time_cpu_s: 0.5 };
+        Plan {
+            schema: "",
+            program: "",
+            ranks: 2,
+            source: Source::Pilots,
+            pilots: vec![pilot(4.0), pilot(1.0)],
+            cells: 1_234_567,
+            time_cpu_s: Some(12.6),
+            memory_peak_bytes: vec![2_000_000, 3_500_000],
+            words_bytes: vec![4_100_000; 2],
+            tree_bytes: 1234,
+            tightest: Some(Tightest {
+                limit: Limit::Machine,
+                left_bytes: 900_000_000,
+                needed_bytes: 5_000_000,
+            }),
+            fits: true,
+            spacing_factor_fits: Some(4.0),
+            spacing_min_fits: Some(0.125),
+        }
+    }
+
+    #[test]
+    fn a_plan_says_all_that_a_run_takes() {
+        let mut plan = plan();
+        assert_eq!(
+            plan.line(),
+            "about 1.2e6 cells, 13 s of CPU time, 3.5 MB of memory per rank, leaf words of 4.1 MB per rank"
+        );
+        let fits = |plan: &Plan| plan.to_string().lines().last().map(str::to_owned);
+        assert_eq!(
+            plan.to_string(),
+            "pilot          run at 4 times the spacings: 12,345 cells, 0.50 s of CPU time\n\
+             pilot          the run itself: 12,345 cells, 0.50 s of CPU time\n\
+             cells          about 1.2e6\n\
+             time           13 s of CPU time over 2 ranks\n\
+             peak memory    5.5 MB over all ranks, 3.5 MB on a rank at most\n\
+             files          leaf words of 4.1 MB per rank; or a tree of 1.2 kB\n\
+             fits           yes: needs 5.0 MB more, of 900 MB that are left (memory of the machine)"
+        );
+        let limits = [
+            (Limit::AddressSpace, "address space of a process"),
+            (Limit::ControlGroup, "control group"),
+        ];
+        for (limit, name) in limits {
+            plan.tightest = Some(Tightest { limit, left_bytes: 7, needed_bytes: 0 });
+            let want = format!(
+                "fits           yes: needs no more than this program holds already; 7 bytes are left ({name})"
+            );
+            assert_eq!(fits(&plan), Some(want));
+        }
+        plan.tightest = None;
+        assert_eq!(fits(&plan).as_deref(), Some("limit          none is known"));
+        let one = Plan { ranks: 1, source: Source::Areas, time_cpu_s: None, ..plan };
+        assert_eq!(one.line(), "very roughly 1e6 cells, 3.5 MB of memory, leaf words of 4.1 MB");
+        let mesh = Plan { source: Source::Mesh, ..one };
+        assert!(mesh.line().starts_with("1,234,567 cells, 3.5 MB"), "{}", mesh.line());
+        assert!(!mesh.to_string().contains("time "), "{mesh}");
+    }
+
+    #[test]
+    fn a_refusal_names_the_limit_and_the_spacing_that_fits() {
+        let mut plan = Plan { fits: false, ..plan() };
+        let refused = "the mesh would have about 1.2e6 cells and need 5.0 MB of memory, but the machine has 900 MB available: \
+                       multiply all spacings by 4, which fits (spacing_min = 0.125), use more machines, or try with --force";
+        assert_eq!(plan.refusal(), Error::memory(refused));
+        let last = plan.to_string().lines().last().map(str::to_owned);
+        assert_eq!(last, Some(format!("fits           no: {}", plan.refusal())));
+        plan.spacing_factor_fits = None;
+        for (limit, phrase) in [
+            (
+                Limit::AddressSpace,
+                "but the limit on its address space leaves a process 8 bytes: no spacing of this case fits, use",
+            ),
+            (
+                Limit::ControlGroup,
+                "but the control group has 8 bytes left: no spacing of this case fits, use",
+            ),
+        ] {
+            plan.tightest = Some(Tightest { limit, left_bytes: 8, needed_bytes: 9 });
+            let text = plan.refusal().to_string();
+            assert!(text.contains(phrase), "{text}");
+        }
+        plan.tightest = None;
+        assert_eq!(plan.refusal(), Error::memory("the run does not fit"));
     }
 }

@@ -81,5 +81,8 @@ mod tests {
         assert_eq!(volumes.cells_in([3 * h; 3], h), 8.0);
         assert!(volumes.meet([4 * h; 3], h) && !volumes.meet([5 * h; 3], h));
         assert_eq!(Volumes::new(&[]).cells(), 0.0);
+        assert!(Volumes::new(&[]).is_empty() && !volumes.is_empty());
+        let counted = |copies: usize| Volumes::new(&vec![coarse; copies]).cells();
+        assert_eq!((counted(24), counted(25)), (64.0, 25.0 * 64.0));
     }
 }

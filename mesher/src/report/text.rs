@@ -131,4 +131,68 @@ mod tests {
         assert_eq!(imbalance(&[1.0, 3.0]), 1.5);
         assert_eq!(imbalance(&[0.0]), 1.0);
     }
+
+    #[test]
+    fn a_report_shows_its_numbers() {
+        use super::super::PhaseEntry;
+        let phase = PhaseEntry {
+            name: "sides".into(),
+            time_wall_s: vec![0.25, 0.5],
+            time_cpu_s: vec![1.0, 3.0],
+            time_comm_wall_s: vec![],
+            time_comm_cpu_s: vec![],
+            messages: vec![],
+            message_bytes: vec![],
+        };
+        let mut report = Report {
+            schema: "",
+            program: "",
+            facets: 1280,
+            cells: 3_000_000,
+            cells_by_level: vec![0, 0, 1234],
+            cells_by_side: [1000, 2000, 3],
+            digest: "abc".into(),
+            root_edge: 8.0,
+            level_surface: 2,
+            level_base: 1,
+            components: 3,
+            components_outside: 1500,
+            components_inside: 1,
+            components_enclosed: 0,
+            enclosed_leaves: 0,
+            enclosed_example: None,
+            components_ambiguous: 0,
+            ambiguous_example: None,
+            warnings: vec![],
+            ranks: 2,
+            time_wall_s: 0.5,
+            peak_rss_bytes: vec![2_000_000, 4_000_000],
+            phases: vec![phase],
+            counters: [("leaves", vec![1, 3])].into(),
+            message_matrix: None,
+        };
+        let text = "facets         1,280\n\
+                    root edge      8 (level 0), surface level 2\n\
+                    cells          3,000,000\n  by side      outside 1,000, inside 2,000, crossing 3\n  \
+                    level  2                1,234   edge 2e0\n\
+                    components     outside 1,500, inside 1\n\
+                    digest         abc\n\
+                    ranks          2, cells max/mean 1.500, base level 1\n\
+                    phase              wall s     cpu s   cpu max/mean\n  \
+                    sides             0.500     4.000      1.500\n\
+                    time           0.500 s wall, 6.00 M cells/s\n\
+                    peak memory    6.0 MB over all ranks, 2.00 bytes per cell";
+        assert_eq!(report.to_string(), text);
+        (report.components_enclosed, report.enclosed_leaves) = (1000, 2000);
+        report.enclosed_example = Some([1.0, 2.0, 0.5]);
+        (report.components_ambiguous, report.ambiguous_example) = (7, Some([0.0, 1.0, 4.0]));
+        report.counters.insert("exposed_faces", vec![1000, 3000]);
+        let added = [
+            "outside 1,500, inside 1; 1,000 outside deleted as enclosed (2,000 leaves of the base tree, one at (1, 2, 0.5)); \
+             7 decided by majority, one at (0, 1, 4)\n",
+            "\nexposed faces  4,000, max/mean 1.500\n",
+        ];
+        let text = report.to_string();
+        assert!(added.iter().all(|line| text.contains(line)), "{text}");
+    }
 }

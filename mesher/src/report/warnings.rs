@@ -11,9 +11,15 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     }
     let has_seeds = !mesh.rules.seeds.is_empty();
     let summary = &mesh.sides.summary;
+    let empty = empty_region(mesh.rules.keep, summary);
+    // These two already advise to enlarge the root.
+    let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
+    let facets_cut = if explains_cut { 0 } else { mesh.facets.beyond_root };
     let warnings = [
-        empty_region(mesh.rules.keep, summary),
+        empty,
         summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
+        summary.flow_misses_boundary.then(flow_without_far_field),
+        (facets_cut > 0).then(|| body_cut(facets_cut, mesh.facets.total)),
     ];
     warnings.into_iter().flatten().collect()
 }
@@ -41,15 +47,64 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
 }
 
 fn flow_at_boundary(has_seeds: bool) -> String {
-    let cause = match has_seeds {
+    let warning = match has_seeds {
         true => {
-            "the flow reaches the root's boundary from its seeds through an opening that is wider than a cell"
+            "the flow reaches the root's boundary from its seeds: right if the root cuts an open end of a duct; otherwise it leaks \
+             through an opening that is wider than a cell: close the openings that `harness leak` finds, increase spacing_min, or \
+             choose a root that cuts the open ends"
         }
         false => {
-            "a component that is inside by its rays reaches the root's boundary: the geometry is open or extends beyond the root"
+            "a component that is inside by its rays reaches the root's boundary: right if the root cuts the geometry on purpose; \
+             otherwise close the openings that `harness leak` finds, increase spacing_min, or enlarge the root if the geometry \
+             extends beyond it"
         }
     };
+    warning.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sides::EnclosedComponents;
+
+    #[test]
+    fn a_region_without_components_is_empty() {
+        let summary = |outside, inside, count| Summary {
+            outside,
+            inside,
+            enclosed: Some(EnclosedComponents { count, leaves: 9, example: [0; 3] }),
+            ..Summary::default()
+        };
+        for (keep, empty, not_empty) in [
+            (Keep::Outside, summary(2, 1, 2), summary(2, 0, 1)),
+            (Keep::Inside, summary(2, 0, 0), summary(0, 1, 0)),
+            (Keep::All, summary(0, 0, 0), summary(0, 1, 0)),
+        ] {
+            assert!(empty_region(keep, &empty).is_some(), "{keep:?}");
+            assert_eq!(empty_region(keep, &not_empty), None, "{keep:?}");
+        }
+        assert_eq!(empty_region(Keep::All, &summary(1, 0, 0)), None);
+        let says = |keep, word: &str| {
+            assert!(empty_region(keep, &Summary::default()).is_some_and(|w| w.contains(word)));
+        };
+        says(Keep::Outside, "enlarge the root");
+        says(Keep::Inside, "set keep = outside");
+        says(Keep::All, "crosses all leaves");
+        assert!(flow_at_boundary(true).starts_with("the flow reaches"));
+        assert!(flow_at_boundary(false).starts_with("a component that is inside"));
+    }
+}
+
+fn flow_without_far_field() -> String {
+    "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
+     to the far field, or set keep = inside if the flow is internal"
+        .to_owned()
+}
+
+fn body_cut(facets: u64, total: u64) -> String {
+    let verb = if facets == 1 { "lies" } else { "lie" };
     format!(
-        "{cause}; `harness leak` finds openings: close them, increase spacing_min, or enlarge the root"
+        "{facets} of {total} facets {verb} wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the \
+         root unless the body is meant to extend beyond it"
     )
 }

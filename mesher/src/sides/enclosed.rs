@@ -18,6 +18,8 @@ pub struct Region {
     pub enclosed: HashSet<Label>,
     /// Whether the inside is kept and reaches the root's boundary.
     pub inside_reaches_boundary: bool,
+    /// Whether the outside is kept and seeds decide it, and none of it reaches the root's boundary.
+    pub flow_misses_boundary: bool,
 }
 
 impl Region {
@@ -45,7 +47,12 @@ impl Region {
                 let (reached, enclosed): (HashSet<_>, HashSet<_>) =
                     outside().partition(|label| far_field.contains(label));
                 let enclosed = if reached.is_empty() { HashSet::new() } else { enclosed };
-                Self { enclosed, inside_reaches_boundary: false }
+                Self { enclosed, ..Self::default() }
+            }
+            Keep::Outside if !rules.seeds.is_empty() => {
+                let far_field = of_all_ranks();
+                let flow_misses_boundary = !outside().any(|label| far_field.contains(&label));
+                Self { flow_misses_boundary, ..Self::default() }
             }
             Keep::Inside if !verdict.inside.is_empty() => Self {
                 inside_reaches_boundary: !verdict.inside.is_disjoint(&of_all_ranks()),

@@ -62,6 +62,8 @@ pub struct Summary {
     pub ambiguous: Option<Ambiguous>,
     /// Whether the inside is kept and reaches the root's boundary.
     pub inside_reaches_boundary: bool,
+    /// Whether the outside is kept and seeds decide it, and none of it reaches the root's boundary.
+    pub flow_misses_boundary: bool,
 }
 
 /// Outside components that are deleted because the far field does not reach them.
@@ -158,6 +160,7 @@ pub fn decide(
             enclosed: None,
             ambiguous: verdict.ambiguous,
             inside_reaches_boundary: region.inside_reaches_boundary,
+            flow_misses_boundary: region.flow_misses_boundary,
         },
         rays: verdict.rays,
     };

@@ -169,4 +169,22 @@ mod tests {
         facets.extend(facets.clone());
         assert_eq!(parities(&facets, &[[1 << 21; 3]]), [0]);
     }
+
+    #[test]
+    fn a_facet_meets_the_ray_towards_it_only() {
+        let at = |axis: usize, along: i64, u: i64, w: i64| {
+            let mut v = [along; 3];
+            (v[(axis + 1) % 3], v[(axis + 2) % 3]) = (u, w);
+            v
+        };
+        for axis in 0..3 {
+            let v = |u, w| at(axis, 1 << 21, u, w).map(|c| c as i32);
+            let corners = [v(0, 0), v(1 << 22, 0), v(0, 1 << 22)];
+            for v in [corners, [corners[0], corners[2], corners[1]]] {
+                let points = [1 << 20, 1 << 22].map(|along| at(axis, along, 1 << 20, 1 << 20));
+                let below_and_above = parities(&[Facet { v }], &points);
+                assert_eq!(below_and_above, [2 << (2 * axis), 1 << (2 * axis)], "axis {axis}");
+            }
+        }
+    }
 }

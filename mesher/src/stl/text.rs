@@ -161,3 +161,18 @@ fn unexpected(word: &[u8], wanted: &str) -> String {
         false => format!("it has {shown:?} where {wanted} was expected"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::may_begin_with_solid;
+
+    #[test]
+    fn only_a_whole_word_or_the_beginning_of_one_that_is_cut_short_is_solid() {
+        for head in ["solid", "\u{feff} \n SoLiD name", "solid\tname", "", "  s", "SOLI"] {
+            assert!(may_begin_with_solid(head.as_bytes()), "{head:?}");
+        }
+        for head in ["solids", "solid_body x", "sol id", "facet", "a solid", "soli\n"] {
+            assert!(!may_begin_with_solid(head.as_bytes()), "{head:?}");
+        }
+    }
+}

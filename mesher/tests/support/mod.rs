@@ -106,9 +106,19 @@ impl Small {
             example: on_lattice(example),
         });
         // All inside leaves are kept, and those made by gradation tile the same places.
-        let inside_reaches_boundary =
-            self.keep == Keep::Inside && mesh.words.iter().copied().any(is_inside_at_boundary);
-        let summary = Summary { outside, inside, enclosed, ambiguous, inside_reaches_boundary };
+        let reaches_boundary =
+            |side| mesh.words.iter().any(|&word| word & 3 == side && is_at_boundary(word));
+        let inside_reaches_boundary = self.keep == Keep::Inside && reaches_boundary(1);
+        let is_seeded = self.keep == Keep::Outside && !self.seeds.is_empty();
+        let flow_misses_boundary = is_seeded && !reaches_boundary(0);
+        let summary = Summary {
+            outside,
+            inside,
+            enclosed,
+            ambiguous,
+            inside_reaches_boundary,
+            flow_misses_boundary,
+        };
         Ok(Outcome { words: mesh.words, summary })
     }
 
@@ -187,9 +197,9 @@ impl Run {
 }
 
 /// Whether the word is that of an inside leaf with a face on the root's boundary.
-fn is_inside_at_boundary(word: u64) -> bool {
+fn is_at_boundary(word: u64) -> bool {
     let edge = 1 << (19 - (word >> 2 & 31));
-    word & 3 == 1 && position(word >> 7).iter().any(|&c| c == 0 || c + edge == 1 << 19)
+    position(word >> 7).iter().any(|&c| c == 0 || c + edge == 1 << 19)
 }
 
 /// A mesh: leaf words and a summary of its components.

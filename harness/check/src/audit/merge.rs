@@ -65,3 +65,71 @@ pub(crate) fn merge(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::digest::mix;
+    use contract::npy;
+
+    fn parts(words: &[Vec<u64>]) -> (tempfile::TempDir, Vec<PartFile>) {
+        let dir = tempfile::tempdir().unwrap();
+        let open = |(i, words): (usize, &Vec<u64>)| {
+            let path = dir.path().join(format!("{i}.npy"));
+            npy::write(&path, words).unwrap();
+            PartFile::open(&path).unwrap()
+        };
+        let files = words.iter().enumerate().map(open).collect();
+        (dir, files)
+    }
+
+    #[test]
+    fn the_words_of_sorted_parts_become_one_sorted_stream() {
+        // One part exceeds the buffer, one is empty, and words are repeated within and across parts.
+        let random = |count: u64, salt: u64| {
+            let mut words: Vec<u64> =
+                (0..count).map(|i| (mix(i ^ salt << 40) >> 64) as u64 % 50_000).collect();
+            words.sort_unstable();
+            words
+        };
+        let given = [
+            random(2 * CHUNK as u64 + 5, 1),
+            vec![],
+            random(300, 2),
+            vec![7; 3],
+            random(CHUNK as u64, 3),
+        ];
+        let (_dir, files) = parts(&given);
+        let (mut found, mut by_part) = (Vec::new(), vec![Vec::new(); given.len()]);
+        merge(&files, &mut |part, run| {
+            assert!(!run.is_empty());
+            by_part[part].extend_from_slice(run);
+            found.extend_from_slice(run);
+            true
+        })
+        .unwrap();
+        let mut expected = given.concat();
+        expected.sort_unstable();
+        assert!(found == expected && by_part == given);
+        let mut runs = 0;
+        merge(&files, &mut |_, _| {
+            runs += 1;
+            runs < 3
+        })
+        .unwrap();
+        assert_eq!(runs, 3);
+    }
+
+    #[test]
+    fn words_of_unsorted_parts_are_all_passed_on() {
+        let given = [vec![9, 1, 5], vec![2, u64::MAX, 0]];
+        let (_dir, files) = parts(&given);
+        let mut by_part = vec![Vec::new(); 2];
+        merge(&files, &mut |part, run| {
+            by_part[part].extend_from_slice(run);
+            true
+        })
+        .unwrap();
+        assert_eq!(by_part, given);
+    }
+}

@@ -286,6 +286,28 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_report_states_each_check_and_whether_leaves_were_checked() {
+        let mut report = AuditReport {
+            checks: vec![CheckResult::new("manifest"), CheckResult::nothing("layer", "no layer")],
+            leaves: 3_000_000,
+            nodes: 12,
+            time_read_s: 0.25,
+            time_wall_s: 1.5,
+        };
+        let expected = "manifest   holds, 0 examined\nlayer      nothing to check: no layer\n\
+            left out: the mesh gave no check of its leaves anything to check\n\
+            3000000 leaves (12 distinct octants) in 1.50 s, of which reading 0.25 s: 2.0 M leaves/s";
+        assert_eq!(report.to_string(), expected);
+        assert_eq!(report.not_run().map(|check| check.name).collect::<Vec<_>>(), ["layer"]);
+        assert!(report.holds() && !report.checked_anything());
+        report.checks.push(CheckResult::new("balance"));
+        assert!(report.holds() && report.checked_anything());
+        report.checks.remove(2);
+        report.checks[0].report("a finding".to_owned());
+        assert!(!report.holds() && report.checked_anything());
+    }
+
     /// The audit must not pass if memory does not suffice, but it still checks counts and digests.
     #[test]
     fn an_exceeded_memory_limit_is_a_finding() {

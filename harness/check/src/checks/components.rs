@@ -168,3 +168,79 @@ impl Sets {
         self.0[a.max(b) as usize] = a.min(b);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::random_words;
+    use proptest::prelude::*;
+
+    /// Whether two octants share part of a face.
+    fn share_face(a: &Octant, b: &Octant) -> bool {
+        let ((al, ah), (bl, bh)) = (a.bounds(), b.bounds());
+        let overlap = [0, 1, 2].map(|i| ah[i].min(bh[i]) - al[i].max(bl[i]));
+        overlap.iter().all(|&o| o >= 0) && overlap.iter().filter(|&&o| o == 0).count() == 1
+    }
+
+    proptest! {
+        #[test]
+        fn groups_are_those_of_a_search_among_all_pairs(words in random_words(3)) {
+            let octants: Vec<Octant> = words.iter().map(|&w| word::octant(w)).collect();
+            let mut label: Vec<usize> = (0..words.len()).collect();
+            let free = |i: usize| word::side(words[i]) != Side::Crossing;
+            loop {
+                let before = label.clone();
+                for i in (0..words.len()).filter(|&i| free(i)) {
+                    for j in (0..words.len()).filter(|&j| free(j) && share_face(&octants[i], &octants[j])) {
+                        label[i] = label[i].min(label[j]);
+                    }
+                }
+                if label == before {
+                    break;
+                }
+            }
+            let mut expected: Vec<Vec<u32>> = (0..words.len())
+                .map(|of| (0..words.len()).filter(|&i| free(i) && label[i] == of).map(|i| i as u32).collect())
+                .filter(|group: &Vec<u32>| !group.is_empty())
+                .collect();
+            let order = |&i: &u32| (octants[i as usize].level, i);
+            expected.iter_mut().for_each(|group| group.sort_by_key(order));
+            let mut found = groups(&words);
+            found.sort_by_key(|group| group.iter().min().copied());
+            prop_assert_eq!(&found, &expected);
+            for group in found {
+                let at_boundary = group.iter().any(|&i| {
+                    let (low, high) = octants[i as usize].bounds();
+                    low.contains(&0) || high.contains(&UNITS_PER_EDGE)
+                });
+                prop_assert_eq!(touches_boundary(&words, &group), at_boundary);
+            }
+        }
+
+        #[test]
+        fn the_leaf_at_a_point_is_found_among_all(words in random_words(3), point in prop::array::uniform3(-5i64..=UNITS_PER_EDGE + 5)) {
+            let contains = |w: &u64| {
+                let (low, high) = word::octant(*w).bounds();
+                (0..3).all(|a| low[a] <= point[a] && point[a] < high[a])
+            };
+            prop_assert_eq!(leaf_at(&words, point), words.iter().position(contains));
+            for &w in &words {
+                let (low, high) = word::octant(w).bounds();
+                prop_assert_eq!(leaf_at(&words, low).map(|i| words[i]), Some(w));
+                prop_assert_eq!(leaf_at(&words, high.map(|c| c - 1)).map(|i| words[i]), Some(w));
+            }
+        }
+    }
+
+    #[test]
+    fn the_root_is_half_open() {
+        assert!(in_root([0; 3]) && in_root([UNITS_PER_EDGE - 1; 3]));
+        for axis in 0..3 {
+            for outside in [-1, UNITS_PER_EDGE] {
+                let mut point = [5; 3];
+                point[axis] = outside;
+                assert!(!in_root(point) && leaf_at(&[0], point).is_none());
+            }
+        }
+    }
+}

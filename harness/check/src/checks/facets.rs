@@ -75,3 +75,34 @@ impl Facets {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::{octants_of, random_words};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_walk_visits_leaves_and_their_ancestors_with_what_crosses_them(
+            words in random_words(3),
+            facets in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(0i64..1 << 27)), 0..3),
+        ) {
+            let crossed_by_any = |octant: &Octant| {
+                let (low, high) = octant.bounds();
+                facets.iter().any(|facet| Triangle::new(facet).meets(low, high))
+            };
+            let mut visited = Vec::new();
+            Facets::new(&facets).walk(&words, &mut |visit, octant, crossed| {
+                assert_eq!(crossed, crossed_by_any(octant), "{octant}");
+                match visit {
+                    Visit::Leaf(i) => assert_eq!(word::octant(words[i]), *octant),
+                    Visit::Split => assert!(words.iter().all(|&w| word::octant(w) != *octant)),
+                }
+                visited.push(*octant);
+            });
+            visited.sort_unstable_by_key(|o| (o.level, o.corner));
+            prop_assert_eq!(visited, octants_of(&words));
+        }
+    }
+}

@@ -102,6 +102,49 @@ mod tests {
     }
 
     #[test]
+    fn a_check_states_what_the_mesh_lacks() {
+        let names = [
+            "manifest",
+            "identical",
+            "complete",
+            "spacing",
+            "crossing",
+            "kept",
+            "sides",
+            "balance",
+            "layer",
+        ];
+        let of = |tree: &Tree, base: Option<&Tree>, terms: &Terms| {
+            names.map(|name| missing(name, tree, base, terms).unwrap_or_default())
+        };
+        let (empty, uniform) = (Tree::default(), Tree::of_words(&words_of(|o| o.level < 1)));
+        let crossing: Vec<u64> = words_of(|o| o.level < 1).iter().map(|w| w | 2).collect();
+        let crossing = Tree::of_words(&crossing);
+        let none = "the mesh has no leaves";
+        assert_eq!(of(&empty, None, &terms(2)), ["", "", none, none, none, none, none, none, none]);
+        assert_eq!(of(&empty, Some(&uniform), &terms(2)), ["", "", "", "", "", "", "", none, none]);
+        let level = "all leaves have level 1";
+        let (surface, side) =
+            ("no leaf is crossing, and there are no boxes", "all leaves have the same side");
+        assert_eq!(
+            of(&uniform, None, &terms(2)),
+            ["", "", "", surface, "", "", side, level, level]
+        );
+        let thin = "with n = 1 the layers are the 2:1 balance, which `balance` checks";
+        assert_eq!(of(&crossing, None, &terms(1)), ["", "", "", "", "", "", side, level, thin]);
+        let deletes = Terms { keep_crossing: false, ..terms(1) };
+        assert_eq!(of(&crossing, None, &deletes), ["", "", "", "", "", "", side, level, level]);
+        assert_eq!(of(&uniform, None, &deletes)[8], thin);
+        let all = "all leaves of T0 are crossing";
+        assert_eq!(
+            of(&uniform, Some(&crossing), &terms(2)),
+            ["", "", "", "", "", "", all, level, level]
+        );
+        let boxes = vec![contract::manifest::ExtentBox { min: [0; 3], max: [9; 3], level: 1 }];
+        assert_eq!(of(&uniform, None, &Terms { boxes, ..terms(2) })[3], "");
+    }
+
+    #[test]
     fn a_finding_is_never_hidden() {
         let mut result = CheckResult::new("sides");
         result.report("wrong".to_owned());

@@ -109,3 +109,30 @@ impl fmt::Display for CheckResult {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_result_lists_its_first_findings_and_counts_the_others() {
+        let mut result = CheckResult { examined: 7, ..CheckResult::new("balance") };
+        assert!(result.holds() && result.was_run());
+        assert_eq!(result.to_string(), "balance    holds, 7 examined");
+        result.note = "a note".to_owned();
+        result.report("first".to_owned());
+        assert_eq!(result.to_string(), "balance    1 finding, 7 examined; a note\n    first");
+        (1..FINDINGS_LISTED).for_each(|i| result.report(format!("finding {i}")));
+        let listed = result.to_string();
+        assert!(
+            listed.starts_with("balance    20 findings, ") && listed.ends_with("\n    finding 19"),
+            "{listed}"
+        );
+        result.report_with(|| unreachable!("this text is not listed"));
+        assert!(!result.holds());
+        assert!(result.to_string().ends_with("\n    finding 19\n    and 1 more"));
+        let nothing = CheckResult::nothing("sides", "no leaves");
+        assert!(nothing.holds() && !nothing.was_run());
+        assert_eq!(nothing.to_string(), "sides      nothing to check: no leaves");
+    }
+}

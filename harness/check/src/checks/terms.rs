@@ -97,3 +97,61 @@ impl Terms {
         self.boxes.iter().find(|b| b.level > octant.level && b.meets(octant))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn terms() -> Terms {
+        let mut manifest = contract::testing::leaf_set(vec![]).manifest;
+        (manifest.root.edge, manifest.level_surface) = (2.0, 3);
+        Terms::of_manifest(&manifest)
+    }
+
+    #[test]
+    fn sides_are_kept_as_the_case_requires() {
+        let kinds = |keep, keep_crossing| {
+            [0, 1, 2].map(|kind| Terms { keep, keep_crossing, ..terms() }.keeps(kind))
+        };
+        assert_eq!(kinds(Keep::Outside, true), [true, false, true]);
+        assert_eq!(kinds(Keep::Outside, false), [true, false, false]);
+        assert_eq!(kinds(Keep::Inside, false), [false, true, false]);
+        assert_eq!(kinds(Keep::All, false), [true, true, false]);
+        assert_eq!(kinds(Keep::All, true), [true, true, true]);
+        let flow = |keep| Terms { keep, ..terms() }.side_of_flow();
+        assert_eq!(
+            [Keep::Outside, Keep::Inside, Keep::All].map(flow),
+            [Side::Outside, Side::Inside, Side::Outside]
+        );
+        let deletes = Terms { keep: Keep::Outside, ..terms() };
+        assert!(deletes.deletes_enclosed() && !terms().deletes_enclosed());
+        assert!(!Terms { seeds: vec![[0; 3]], ..deletes.clone() }.deletes_enclosed());
+        assert!(!Terms { enclosed: Enclosed::Keep, ..deletes }.deletes_enclosed());
+    }
+
+    #[test]
+    fn a_box_splits_octants_that_it_meets_and_that_are_coarser() {
+        let extent = |level| ExtentBox { min: [0; 3], max: [1 << 20; 3], level };
+        let with = |level| Terms { boxes: vec![extent(1), extent(level)], ..terms() };
+        let near = Octant::ROOT.child(0).child(0);
+        assert_eq!(with(3).box_that_splits(&near), Some(&extent(3)));
+        assert_eq!(with(2).box_that_splits(&near), None);
+        assert_eq!(with(3).box_that_splits(&Octant::ROOT.child(0).child(1)), None);
+        assert!(with(4).has_box_finer_than_surface() && !with(3).has_box_finer_than_surface());
+    }
+
+    #[test]
+    fn places_are_the_same_up_to_rounding() {
+        let same = |by: f64| {
+            (0..3)
+                .map(|axis| {
+                    let mut moved = [1.0; 3];
+                    moved[axis] += by;
+                    terms().same_place([1.0; 3], moved)
+                })
+                .collect::<Vec<_>>()
+        };
+        assert_eq!([same(1e-9), same(-1e-9)], [[true; 3], [true; 3]]);
+        assert_eq!([same(3e-9), same(-3e-9)], [[false; 3], [false; 3]]);
+    }
+}

@@ -5,15 +5,11 @@ use contract::manifest::{BySide, Components, ExtentBox, Manifest, Sides};
 use serde::Serialize;
 use std::fmt::Display;
 
-/// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
-pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
+/// The differences of inputs, one line each, with names for the owners of both manifests.
+pub fn differing_inputs(a: (&str, &Manifest), b: (&str, &Manifest)) -> Vec<String> {
     let mut fields = Vec::new();
-    let mut same = |name: &str, of: &dyn Fn(&Manifest) -> String| {
-        let (x, y) = (of(a), of(b));
-        if x != y {
-            fields.push(format!("{name}: {x} in A; {y} in B"));
-        }
-    };
+    let mut same =
+        |name: &str, of: &dyn Fn(&Manifest) -> String| fields.extend(difference(name, a, b, of));
     same("tree", &|m| key(&m.tree));
     same("root", &|m| root(&m.root));
     same("level of the surface (from spacing_min)", &|m| m.level_surface.to_string());
@@ -25,6 +21,15 @@ pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
         list(m.seeds.iter().map(|&seed| point(m.root.rounded(m.root.to_user(seed)))))
     });
     same("enclosed", &|m| key(&m.enclosed));
+    fields
+}
+
+/// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
+pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
+    let mut fields = differing_inputs(("A", a), ("B", b));
+    let mut same = |name: &str, of: &dyn Fn(&Manifest) -> String| {
+        fields.extend(difference(name, ("A", a), ("B", b), of));
+    };
     same("leaves", &|m| m.leaves.to_string());
     if a.sides == Sides::Known && b.sides == Sides::Known {
         same("components", &|m| components(m.components.as_ref()));
@@ -37,6 +42,16 @@ pub fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
         same(&format!("leaves of level {level}"), &|m| m.leaves_by_level[level].to_string());
     }
     fields
+}
+
+fn difference(
+    name: &str,
+    (owner_a, a): (&str, &Manifest),
+    (owner_b, b): (&str, &Manifest),
+    of: &dyn Fn(&Manifest) -> String,
+) -> Option<String> {
+    let (x, y) = (of(a), of(b));
+    (x != y).then(|| format!("{name}: {x} in {owner_a}; {y} in {owner_b}"))
 }
 
 /// The word of the case file for a value.
@@ -90,23 +105,65 @@ fn place(example: Option<[f64; 3]>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::manifest::{Enclosed, Keep};
+    use contract::manifest::{Enclosed, EnclosedComponents, Keep, Tree};
     use contract::testing::{leaf_set, words_of};
 
     #[test]
-    fn fields_are_described_in_the_words_of_the_case_file() {
+    fn every_field_that_differs_is_described_in_the_words_of_the_case_file() {
         let a = leaf_set(vec![words_of(|o| o.level < 1)]).manifest;
         assert_eq!(differing(&a, &a), [""; 0]);
+        let enclosed = EnclosedComponents { count: 1, leaves: 9, example: Some([0.5, 1.0, 2.0]) };
+        type Change = fn(&mut Manifest);
+        let cases: [(Change, &str); 14] = [
+            (|m| m.tree = Tree::Base, "tree: final in A; base in B"),
+            (|m| m.root.edge = 3.0, "root: (0, 0, 0) with edge 8 in A; (0, 0, 0) with edge 3 in B"),
+            (|m| m.level_surface = 4, "level of the surface (from spacing_min): 0 in A; 4 in B"),
+            (|m| m.layer_cells_min = 2, "layer_cells_min: 1 in A; 2 in B"),
+            (|m| m.keep = Keep::Inside, "keep: all in A; inside in B"),
+            (|m| m.keep_crossing = false, "keep_crossing: true in A; false in B"),
+            (
+                |m| m.boxes = vec![ExtentBox { min: [0; 3], max: [1 << 26; 3], level: 4 }; 2],
+                "boxes: none in A; 0: (0, 0, 0) to (4, 4, 4) at level 4, 1: (0, 0, 0) to (4, 4, 4) at level 4 in B",
+            ),
+            (|m| m.seeds = vec![[0, 1 << 24, 1 << 26]], "seeds: none in A; 0: (0, 1, 4) in B"),
+            (|m| m.enclosed = Enclosed::Keep, "enclosed: delete in A; keep in B"),
+            (|m| m.leaves = 7, "leaves: 8 in A; 7 in B"),
+            (
+                |m| {
+                    m.components =
+                        Some(Components { outside: 3, inside: 2, ..Components::default() })
+                },
+                "components: not stated in A; 3 outside (0 enclosed, of 0 leaves), 2 inside in B",
+            ),
+            (
+                |m| m.components_ambiguous.count = 5,
+                "components decided by a majority of rays: 0 in A; 5 in B",
+            ),
+            (
+                |m| m.leaves_by_side.inside = 2,
+                "leaves by side: 8 outside, 0 inside, 0 crossing in A; 8 outside, 2 inside, 0 crossing in B",
+            ),
+            (|m| m.leaves_by_level[19] = 1, "leaves of level 19: 0 in A; 1 in B"),
+        ];
+        for (change, line) in cases {
+            let mut b = a.clone();
+            change(&mut b);
+            assert_eq!(differing(&a, &b), [line]);
+        }
         let mut b = a.clone();
-        (b.keep, b.enclosed, b.root.edge) = (Keep::Inside, Enclosed::Keep, 3.0);
-        b.boxes = vec![ExtentBox { min: [0; 3], max: [1 << 26; 3], level: 4 }];
-        let text = differing(&a, &b).join("\n");
-        assert!(text.contains("keep: all in A; inside in B"), "{text}");
-        assert!(text.contains("enclosed: delete in A; keep in B"), "{text}");
-        assert!(text.contains("with edge 3 in B"), "{text}");
-        assert!(
-            text.contains("boxes: none in A; 0: (") && text.contains(") at level 4 in B"),
-            "{text}"
-        );
+        b.components = Some(Components { outside: 3, inside: 2, enclosed });
+        let line = "components: not stated in A; 3 outside (1 enclosed, of 9 leaves, one at (0.5, 1, 2)), 2 inside in B";
+        assert_eq!(differing(&a, &b), [line]);
+    }
+
+    #[test]
+    fn what_follows_from_sides_is_compared_only_if_both_meshes_have_them() {
+        let a = leaf_set(vec![words_of(|o| o.level < 1)]).manifest;
+        let mut b = a.clone();
+        b.leaves_by_side.inside = 2;
+        b.components_ambiguous.count = 1;
+        assert_eq!(differing(&a, &b).len(), 2);
+        b.sides = Sides::Unknown;
+        assert_eq!((differing(&a, &b), differing(&b, &a)), (vec![], vec![]));
     }
 }

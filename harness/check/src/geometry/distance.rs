@@ -251,26 +251,54 @@ mod tests {
             prop_assert!((from_square(&square, &t) - expected).abs() <= 1e-9 * expected);
         }
 
-        /// No pair of sampled points is nearer, and the points returned are as far apart as reported.
+        /// Two points of convex sets are nearest iff the planes through them, normal to their difference, separate the sets.
         #[test]
-        fn no_sampled_pair_of_points_is_nearer(
-            a in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)),
-            b in prop::array::uniform3(prop::array::uniform3(-9.0f64..9.0)),
+        fn nearest_points_lie_in_their_triangles_and_separate_them(
+            a in prop::array::uniform3(point()), b in prop::array::uniform3(point()), is_parallel in any::<bool>(),
         ) {
-            let shifted = b.map(|[x, y, z]| [x + 20.0, y, z]);
-            let (squared, p, q) = nearest(&a, &shifted);
+            let b = if is_parallel { a } else { b }.map(|[x, y, z]| [x + 20.0, y, z]);
+            prop_assume!([&a, &b].iter().all(|t| (0..3).all(|i| t[i] != t[(i + 1) % 3])));
+            let (squared, p, q) = nearest(&a, &b);
             prop_assert!((dot(sub(p, q), sub(p, q)) - squared).abs() <= 1e-9 * squared);
-            let point = |t: &Triangle, i: i32, j: i32| -> Point {
-                let (u, v) = (f64::from(i) / 8.0, f64::from(j) / 8.0);
-                std::array::from_fn(|x| t[0][x] * (1.0 - u - v) + t[1][x] * u + t[2][x] * v)
-            };
-            let grid = || (0..=8).flat_map(|i| (0..=8 - i).map(move |j| (i, j)));
-            for (i, j) in grid() {
-                for (k, l) in grid() {
-                    let d = sub(point(&a, i, j), point(&shifted, k, l));
-                    prop_assert!(dot(d, d) >= squared * (1.0 - 1e-9));
-                }
-            }
+            prop_assert!(is_within(p, &a) && is_within(q, &b));
+            let is_beyond = |v: &Point, at: Point, to: Point| dot(sub(*v, at), sub(to, at)) <= 1e-6;
+            prop_assert!(a.iter().all(|v| is_beyond(v, p, q)) && b.iter().all(|v| is_beyond(v, q, p)));
         }
+
+        #[test]
+        fn no_corner_lies_before_the_plane_through_the_nearest_point(
+            p in point(), t in prop::array::uniform3(point()), kind in 0..4,
+        ) {
+            let t = match kind {
+                0 => [t[0]; 3],
+                1 => [t[0], t[1], t[0]],
+                2 => [t[0], t[1], along(t[0], sub(t[1], t[0]), 0.5)],
+                _ => t,
+            };
+            let (squared, foot) = from_point(p, &t);
+            prop_assert!((Prepared::new(&t).squared(p) - squared).abs() <= 1e-9 * squared);
+            prop_assert!((dot(sub(p, foot), sub(p, foot)) - squared).abs() <= 1e-9 * (1.0 + squared));
+            prop_assert!(is_within(foot, &t));
+            prop_assert!(t.iter().all(|v| dot(sub(*v, foot), sub(p, foot)) <= 1e-6));
+        }
+    }
+
+    /// Often with coordinates that coincide with others.
+    fn point() -> impl Strategy<Value = Point> {
+        let coordinate = prop_oneof![(-9i32..=9).prop_map(f64::from), -9.0..9.0];
+        prop::array::uniform3(coordinate)
+    }
+
+    /// Whether a point is in a triangle: the triangles that it forms with the edges have no greater area together. A triangle
+    /// without area is its longest edge.
+    fn is_within(p: Point, t: &Triangle) -> bool {
+        let edges = [0, 1, 2].map(|i| (t[i], t[(i + 1) % 3]));
+        let area = |a: Point, b: Point, c: Point| length(cross(sub(b, a), sub(c, a)));
+        let parts: f64 = edges.iter().map(|&(a, b)| area(p, a, b)).sum();
+        let whole = area(t[0], t[1], t[2]);
+        let is_on = |&(a, b): &(Point, Point)| {
+            length(sub(a, p)) + length(sub(b, p)) <= length(sub(a, b)) + 1e-6
+        };
+        parts <= whole + 1e-6 && (whole > 1e-3 || edges.iter().any(is_on))
     }
 }

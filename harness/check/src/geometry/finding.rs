@@ -16,6 +16,10 @@ pub enum Kind {
     NonManifoldEven,
     /// Pairs of facets that traverse their common edge, which has no other facet, in the same direction.
     Winding,
+    /// Closed shells of consistent winding that enclose a negative volume, and cannot lie in another closed shell.
+    InsideOut,
+    /// Closed shells of consistent winding that enclose a negative volume, within the bounding box of another closed shell.
+    Cavities,
     /// Facets with the three vertices of an earlier facet, in any order.
     Duplicates,
     /// Facets without area on the lattice.
@@ -26,7 +30,7 @@ pub enum Kind {
     Intersections,
     /// Pairs of facets without a common vertex that share boundary points only, on the lattice.
     Contacts,
-    /// Facets with an opposite facet less than one cell away, on the inner side.
+    /// Facets with an opposite facet less than one cell away, on the inner side, but not of another solid.
     ThinWalls,
     /// Facets with an opposite facet less than one cell away, on the outer side.
     ThinGaps,
@@ -87,7 +91,7 @@ pub struct Finding {
     pub edges: Option<u64>,
     /// The effect on the mesh; empty where nothing was found.
     pub meaning: String,
-    /// The first places: widest openings, narrowest sheets, deep before shallow intersections, lowest facet numbers.
+    /// The first places: widest openings, narrowest sheets, deep before shallow intersections, largest shells, lowest facet numbers.
     pub places: Vec<Place>,
 }
 

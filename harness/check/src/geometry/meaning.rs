@@ -17,6 +17,8 @@ pub fn changes_region(kind: Kind, keep: Keep) -> bool {
         | Kind::Junctions
         | Kind::NonManifoldEven
         | Kind::Winding
+        | Kind::InsideOut
+        | Kind::Cavities
         | Kind::Degenerate
         | Kind::Slivers
         | Kind::Intersections
@@ -40,6 +42,16 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
         }
         Kind::Winding => "No effect on the mesh: no decision uses a facet's orientation. Thin walls and thin gaps \
                           may be confused with each other or missed at these facets."
+            .into(),
+        Kind::InsideOut => "No effect on the mesh: no decision uses a facet's orientation. The facets of such a closed shell \
+                            are wound so that their normals point inward: thin walls and thin gaps are confused with each \
+                            other there, and other programs may exchange inside and outside. Reverse all its facets. The \
+                            first facet of each is listed."
+            .into(),
+        Kind::Cavities => "A closed shell whose normals point inward, within the bounding box of another \
+                           closed shell, is a cavity if it lies in that solid. Rays count both surfaces, so its interior is \
+                           outside. If the outside is kept, it is deleted, unless enclosed = keep. If seeds are given, it is \
+                           flow only if a seed lies in it. The first facet of each is listed."
             .into(),
         Kind::Duplicates => "A ray counts every copy: an even number of copies is passed as if the surface were \
                              open there, so a component's side may be wrong. Remove the copies."
@@ -65,7 +77,8 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
             resolved(finding, input)
         ),
         Kind::ThinGaps => format!(
-            "No cell fits into the gap: crossing leaves fill it, and no flow passes. {}",
+            "No cell fits into the gap: crossing leaves fill it, and no flow passes. The wedge along the line where two \
+             shells intersect is a gap, too. {}",
             resolved(finding, input)
         ),
         Kind::OutsideRoot => "The root cuts the body: no leaf exists beyond its boundary. Rays still count these \
@@ -146,5 +159,138 @@ pub fn number(x: f64) -> String {
         format!("{x:.*}", digits.max(0) as usize)
     } else {
         format!("{x:.2e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::finding::Place;
+    use crate::geometry::input::Requested;
+    use contract::lattice::Root;
+
+    /// The root's finest cell is 1 wide, and with a spacing the cells at the surface are 4.
+    fn input(with_cell: bool) -> Input {
+        let edge = f64::from(CELLS_PER_EDGE);
+        let root = Some(Root { origin: [0.0; 3], edge });
+        let requested = Requested { spacing_min: with_cell.then_some(4.0), root, root_scale: None };
+        Input::new(vec![[[8.0; 3], [16.0, 8.0, 8.0], [8.0, 16.0, 8.0]]], &requested).unwrap()
+    }
+
+    /// The meaning of places of which the first is this wide.
+    fn of_width(kind: Kind, width: f64, changing: u64, with_cell: bool) -> String {
+        let place = Place { width: Some(width), ..Place::new(vec![0], [0.0; 3]) };
+        let finding = Finding {
+            count: 3,
+            count_changing: changing,
+            places: vec![place],
+            ..Finding::new(kind)
+        };
+        meaning(&finding, &input(with_cell))
+    }
+
+    #[test]
+    fn an_opening_is_judged_by_its_width_in_cells() {
+        let of = |width, changing, with_cell| of_width(Kind::Openings, width, changing, with_cell);
+        for (width, changing, with_cell, beginning) in [
+            (0.0, 0, true, "All have no width"),
+            (0.99, 0, true, "All are narrower than the finest cell"),
+            (
+                1.0,
+                0,
+                true,
+                "All are narrower than a cell, so crossing leaves close them; at a spacing of 1.00 or less",
+            ),
+            (
+                1.0,
+                3,
+                false,
+                "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
+            ),
+            (13.9, 3, true, "All are at least one cell wide and may leak"),
+            (14.0, 3, true, "All are at least one cell wide, and the widest leaks unless"),
+            (14.0, 1, true, "One is at least one cell wide, and"),
+            (14.0, 2, true, "2 of them are at least one cell wide, and"),
+        ] {
+            let text = of(width, changing, with_cell);
+            assert!(text.starts_with(beginning), "{width}, {changing}, {with_cell}: {text}");
+        }
+        let one = Finding { count: 1, count_changing: 1, ..Finding::new(Kind::Openings) };
+        assert_eq!(super::of(&one), "It is");
+    }
+
+    #[test]
+    fn a_sheet_is_resolved_by_half_its_width_unless_that_is_below_the_finest_cell() {
+        for kind in [Kind::ThinWalls, Kind::ThinGaps] {
+            let narrow = of_width(kind, 1.99, 3, true);
+            assert!(narrow.ends_with("too narrow for the finest cell of the root."), "{narrow}");
+            let wide = of_width(kind, 2.0, 3, true);
+            assert!(
+                wide.ends_with(" A spacing below 1.00 would resolve the narrowest place."),
+                "{wide}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_kind_has_a_meaning_of_its_own() {
+        let kinds = [
+            Kind::Openings,
+            Kind::Junctions,
+            Kind::NonManifoldOdd,
+            Kind::NonManifoldEven,
+            Kind::Winding,
+            Kind::Duplicates,
+            Kind::Degenerate,
+            Kind::Slivers,
+            Kind::Intersections,
+            Kind::Contacts,
+            Kind::ThinWalls,
+            Kind::ThinGaps,
+            Kind::OutsideRoot,
+            Kind::TouchingRoot,
+        ];
+        let text = |kind, changing| of_width(kind, 3.0, changing, true);
+        let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
+        meanings.push(text(Kind::Intersections, 0));
+        assert!(meanings[14].starts_with("No effect: the facets overlap within one plane"));
+        assert!(meanings[8].starts_with("Where two closed shells overlap"));
+        meanings.sort();
+        meanings.dedup();
+        assert_eq!(meanings.len(), kinds.len() + 1);
+        let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.title()).collect();
+        assert_eq!(titles.len(), kinds.len());
+        let changing = |keep| {
+            kinds.into_iter().filter(move |&kind| changes_region(kind, keep)).collect::<Vec<_>>()
+        };
+        let always = [Kind::NonManifoldOdd, Kind::Duplicates];
+        let all = [always[0], always[1], Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot];
+        assert_eq!(changing(Keep::All), all);
+        assert_eq!(
+            changing(Keep::Outside),
+            [always[0], always[1], Kind::ThinGaps, Kind::OutsideRoot]
+        );
+        assert_eq!(
+            changing(Keep::Inside),
+            [always[0], always[1], Kind::ThinWalls, Kind::OutsideRoot]
+        );
+    }
+
+    #[test]
+    fn lengths_have_three_significant_digits() {
+        for (length, text) in [
+            (0.0, "0"),
+            (1.0, "1.00"),
+            (-12.34, "-12.3"),
+            (99_999.0, "99999"),
+            (1e5, "100000"),
+            (1e6, "1.00e6"),
+            (123_456.0, "123456"),
+            (0.000_123_4, "0.000123"),
+            (0.000_099_9, "9.99e-5"),
+            (0.012_345, "0.0123"),
+        ] {
+            assert_eq!(number(length), text);
+        }
     }
 }

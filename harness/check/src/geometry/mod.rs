@@ -33,6 +33,7 @@ use edges::Edges;
 use finding::Finding;
 use input::Input;
 use report::Diagnosis;
+use shells::Shells;
 
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug)]
@@ -52,10 +53,11 @@ impl Default for Options {
 /// Diagnoses a geometry. The counts do not depend on the order of the facets or of a facet's vertices.
 pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
     let edges = Edges::new(&input.facets);
-    let shells = shells::shells(&edges);
+    let shells = Shells::new(&edges, &input.lattice);
     let mut findings: Vec<Finding> = Vec::new();
     findings.extend(openings::openings(input, &edges, options.first));
     findings.extend(edges::findings(input, &edges, options.first));
+    findings.extend(shells.findings(input, options.first));
     findings.push(facets::duplicates(input, &edges, options.first));
     findings.extend(facets::shapes(input, options.first));
     if options.intersections {
@@ -64,8 +66,8 @@ pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
     }
     if let Some(cell) = input.cell {
         let boxes = Boxes::by_normal(&input.lattice);
-        findings.extend(sheets::sheets(input, &edges, &boxes, cell, options.first));
+        findings.extend(sheets::sheets(input, (&edges, &shells), &boxes, cell, options.first));
     }
     findings.extend(extent::findings(input, options.first));
-    Diagnosis::new(input, &edges, shells, findings, options.first)
+    Diagnosis::new(input, &edges, &shells.all, findings, options.first)
 }

@@ -108,6 +108,7 @@ pub fn opposite(
     let (along_f, along_g) = (dot(line, f.normal), dot(line, g.normal));
     let least = COSINE * squared.sqrt();
     let side = usize::from(along_f > 0.0);
-    let is_along = along_f.abs() >= least && along_g.abs() >= least && along_f * along_g < 0.0;
+    let is_between = along_f.signum() != along_g.signum();
+    let is_along = along_f.abs() >= least && along_g.abs() >= least && is_between;
     (is_along && squared < limits[side]).then_some((side, squared))
 }

@@ -54,7 +54,7 @@ impl Diagnosis {
     pub(super) fn new(
         input: &Input,
         edges: &Edges,
-        shells: Vec<Shell>,
+        shells: &[Shell],
         mut findings: Vec<Finding>,
         first: usize,
     ) -> Self {

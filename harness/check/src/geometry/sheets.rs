@@ -16,6 +16,7 @@ use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::intersections::{Relation, relation};
 use super::opposite::{Triangle, is_averted, may_oppose, opposite};
+use super::shells::Shells;
 
 /// An opposite facet.
 #[derive(Clone, Copy)]
@@ -33,7 +34,7 @@ struct Sheet {
 /// Thin walls and thin gaps, narrowest first.
 pub fn sheets(
     input: &Input,
-    edges: &Edges,
+    (edges, shells): (&Edges, &Shells),
     boxes: &Boxes,
     cell: f64,
     first: usize,
@@ -42,8 +43,16 @@ pub fn sheets(
     let none = vec![[None; 2]; boxes.facets.len()];
     let limits = vec![[(cell / unit).powi(2); 2]; none.len()];
     let limits_of_nodes = Vec::new();
-    let mut search =
-        Search { input, edges, boxes, limits, limits_of_nodes, found: none, is_first: true };
+    let mut search = Search {
+        input,
+        edges,
+        shells,
+        boxes,
+        limits,
+        limits_of_nodes,
+        found: none,
+        is_first: true,
+    };
     search.run();
     let counts = [0, 1].map(|side| search.found.iter().filter(|f| f[side].is_some()).count());
     let bounds = [0, 1].map(|side| bound(&search.found, side, first));
@@ -102,6 +111,7 @@ fn place(input: &Input, sheet: &Sheet, unit: f64) -> Place {
 struct Search<'a> {
     input: &'a Input,
     edges: &'a Edges,
+    shells: &'a Shells,
     boxes: &'a Boxes,
     /// An opposite facet must be nearer than this squared distance, as wall and as gap, by position in the tree.
     limits: Vec<[f64; 2]>,
@@ -192,6 +202,10 @@ impl Search<'_> {
         let Some((side, squared)) = opposite(triangle, b, squared_min, limits) else {
             return false;
         };
+        // Two solids that overlap have inner sides that face each other, but no wall.
+        if side == 0 && self.shells.are_of_different_solids(f, g) {
+            return false;
+        }
         let shares_vertex =
             self.edges.corners[f].iter().any(|vertex| self.edges.corners[g].contains(vertex));
         if shares_vertex || relation(a, b, true) != Relation::Disjoint {

@@ -1,8 +1,11 @@
 //! Shells: components of facets that are connected by shared edges.
 
+use contract::lattice::FacetLattice;
 use serde::Serialize;
 
 use super::edges::Edges;
+use super::finding::{Finding, Kind, Place};
+use super::input::Input;
 
 /// A shell.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -13,39 +16,136 @@ pub struct Shell {
     pub facets: u32,
     /// Whether an even number of facets meets at every edge, so that rays agree about the inside.
     pub is_closed: bool,
+    /// Whether as many facets traverse every edge in one direction as in the other.
+    #[serde(skip)]
+    is_oriented: bool,
+    /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
+    #[serde(skip)]
+    volume_sixfold: i128,
+    /// Least coordinates on the lattice.
+    #[serde(skip)]
+    low: [i64; 3],
+    /// Greatest coordinates on the lattice.
+    #[serde(skip)]
+    high: [i64; 3],
 }
 
-/// All shells, largest first. A facet with a repeated vertex belongs to none.
-pub fn shells(edges: &Edges) -> Vec<Shell> {
-    let mut parents: Vec<u32> = (0..edges.corners.len() as u32).collect();
-    for (_, mut uses) in edges.iter() {
-        let Some(first) = uses.next() else { continue };
-        uses.for_each(|other| unite(&mut parents, first.facet, other.facet));
-    }
-    let mut shells: Vec<Shell> = Vec::new();
-    let mut index = vec![u32::MAX; parents.len()];
-    for (facet, &[a, b, c]) in edges.corners.iter().enumerate() {
-        if a == b || b == c || c == a {
-            continue;
-        }
-        let facet = facet as u32;
-        let root = find(&mut parents, facet) as usize;
-        if index[root] == u32::MAX {
-            index[root] = shells.len() as u32;
-            shells.push(Shell { facet_first: facet, facets: 0, is_closed: true });
-        }
-        shells[index[root] as usize].facets += 1;
-    }
-    for (_, mut uses) in edges.iter() {
-        if uses.len() % 2 == 1
-            && let Some(first) = uses.next()
-        {
-            let root = find(&mut parents, first.facet) as usize;
-            shells[index[root] as usize].is_closed = false;
+impl Shell {
+    fn new(facet_first: u32) -> Self {
+        let (low, high) = ([i64::MAX; 3], [i64::MIN; 3]);
+        Self {
+            facet_first,
+            facets: 0,
+            is_closed: true,
+            is_oriented: true,
+            volume_sixfold: 0,
+            low,
+            high,
         }
     }
-    shells.sort_by_key(|shell| (std::cmp::Reverse(shell.facets), shell.facet_first));
-    shells
+
+    fn add(&mut self, facet: &FacetLattice) {
+        self.facets += 1;
+        // Coordinates are below 2^29 and facets below 2^31.
+        let [p, q, r] = facet.map(|v| v.map(i128::from));
+        let along = |a: usize, b: usize, c: usize| p[a] * (q[b] * r[c] - q[c] * r[b]);
+        self.volume_sixfold += along(0, 1, 2) + along(1, 2, 0) + along(2, 0, 1);
+        for vertex in facet {
+            for (a, &c) in vertex.iter().enumerate() {
+                self.low[a] = self.low[a].min(c);
+                self.high[a] = self.high[a].max(c);
+            }
+        }
+    }
+
+    fn is_wound_inward(&self) -> bool {
+        self.is_oriented && self.volume_sixfold < 0
+    }
+
+    /// Whether the bounding box lies in the interior of that of the other shell.
+    fn may_be_in(&self, other: &Self) -> bool {
+        (0..3).all(|a| other.low[a] < self.low[a] && self.high[a] < other.high[a])
+    }
+}
+
+/// The shells of a geometry.
+#[derive(Debug)]
+pub struct Shells {
+    /// All shells, largest first.
+    pub all: Vec<Shell>,
+    /// The index of every facet's shell; [`u32::MAX`] for a facet with a repeated vertex, which belongs to none.
+    of: Vec<u32>,
+}
+
+impl Shells {
+    /// Connects the facets that share edges.
+    pub fn new(edges: &Edges, lattice: &[FacetLattice]) -> Self {
+        let mut parents: Vec<u32> = (0..edges.corners.len() as u32).collect();
+        for (_, mut uses) in edges.iter() {
+            let Some(first) = uses.next() else { continue };
+            uses.for_each(|other| unite(&mut parents, first.facet, other.facet));
+        }
+        let mut all: Vec<Shell> = Vec::new();
+        let mut of = vec![u32::MAX; parents.len()];
+        for (facet, &[a, b, c]) in edges.corners.iter().enumerate() {
+            if a == b || b == c || c == a {
+                continue;
+            }
+            // The representative is the lowest facet, so its shell exists before those of its other facets.
+            let first = find(&mut parents, facet as u32);
+            if first as usize == facet {
+                of[facet] = all.len() as u32;
+                all.push(Shell::new(first));
+            }
+            of[facet] = of[first as usize];
+            all[of[facet] as usize].add(&lattice[facet]);
+        }
+        for (_, uses) in edges.iter() {
+            let count = uses.len();
+            let (mut facet, mut down) = (0, 0);
+            for one in uses {
+                facet = one.facet as usize;
+                down += usize::from(one.is_down);
+            }
+            let shell = &mut all[of[facet] as usize];
+            shell.is_closed &= count % 2 == 0;
+            shell.is_oriented &= 2 * down == count;
+        }
+        let mut order: Vec<u32> = (0..all.len() as u32).collect();
+        order.sort_by_key(|&i| {
+            let Shell { facets, facet_first, .. } = all[i as usize];
+            (std::cmp::Reverse(facets), facet_first)
+        });
+        let mut places = vec![0; order.len()];
+        (0..).zip(&order).for_each(|(place, &i)| places[i as usize] = place);
+        let place = |&i: &u32| places.get(i as usize).map_or(u32::MAX, |&place| place);
+        Self {
+            all: order.iter().map(|&i| all[i as usize].clone()).collect(),
+            of: of.iter().map(place).collect(),
+        }
+    }
+
+    /// Whether two facets belong to different solids: to closed shells neither of which can contain the other, by their bounding
+    /// boxes.
+    pub fn are_of_different_solids(&self, f: usize, g: usize) -> bool {
+        let shell = |facet: usize| self.all.get(self.of[facet] as usize);
+        let (Some(a), Some(b)) = (shell(f), shell(g)) else { return false };
+        self.of[f] != self.of[g]
+            && (a.is_closed && b.is_closed)
+            && !(a.may_be_in(b) || b.may_be_in(a))
+    }
+
+    /// Closed shells that are wound inward: those that are inside out, and those that may be cavities of another one.
+    pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
+        let mut findings = [Kind::InsideOut, Kind::Cavities].map(Finding::new);
+        let closed = || self.all.iter().filter(|shell| shell.is_closed);
+        for shell in closed().filter(|shell| shell.is_wound_inward()) {
+            let at = usize::from(closed().any(|other| shell.may_be_in(other)));
+            let facet = shell.facet_first;
+            findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
+        }
+        findings
+    }
 }
 
 /// The representative of a set; halves the path to it.

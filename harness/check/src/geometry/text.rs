@@ -15,6 +15,8 @@ impl Kind {
             Self::NonManifoldOdd => "edges with 3, 5, ... facets",
             Self::NonManifoldEven => "edges with 4, 6, ... facets",
             Self::Winding => "neighbours, opposite winding",
+            Self::InsideOut => "closed shells inside out",
+            Self::Cavities => "closed shells, likely cavities",
             Self::Duplicates => "duplicate facets",
             Self::Degenerate => "facets without area",
             Self::Slivers => "slivers",
@@ -142,4 +144,118 @@ fn in_cells(cells: Option<f64>) -> String {
 fn point(at: &[f64; 3]) -> String {
     let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
     format!("({x}, {y}, {z})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::extent::Extent;
+    use crate::geometry::report::Shells;
+    use crate::geometry::shells::Shell;
+    use contract::lattice::Root;
+    use contract::stl::Solid;
+
+    fn finding(kind: Kind, count: u64, count_changing: u64, places: Vec<Place>) -> Finding {
+        let meaning = format!("Meaning of {kind:?}.");
+        Finding { count, count_changing, meaning, places, ..Finding::new(kind) }
+    }
+
+    /// A body of one open and two closed shells, with findings of every form.
+    fn diagnosis() -> Diagnosis {
+        let at = [0.1, 2.0, -3.5];
+        let hole = Place {
+            edges: Some(4),
+            diameter: Some(2.5),
+            diameter_cells: Some(10.0),
+            width: Some(0.5),
+            width_cells: Some(2.0),
+            ..Place::new(vec![1, 2], at)
+        };
+        let sheet = Place { width: Some(0.125), ..Place::new(vec![1, 2], at) };
+        let one = |facets: std::ops::Range<u32>| vec![Place::new(facets.collect(), at)];
+        let shell = |facet_first, facets, is_closed| Shell { facet_first, facets, is_closed };
+        let solid = |name: Option<&str>, facets| Solid {
+            name: name.map(str::to_owned),
+            facet_first: 3,
+            facets,
+        };
+        let mut lower_bound = finding(Kind::Intersections, 2, 2, one(0..8));
+        lower_bound.is_lower_bound = true;
+        Diagnosis {
+            schema: crate::geometry::report::SCHEMA,
+            facets: 30,
+            vertices: 17,
+            solids: vec![solid(Some("wing"), 20), solid(None, 10)],
+            shells: Shells {
+                count: 3,
+                closed: 2,
+                largest: vec![shell(0, 16, true), shell(16, 8, false)],
+            },
+            root: Root { origin: [-8.0; 3], edge: 16.0 },
+            cell: Some(0.25),
+            extent: Extent {
+                low: [-1.0; 3],
+                high: [1.0, 1.0, 2.5],
+                margin: 5.5,
+                margin_cells: Some(22.0),
+            },
+            findings: vec![
+                finding(Kind::Openings, 2, 1, vec![hole]),
+                finding(Kind::Junctions, 3, 0, one(4..5)),
+                finding(Kind::Winding, 0, 0, vec![]),
+                lower_bound,
+                finding(Kind::ThinWalls, 4, 4, vec![sheet]),
+                finding(Kind::Slivers, 1, 0, one(0..7)),
+            ],
+            changes_region: true,
+        }
+    }
+
+    #[test]
+    fn a_diagnosis_lists_shells_findings_and_places() {
+        let expected = "facets    30, with 17 distinct vertices\n\
+            solids    2\n          \"wing\": 20 facets from number 3\n\
+            shells    3, 2 closed\n          16 facets from number 0, closed\n          8 facets from number 16, open\n          \
+            and 1 more (--first)\n\
+            extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
+            root      (-8.0, -8.0, -8.0) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
+            cell      0.250 at the surface\n\n\
+            finding                             count  effect on the mesh's region\n\
+            openings                                2  POSSIBLE for 1\n\
+            edges at T-junctions                    3  none\n\
+            neighbours, opposite winding            0\n\
+            intersecting pairs of facets          >=2  POSSIBLE\n\
+            facets of thin walls                    4  POSSIBLE\n\
+            slivers                                 1  none\n\n\
+            openings: Meaning of Openings.\n  \
+            at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells), 2.50 across (10.0 cells), 4 edges; facets 1, 2\n          \
+            and 1 more (--first)\n\n\
+            edges at T-junctions: Meaning of Junctions.\n  at (0.1, 2.0, -3.5); facet 4\n          and 2 more (--first)\n\n\
+            intersecting pairs of facets: Meaning of Intersections.\n  \
+            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--first)\n\n\
+            facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide; facets 1, 2\n\n\
+            slivers: Meaning of Slivers.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
+            findings that can change the mesh's region";
+        assert_eq!(diagnosis().to_string(), expected);
+    }
+
+    #[test]
+    fn a_single_shell_and_an_unknown_cell_need_fewer_lines() {
+        let mut plain = diagnosis();
+        (plain.cell, plain.changes_region) = (None, false);
+        (plain.solids, plain.findings) = (Vec::new(), Vec::new());
+        plain.shells =
+            Shells { count: 1, closed: 1, largest: vec![plain.shells.largest[0].clone()] };
+        let expected = "facets    30, with 17 distinct vertices\nshells    1, 1 closed\n\
+            extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
+            root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\
+            cell      not known; --spacing-min reports sizes in cells and thin sheets\n\n\
+            finding                             count  effect on the mesh's region\n\n\
+            no finding that changes the mesh's region";
+        assert_eq!(plain.to_string(), expected);
+        // Without places, nothing is left unlisted.
+        plain.shells = Shells { count: 2, closed: 0, largest: Vec::new() };
+        plain.findings = vec![finding(Kind::Slivers, 3, 0, Vec::new())];
+        assert!(!plain.to_string().contains("more"));
+    }
 }

@@ -133,6 +133,7 @@ fn norm(a: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn circle(n: usize, radius: f64) -> Vec<Point> {
         let point = |i: usize| {
@@ -157,6 +158,42 @@ mod tests {
             assert!((3.96..=4.0 + 1e-12).contains(&diameter), "{n}: {diameter}");
             assert!((3.96..=4.0 + 1e-12).contains(&width), "{n}: {width}");
         }
+    }
+
+    proptest! {
+        /// The least distance of two parallel lines, one through two of the points, with all points between them.
+        #[test]
+        fn the_size_of_flat_points_is_that_of_a_search_among_all_pairs(
+            flat in prop::collection::vec(prop::array::uniform2(-9i32..9), 1..14), turn in 0usize..3,
+        ) {
+            let flat: Vec<[f64; 2]> = flat.into_iter().map(|p| p.map(f64::from)).collect();
+            let mut least = f64::INFINITY;
+            let mut farthest = 0.0f64;
+            for (i, &p) in flat.iter().enumerate() {
+                for &q in &flat[i + 1..] {
+                    let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+                    farthest = farthest.max(length);
+                    let heights: Vec<f64> = flat.iter().map(|&r| turn_of(p, q, r) / length).collect();
+                    let (low, high) = heights.iter().fold((0.0f64, 0.0f64), |(l, h), &x| (l.min(x), h.max(x)));
+                    if length > 0.0 && low.abs().min(high) < 1e-9 {
+                        least = least.min(high - low);
+                    }
+                }
+            }
+            let points: Vec<Point> = flat.iter().map(|&[x, y]| {
+                let mut at = [x, y, 3.0];
+                at.rotate_left(turn);
+                at
+            }).collect();
+            let found = size(&points);
+            prop_assert!((found.diameter - farthest).abs() < 1e-9);
+            let expected = if least.is_finite() { least } else { 0.0 };
+            prop_assert!((found.width - expected).abs() < 1e-9, "{} instead of {}", found.width, expected);
+        }
+    }
+
+    fn turn_of(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
     }
 
     #[test]

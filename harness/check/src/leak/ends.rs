@@ -82,8 +82,9 @@ pub fn in_tree(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::testing::words_with_sides;
+    use contract::testing::{random_words, words_with_sides};
     use contract::word::Side;
+    use proptest::prelude::*;
 
     const ROOT: Root = Root { origin: [0.0; 3], edge: 8.0 };
 
@@ -106,5 +107,33 @@ mod tests {
         assert!(why.contains("[2.0, 6.0, 2.0]"), "{why}");
         assert!(leaf([9.0, 1.0, 1.0]).unwrap_err().contains("outside the root"));
         assert!(leaf([f64::NAN, 1.0, 1.0]).unwrap_err().contains("outside the root"));
+    }
+
+    #[test]
+    fn the_ends_of_a_path_are_free_leaves() {
+        let crossing = |digit: u8| if digit < 2 { Side::Crossing } else { Side::Outside };
+        let words = words_with_sides(|o| o.level < 1, |o| Some(crossing(o.digit())));
+        let leaves = Leaves::new(&words).unwrap();
+        let (crossed, free) = ([UNITS_PER_EDGE / 4; 3], [3 * UNITS_PER_EDGE / 4; 3]);
+        assert_eq!(
+            in_tree(crossed, None, &leaves).err(),
+            Some("facets cross the leaf of the start")
+        );
+        assert_eq!(
+            in_tree(free, Some(crossed), &leaves).err(),
+            Some("facets cross the leaf of the end")
+        );
+        assert!(matches!(in_tree(free, None, &leaves), Ok((7, Goal::Far))));
+        assert!(matches!(in_tree(free, Some(free), &leaves), Ok((7, Goal::Place(7)))));
+    }
+
+    proptest! {
+        #[test]
+        fn no_centre_of_a_free_leaf_is_nearer(words in random_words(3), at in prop::array::uniform3(0..=UNITS_PER_EDGE)) {
+            let squared = |centre: [i64; 3]| (0..3).map(|a| i128::from(centre[a].abs_diff(at[a])).pow(2)).sum::<i128>();
+            let free = words.iter().filter(|&&w| word::side(w) != Side::Crossing);
+            let expected = free.map(|&w| squared(word::octant(w).centre())).min();
+            prop_assert_eq!(nearest_free_centre(at, &words).map(squared), expected);
+        }
     }
 }

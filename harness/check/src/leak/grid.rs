@@ -41,6 +41,9 @@ struct Block {
 /// Points of a block along an edge.
 const BLOCK: i32 = 4;
 
+/// Half of a block's edge, in steps.
+const BLOCK_HALF: f64 = (BLOCK - 1) as f64 / 2.0;
+
 /// Blocks of a grid along an edge.
 const BLOCKS: i32 = (SIDE + BLOCK - 1) / BLOCK;
 
@@ -88,11 +91,10 @@ impl<'a> Distances<'a> {
 
     fn block(&mut self, indices: [i32; 3]) -> Block {
         let Grid { centre, step } = *self.grid;
-        let half = f64::from(BLOCK - 1) / 2.0;
         let centre: Point = std::array::from_fn(|a| {
-            centre[a] + (f64::from(indices[a] * BLOCK - STEPS) + half) * step
+            centre[a] + (f64::from(indices[a] * BLOCK - STEPS) + BLOCK_HALF) * step
         });
-        let radius = 3f64.sqrt() * half * step;
+        let radius = 3f64.sqrt() * BLOCK_HALF * step;
         let candidates = if self.shared > 0 {
             0..self.shared
         } else {

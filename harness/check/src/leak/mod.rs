@@ -3,7 +3,7 @@
 //!
 //! - [`leaves`]: a base tree with neighbours; [`ends`]: the ends of the path; [`search`]: the path through the leaves;
 //! - [`clearance`]: distances to facets; [`grid`]: the same for the points of a grid;
-//! - [`path`]: free widths along a path and its narrowest place;
+//! - [`path`]: free widths along a path and its narrowest place; [`middle`]: the middle of a long passage;
 //! - [`passage`]: the widest path; [`surface`]: whether the facets form a closed surface between the ends;
 //! - [`report`]: the answer as data; [`text`]: the answer for a terminal.
 //!
@@ -15,6 +15,7 @@ pub mod clearance;
 pub mod ends;
 pub mod grid;
 pub mod leaves;
+pub mod middle;
 pub mod passage;
 pub mod path;
 pub mod report;

@@ -8,6 +8,7 @@
 use super::clearance::{Clearance, Point};
 use super::grid::{Distances, Grid, STEPS};
 use super::leaves::{Leaves, shared_face_centre};
+use super::middle;
 use super::search::{self, Goal, Graph, Interrupted, Memory, nearest_boundary};
 use crate::geometry::distance::{length, sub};
 
@@ -23,10 +24,13 @@ pub struct Spot {
 }
 
 /// Step of a grid that is fine enough, in parts of the clearance.
-const PRECISION: f64 = 1e-3;
+pub const PRECISION: f64 = 1e-3;
 
 /// Grids that are searched at most.
 const GRIDS_MAX: usize = 150;
+
+/// An opening that needs more grids than this is a passage: every place of it is almost the narrowest.
+const GRIDS_FEW: usize = 16;
 
 /// A path from its first to its last point.
 #[derive(Clone, Debug)]
@@ -75,19 +79,27 @@ impl Path {
             narrowest: 0,
             approaches: route.approaches.map(|count| 2 * count),
         };
+        path.widen_ends(goal, clearance);
         // No ball of a greater radius passes the grids.
         let mut bound = f64::INFINITY;
-        for _ in 0..GRIDS_MAX {
+        let mut is_centred = false;
+        for grids in 1..=GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
             let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.clearance;
-            if path.is_narrowest_at_end() || is_precise || bound < route.wanted {
+            let is_fine = spot.step <= PRECISION * spot.clearance;
+            if path.is_narrowest_at_end() || is_precise || is_fine || bound < route.wanted {
                 break;
             }
             let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
-            let Some(least) = path.widen(step, clearance, scratch, stop)? else { break };
+            let Some(found) = path.widen(step, clearance, scratch, stop)? else { break };
+            if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
+                path.centre(bound.min(route.radius), clearance);
+                is_centred = true;
+                continue;
+            }
             // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
-            bound = bound.min(least + 3f64.sqrt() * step);
+            bound = bound.min(found.least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
         Ok(path)
@@ -136,15 +148,34 @@ impl Path {
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
     }
 
-    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. Returns the least
-    /// clearance of the grid's path, or `None` if there is no path.
+    /// Moves the ends, approaches excepted, to the widest places near them: the centre of a leaf is rarely one.
+    fn widen_ends(&mut self, goal: Goal, clearance: &Clearance) {
+        let (first, last) = self.inner();
+        let ends = [Some(first), (goal != Goal::Far && last != first).then_some(last)];
+        for end in ends.into_iter().flatten() {
+            self.spots[end] = middle::widest_near(self.spots[end].at, clearance);
+        }
+    }
+
+    /// Moves points less than `below` from the facets to the middle of a passage, unless that makes the path narrower.
+    fn centre(&mut self, below: f64, clearance: &Clearance) {
+        let (first, last) = self.inner();
+        let least =
+            |spots: &[Spot]| spots.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min);
+        let centred = middle::centred(&self.spots[first..=last], below, clearance);
+        if least(&centred) > least(&self.spots[first..=last]) {
+            self.spots.splice(first..=last, centred);
+        }
+    }
+
+    /// Replaces the narrowest point and its surroundings by the widest path through a grid around it. `None` if there is no path.
     fn widen(
         &mut self,
         step: f64,
         clearance: &Clearance,
         Scratch { known, memory }: &mut Scratch,
         stop: &dyn Fn() -> bool,
-    ) -> Result<Option<f64>, Interrupted> {
+    ) -> Result<Option<Widest>, Interrupted> {
         let grid = Grid { centre: self.throat().at, step };
         let (first, last) = self.surroundings(f64::from(STEPS) * step);
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
@@ -169,6 +200,7 @@ impl Path {
         let least = widest.iter().map(|&place| width(place, place)).fold(f32::INFINITY, f32::min);
         let route = search::shortest(&grid, from, goal, least, &mut width, memory, stop)?;
         let route = route.expect("the widest path is as wide");
+        let is_at_end = [from, to].iter().any(|&end| width(end, end) <= least);
         // Points near the grid's edge depend on where the path enters it, so they are not final.
         let coarse = self.spots[first].step.max(self.spots[last].step);
         let spot = |&place: &u32| Spot {
@@ -180,8 +212,16 @@ impl Path {
         let (begin, end) = self.inner();
         let replaced = first + usize::from(first == begin)..last + usize::from(last != end);
         self.spots.splice(replaced, widened);
-        Ok(Some(f64::from(least)))
+        Ok(Some(Widest { least: f64::from(least), is_at_end }))
     }
+}
+
+/// What a grid's path shows.
+struct Widest {
+    /// Its least clearance.
+    least: f64,
+    /// Whether that is at one of its ends, which were given, so that a wider path may pass elsewhere.
+    is_at_end: bool,
 }
 
 /// Memory of searches through grids.

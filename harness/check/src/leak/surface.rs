@@ -115,6 +115,23 @@ mod tests {
     }
 
     #[test]
+    fn welding_moves_a_vertex_to_an_earlier_one_and_drops_facets_that_lose_their_area() {
+        let [a, b, c, d] = [[0; 3], [1000, 0, 0], [0, 1000, 0], [0, 0, 1000]];
+        let near = |[x, y, z]: [i64; 3]| [x + WELD, y - WELD, z];
+        assert_eq!(welded(&[[a, b, c], [near(b), d, near(a)]]), [[a, b, c], [b, d, a]]);
+        for thin in [[a, near(a), d], [d, a, near(a)], [near(a), d, a], [a, near(a), near(a)]] {
+            assert_eq!(welded(&[[a, b, c], thin]), [[a, b, c]]);
+        }
+        for axis in 0..3 {
+            for by in [-WELD - 1, WELD + 1] {
+                let mut apart = b;
+                apart[axis] += by;
+                assert_eq!(welded(&[[a, b, c], [apart, d, a]]), [[a, b, c], [apart, d, a]]);
+            }
+        }
+    }
+
+    #[test]
     fn each_of_two_shells_separates_a_cavity_from_the_outside() {
         let mut hollow = tetrahedron(4);
         let cavity = hollow.facets_lattice.clone();

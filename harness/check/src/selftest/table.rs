@@ -64,3 +64,46 @@ fn one_line(finding: &str) -> String {
         flat.chars().take(SHOWN).collect::<String>() + "..."
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_a_row_per_trial_and_the_counts() {
+        let kill = |mutant, expected, caught_by: &[&'static str], audit: &[&'static str]| Kill {
+            mutant,
+            case: "a case".to_owned(),
+            expected,
+            caught_by: caught_by.to_vec(),
+            audit_expected: !audit.is_empty(),
+            audit_caught_by: audit.to_vec(),
+            finding: None,
+        };
+        let mut report = SelftestReport::default();
+        report.kills.push(kill(
+            "leaf removed",
+            "complete",
+            &["complete", "identical"],
+            &["complete"],
+        ));
+        report.kills[0].finding = Some("two\nlines".to_owned());
+        report.kills.push(kill("leaf removed", "complete", &["balance"], &[]));
+        report.kills.push(kill("side", "sides", &["sides"], &[]));
+        let rows = "corruption    case    expected              reported by\n\
+            leaf removed  a case  complete    killed    complete, identical; audit: complete\n              \
+            first finding: two lines\n\
+            leaf removed  a case  complete    SURVIVED  balance\n\
+            side          a case  sides       killed    sides\n";
+        let counts = "2 corruptions in 3 trials: 1 survived, 0 false alarms";
+        assert_eq!(report.to_string(), format!("{rows}{counts}"));
+        report.alarms.push("an alarm".to_owned());
+        report.unused.push("unused");
+        report.left_out.push(("left", "why".to_owned()));
+        let rest = "FALSE ALARM on a correct mesh: an alarm\nNO MESH to which this applies: unused\nleft out: left: why\n\
+            2 corruptions in 3 trials: 1 survived, 1 false alarms, 1 left out";
+        assert_eq!(report.to_string(), format!("{rows}{rest}"));
+        assert_eq!(one_line(&"x".repeat(160)), "x".repeat(160));
+        assert_eq!(one_line(&"x".repeat(161)), "x".repeat(160) + "...");
+    }
+}

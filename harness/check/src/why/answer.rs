@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use super::base::{Cause, Surface};
-use super::chain::{Chain, Link, Rule};
+use super::chain::{Chain, Link, Rule, SEARCHES_MAX};
 use super::side::Decision;
 use contract::lattice::Root;
 use contract::manifest::{self, Keep};
@@ -165,6 +165,10 @@ impl Mesh<'_> {
     /// # Errors
     /// One sentence, if the point lies outside the root or the mesh is invalid.
     pub fn at(&self, point: [f64; 3]) -> Result<Answer, String> {
+        // Without facets, the search for crossing leaves reads the words of coarse octants.
+        if matches!(self.surface, Surface::Facets(_)) {
+            self.leaves.expect_few_reads();
+        }
         let root = &self.terms.root;
         let lattice = root.quantise_seed(point).ok_or_else(|| {
             let (from, to) = (root.origin, root.to_user([contract::lattice::UNITS_PER_EDGE; 3]));
@@ -199,6 +203,7 @@ impl Mesh<'_> {
         let cause = of_base.checked_sub(1).and_then(|level| {
             self.base_cause(&octant.ancestor(level as u8)).map(|cause| self.cause(&cause))
         });
+        let mut searches_left = SEARCHES_MAX;
         let split = |ancestor: Octant| {
             let octant = self.place(&ancestor);
             if usize::from(ancestor.level) < of_base {
@@ -209,7 +214,9 @@ impl Mesh<'_> {
                     is_shortest: true,
                 };
             }
-            let Some(Chain { links, cause, is_shortest, .. }) = self.chain(&ancestor) else {
+            let Some(Chain { links, cause, is_shortest, .. }) =
+                self.chain(&ancestor, &mut searches_left)
+            else {
                 return Split { octant, links: Vec::new(), cause: None, is_shortest: true };
             };
             let links = links.iter().map(|link| self.link(link)).collect();

@@ -33,11 +33,17 @@ pub struct Cause {
 impl Mesh<'_> {
     /// Whether the surface crosses an octant. Without facets the answer holds for octants coarser than D only.
     pub(super) fn is_crossed(&self, octant: &Octant) -> bool {
-        match &self.surface {
+        let id = id(octant);
+        if let Some(&known) = self.known.crossed.borrow().get(&id) {
+            return known;
+        }
+        let crossed = match &self.surface {
             Surface::Facets(crossings) => crossings.any(octant),
             Surface::Leaves => self.leaves.has_crossing(octant),
             Surface::Unknown => false,
-        }
+        };
+        self.known.crossed.borrow_mut().insert(id, crossed);
+        crossed
     }
 
     /// Whether T0 splits an octant.
@@ -45,14 +51,8 @@ impl Mesh<'_> {
         if octant.level == LEVEL_MAX {
             return false;
         }
-        let id = id(octant);
-        if let Some(&known) = self.known.base_splits.borrow().get(&id) {
-            return known;
-        }
-        let splits = self.terms.box_that_splits(octant).is_some()
-            || octant.level < self.terms.level_surface && self.is_crossed(octant);
-        self.known.base_splits.borrow_mut().insert(id, splits);
-        splits
+        self.terms.box_that_splits(octant).is_some()
+            || octant.level < self.terms.level_surface && self.is_crossed(octant)
     }
 
     /// The facets and boxes that require an octant to be split; `None` if none does.

@@ -83,6 +83,11 @@ impl Leaves {
         })
     }
 
+    /// Announces that few words will be read, at random places, so that the system does not read ahead of them.
+    pub fn expect_few_reads(&self) {
+        self.parts.iter().for_each(MappedPart::expect_few_reads);
+    }
+
     /// A word that was found and that no correct mesh contains.
     pub fn invalid(&self) -> Option<u64> {
         self.invalid.get()

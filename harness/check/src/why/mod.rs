@@ -3,7 +3,7 @@
 //! - [`leaves`]: the leaves on disk; [`crossings`]: the facets of an octant;
 //! - [`base`](mod@base): T0 where it is needed, octant by octant (section 3 of reference/DEFINITION.md);
 //! - [`gradation`]: the leaves that force an octant to split (section 6);
-//! - [`chain`]: the shortest chain of them to a cause of T0; [`side`]: the rays or the seed of a component (section 4);
+//! - [`chain`]: the shortest chain of them to a cause of T0, and [`bound`] of its length; [`side`]: the rays or the seed of a component (section 4);
 //! - [`answer`]: the result as data, [`text`]: for people; [`unneeded`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
@@ -19,9 +19,11 @@ use contract::octant::Octant;
 use rustc_hash::FxHashMap;
 
 use crate::checks::Terms;
+use crate::diff::fields::differing_inputs;
 
 pub mod answer;
 pub mod base;
+pub mod bound;
 pub mod chain;
 pub mod crossings;
 pub mod gradation;
@@ -31,6 +33,7 @@ pub mod text;
 pub mod unneeded;
 
 use base::Surface;
+use bound::Bounds;
 use crossings::Crossings;
 use leaves::Leaves;
 
@@ -46,6 +49,8 @@ pub struct Mesh<'a> {
     distrusts: bool,
     /// Deepest level of a leaf that can force an octant to split; no search goes deeper.
     level_deepest: u8,
+    /// What the search for a chain expects.
+    bounds: Bounds,
     /// Answers for octants that were asked about before.
     known: Known,
 }
@@ -53,7 +58,8 @@ pub struct Mesh<'a> {
 /// Answers by [`leaves::id`].
 #[derive(Debug, Default)]
 struct Known {
-    base_splits: RefCell<FxHashMap<u64, bool>>,
+    crossed: RefCell<FxHashMap<u64, bool>>,
+    distances: RefCell<FxHashMap<u64, Option<i64>>>,
     deep: RefCell<FxHashMap<u64, bool>>,
     justified: RefCell<FxHashMap<u64, bool>>,
 }
@@ -66,11 +72,8 @@ impl<'a> Mesh<'a> {
     pub fn open(dir: &Path, case: Option<&'a Case>) -> Result<Self, String> {
         let leaves = Leaves::open(dir).map_err(|error| error.to_string())?;
         let mut terms = Terms::of_manifest(&leaves.manifest);
-        if case.is_some_and(|case| Terms::of_case(case) != terms) {
-            let dir = dir.display();
-            return Err(format!(
-                "{dir} was made from other inputs than the case; give the case file from which the mesh was made"
-            ));
+        if let Some(case) = case.filter(|case| Terms::of_case(case) != terms) {
+            return Err(other_inputs(dir, &leaves.manifest, case));
         }
         let is_base = leaves.manifest.tree == manifest::Tree::Base;
         if is_base {
@@ -85,7 +88,8 @@ impl<'a> Mesh<'a> {
             leaves.manifest.leaves_by_level.iter().rposition(|&n| n > 0).unwrap_or(0) as u8;
         let level_deepest = of_mesh.max(required(&terms));
         let known = Known::default();
-        Ok(Self { leaves, terms, surface, is_base, distrusts: false, level_deepest, known })
+        let bounds = Bounds::new(&terms);
+        Ok(Self { leaves, terms, surface, is_base, distrusts: false, level_deepest, bounds, known })
     }
 
     /// The same mesh, in which needless splits justify nothing.
@@ -108,6 +112,20 @@ impl<'a> Mesh<'a> {
     fn place(&self, octant: &Octant) -> answer::Place {
         answer::Place::new(octant, &self.terms.root)
     }
+}
+
+/// The error of a case that is not that of a mesh, with the inputs that differ.
+fn other_inputs(dir: &Path, of_mesh: &manifest::Manifest, case: &Case) -> String {
+    let of_case = case.manifest(of_mesh.tree, String::new());
+    let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &of_case));
+    if of_mesh.sides == manifest::Sides::Unknown {
+        differing.push("the sides of the mesh are unknown".to_owned());
+    }
+    format!(
+        "{} was made from other inputs than the case ({}); give the case file from which the mesh was made",
+        dir.display(),
+        differing.join("; ")
+    )
 }
 
 /// The deepest level that the surface or a box requires.

@@ -3,6 +3,7 @@
 use crate::support;
 use check::selftest::scale::{self, Options, Source};
 use check::selftest::{self, SelftestCase, SelftestReport};
+use contract::testing::assert_text;
 use std::path::Path;
 
 /// Every corruption that a mesh can have applies to at least one of these cases. The first has more than 20 000
@@ -78,6 +79,7 @@ fn a_mesh_without_its_base_tree_is_corrupted_in_every_other_way() {
     let report = run(&[source], 1, 1);
     assert!(report.holds(), "{report}");
     assert!(report.kills.len() > 30, "{report}");
+    assert_text(&report.to_string(), "tests/checks/expected/at-scale-without-base.txt");
     for (name, reason) in &report.left_out {
         assert!(!name.starts_with("T0 ") || reason.contains("T0"), "{name}: {reason}");
     }

@@ -41,7 +41,10 @@ fn read_meshes(path: &Path, dir: &Path) -> SelftestCase {
     let write = |which, name: &str, mesh| {
         let dir = dir.join(name);
         write::leaf_set(write::claim(&dir).unwrap(), &dir, which, &given, &mesh).unwrap();
-        leafset::read(&dir).unwrap()
+        let mut set = leafset::read(&dir).unwrap();
+        // Positions in the manifest, which errors name, must not depend on the version.
+        set.manifest.program = "another version".to_owned();
+        set
     };
     SelftestCase {
         case: Case::read(path).unwrap(),

@@ -8,6 +8,7 @@ use check::geometry::report::Diagnosis;
 use check::geometry::{Options, diagnose};
 use contract::case::Facet;
 use contract::lattice::Root;
+use contract::testing::assert_text;
 use geometries::{Generator, Shape};
 use proptest::prelude::*;
 
@@ -123,6 +124,41 @@ fn a_flipped_facet_disagrees_with_three_neighbours() {
 }
 
 #[test]
+fn a_closed_shell_that_is_wound_inward_is_inside_out_or_a_cavity() {
+    let inward = |low, high| {
+        let mut facets = cuboid(low, high);
+        facets.iter_mut().for_each(|f| f.swap(0, 1));
+        facets
+    };
+    let small = inward([1.0; 3], [2.0; 3]);
+    let beside = diagnosis([cube(), inward([5.0; 3], [6.0; 3])].concat(), Some(0.25));
+    assert_eq!(counts(&beside), [(Kind::InsideOut, 1)]);
+    assert_eq!(first(&beside, Kind::InsideOut).facets, [12]);
+    assert!(!beside.changes_region);
+    assert_eq!(
+        counts(&diagnosis([cube(), small.clone()].concat(), Some(0.25))),
+        [(Kind::Cavities, 1)]
+    );
+    // An open shell has no volume.
+    assert_eq!(counts(&diagnosis(small[1..].to_vec(), None)), [(Kind::Openings, 1)]);
+    let far = [inward([-15.0; 3], [-14.0; 3]), cuboid([14.0; 3], [15.0; 3])].concat();
+    assert_eq!(counts(&diagnosis(far, Some(0.25))), [(Kind::InsideOut, 1)]);
+}
+
+#[test]
+fn an_overlap_of_two_solids_is_not_a_thin_wall_but_the_wall_of_a_cavity_is() {
+    // The lower face of the upper box is a quarter below the upper face of the lower one.
+    let overlap =
+        [cuboid([0.0; 3], [4.0, 4.0, 4.0]), cuboid([1.0, 1.0, 3.75], [3.0, 3.0, 8.0])].concat();
+    let overlap = diagnosis(overlap, Some(0.5));
+    assert!(count(&overlap, Kind::Intersections) > 0);
+    assert_eq!(count(&overlap, Kind::ThinWalls), 0);
+    let mut cavity = cuboid([0.25; 3], [3.75; 3]);
+    cavity.iter_mut().for_each(|f| f.swap(0, 1));
+    assert_eq!(count(&diagnosis([cube(), cavity].concat(), Some(0.5)), Kind::ThinWalls), 24);
+}
+
+#[test]
 fn overlapping_boxes_intersect_along_six_segments() {
     // Each segment of the hexagon lies in one facet of each box.
     let facets = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat();
@@ -169,10 +205,11 @@ fn edges_with_more_than_two_facets_are_even_or_odd() {
 #[test]
 fn facets_without_area_and_slivers_have_no_effect() {
     let mut facets = cube();
-    facets.push([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]);
+    // A copy of one is no duplicate.
+    facets.extend([[[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]; 2]);
     facets.push([[9.0, 9.0, 9.0]; 3]);
     let found = diagnosis(facets, Some(0.25));
-    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 2)], false));
+    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 3)], false));
     let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
     assert_eq!(count(&point, Kind::Degenerate), 1);
     let sliver = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]];
@@ -221,6 +258,59 @@ fn json_has_the_schema_and_text_has_every_kind() {
     assert!(text.contains("2.00 wide (4.00 cells)"), "{text}");
 }
 
+/// Every kind of finding at a place of its own.
+#[test]
+fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
+    let at = |[x, y, z]: [f32; 3], facets: Vec<Facet>| -> Vec<Facet> {
+        facets
+            .iter()
+            .map(|facet| facet.map(|v| [v[0] / 2.0 + x, v[1] / 2.0 + y, v[2] / 2.0 + z]))
+            .collect()
+    };
+    let mut without_two = cube();
+    without_two.drain(2..4);
+    let mut junction = cube();
+    let [a, b, c] = junction[0];
+    let middle = std::array::from_fn(|x| (b[x] + c[x]) / 2.0);
+    junction[0] = [a, b, middle];
+    junction.push([a, middle, c]);
+    let mut with_fin = cube();
+    let [a, b, _] = with_fin[0];
+    with_fin.push([a, b, [-1.0; 3]]);
+    with_fin.push([b, a, [1.0, -1.0, -2.0]]);
+    let mut odd = cube();
+    odd.push([a, b, [-1.0; 3]]);
+    let mut flipped = cube();
+    flipped[7].swap(0, 1);
+    let mut copied = cube();
+    copied.extend([flipped[0], flipped[0]]);
+    let plates =
+        [cuboid([0.0; 3], [4.0, 4.0, 0.375]), cuboid([0.0, 0.0, 0.75], [4.0, 4.0, 4.0])].concat();
+    let facets = [
+        at([-12.0; 3], cube_with_hole([1.0, 1.0], [2.0, 3.0])),
+        at([-8.0, -12.0, -12.0], without_two),
+        at([-4.0, -12.0, -12.0], junction),
+        at([0.0, -12.0, -12.0], with_fin),
+        at([4.0, -12.0, -12.0], odd),
+        at([8.0, -12.0, -12.0], flipped),
+        at([-12.0, -8.0, -12.0], copied),
+        at([-8.0, -8.0, -12.0], [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat()),
+        at([-4.0, -8.0, -12.0], [cube(), cuboid([4.0, 1.0, 1.0], [6.0, 3.0, 3.0])].concat()),
+        at([4.0, -8.0, -12.0], plates),
+        at([-12.0, -4.0, -12.0], vec![[[0.0; 3], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]]]),
+        at([-12.0, 0.0, -12.0], vec![[[1.0; 3], [2.0; 3], [1.0; 3]], [[9.0; 3]; 3]]),
+        at([-16.0, 4.0, 0.0], cube()),
+        at([15.0, 8.0, 0.0], cube()),
+    ]
+    .concat();
+    for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no-cells")] {
+        let requested = Requested { spacing_min: spacing, root: Some(ROOT), root_scale: None };
+        let input = Input::new(facets.clone(), &requested).unwrap();
+        let text = diagnose(&input, &Options { first, ..Options::default() }).to_string();
+        assert_text(&text, &format!("tests/geometry/expected/{name}.txt"));
+    }
+}
+
 /// Closed shapes at random sizes and places.
 fn shape() -> impl Strategy<Value = Vec<Facet>> {
     let shapes = [Shape::Cube, Shape::Sphere, Shape::Torus, Shape::NestedSpheres, Shape::Pipe];
@@ -235,8 +325,11 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn closed_shapes_have_no_findings(facets in shape()) {
-        prop_assert_eq!(counts(&diagnosis(facets, Some(0.002))), []);
+    fn closed_shapes_have_no_findings_but_a_cavity(facets in shape()) {
+        let found = diagnosis(facets, Some(0.002));
+        // The inner one of two spheres is a cavity.
+        let cavity = (found.shells.count == 2).then_some((Kind::Cavities, 1));
+        prop_assert_eq!(counts(&found), Vec::from_iter(cavity));
     }
 
     /// Defects at random: some facets removed, repeated, flipped, and a second shape put over the first.

@@ -8,8 +8,8 @@ use check::leak::report::Report;
 use check::leak::{LeakError, Question, Watch, answer};
 use contract::case::{Case, Facet};
 use contract::lattice::Root;
-use contract::testing::base_tree;
-use openings::{Body, ROTATIONS, bodies, two_holes};
+use contract::testing::{assert_text, base_tree};
+use openings::{Body, ROTATIONS, bodies, pipe, two_holes};
 use std::convert::Infallible;
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
@@ -60,28 +60,57 @@ fn assert_describes(report: &Report, body: &Body, what: &str) {
     assert_eq!(passes % 2, 1, "{what}: the path crosses the opening {passes} times");
 }
 
-#[test]
-fn the_widest_path_leads_through_the_opening_and_its_width_and_rim_are_right() {
-    for body in bodies() {
-        for (turn, rotation) in ROTATIONS.into_iter().enumerate() {
-            let body = body.rotated(rotation);
-            let what = format!("{}, rotation {turn}", body.name);
-            // An opening wider than 2 sqrt(3) cells joins the leaves at both sides.
-            let wide = ROOT.level_for(body.width / 12f64.sqrt()).unwrap();
-            let report = from_centre(&body.facets, wide);
-            assert!(report.is_leak && report.opens.is_none(), "{what}");
-            assert_describes(&report, &body, &what);
-            // One narrower than a cell does not.
-            let closes = report.closes.expect("a coarse tree is closed");
-            assert!(closes.spacing > body.width / 12f64.sqrt(), "{what}");
-            assert!(closes.spacing / 2.0 <= body.width, "{what}");
+/// The widest path leads through the opening, and its width and rim are right, in every orientation.
+fn assert_passage(body: &Body) {
+    for (turn, rotation) in ROTATIONS.into_iter().enumerate() {
+        let body = body.rotated(rotation);
+        let what = format!("{}, rotation {turn}", body.name);
+        // An opening wider than 2 sqrt(3) cells joins the leaves at both sides.
+        let wide = ROOT.level_for(body.width / 12f64.sqrt()).unwrap();
+        let report = from_centre(&body.facets, wide);
+        assert!(report.is_leak && report.opens.is_none(), "{what}");
+        assert_describes(&report, &body, &what);
+        // One narrower than a cell does not.
+        let closes = report.closes.expect("a coarse tree is closed");
+        assert!(closes.spacing > body.width / 12f64.sqrt(), "{what}");
+        assert!(closes.spacing / 2.0 <= body.width, "{what}");
 
-            let closed = from_centre(&body.facets, closes.level);
-            assert!(!closed.is_leak && closed.limit.is_none(), "{what}");
-            assert_eq!(closed.opens.unwrap().level, closes.level + 1, "{what}");
-            assert_describes(&closed, &body, &format!("{what}, when it opens"));
-            let (last, open) = report.levels.split_last().unwrap();
-            assert!(!last.is_joined && open.iter().all(|level| level.is_joined), "{what}");
+        let closed = from_centre(&body.facets, closes.level);
+        assert!(!closed.is_leak && closed.limit.is_none(), "{what}");
+        assert_eq!(closed.opens.unwrap().level, closes.level + 1, "{what}");
+        assert_describes(&closed, &body, &format!("{what}, when it opens"));
+        let (last, open) = report.levels.split_last().unwrap();
+        assert!(!last.is_joined && open.iter().all(|level| level.is_joined), "{what}");
+    }
+}
+
+#[test]
+fn the_widest_path_leads_through_a_hole() {
+    assert_passage(&bodies()[0]);
+}
+
+#[test]
+fn the_widest_path_leads_through_a_slit() {
+    assert_passage(&bodies()[1]);
+}
+
+#[test]
+fn the_widest_path_leads_through_a_crack() {
+    assert_passage(&bodies()[2]);
+}
+
+#[test]
+fn the_widest_path_leads_through_a_missing_facet() {
+    assert_passage(&bodies()[3]);
+}
+
+#[test]
+fn the_answer_about_a_slit_and_a_crack_is_the_expected_text() {
+    for body in &bodies()[1..3] {
+        let wide = ROOT.level_for(body.width / 12f64.sqrt()).unwrap();
+        for (level, what) in [(wide, "open"), (wide - 3, "closed")] {
+            let text = from_centre(&body.facets, level).to_string();
+            assert_text(&text, &format!("tests/leak/expected/{}-{what}.txt", body.name));
         }
     }
 }
@@ -95,6 +124,29 @@ fn of_several_openings_the_widest_is_reported_even_if_they_differ_little() {
             let body = body.rotated(rotation);
             let report = from_centre(&body.facets, level);
             assert_describes(&report, &body, &format!("level {level}, radius {radius}"));
+        }
+    }
+}
+
+/// Every place of a pipe is equally narrow, and more of them than a search can refine.
+#[test]
+fn a_long_pipe_is_as_wide_as_it_is_wherever_the_lattice_lies() {
+    for rotation in ROTATIONS {
+        for (level, radius, length) in [(7, 0.1, 2.0), (7, 0.13, 1.0)] {
+            let body = pipe(length, radius).rotated(rotation);
+            let what = format!("level {level}, radius {radius}, length {length}");
+            let from_inside = from_centre(&body.facets, level).passage.unwrap().narrowest;
+            let error = from_inside.width / body.width - 1.0;
+            assert!(error.abs() < 0.01 && !from_inside.is_end, "{what}: error {error}");
+            // The start is in the pipe.
+            let case = case(&body.facets, 8);
+            let start = std::array::from_fn(|i| {
+                let mean = body.rim.iter().map(|v| v[i]).sum::<f64>() / body.rim.len() as f64;
+                mean + 0.3 * body.axis()[i]
+            });
+            let in_pipe = ask(&case, start, Target::Far).unwrap().passage.unwrap().narrowest;
+            let error = in_pipe.width / body.width - 1.0;
+            assert!(error.abs() < 0.01, "{what}, from {start:?}: error {error}");
         }
     }
 }

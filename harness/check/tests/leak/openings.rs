@@ -44,6 +44,19 @@ pub fn two_holes(radius: f64, radius_opposite: f64) -> Body {
     Body { name: "two holes", facets, rim, width, is_round: true }
 }
 
+/// A box with a pipe of this length and radius on its wall z = 1. The opening is the pipe's inner end.
+pub fn pipe(length: f32, radius: f64) -> Body {
+    let mut facets = box_without_walls(|axis, side| axis == 2 && side > 0.0);
+    let (wall, rim, width) = wall_with_hole(radius);
+    facets.extend(wall);
+    for i in 0..rim.len() {
+        let [a, b] = [rim[i], rim[(i + 1) % rim.len()]].map(|v| v.map(|c| c as f32));
+        let [c, d] = [a, b].map(|[x, y, z]| [x, y, z + length]);
+        facets.extend([[a, b, c], [b, d, c]]);
+    }
+    Body { name: "pipe", facets, rim, width, is_round: true }
+}
+
 /// The wall z = 1 with a round hole, the hole's rim, and the diameter of the largest ball that passes.
 fn wall_with_hole(radius: f64) -> (Vec<Facet>, Vec<Point>, f64) {
     const CORNERS: usize = 32;
@@ -170,6 +183,15 @@ impl Body {
             rim: self.rim.iter().map(|&v| turn(v)).collect(),
             ..self.clone()
         }
+    }
+
+    /// The unit vector from the origin to the middle of the wall with the opening.
+    pub fn axis(&self) -> Point {
+        let count = self.rim.len();
+        let normal =
+            cross(sub(self.rim[count / 3], self.rim[0]), sub(self.rim[2 * count / 3], self.rim[0]));
+        let length = dot(normal, normal).sqrt();
+        normal.map(|c| c / length)
     }
 
     /// The facets with at least this many corners on the rim.

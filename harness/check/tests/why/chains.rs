@@ -91,16 +91,18 @@ proptest! {
 
     #[test]
     fn no_chain_is_shorter_than_the_one_reported(
-        level in 3i32..=5, n in 1u32..=5, facets in soup(1..4), boxes in boxes(0..2, 6),
+        level in 3i32..=5, n in 1u32..=5, keep in prop::sample::select(vec!["outside", "inside", "all"]),
+        facets in prop_oneof![soup(1..4), hull()], boxes in boxes(0..2, 6),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 3),
     ) {
         let spacing = 16.0 * 0.5f64.powi(level);
-        let text = format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\nkeep = 'all'\n{ROOT}{}", boxes.concat());
+        let keep = format!("keep = {keep:?}\nkeep_crossing = true\n");
+        let text = format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\n{keep}{ROOT}{}", boxes.concat());
         let correct = made(&text, &facets);
         let leaves: Vec<Octant> = correct.mesh.words.iter().map(|&w| word::octant(w)).collect();
         let brute = Brute { case: &correct.case, terms: Terms::of_case(&correct.case), leaves };
         with_mesh(&correct.mesh, Some(&correct.case), |mesh| {
-            for pick in &picks {
+            for pick in picks.iter().filter(|_| !brute.leaves.is_empty()) {
                 let centre = correct.case.root.to_user(pick.get(&brute.leaves).centre());
                 let answer = mesh.at(centre).unwrap();
                 for split in &answer.splits {
@@ -110,6 +112,32 @@ proptest! {
             }
             Ok(())
         })?;
+    }
+}
+
+/// Far from a single small facet, so that chains lead through many levels.
+#[test]
+fn no_chain_through_many_levels_is_shorter_than_the_one_reported() {
+    for (n, level, far) in [(1, 9, 6.9), (2, 8, 6.9), (3, 8, 5.9), (5, 6, 6.9)] {
+        let spacing = 16.0 * 0.5f64.powi(level);
+        let text =
+            format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\nkeep = 'all'\n{ROOT}");
+        let correct = made(&text, &[[[0.3, 0.2, 0.1], [0.31, 0.2, 0.1], [0.3, 0.21, 0.12]]]);
+        let leaves: Vec<Octant> = correct.mesh.words.iter().map(|&w| word::octant(w)).collect();
+        let brute = Brute { case: &correct.case, terms: Terms::of_case(&correct.case), leaves };
+        let at =
+            |point| with_mesh(&correct.mesh, Some(&correct.case), |mesh| mesh.at(point).unwrap());
+        let mut links_max = 0;
+        for point in [[far, 0.4, -1.3], [-2.2, far, far]] {
+            let answer = at(point);
+            for split in &answer.splits {
+                assert!(split.is_shortest, "n = {n}: {answer}");
+                let links = Some(split.links.len());
+                assert_eq!(brute.links(&split.octant.octant), links, "n = {n}: {answer}");
+                links_max = links_max.max(split.links.len());
+            }
+        }
+        assert!(links_max >= 3, "n = {n}: {links_max}");
     }
 }
 

@@ -14,6 +14,8 @@ use check::selftest::SelftestCase;
 use check::why::Mesh;
 use contract::case::Case;
 use contract::leafset::LeafSet;
+use contract::testing::assert_text;
+use contract::word;
 use geometries::Facet;
 use proptest::prelude::*;
 
@@ -88,4 +90,32 @@ fn settings(levels: std::ops::Range<i32>) -> impl Strategy<Value = String> {
         let spacing = 16.0 * 0.5f64.powi(level);
         format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = {crossing}\n{ROOT}")
     })
+}
+
+/// The answers about points in leaves of every size and side, and in deleted parts.
+#[test]
+fn the_answers_about_points_of_each_case_are_the_expected_texts() {
+    const CASES: [(&str, &str); 5] = [
+        ("outside", include_str!("../../../selftest-cases/outside.toml")),
+        ("inside", include_str!("../../../selftest-cases/inside.toml")),
+        ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+        ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
+        ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
+    ];
+    let mut texts = String::new();
+    for (name, text) in CASES {
+        let correct = support::selftest_case(name, text);
+        let of_mesh = &correct.mesh.words;
+        let leaves = correct.base.words.iter().step_by(correct.base.words.len() / 3);
+        let leaves = leaves.chain(of_mesh.iter().step_by(of_mesh.len() / 3));
+        with_mesh(&correct.mesh, Some(&correct.case), |mesh| {
+            for &leaf in leaves {
+                let centre = correct.case.root.to_user(word::octant(leaf).centre());
+                let answer = mesh.at(centre).unwrap().to_string();
+                let (answer, _terms) = answer.split_once("\n\nterms").unwrap();
+                texts += &format!("{name}\n{answer}\n\n");
+            }
+        });
+    }
+    assert_text(&texts, "tests/why/expected/answers.txt");
 }

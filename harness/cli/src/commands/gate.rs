@@ -46,7 +46,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
     timeout: u64,
     /// Write the exact measures of the candidate: a baseline for later and input of `harness track`
     #[arg(long, value_name = "FILE")]

@@ -58,7 +58,7 @@ pub struct Source {
     #[arg(long, value_enum, default_value_t)]
     position: Position,
     /// Time limit of VTK's reader
-    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = super::values::whole_seconds)]
     timeout: u64,
 }
 

@@ -61,7 +61,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "2e7", value_parser = cell_count)]
     leaves_max: u64,
     /// Time limit of every single run of the mesher
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
     timeout: u64,
     /// Paths of the programs.
     #[command(flatten)]

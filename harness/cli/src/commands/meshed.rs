@@ -38,7 +38,7 @@ pub struct EngineArguments {
     #[arg(long, default_value = "mesher")]
     engine: String,
     /// Time limit for meshing a case
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
     timeout: u64,
     /// Paths of the programs.
     #[command(flatten)]

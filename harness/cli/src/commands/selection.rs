@@ -72,8 +72,10 @@ impl SelectionArguments {
                 return Err(mesh.ranks_unknown());
             }
             if rank as usize >= ranks {
-                let why = format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0");
-                return Err(ExportError::Request(why));
+                return Err(ExportError::Request(match ranks {
+                    1 => format!("--rank {rank}: the mesh has one rank, number 0"),
+                    _ => format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"),
+                }));
             }
         }
         if self.side.is_some() && mesh.manifest.sides == Sides::Unknown {

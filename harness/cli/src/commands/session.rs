@@ -31,7 +31,7 @@ pub struct SessionArguments {
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = super::values::whole_seconds)]
     pub timeout: u64,
     /// Also write a report; the record is then DIR/record.jsonl unless --record is given
     #[arg(long, value_name = "DIR")]

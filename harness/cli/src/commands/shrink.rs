@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 900)]
     budget: u64,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = super::values::whole_seconds)]
     timeout: u64,
     #[command(flatten)]
     programs: ProgramArguments,

@@ -14,6 +14,13 @@ fn positive(text: &str, max: f64) -> Result<f64, String> {
     number.ok_or_else(|| format!("give a number greater than 0 and at most {max}"))
 }
 
+/// Parses a whole number of seconds: at least 1, and at most a week.
+pub fn whole_seconds(text: &str) -> Result<u64, String> {
+    const WEEK: u64 = 7 * 86_400;
+    let number = text.trim().parse().ok().filter(|n| (1..=WEEK).contains(n));
+    number.ok_or_else(|| format!("give a whole number of seconds from 1 to {WEEK}"))
+}
+
 /// Parses a probability that is not 0.
 pub fn probability(text: &str) -> Result<f64, String> {
     positive(text, 1.0)
@@ -36,5 +43,21 @@ pub fn root(text: &str) -> Result<Root, String> {
     match numbers[..] {
         [x, y, z, edge] if text.split(',').count() == 4 => Ok(Root { origin: [x, y, z], edge }),
         _ => Err("give four numbers: X,Y,Z,EDGE".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_limit_is_at_least_a_second_and_at_most_a_week() {
+        assert_eq!((whole_seconds("1"), whole_seconds(" 604800 ")), (Ok(1), Ok(604_800)));
+        for wrong in ["0", "-1", "604801", "1.5", ""] {
+            assert_eq!(
+                whole_seconds(wrong),
+                Err("give a whole number of seconds from 1 to 604800".to_owned())
+            );
+        }
     }
 }

@@ -113,7 +113,7 @@ fn an_unknown_case_is_invalid_input() {
     let fixture = Fixture::new();
     fixture.catalogue_with_absent_geometry();
     let outcome = fixture.harness(&["verify", "unheard-of"]);
-    let why = "no case unheard-of in the catalogue, which has jet";
+    let why = "unheard-of: no such file or directory exists, nor a case of this name in ";
     assert_eq!(outcome.code, 2, "{}", outcome.printed);
     assert!(outcome.printed.contains(why), "{}", outcome.printed);
     assert_eq!(fixture.harness(&["verify", "--ranks", "none"]).code, 2);

@@ -202,6 +202,13 @@ mod tests {
         assert_eq!(word::octant(cells.words(&root).unwrap()[0]).path(), "1.2");
         cells.corners[0][0] = 0.503;
         assert!(cells.words(&root).is_err());
+        // The limit itself, which a cell of the root's size can have exactly.
+        let mut whole = Cells::default();
+        assert!(whole.is_empty());
+        whole.push([TOLERANCE, 0.0, 0.0], 1.0);
+        assert!(!whole.is_empty() && whole.words(&root).is_ok());
+        whole.corners[0][0] = TOLERANCE.next_up();
+        assert!(whole.words(&root).is_err());
     }
 
     #[test]

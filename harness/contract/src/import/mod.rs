@@ -237,6 +237,15 @@ mod tests {
         }
     }
 
+    /// The head of a file may end within a character.
+    #[test]
+    fn a_character_that_is_cut_off_does_not_hide_the_format() {
+        for cut in [&b"\xc3"[..], b"\xe2\x82", b"\xf0\x9f\x98"] {
+            assert_eq!(of_content(&[b"0 0 0 1\n", cut].concat()), Some(Format::Csv));
+            assert_eq!(of_content(&[b"0 0 0 1\n", cut, b" "].concat()), None);
+        }
+    }
+
     #[test]
     fn a_path_that_is_no_mesh_is_an_error() {
         let empty = tempfile::tempdir().unwrap();

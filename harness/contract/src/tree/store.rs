@@ -19,6 +19,10 @@ impl Store {
         self.children.len()
     }
 
+    pub(super) fn all(&self) -> &[[Handle; 8]] {
+        &self.children
+    }
+
     pub(super) fn children(&self, of: Handle) -> &[Handle; 8] {
         &self.children[of.index()]
     }

@@ -4,13 +4,15 @@
 //! and every cell is closed. `checkMesh -allTopology` verifies that. Cells are numbered in Morton order, which yields
 //! OpenFOAM's upper-triangular order of faces: a cell on the high side of another has the higher number.
 //!
-//! Cells and tree are kept in memory, about 20 bytes per cell, and 5 more for each thread that writes the directory of a processor; the
-//! files are written cell by cell.
+//! Tree, points and boundary are kept in memory, 2.3 bytes per cell of a mesh of 50 million. Each thread that writes the directory of a
+//! processor adds 8 bytes per point in it. The files are written cell by cell.
 //!
 //! - [`tree`]: the cells and what is across their faces; [`faces`]: the faces and their vertices; [`points`]: the numbers of points;
-//! - [`regions`], [`patches`], [`processors`];
-//! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
+//! - [`regions`], [`patches`], [`processors`]; [`face_list`]: the faces of a boundary;
+//! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`cell_files`]: those with a label for each cell; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
+pub mod cell_files;
+pub mod face_list;
 pub mod faces;
 pub mod lists;
 pub mod notes;
@@ -30,6 +32,7 @@ use std::path::{Path, PathBuf};
 
 use contract::files::{Staging, nearest_directory};
 use contract::manifest::Sides;
+use contract::tree::{Builder, DELETED};
 use contract::word;
 
 use crate::error::ExportError;
@@ -46,7 +49,7 @@ use poly_mesh::Counts;
 use processors::Distribution;
 use regions::{Regions, Size};
 use survey::{Domain, Model, survey, visit};
-use tree::{Builder, CELLS_MAX};
+use tree::{CELLS_MAX, Tree};
 
 /// Writes the selected leaves as `path`, which is a case's `constant/polyMesh`, or as one
 /// `processorN/constant/polyMesh` per processor in the same case. Directories appear under their names when all are complete.
@@ -66,7 +69,7 @@ pub fn write(
     let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
         .map_err(ExportError::Request)?;
 
-    let survey = survey(&model, &mut patches, distribution.as_ref())?;
+    let survey = survey(&mut model, &mut patches, distribution.as_ref())?;
 
     let named = |error| ExportError::write(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
@@ -79,11 +82,12 @@ pub fn write(
             error => error,
         })
     };
+    let cells = u64::from(model.tree.cells());
     let (mut counts, mut done) = (Vec::new(), 0);
     in_order(targets.len(), options.jobs, make, |_, of_directory: Counts| {
         done += of_directory.cells;
         counts.push(of_directory);
-        options.watch.progress(done, model.words.len() as u64);
+        options.watch.progress(done, cells);
         Ok(())
     })?;
     let (files, bytes) = sizes(staging.path()).map_err(named)?;
@@ -99,10 +103,11 @@ pub fn write(
         Ok::<(), ExportError>(())
     })?;
     let mut notes = notes::notes(&counts, &regions, options.foam.regions);
+    notes.extend(notes::crossing(mesh, selection));
     if counts.len() > 1 && !survey.has_addressing(&model) {
         notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
     }
-    Ok(Summary { leaves: model.words.len() as u64, files, bytes, notes })
+    Ok(Summary { leaves: cells, files, bytes, notes })
 }
 
 /// Number and size of the files in the directories of a directory.
@@ -129,33 +134,34 @@ fn read<'a>(
             "the mesh has another root than the case: give the case that was meshed".to_owned(),
         ));
     }
-    let has_ranks = mesh.leaves_by_rank()?.len() > 1;
-    let (mut builder, mut words, mut ranks) = (Builder::default(), Vec::new(), Vec::new());
-    let mut visited = 0u64;
+    let parts = mesh.leaves_by_rank()?.len();
+    let mut ranks = (parts > 1).then(|| Distribution::new(parts as u32));
+    let (mut builder, mut visited, mut cells) = (Builder::default(), 0u64, 0);
     mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
         visited += 1;
         if visited.is_multiple_of(1 << 16) {
             options.check()?;
         }
         let is_exported = selection.has(&leaf);
-        if is_exported {
-            words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
-            ranks.extend(has_ranks.then_some(leaf.rank));
-        }
-        if words.len() as u64 > CELLS_MAX {
+        cells += u64::from(is_exported);
+        if cells > CELLS_MAX {
             return Err(ExportError::Request(format!(
                 "a polyMesh can have {CELLS_MAX} cells here: select fewer leaves"
             )));
         }
-        builder.push(&leaf.octant, is_exported);
+        if let Some(ranks) = &mut ranks {
+            ranks.push(leaf.rank, u32::from(is_exported));
+        }
+        let kind = if is_exported { leaf.side as u8 } else { DELETED };
+        let pushed = builder.push_leaf(word::key_of(leaf.octant.corner), leaf.octant.level, kind);
+        pushed.expect("the leaves of a visit ascend and do not overlap");
         Ok(())
     })?;
-    if words.is_empty() {
+    if cells == 0 {
         return Err(nothing_selected(mesh));
     }
     Ok(Model {
-        tree: builder.finish(),
-        words,
+        tree: Tree::new(&builder.finish()),
         ranks,
         points: Points::default(),
         root,
@@ -164,34 +170,27 @@ fn read<'a>(
     })
 }
 
-/// Finds the regions, removes those that are not to be exported, and numbers the points.
+/// Finds the regions, and removes those that are not to be exported.
 fn connect(model: &mut Model, keep: options::Regions) -> Result<Vec<Size>, ExportError> {
-    let mut regions = Regions::new(model.tree.cells());
-    let mut points = Points::default();
-    visit(model, Domain(None), |cell, around, squares| {
-        for across in squares.iter().filter(|s| s.is_high).filter_map(|s| s.across.as_cell()) {
-            regions.join(cell, across);
-        }
-        faces::insert_corners(&around.octant, squares, &mut points);
+    let blocks = model.tree.blocks();
+    let mut regions = Regions::new(blocks.cells());
+    visit(&blocks, 0..blocks.cells(), model.options, |block, _, squares| {
+        let high = squares.iter().filter(|square| square.is_high);
+        high.filter_map(|s| s.across.as_cell()).for_each(|across| regions.join(block, across));
         Ok(())
     })?;
-    let mut sizes = regions.sizes(&model.words);
-    sizes.sort_by_key(|&(_, size)| std::cmp::Reverse(size));
+    let sizes = regions.sizes(&model.tree, &blocks);
     if keep == options::Regions::Largest && sizes.len() > 1 {
         let keep = regions.members(sizes[0].0);
-        let mut kept = keep.iter();
-        model.words.retain(|_| *kept.next().expect("a flag per cell"));
-        let mut kept = keep.iter();
-        model.ranks.retain(|_| *kept.next().expect("a flag per cell"));
-        model.tree.retain(&keep);
-        points = Points::default();
-        visit(model, Domain(None), |_, around, squares| {
-            faces::insert_corners(&around.octant, squares, &mut points);
-            Ok(())
-        })?;
+        if let Some(ranks) = &mut model.ranks {
+            let mut kept = Vec::new();
+            model.tree.visit_blocks(&blocks, &mut |block, _, cells| {
+                kept.extend(keep[block as usize].then_some(cells));
+            });
+            *ranks = ranks.retain(kept.into_iter());
+        }
+        model.tree.retain(&blocks, &keep);
     }
-    points.number();
-    model.points = points;
     Ok(sizes.into_iter().map(|(_, size)| size).collect())
 }
 
@@ -211,12 +210,11 @@ fn distribute(
             )));
         }
         Some(Processors::Ranks) if !mesh.has_ranks() => return Err(mesh.ranks_unknown()),
-        Some(Processors::Ranks) if model.ranks.is_empty() => Distribution::equal(cells, 1),
         Some(Processors::Ranks) => {
-            Distribution::new(model.ranks.clone(), mesh.leaves_by_rank()?.len() as u32)
+            model.ranks.clone().unwrap_or_else(|| Distribution::equal(cells, 1))
         }
     };
-    match (0..distribution.processors()).find(|&p| distribution.cells(p).is_empty()) {
+    match (0..distribution.processors()).find(|&p| distribution.count(p) == 0) {
         None => Ok(Some(distribution)),
         Some(rank) => Err(ExportError::Request(format!(
             "rank {rank} has no cell that is exported, and OpenFOAM needs one on each processor: choose a number of processors"

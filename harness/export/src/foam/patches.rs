@@ -15,7 +15,7 @@ pub const SIDES: [&str; 6] = ["xMin", "xMax", "yMin", "yMax", "zMin", "zMax"];
 /// Patch of the faces beyond which there is no leaf, of a body without named solids.
 const BODY: &str = "body";
 /// Patch of the faces beyond which there is a leaf that is not exported.
-const CUT: &str = "cut";
+pub const CUT: &str = "cut";
 
 /// The patches: [`SIDES`], the solids of the body, and, if leaves were left out, the cut.
 #[derive(Debug)]

@@ -1,20 +1,22 @@
 //! A set of lattice points, numbered.
 //!
-//! A point belongs to the coarsest grid that has it. Four by four by four points of a grid are a brick: one bit per point
-//! that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 2 bytes, and finding its
+//! A [brick](crate::brick) has one bit per point that is in the set. A mesh is mostly uniform, so most bricks are nearly full, a point takes about 0.85 bytes, and finding its
 //! number is one look into a table that is small enough to stay in the cache.
 
-use contract::octant::LEVEL_MAX;
-use rustc_hash::FxHashMap;
+use std::hash::BuildHasher;
 
-/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
-pub type Point = [u32; 3];
+use hashbrown::HashTable;
+use hashbrown::hash_table::Entry;
+use rustc_hash::FxBuildHasher;
+
+pub use crate::brick::Point;
+use crate::brick::{place, point};
 
 /// The set.
 #[derive(Debug, Default)]
 pub struct Points {
-    /// Index of each brick.
-    index: FxHashMap<u64, u32>,
+    /// Indices of the bricks by their keys.
+    index: HashTable<u32>,
     bricks: Vec<Brick>,
     /// Bitwise or of all coordinates: its lowest bit is the finest grid that has a point.
     bits: u32,
@@ -25,8 +27,8 @@ pub struct Points {
 pub struct Own {
     /// One more than the new number of each point of the set; 0 if it has none.
     numbers: Vec<u32>,
-    /// The points in the order of their new numbers.
-    pub points: Vec<Point>,
+    /// The numbers that the points have in the set, in the order of their new numbers.
+    pub points: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -37,26 +39,8 @@ struct Brick {
     first: u64,
 }
 
-/// Bits of each coordinate of a brick.
-const BITS: u32 = 18;
-
-/// The brick of a point, and its bit there.
-fn place(point: Point) -> (u64, u32) {
-    let [x, y, z] = point;
-    let zeros = (x | y | z).trailing_zeros().min(u32::from(LEVEL_MAX));
-    let at = |c: u32| u64::from(c >> zeros >> 2);
-    let bit = |c: u32| c >> zeros & 3;
-    let key = at(x) | at(y) << BITS | at(z) << (2 * BITS) | u64::from(zeros) << (3 * BITS);
-    (key, bit(x) | bit(y) << 2 | bit(z) << 4)
-}
-
-/// The inverse of [`place`].
-fn point(key: u64, bit: u32) -> Point {
-    let zeros = (key >> (3 * BITS)) as u32;
-    std::array::from_fn(|a| {
-        let at = key >> (BITS * a as u32) & ((1 << BITS) - 1);
-        ((at as u32) << 2 | bit >> (2 * a) & 3) << zeros
-    })
+fn hash(key: u64) -> u64 {
+    FxBuildHasher.hash_one(key)
 }
 
 impl Points {
@@ -64,12 +48,16 @@ impl Points {
     pub fn insert(&mut self, point: Point) {
         self.bits |= point[0] | point[1] | point[2];
         let (key, bit) = place(point);
-        let next = self.bricks.len() as u32;
-        let index = *self.index.entry(key).or_insert(next);
-        if index == next {
-            self.bricks.push(Brick { key, mask: 0, first: 0 });
-        }
-        self.bricks[index as usize].mask |= 1 << bit;
+        let Self { index, bricks, .. } = self;
+        let is_equal = |&brick: &u32| bricks[brick as usize].key == key;
+        let brick = match index.entry(hash(key), is_equal, |&b| hash(bricks[b as usize].key)) {
+            Entry::Occupied(entry) => *entry.get(),
+            Entry::Vacant(entry) => {
+                bricks.push(Brick { key, mask: 0, first: 0 });
+                *entry.insert(bricks.len() as u32 - 1).get()
+            }
+        };
+        bricks[brick as usize].mask |= 1 << bit;
     }
 
     /// Numbers the points: bricks in the order of their first points, within a brick x fastest.
@@ -94,9 +82,17 @@ impl Points {
     /// The number of a point; `None` if it is not in the set.
     pub fn find(&self, point: Point) -> Option<u64> {
         let (key, bit) = place(point);
-        let brick = self.bricks[*self.index.get(&key)? as usize];
+        let is_equal = |&brick: &u32| self.bricks[brick as usize].key == key;
+        let brick = self.bricks[*self.index.find(hash(key), is_equal)? as usize];
         let before = brick.mask & ((1 << bit) - 1);
         (brick.mask >> bit & 1 == 1).then(|| brick.first + u64::from(before.count_ones()))
+    }
+
+    /// The point with a number.
+    pub fn point(&self, number: u64) -> Point {
+        let brick = &self.bricks[self.bricks.partition_point(|brick| brick.first <= number) - 1];
+        let before = (brick.first..number).fold(brick.mask, |mask, _| mask & (mask - 1));
+        point(brick.key, before.trailing_zeros())
     }
 
     /// The points in the order of their numbers.
@@ -113,12 +109,12 @@ impl Own {
         Self { numbers: vec![0; all.count() as usize], points: Vec::new() }
     }
 
-    /// The new number of a point, which has the number `of_all` in the set.
-    pub fn number(&mut self, point: Point, of_all: u64) -> u64 {
+    /// The new number of the point that has the number `of_all` in the set.
+    pub fn number(&mut self, of_all: u64) -> u64 {
         let number = &mut self.numbers[of_all as usize];
         if *number == 0 {
-            self.points.push(point);
-            *number = u32::try_from(self.points.len()).expect("the points fit in memory");
+            self.points.push(u32::try_from(of_all).expect("the numbers fit in memory"));
+            *number = self.points.len() as u32;
         }
         u64::from(*number) - 1
     }
@@ -148,6 +144,7 @@ mod tests {
             prop_assert_eq!(points.count(), expected.len() as u64);
             for (number, point) in points.iter().enumerate() {
                 prop_assert_eq!(points.find(point), Some(number as u64));
+                prop_assert_eq!(points.point(number as u64), point);
             }
             prop_assert_eq!(points.iter().collect::<BTreeSet<_>>(), expected.clone());
             let absent = [1, 2, 3].map(|c| c + CELLS_PER_EDGE / 2);

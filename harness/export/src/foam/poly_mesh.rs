@@ -5,13 +5,14 @@ use std::io::Write as _;
 use std::path::Path;
 
 use contract::octant::UNITS_PER_CELL;
-use contract::word;
 
+use super::cell_files::{CellFiles, labels};
+use super::face_list::FaceList;
 use super::faces::Square;
 use super::lists::{self, Faces, List};
 use super::patches::Patches;
 use super::points::{Own, Point};
-use super::survey::{Boundary, Domain, Face, Model, Survey, owned, visit};
+use super::survey::{Domain, Model, Survey, owned, visit, visit_faces};
 use crate::error::ExportError;
 use crate::options::Style;
 
@@ -59,31 +60,31 @@ pub fn write(
     domain: Domain,
     dir: &Path,
 ) -> Result<Counts, ExportError> {
-    let boundary = &survey.boundaries[domain.0.map_or(0, |(_, here)| here as usize)];
-    let size = |faces: &Vec<Face>| faces.len() as u64;
+    let boundary = survey.of(domain);
+    let by_patch = boundary.by_patch.iter().map(FaceList::count);
     let mut counts = Counts {
-        cells: domain.cells(model.tree.cells()).count() as u64,
+        cells: u64::from(domain.count(model.tree.cells())),
         points: model.points.count(),
         faces_internal: boundary.internal,
-        patches: patches.names.iter().cloned().zip(boundary.by_patch.iter().map(size)).collect(),
-        faces_between: boundary.by_processor.iter().map(|(&p, faces)| (p, size(faces))).collect(),
+        patches: patches.names.iter().cloned().zip(by_patch).collect(),
+        faces_between: boundary.by_processor.iter().map(|(&p, faces)| (p, faces.count())).collect(),
     };
     // The vertices of the faces are counted as they are written; there are at least four each.
     if 4 * counts.faces().max(counts.points / 4) > lists::label_max(model.options.foam.style.label)
     {
         return Err(narrow());
     }
-    let own = write_faces(model, domain, survey, boundary, &mut counts, dir)?;
+    let own = write_faces(model, domain, survey, &mut counts, dir)?;
     match &own {
         None => write_points(model, model.points.iter(), &counts, dir)?,
         Some(own) => {
-            write_points(model, own.points.iter().copied(), &counts, dir)?;
+            let points = own.points.iter().map(|&number| model.points.point(number.into()));
+            write_points(model, points, &counts, dir)?;
             if survey.has_addressing(model) {
                 write_addressing(model, domain, own, &counts, dir)?;
             }
         }
     }
-    write_cells(model, domain, &counts, dir)?;
     write_boundary(model, patches, domain, &counts, dir)?;
     Ok(counts)
 }
@@ -136,7 +137,7 @@ impl FaceFiles<'_> {
         match &mut self.own {
             None => self.vertices.extend(self.polygon.iter().map(|&(_, number)| number)),
             Some(own) => {
-                self.vertices.extend(self.polygon.iter().map(|&(p, number)| own.number(p, number)));
+                self.vertices.extend(self.polygon.iter().map(|&(_, number)| own.number(number)));
             }
         }
         if let Some(addressing) = &mut self.addressing {
@@ -149,26 +150,24 @@ impl FaceFiles<'_> {
     }
 }
 
-/// Writes the faces, and returns the points of a directory that has not all cells; its number of points is known then.
+/// Writes the files of faces and cells, and returns the points of a directory that has not all cells; its number of points is known then.
 fn write_faces(
     model: &Model,
     domain: Domain,
     survey: &Survey,
-    boundary: &Boundary,
     counts: &mut Counts,
     dir: &Path,
 ) -> Result<Option<Own>, ExportError> {
-    let (style, all, internal) = (model.options.foam.style, counts.faces(), counts.faces_internal);
-    let labels = |object: &str, note: &str, count: u64| {
-        List::create(dir, style, "labelList", object, note, count)
-    };
+    let (all, internal) = (counts.faces(), counts.faces_internal);
+    let labels = |object: &str, note: &str, count: u64| labels(model, object, note, count, dir);
     let mut neighbours = labels("neighbour", &counts.note(), internal)?;
+    let mut cells = CellFiles::create(model, counts.cells, dir)?;
     let own = domain.0.map(|_| Own::new(&model.points));
     let has_addressing = own.is_some() && survey.has_addressing(model);
     let addressing = has_addressing.then(|| labels("faceProcAddressing", "", all)).transpose()?;
     let mut files = FaceFiles {
         model,
-        faces: Faces::create(dir, style, all)?,
+        faces: Faces::create(dir, model.options.foam.style, all)?,
         owner: labels("owner", &counts.note(), all)?,
         polygon: Vec::new(),
         vertices: Vec::new(),
@@ -176,26 +175,23 @@ fn write_faces(
         addressing,
     };
     let (mut of_cell, mut number) = (Vec::new(), 0);
-    visit(model, domain, |cell, _, squares| {
+    let numbers = domain.cells(model.tree.cells());
+    visit(&model.tree, numbers, model.options, |cell, around, squares| {
+        cells.push(model, cell, around)?;
         number = survey.first_face(cell).unwrap_or(number);
         let owner = domain.number(cell).expect("only cells of the directory are visited");
         owned(squares, &mut of_cell);
-        for (across, square) in &of_cell {
-            if let Some(neighbour) = domain.number(*across) {
+        for &(across, square) in &of_cell {
+            if let Some(neighbour) = domain.number(across) {
                 neighbours.label(i64::from(neighbour))?;
-                files.push(owner, square, number, false)?;
+                files.push(owner, &squares[square], number, false)?;
             }
             number += 1;
         }
         Ok(())
     })?;
-    let owner = |face: &Face| domain.number(face.cell).expect("a face has a cell of its directory");
-    for face in boundary.by_patch.iter().flatten() {
-        files.push(owner(face), &face.square, face.number, false)?;
-    }
-    for face in boundary.by_processor.values().flatten() {
-        files.push(owner(face), &face.square, face.number, !face.square.is_high)?;
-    }
+    cells.finish()?;
+    write_boundary_faces(survey, domain, &mut files)?;
     let FaceFiles { faces, owner, own, addressing, .. } = files;
     faces.finish()?;
     addressing.map_or(Ok(()), List::finish)?;
@@ -203,6 +199,33 @@ fn write_faces(
     neighbours.finish_with_note("labelList", "neighbour", &counts.note())?;
     owner.finish_with_note("labelList", "owner", &counts.note())?;
     Ok(own)
+}
+
+/// Writes the faces of the patches, and then those at other processors.
+fn write_boundary_faces(
+    survey: &Survey,
+    domain: Domain,
+    files: &mut FaceFiles,
+) -> Result<(), ExportError> {
+    let boundary = survey.of(domain);
+    for (patch, faces) in boundary.by_patch.iter().enumerate() {
+        visit_faces(files.model, faces, |face, square| {
+            let owner =
+                domain.number(face.cell).expect("a patch has faces of its directory's cells");
+            files.push(owner, square, survey.start(patch) + face.number, false)
+        })?;
+    }
+    for faces in boundary.by_processor.values() {
+        visit_faces(files.model, faces, |face, square| {
+            // Seen from the cell that the directory has.
+            let is_turned = domain.number(face.cell).is_none();
+            let cell = if is_turned { square.across.as_cell() } else { Some(face.cell) };
+            let owner =
+                cell.and_then(|cell| domain.number(cell)).expect("one of the cells is here");
+            files.push(owner, &Square { is_high: !is_turned, ..*square }, face.number, is_turned)
+        })?;
+    }
+    Ok(())
 }
 
 /// Writes what reconstructPar needs besides the addressing of faces: the numbers that the points, cells and patches of a
@@ -217,8 +240,7 @@ fn write_addressing(
     let write = |object: &str, count: u64, numbers: &mut dyn Iterator<Item = i64>| {
         write_labels(model, object, count, numbers, dir)
     };
-    let number = |&point: &Point| model.points.find(point).expect("it is a point of the mesh");
-    let mut points = own.points.iter().map(|point| number(point) as i64);
+    let mut points = own.points.iter().map(|&number| i64::from(number));
     write("pointProcAddressing", counts.points, &mut points)?;
     let mut cells = domain.cells(model.tree.cells()).map(i64::from);
     write("cellProcAddressing", counts.cells, &mut cells)?;
@@ -231,35 +253,14 @@ fn write_labels(
     model: &Model,
     object: &str,
     count: u64,
-    labels: &mut dyn Iterator<Item = i64>,
+    numbers: &mut dyn Iterator<Item = i64>,
     dir: &Path,
 ) -> Result<(), ExportError> {
-    let mut list = List::create(dir, model.options.foam.style, "labelList", object, "", count)?;
-    for label in labels {
-        list.label(label)?;
+    let mut list = labels(model, object, "", count, dir)?;
+    for number in numbers {
+        list.label(number)?;
     }
     Ok(list.finish()?)
-}
-
-/// Writes the level of each cell, and its side and rank where they are known.
-fn write_cells(
-    model: &Model,
-    domain: Domain,
-    counts: &Counts,
-    dir: &Path,
-) -> Result<(), ExportError> {
-    let write = |object: &str, label: &dyn Fn(usize) -> i64| {
-        let cells = domain.cells(model.tree.cells());
-        write_labels(model, object, counts.cells, &mut cells.map(|c| label(c as usize)), dir)
-    };
-    write("cellLevel", &|cell| i64::from(word::level(model.words[cell])))?;
-    if model.has_sides {
-        write("side", &|cell| (model.words[cell] & 3) as i64)?;
-    }
-    if !model.ranks.is_empty() {
-        write("rank", &|cell| i64::from(model.ranks[cell]))?;
-    }
-    Ok(())
 }
 
 fn write_boundary(

@@ -1,62 +1,98 @@
-//! The distribution of cells to processor directories.
+//! The distribution of cells to processors, or to the ranks that wrote them.
 //!
-//! Invariant: the cells of a processor are numbered from 0 in the order of all cells.
+//! It consists of runs of consecutive cells: few, because parts of a mesh are intervals of the Morton curve or made of large octants.
+//!
+//! Invariants: consecutive runs are on different processors, and none is empty; the cells of a processor are numbered from 0 in the
+//! order of all cells.
 
-use super::tree::CELLS_MAX;
+use std::ops::Range;
 
 /// Cells distributed to processors.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Distribution {
-    /// Processor of each cell.
-    processor: Vec<u32>,
-    /// Number of each cell on its processor.
-    number: Vec<u32>,
-    /// All cells, sorted by processor.
-    cells: Vec<u32>,
-    /// End of each processor in `cells`.
-    ends: Vec<usize>,
+    runs: Vec<Run>,
+    /// Number of cells of each processor.
+    counts: Vec<u32>,
+    /// Number of all cells.
+    cells: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    /// The first cell.
+    first: u32,
+    processor: u32,
+    /// Number of the first cell on its processor.
+    number: u32,
 }
 
 impl Distribution {
-    /// `count` intervals of the curve.
-    pub fn equal(cells: u32, count: u32) -> Self {
-        let of = |cell: u32| u64::from(cell) * u64::from(count) / u64::from(cells);
-        Self::new((0..cells).map(|cell| of(cell) as u32).collect(), count)
+    /// No cells on `count` processors.
+    pub fn new(count: u32) -> Self {
+        Self { runs: Vec::new(), counts: vec![0; count as usize], cells: 0 }
     }
 
-    /// Cells on given processors, all of which are below `count`.
-    pub fn new(processor: Vec<u32>, count: u32) -> Self {
-        debug_assert!(processor.len() as u64 <= CELLS_MAX);
-        let mut ends = vec![0; count as usize];
-        let number = processor.iter().map(|&p| {
-            ends[p as usize] += 1;
-            ends[p as usize] as u32 - 1
-        });
-        let number = number.collect();
-        let mut cells: Vec<u32> = (0..processor.len() as u32).collect();
-        cells.sort_by_key(|&cell| processor[cell as usize]);
-        let mut end = 0;
-        for of_processor in &mut ends {
-            end += *of_processor;
-            *of_processor = end;
+    /// `count` intervals of the curve.
+    pub fn equal(cells: u32, count: u32) -> Self {
+        let begin = |p: u32| (u64::from(p) * u64::from(cells)).div_ceil(u64::from(count)) as u32;
+        let mut distribution = Self::new(count);
+        (0..count).for_each(|p| distribution.push(p, begin(p + 1) - begin(p)));
+        distribution
+    }
+
+    /// Adds the next cells.
+    pub fn push(&mut self, processor: u32, cells: u32) {
+        let number = &mut self.counts[processor as usize];
+        if cells > 0 && self.runs.last().is_none_or(|last| last.processor != processor) {
+            self.runs.push(Run { first: self.cells, processor, number: *number });
         }
-        Self { processor, number, cells, ends }
+        *number += cells;
+        self.cells += cells;
+    }
+
+    /// The distribution of the cells in ascending intervals, which are renumbered.
+    pub fn retain(&self, kept: impl Iterator<Item = Range<u32>>) -> Self {
+        let mut retained = Self::new(self.processors());
+        for Range { mut start, end } in kept {
+            while start < end {
+                let run = self.run(start);
+                let end_of_run = self.cells_of(run).end.min(end);
+                retained.push(self.runs[run].processor, end_of_run - start);
+                start = end_of_run;
+            }
+        }
+        retained
     }
 
     /// Number of processors.
     pub fn processors(&self) -> u32 {
-        self.ends.len() as u32
+        self.counts.len() as u32
+    }
+
+    /// Number of cells of a processor.
+    pub fn count(&self, processor: u32) -> u32 {
+        self.counts[processor as usize]
     }
 
     /// The cells of a processor, ascending.
-    pub fn cells(&self, processor: u32) -> &[u32] {
-        let begin = processor.checked_sub(1).map_or(0, |before| self.ends[before as usize]);
-        &self.cells[begin..self.ends[processor as usize]]
+    pub fn cells(&self, processor: u32) -> impl Iterator<Item = u32> {
+        let runs = (0..self.runs.len()).filter(move |&run| self.runs[run].processor == processor);
+        runs.flat_map(|run| self.cells_of(run))
     }
 
     /// Processor of a cell, and the cell's number there.
     pub fn place(&self, cell: u32) -> (u32, u32) {
-        (self.processor[cell as usize], self.number[cell as usize])
+        let Run { first, processor, number } = self.runs[self.run(cell)];
+        (processor, number + (cell - first))
+    }
+
+    /// The run of a cell.
+    fn run(&self, cell: u32) -> usize {
+        self.runs.partition_point(|run| run.first <= cell) - 1
+    }
+
+    fn cells_of(&self, run: usize) -> Range<u32> {
+        self.runs[run].first..self.runs.get(run + 1).map_or(self.cells, |next| next.first)
     }
 }
 
@@ -66,14 +102,20 @@ mod tests {
 
     #[test]
     fn every_cell_has_one_place() {
-        let distribution = Distribution::new(vec![1, 0, 1, 3, 0], 4);
-        for (processor, cells) in [(0, &[1, 4][..]), (1, &[0, 2]), (2, &[]), (3, &[3])] {
-            assert_eq!(distribution.cells(processor), cells);
-            for (number, &cell) in cells.iter().enumerate() {
-                assert_eq!(distribution.place(cell), (processor, number as u32));
+        let mut distribution = Distribution::new(4);
+        [1, 0, 1, 3, 3, 0].into_iter().for_each(|p| distribution.push(p, 1));
+        let check = |distribution: &Distribution, expected: [&[u32]; 4]| {
+            for (processor, cells) in (0..).zip(expected) {
+                assert!(distribution.cells(processor).eq(cells.iter().copied()));
+                assert_eq!(distribution.count(processor) as usize, cells.len());
+                for (number, &cell) in cells.iter().enumerate() {
+                    assert_eq!(distribution.place(cell), (processor, number as u32));
+                }
             }
-        }
+        };
+        check(&distribution, [&[1, 5], &[0, 2], &[], &[3, 4]]);
+        check(&distribution.retain([0..1, 2..4, 4..6].into_iter()), [&[4], &[0, 1], &[], &[2, 3]]);
         let equal = Distribution::equal(10, 3);
-        assert_eq!((0..3).map(|p| equal.cells(p).len()).collect::<Vec<_>>(), [4, 3, 3]);
+        assert_eq!([0, 1, 2].map(|p| equal.cells(p).count()), [4, 3, 3]);
     }
 }

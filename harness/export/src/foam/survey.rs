@@ -1,10 +1,11 @@
-//! A walk over all cells and their faces, and what it finds of every directory: its boundary, and the numbers that its faces have in
-//! the whole mesh.
+//! A walk over all cells and their faces, and what it finds: the points, the boundary of every directory, and the numbers that its
+//! faces have in the whole mesh.
 
 use std::collections::BTreeMap;
 
 use contract::lattice::Root;
 
+use super::face_list::{Face, FaceList};
 use super::faces::{self, Square};
 use super::lists::label_max;
 use super::patches::Patches;
@@ -18,29 +19,16 @@ use crate::options::Options;
 pub struct Model<'a> {
     /// The cells.
     pub tree: Tree,
-    /// Their words.
-    pub words: Vec<u64>,
-    /// The rank that wrote each cell; none if there is only one.
-    pub ranks: Vec<u32>,
-    /// The points of all cells.
+    /// The rank that wrote each cell, if there are several.
+    pub ranks: Option<Distribution>,
+    /// The points of all cells, which the survey finds.
     pub points: Points,
     /// The root.
     pub root: Root,
-    /// Whether the words hold sides.
+    /// Whether the sides of cells are known.
     pub has_sides: bool,
     /// The options of the export.
     pub options: &'a Options<'a>,
-}
-
-/// A face at the boundary of a directory.
-#[derive(Clone, Copy)]
-pub struct Face {
-    /// Its cell.
-    pub cell: u32,
-    /// The face.
-    pub square: Square,
-    /// Its number in the whole mesh.
-    pub number: u64,
 }
 
 /// The cells of a directory.
@@ -52,10 +40,13 @@ impl<'a> Domain<'a> {
     pub fn cells(self, all: u32) -> Box<dyn Iterator<Item = u32> + 'a> {
         match self.0 {
             None => Box::new(0..all),
-            Some((distribution, processor)) => {
-                Box::new(distribution.cells(processor).iter().copied())
-            }
+            Some((distribution, processor)) => Box::new(distribution.cells(processor)),
         }
+    }
+
+    /// Number of the cells, of `all` in the mesh.
+    pub fn count(self, all: u32) -> u32 {
+        self.0.map_or(all, |(distribution, processor)| distribution.count(processor))
     }
 
     /// Number of a cell in this directory, if it is there.
@@ -71,26 +62,28 @@ impl<'a> Domain<'a> {
 pub struct Boundary {
     /// Number of faces between two cells of the directory.
     pub internal: u64,
-    /// The faces of each patch of the mesh.
-    pub by_patch: Vec<Vec<Face>>,
-    /// The faces at the cells of each other processor, in the same order as there.
-    pub by_processor: BTreeMap<u32, Vec<Face>>,
+    /// The faces of each patch of the mesh, with their numbers there.
+    pub by_patch: Vec<FaceList>,
+    /// The faces at the cells of each other processor, in the same order as there: as faces of the cell with the lower number, in
+    /// whichever directory that is, with their numbers in the whole mesh.
+    pub by_processor: BTreeMap<u32, FaceList>,
 }
 
 /// All directories.
 pub struct Survey {
     /// The boundary of each.
-    pub boundaries: Vec<Boundary>,
+    boundaries: Vec<Boundary>,
     /// The cells that follow one of another directory, ascending, and the number of the first face that each owns.
     runs: Vec<(u32, u64)>,
-    /// Number of faces of the whole mesh.
-    faces: u64,
+    /// Number of the first face of each patch, and the number of all faces.
+    starts: Vec<u64>,
 }
 
 impl Survey {
     /// Whether labels can hold the numbers of the whole mesh, so that each processor can state which part of it it has.
     pub fn has_addressing(&self, model: &Model) -> bool {
-        self.faces.max(model.points.count()) < label_max(model.options.foam.style.label)
+        let faces = self.starts[self.starts.len() - 1];
+        faces.max(model.points.count()) < label_max(model.options.foam.style.label)
     }
 
     /// The number of the first face that a cell owns, if the cell before it is in another directory.
@@ -98,60 +91,90 @@ impl Survey {
         let run = self.runs.binary_search_by_key(&cell, |&(first, _)| first);
         run.ok().map(|run| self.runs[run].1)
     }
+
+    /// The boundary of a directory.
+    pub fn of(&self, domain: Domain) -> &Boundary {
+        &self.boundaries[domain.0.map_or(0, |(_, here)| here as usize)]
+    }
+
+    /// The number of the first face of a patch in the whole mesh.
+    pub fn start(&self, patch: usize) -> u64 {
+        self.starts[patch]
+    }
 }
 
-/// Visits the cells of a directory with their squares.
+/// Visits cells of a tree, given by ascending numbers, with their squares.
 ///
 /// # Errors
 /// The first error of `visit`, or the user's interrupt.
 pub fn visit(
-    model: &Model,
-    domain: Domain,
-    mut visit: impl FnMut(u32, &Around, &mut Vec<Square>) -> Result<(), ExportError>,
+    tree: &Tree,
+    cells: impl Iterator<Item = u32>,
+    options: &Options<'_>,
+    mut visit: impl FnMut(u32, &Around, &[Square]) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let mut squares = Vec::new();
     let mut until_look = 0u32;
-    walk(&model.tree, domain.cells(model.tree.cells()), &mut |cell, around| {
+    walk(tree, cells, &mut |cell, around| {
         if until_look == 0 {
             until_look = 1 << 14;
-            model.options.check()?;
+            options.check()?;
         }
         until_look -= 1;
         squares.clear();
-        faces::squares(&model.tree, around, &mut squares);
-        visit(cell, around, &mut squares)
+        faces::squares(tree, around, &mut squares);
+        visit(cell, around, &squares)
     })
 }
 
-/// Replaces `owned` by the faces that a cell owns, each with the cell across: those on its high sides, because that cell
-/// has the higher number. They are in the order of the mesh.
-pub fn owned(squares: &[Square], owned: &mut Vec<(u32, Square)>) {
-    owned.clear();
-    let high = squares.iter().filter(|s| s.is_high);
-    owned.extend(high.filter_map(|square| Some((square.across.as_cell()?, *square))));
-    owned.sort_unstable_by_key(|&(across, _)| across);
+/// Visits the faces of a list.
+///
+/// # Errors
+/// As [`visit`].
+pub fn visit_faces(
+    model: &Model,
+    faces: &FaceList,
+    mut face: impl FnMut(&Face, &Square) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    let mut next = faces.iter();
+    let cells = faces.iter().map(|face| face.cell);
+    visit(&model.tree, cells, model.options, |_, _, squares| {
+        let of_cell = next.next().expect("a cell is visited once per face");
+        face(&of_cell, &squares[of_cell.square])
+    })
 }
 
-/// Collects the faces at the boundary of every directory, and counts and numbers the others.
+/// Replaces `owned` by the faces that a cell owns: the cell across and the index of the square. They are those on the cell's high sides, because the cell there
+/// has the higher number, and are in the order of the mesh.
+pub fn owned(squares: &[Square], owned: &mut Vec<(u32, usize)>) {
+    owned.clear();
+    let high = squares.iter().enumerate().filter(|(_, square)| square.is_high);
+    owned.extend(high.filter_map(|(index, square)| Some((square.across.as_cell()?, index))));
+    owned.sort_unstable();
+}
+
+/// Numbers the points, collects the faces at the boundary of every directory, and counts and numbers the others.
 ///
 /// # Errors
 /// If the user interrupts.
 pub fn survey(
-    model: &Model,
+    model: &mut Model,
     patches: &mut Patches,
     distribution: Option<&Distribution>,
 ) -> Result<Survey, ExportError> {
     let directories = distribution.map_or(1, Distribution::processors);
     let place = |cell| distribution.map_or(0, |distribution| distribution.place(cell).0);
     let empty = || Boundary {
-        by_patch: patches.names.iter().map(|_| Vec::new()).collect(),
+        by_patch: patches.names.iter().map(|_| FaceList::default()).collect(),
         ..Boundary::default()
     };
     let mut boundaries: Vec<Boundary> = (0..directories).map(|_| empty()).collect();
     let mut of_patches = vec![0; patches.names.len()];
     let (mut runs, mut last) = (Vec::new(), None);
     let (mut of_cell, mut number) = (Vec::new(), 0);
-    visit(model, Domain(None), |cell, _, squares| {
+    let mut points = Points::default();
+    visit(&model.tree, 0..model.tree.cells(), model.options, |cell, around, squares| {
+        faces::insert_corners(&around.octant, squares, &mut points);
         let here = place(cell);
         if last.replace(here) != Some(here) {
             runs.push((cell, number));
@@ -159,32 +182,32 @@ pub fn survey(
         owned(squares, &mut of_cell);
         for &(across, square) in &of_cell {
             let there = place(across);
-            let mut add = |here: u32, there: u32, face: Face| {
-                boundaries[here as usize].by_processor.entry(there).or_default().push(face);
-            };
             if here == there {
                 boundaries[here as usize].internal += 1;
             } else {
-                add(here, there, Face { cell, square, number });
-                let seen_from_there = Square { is_high: false, ..square };
-                add(there, here, Face { cell: across, square: seen_from_there, number });
+                for (of, with) in [(here, there), (there, here)] {
+                    let between = boundaries[of as usize].by_processor.entry(with).or_default();
+                    between.push(Face { cell, square, number });
+                }
             }
             number += 1;
         }
-        for &square in squares.iter().filter(|square| square.across.as_cell().is_none()) {
-            let patch = patches.of(&square);
-            let face = Face { cell, square, number: of_patches[patch] };
+        let at_boundary = |(_, square): &(usize, &Square)| square.across.as_cell().is_none();
+        for (index, square) in squares.iter().enumerate().filter(at_boundary) {
+            let patch = patches.of(square);
+            let face = Face { cell, square: index, number: of_patches[patch] };
             boundaries[here as usize].by_patch[patch].push(face);
             of_patches[patch] += 1;
         }
         Ok(())
     })?;
+    points.number();
+    model.points = points;
     // The patches follow the faces between cells.
-    for (patch, faces) in of_patches.into_iter().enumerate() {
-        for boundary in &mut boundaries {
-            boundary.by_patch[patch].iter_mut().for_each(|face| face.number += number);
-        }
+    let mut starts = vec![number];
+    for faces in of_patches {
         number += faces;
+        starts.push(number);
     }
-    Ok(Survey { boundaries, runs, faces: number })
+    Ok(Survey { boundaries, runs, starts })
 }

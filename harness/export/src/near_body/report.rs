@@ -189,10 +189,12 @@ impl fmt::Display for Report {
         let Some(Ranks { cells, lambda_cells, lambda_faces, .. }) = &self.ranks else {
             return writeln!(f, "the ranks of the cells are unknown");
         };
-        writeln!(
-            f,
-            "{} ranks: lambda {lambda_cells:.3} by cells, {lambda_faces:.3} by exposed faces",
-            cells.len()
-        )
+        match cells.len() {
+            1 => writeln!(f, "one rank, which has all cells and exposed faces"),
+            ranks => writeln!(
+                f,
+                "{ranks} ranks: lambda {lambda_cells:.3} by cells, {lambda_faces:.3} by exposed faces"
+            ),
+        }
     }
 }

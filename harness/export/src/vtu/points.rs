@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::brick::{Point, place};
 use crate::leaf::Leaf;
 
 /// Corners of a hexahedron in VTK's order, in cell edges.
@@ -17,7 +18,12 @@ pub struct Points {
     pub packed: Vec<u64>,
     /// Eight numbers for each leaf, in VTK's order.
     pub connectivity: Vec<u32>,
-    numbers: FxHashMap<u64, u32>,
+    /// Index of each brick by its key.
+    index: FxHashMap<u64, usize>,
+    /// One more than the number of each point of a brick, or 0. Points that are searched one after the other are near each other in memory.
+    bricks: Vec<[u32; 64]>,
+    /// Key and index of the brick that was searched last.
+    last: (u64, usize),
 }
 
 impl Points {
@@ -25,7 +31,9 @@ impl Points {
     pub fn set(&mut self, mut leaves: &[Leaf]) {
         self.packed.clear();
         self.connectivity.clear();
-        self.numbers.clear();
+        self.index.clear();
+        self.bricks.clear();
+        self.last = (u64::MAX, 0);
         while !leaves.is_empty() {
             let depth = (1..=DEPTH_MAX).take_while(|&depth| is_block(leaves, depth)).last();
             let depth = depth.unwrap_or(0);
@@ -45,7 +53,7 @@ impl Points {
             let steps = [index % along, index / along % along, index / along / along];
             let at = [0, 1, 2].map(|a| first.corner[a] + first.edge() * steps[a] as u32);
             let is_inner = steps.iter().all(|&step| 0 < step && step < along - 1);
-            *number = if is_inner { self.push(packed(at)) } else { self.number(packed(at)) };
+            *number = if is_inner { self.push(at) } else { self.number(at) };
         }
         let shift = first.edge().trailing_zeros();
         for Leaf { octant, .. } in block {
@@ -58,17 +66,25 @@ impl Points {
     }
 
     /// The number of a point, which is a new one if the point is new.
-    fn number(&mut self, packed: u64) -> u32 {
-        let Self { packed: points, numbers, .. } = self;
-        *numbers.entry(packed).or_insert_with(|| {
-            points.push(packed);
-            points.len() as u32 - 1
-        })
+    fn number(&mut self, point: Point) -> u32 {
+        let (key, at) = place(point);
+        if self.last.0 != key {
+            let brick = *self.index.entry(key).or_insert(self.bricks.len());
+            if brick == self.bricks.len() {
+                self.bricks.push([0; 64]);
+            }
+            self.last = (key, brick);
+        }
+        let (brick, at) = (self.last.1, at as usize);
+        if self.bricks[brick][at] == 0 {
+            self.bricks[brick][at] = self.push(point) + 1;
+        }
+        self.bricks[brick][at] - 1
     }
 
     /// The number of a point that is not searched again.
-    fn push(&mut self, packed: u64) -> u32 {
-        self.packed.push(packed);
+    fn push(&mut self, point: Point) -> u32 {
+        self.packed.push(packed(point));
         self.packed.len() as u32 - 1
     }
 }

@@ -9,8 +9,10 @@ use crate::figure::palette::hex;
 use crate::section::Planar;
 use std::collections::BTreeSet;
 
-/// Space for the ticks and the label of the vertical axis, and at the right.
+/// Least space for the ticks and the label of the vertical axis, and space at the right.
 const SIDES: (f64, f64) = (200.0, 40.0);
+/// Space for the label of the vertical axis and for its ticks, without their labels.
+const BESIDE_TICKS: f64 = 100.0;
 /// Greatest height of the window: it and its margins fit on a page.
 const HEIGHT_MAX: f64 = 1650.0;
 /// Space below the window for ticks, label and scale.
@@ -26,10 +28,17 @@ fn width(text: &str) -> f64 {
     text.chars().count() as f64 * SIZE * 0.62
 }
 
+/// Left edge of a window on the page.
+fn left(window: &[Planar; 2]) -> f64 {
+    let ticks = Ticks::of(window[0][1], window[1][1]);
+    let widest = ticks.values().iter().map(|&t| width(&ticks.label(t))).fold(0.0, f64::max);
+    SIDES.0.max(BESIDE_TICKS + widest)
+}
+
 /// Units of the page per unit of the user in a window.
 pub fn scale(window: &[Planar; 2]) -> f64 {
     let [across, up] = [0, 1].map(|i| window[1][i] - window[0][i]);
-    ((f64::from(WIDTH) - SIDES.0 - SIDES.1) / across).min(HEIGHT_MAX / up)
+    ((f64::from(WIDTH) - left(window) - SIDES.1) / across).min(HEIGHT_MAX / up)
 }
 
 /// The picture as an SVG document.
@@ -42,6 +51,7 @@ pub fn svg(picture: &Picture) -> String {
 /// The place of the window on the page.
 struct Page<'a> {
     picture: &'a Picture,
+    left: f64,
     top: f64,
     scale: f64,
 }
@@ -51,7 +61,7 @@ impl Page<'_> {
     fn at(&self, [u, v]: Planar) -> (f64, f64) {
         let [low, high] = self.picture.window;
         let tenth = |value: f64| (value * 10.0).round() / 10.0;
-        (tenth(SIDES.0 + (u - low[0]) * self.scale), tenth(self.top + (high[1] - v) * self.scale))
+        (tenth(self.left + (u - low[0]) * self.scale), tenth(self.top + (high[1] - v) * self.scale))
     }
 
     /// The rectangle of a square within the window; `None` if nothing of it is visible.
@@ -67,7 +77,8 @@ impl Page<'_> {
 /// Draws the picture; returns its height.
 pub fn draw(picture: &Picture, sheet: &mut dyn Sheet) -> u32 {
     let top = legend(picture, sheet) + 14.0;
-    let page = Page { picture, top, scale: scale(&picture.window) };
+    let left = left(&picture.window);
+    let page = Page { picture, left, top, scale: scale(&picture.window) };
     // Where there is no leaf, the page is white, on a dark one too: the colours are chosen for it.
     let (low, high) = (page.at(picture.window[0]), page.at(picture.window[1]));
     sheet.rectangles(&[[low.0, high.1, high.0 - low.0, low.1 - high.1]], "#FFFFFF", None);
@@ -85,7 +96,8 @@ pub fn draw(picture: &Picture, sheet: &mut dyn Sheet) -> u32 {
 fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
     let (entries, remark) = picture.colour.legend(&picture.key);
     let right = f64::from(WIDTH) - SIDES.1;
-    let (mut x, mut y) = (SIDES.0, ROW / 2.0);
+    let left = left(&picture.window);
+    let (mut x, mut y) = (left, ROW / 2.0);
     let title = if remark.is_empty() { picture.colour.to_string() } else { remark };
     sheet.text(&title, (x, y), Anchor::Start);
     x += width(&title) + 40.0;
@@ -94,7 +106,7 @@ fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
     for (name, fill) in names.chain(line.map(|name| (name, None))) {
         let entry = SYMBOL + 14.0 + width(name) + 30.0;
         if x + entry > right {
-            (x, y) = (SIDES.0, y + ROW);
+            (x, y) = (left, y + ROW);
         }
         match fill {
             Some(fill) => {
@@ -179,7 +191,7 @@ fn below(page: &Page, sheet: &mut dyn Sheet) {
     let Picture { window: [low, high], squares, slice, root, .. } = page.picture;
     let y = page.at(*low).1 + 170.0;
     let length = Ticks::of(0.0, high[0] - low[0]).step;
-    let (left, right) = (SIDES.0, SIDES.0 + length * page.scale);
+    let (left, right) = (page.left, page.left + length * page.scale);
     let bar = [
         [(left, y), (right, y)],
         [(left, y - 12.0), (left, y + 12.0)],
@@ -190,9 +202,10 @@ fn below(page: &Page, sheet: &mut dyn Sheet) {
     sheet.text(&label, (right + 16.0, y), Anchor::Start);
     let plane = super::plane_name(root, *slice);
     sheet.text(&plane, (right + 16.0 + width(&label) + 60.0, y), Anchor::Start);
+    let noun = if squares.leaves == 1 { "cell" } else { "cells" };
     let merged = if squares.is_merged { ", the smallest merged" } else { "" };
-    let cells = format!("{} cells in the plane{merged}", squares.leaves);
-    sheet.text(&cells, (SIDES.0, y + ROW), Anchor::Start);
+    let cells = format!("{} {noun} in the plane{merged}", squares.leaves);
+    sheet.text(&cells, (page.left, y + ROW), Anchor::Start);
 }
 
 /// Ticks at multiples of a round step.

@@ -222,7 +222,12 @@ fn plane_name(root: &Root, slice: Slice) -> String {
     let resolved = 10f64.powf((root.edge / UNITS_PER_EDGE as f64).log10().ceil());
     // Adding zero turns -0 into 0.
     let at = (at / resolved).round() * resolved + 0.0;
-    format!("{} = {}", ["x", "y", "z"][slice.axis], short(at))
+    let is_short = at == 0.0 || (1e-6..1e9).contains(&at.abs());
+    let decimals = (-resolved.log10()).round().max(0.0) as usize;
+    // Parsing removes the zeros at the end.
+    let shown = format!("{at:.decimals$}").parse().ok().filter(|_: &f64| is_short);
+    let shown = shown.map_or_else(|| short(at), |at| at.to_string());
+    format!("{} = {shown}", ["x", "y", "z"][slice.axis])
 }
 
 /// The segments in which the plane cuts the facets. The plane is moved into the layer of leaves that it cuts, so that

@@ -30,7 +30,7 @@ pub struct Square {
     pub level: u8,
     /// Greatest value of its leaves.
     pub value: u32,
-    /// Number of its leaves that the plane cuts.
+    /// Number of its leaves that the plane cuts, where leaves below the deepest level of the request are one.
     pub leaves: u64,
 }
 
@@ -73,9 +73,9 @@ pub struct Squares {
     pub level_outlined: u8,
     /// Deepest level of a square; deeper leaves are merged.
     level_drawn: u8,
-    /// Whether leaves were merged.
+    /// Whether leaves that are too small for the page were merged.
     pub is_merged: bool,
-    /// Number of leaves that the plane cuts.
+    /// Number of leaves that the plane cuts, where leaves below the deepest level of the request are one.
     pub leaves: u64,
 }
 
@@ -105,10 +105,12 @@ impl Squares {
         let level_outlined = deepest(EDGE_OUTLINED).min(level_drawn);
         let mut found =
             Self { squares: Vec::new(), level_outlined, level_drawn, is_merged: false, leaves: 0 };
+        let mut last = None;
         mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
-            found.is_merged |= leaf.octant.level > detail.level_max;
             let octant = leaf.octant.ancestor(leaf.octant.level.min(detail.level_max));
-            found.add(square(&Leaf { octant, ..leaf }, axes, colour));
+            // Leaves merged to the deepest level are one cell of the mesh that is shown.
+            let leaves = u64::from(last.replace(octant) != Some(octant));
+            found.add(Square { leaves, ..square(&Leaf { octant, ..leaf }, axes, colour) });
             match found.leaves.is_multiple_of(LEAVES_PER_CHECK) && interrupt::requested() {
                 true => Err(ExportError::Interrupted),
                 false => Ok(()),

@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn the_verdict_comes_last() {
-        let verdict = "1 cases: 1 checks hold, 1 fail, 1 left out, in 2.0 s: FAILED\n";
+        let verdict = "1 case: 1 check holds, 1 fail, 1 left out, in 2.0 s: FAILED\n";
         assert!(table(&sample()).ends_with(verdict));
     }
 }

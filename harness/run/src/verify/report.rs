@@ -153,7 +153,9 @@ impl Report {
         let all = self.cases.iter().flat_map(|case| &case.checks);
         let Tally { pass, fail, left_out } = all.collect();
         let cases = self.cases.len();
-        let counts = format!("{cases} cases: {pass} checks hold, {fail} fail, {left_out} left out");
+        let noun = if cases == 1 { "case" } else { "cases" };
+        let checks = if pass == 1 { "check holds" } else { "checks hold" };
+        let counts = format!("{cases} {noun}: {pass} {checks}, {fail} fail, {left_out} left out");
         let end = match self.exit_code() {
             EXIT_HOLDS if pass == 0 => "nothing was checked",
             EXIT_HOLDS => "all hold",

@@ -131,3 +131,67 @@ impl Schedule for Adversary {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Turns and arrivals that a seed chooses among three, all and two of five ranks.
+    fn choices(seed: u64) -> Vec<usize> {
+        let mut adversary = Adversary::new(seed, 5);
+        let mut all = Vec::new();
+        for step in 0..40 {
+            let ready: &[usize] = [&[0, 2, 4][..], &[0, 1, 2, 3, 4], &[1, 3], &[2]][step % 4];
+            all.push(adversary.next(ready));
+            let words = [[0]; 5];
+            let mut messages: Vec<Arrival> = (0..5).map(|from| (from, &words[from][..])).collect();
+            adversary.arrange(0, &mut messages[..5 - step % 5]);
+            all.extend(messages.iter().map(|m| m.0));
+        }
+        all
+    }
+
+    /// A failure is replayed from its seed, also by a later program.
+    #[test]
+    fn a_seed_means_the_same_schedule_for_ever() {
+        let fold = |seed| {
+            choices(seed).into_iter().fold(seed, |sum: u64, choice| {
+                (sum.rotate_left(5) ^ choice as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            })
+        };
+        let sums: Vec<u64> = (0..48).map(fold).collect();
+        let first: Vec<usize> = choices(1).into_iter().take(18).collect();
+        assert_eq!(first, [0, 3, 4, 2, 1, 0, 0, 3, 2, 1, 0, 4, 0, 2, 0, 1, 3, 4]);
+        assert_eq!(
+            sums.iter().fold(0, |all: u64, sum| all.rotate_left(1) ^ sum),
+            0x57195d1ebfbcf708,
+            "{sums:?}"
+        );
+    }
+
+    #[test]
+    fn patterns_of_turns_and_arrivals_are_kept() {
+        let with = |turns, arrivals| Adversary { random: 7, ranks: 5, turns, arrivals, change: 0 };
+        let turn = |turns, ready: &[usize]| with(turns, Arrivals::Random).next(ready);
+        assert_eq!(turn(Turns::RoundRobin, &[1, 3, 4]), 0);
+        assert_eq!(turn(Turns::Reversed, &[1, 3, 4]), 2);
+        assert_eq!(turn(Turns::Preferred(3), &[1, 3, 4]), 1);
+        assert_eq!(turn(Turns::Starved(3), &[3]), 0);
+        let mut starved = with(Turns::Starved(3), Arrivals::Random);
+        let turns: std::collections::BTreeSet<usize> =
+            (0..50).map(|_| starved.next(&[1, 3, 4])).collect();
+        assert!(turns.into_iter().eq([0, 2]));
+        let senders = |arrivals| {
+            let mut messages: Vec<Arrival> = (0..4).map(|from| (from, &[0][..])).collect();
+            with(Turns::Random, arrivals).arrange(0, &mut messages);
+            messages.iter().map(|m| m.0).collect::<Vec<_>>()
+        };
+        assert_eq!(senders(Arrivals::BySender), [0, 1, 2, 3]);
+        assert_eq!(senders(Arrivals::Reversed), [3, 2, 1, 0]);
+        assert_eq!(senders(Arrivals::Late(1))[3], 1);
+        assert_eq!(senders(Arrivals::Early(2))[0], 2);
+        let mut sorted = senders(Arrivals::Random);
+        sorted.sort_unstable();
+        assert_eq!(sorted, [0, 1, 2, 3]);
+    }
+}

@@ -223,3 +223,24 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
     let error = write(&mesh, &Selection::default(), &target, &options).unwrap_err().to_string();
     assert!(error.contains("another root"), "{error}");
 }
+
+#[test]
+fn crossing_cells_and_solids_without_faces_produce_warnings() {
+    let notes = |side: Side, selection: Selection| {
+        let (dir, mesh) =
+            on_disk(&leaf_set(vec![words_with_sides(|o| o.level < 1, |_| Some(side))]));
+        write(&mesh, &selection, &dir.path().join("polyMesh"), &options(ASCII)).unwrap().notes
+    };
+    let all = notes(Side::Crossing, Selection::default());
+    let expected = [
+        "faces of each patch: xMin 4, ",
+        "warning: patches without faces",
+        "warning: the geometry crosses",
+    ];
+    assert_eq!(all.len(), expected.len(), "{all:?}");
+    for (note, expected) in all.iter().zip(expected) {
+        assert!(note.starts_with(expected), "{note}");
+    }
+    assert!(all[1].ends_with(": body"), "{}", all[1]);
+    assert_eq!(notes(Side::Outside, Selection::default()).len(), 2);
+}

@@ -74,22 +74,19 @@ fn complex_in(dir: &Path) -> Complex {
 
 /// The complex of sorted words, without files. Faces are in the order of their owners.
 fn complex_of(words: &[u64]) -> Complex {
-    let mut builder = Builder::default();
-    words.iter().for_each(|&w| builder.push(&word::octant(w), true));
     let mut model = Model {
-        tree: builder.finish(),
-        words: words.to_vec(),
-        ranks: Vec::new(),
+        tree: Tree::new(&contract::tree::Tree::of_words(words)),
+        ranks: None,
         points: Points::default(),
         root: Root { origin: [0.0; 3], edge: 1.0 },
         has_sides: true,
         options: &options(ASCII),
     };
-    connect(&mut model, options::Regions::All).unwrap();
+    survey(&mut model, &mut Patches::new(None, false).unwrap(), None).unwrap();
     let points = model.points.iter().map(|p| p.map(f64::from)).collect();
     let mut complex = Complex { points, ..Complex::default() };
     let (mut boundary, mut polygon) = (Vec::new(), Vec::new());
-    visit(&model, Domain(None), |cell, _, squares| {
+    visit(&model.tree, 0..model.tree.cells(), model.options, |cell, _, squares| {
         for square in squares {
             square.polygon(&model.points, !square.is_high, &mut polygon);
             let vertices = polygon.iter().map(|&(_, number)| number as usize).collect();

@@ -1,0 +1,145 @@
+//! Moves the points of a path to the middle of a long passage.
+//!
+//! A grid is searched between the points where the path enters and leaves it. In a passage longer than the grid these lie off the
+//! middle, like all points that are centres of leaves, and limit what the grid can find. So every point is moved to where
+//! the passage is widest, in the plane across the path.
+
+use super::clearance::{Clearance, Point};
+use super::path::{PRECISION, Spot};
+use crate::geometry::distance::{dot, length, sub};
+
+/// Places that are tried around a point.
+const AROUND: u32 = 16;
+
+/// Angle between successive trials, so that no direction is missed: the golden angle.
+const TURN: f64 = 2.399_963_229_728_653;
+
+/// Moves of a point at most.
+const MOVES_MAX: usize = 200;
+
+/// A point moves by no more than this, in clearances.
+const REACH: f64 = 2.0;
+
+/// More facets than this near a point are searched in the tree.
+const FACETS_FEW: usize = 128;
+
+/// Distance of successive points that need none between them, in clearances.
+const GAP: f64 = 0.5;
+
+/// Points between two, at most: 2^8 - 1.
+const HALVINGS_MAX: u32 = 8;
+
+/// The point of greatest clearance near a point, in the plane through it that has this normal. Every move ends in the ball
+/// around the point before it.
+fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
+    let start = clearance.at(from, f64::INFINITY);
+    let near = clearance.near(from, REACH * start, FACETS_FEW);
+    let free = |at: Point| match near.is_empty() {
+        true => clearance.at(at, f64::INFINITY),
+        false => near.iter().map(|t| t.squared(at)).fold(f64::INFINITY, f64::min).sqrt(),
+    };
+    let [u, v] = plane(normal);
+    let step_min = PRECISION / 2.0 * start;
+    let mut best = Spot { at: from, clearance: start, step: step_min };
+    let (mut step, mut turn) = (start / 2.0, 0.0);
+    for _ in 0..MOVES_MAX {
+        if step < step_min {
+            break;
+        }
+        let around = (0..AROUND).map(|i| {
+            let angle = turn + f64::from(i) * std::f64::consts::TAU / f64::from(AROUND);
+            let (sin, cos) = angle.sin_cos();
+            let at = std::array::from_fn(|a| best.at[a] + step * (cos * u[a] + sin * v[a]));
+            Spot { at, clearance: free(at), step: step_min }
+        });
+        let within = around.filter(|spot| length(sub(spot.at, from)) <= REACH * start);
+        match within.max_by(|p, q| p.clearance.total_cmp(&q.clearance)) {
+            Some(spot) if spot.clearance > best.clearance => best = spot,
+            _ => step /= 2.0,
+        }
+        turn += TURN;
+    }
+    best
+}
+
+/// Two unit vectors across a direction.
+fn plane(normal: Point) -> [Point; 2] {
+    let least = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap_or(0);
+    let mut other = [0.0; 3];
+    other[least] = 1.0;
+    let u = unit(cross(normal, other));
+    [u, unit(cross(normal, u))]
+}
+
+fn cross(a: Point, b: Point) -> Point {
+    std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
+}
+
+fn unit(a: Point) -> Point {
+    let length = dot(a, a).sqrt();
+    if length > 0.0 { a.map(|c| c / length) } else { [0.0; 3] }
+}
+
+/// The widest place near a point, by moves in planes across the axes.
+pub fn widest_near(at: Point, clearance: &Clearance) -> Spot {
+    let mut best = across(at, [1.0, 0.0, 0.0], clearance);
+    for axis in [1, 2, 0, 1, 2] {
+        let mut normal = [0.0; 3];
+        normal[axis] = 1.0;
+        best = across(best.at, normal, clearance);
+    }
+    best
+}
+
+/// The path with points less than `below` from the facets moved to the middle, and with points between those that are far apart.
+pub fn centred(spots: &[Spot], below: f64, clearance: &Clearance) -> Vec<Spot> {
+    let passage = Passage { below, clearance };
+    let mut path: Vec<Spot> = Vec::new();
+    for (i, &spot) in spots.iter().enumerate() {
+        let moved = passage.moved(spot, direction(spots, i));
+        if let Some(&last) = path.last() {
+            passage.fill(last, moved, HALVINGS_MAX, &mut path);
+        }
+        path.push(moved);
+    }
+    path
+}
+
+struct Passage<'a> {
+    below: f64,
+    clearance: &'a Clearance<'a>,
+}
+
+impl Passage<'_> {
+    fn moved(&self, spot: Spot, direction: Point) -> Spot {
+        match spot.clearance < self.below {
+            true => across(spot.at, direction, self.clearance),
+            false => spot,
+        }
+    }
+
+    /// Appends points between two, without them.
+    fn fill(&self, from: Spot, to: Spot, halvings: u32, path: &mut Vec<Spot>) {
+        let (gap, least) = (sub(to.at, from.at), from.clearance.min(to.clearance));
+        if halvings == 0 || least >= self.below || length(gap) <= GAP * least {
+            return;
+        }
+        let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
+        let clearance = self.clearance.at(at, f64::INFINITY);
+        let middle = self.moved(Spot { at, clearance, step: f64::INFINITY }, gap);
+        self.fill(from, middle, halvings - 1, path);
+        path.push(middle);
+        self.fill(middle, to, halvings - 1, path);
+    }
+}
+
+/// The direction of the path at a point: between the points before and after it that are at least its clearance away.
+fn direction(spots: &[Spot], i: usize) -> Point {
+    let is_far = |spot: &&Spot| length(sub(spot.at, spots[i].at)) >= spots[i].clearance;
+    let before = spots[..i].iter().rev().find(is_far).or(spots.first());
+    let after = spots[i..].iter().find(is_far).or(spots.last());
+    match (before, after) {
+        (Some(before), Some(after)) => sub(after.at, before.at),
+        _ => [1.0, 0.0, 0.0],
+    }
+}
