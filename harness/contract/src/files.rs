@@ -115,7 +115,8 @@ impl Staging {
         let mut staged = publications();
         let mut builder = tempfile::Builder::new();
         let builder = builder.permissions(Permissions::from_mode(0o777));
-        // The error itself names the temporary directory, which means nothing to the user.
+        // Errors of `tempdir_in` name the temporary directory, which means nothing to the user.
+        fs::metadata(directory)?;
         let dir = builder.tempdir_in(directory).map_err(|error| error.kind())?;
         staged.push(dir.path().to_owned());
         Ok(Self(dir))
