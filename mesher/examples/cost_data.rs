@@ -11,6 +11,7 @@ use mesher::kept::Kept;
 use mesher::partition::cost::Counts;
 use mesher::partition::initial::{self, Partition};
 use mesher::partition::{Division, Partitioner, Weights, repartition};
+use mesher::quantise::Quantised;
 use mesher::voxelise::BinnedFacets;
 use mesher::{grade, ingest, quantise, refine, sides};
 use std::path::Path;
@@ -18,7 +19,7 @@ use std::path::Path;
 /// Phases 1 to 7 of a case on this rank: the counts, and the CPU time of sides and of gradation in nanoseconds.
 fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let slice = ingest::read(&case.source, comm)?;
-    let (rules, _, facets) = quantise::quantise(case, slice, comm)?;
+    let Quantised { rules, facets, .. } = quantise::quantise(case, slice, comm)?;
     let division = Division {
         partitioner: Partitioner::Morton,
         weights: Weights::Rebalance,
