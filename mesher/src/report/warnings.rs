@@ -62,6 +62,20 @@ fn flow_at_boundary(has_seeds: bool) -> String {
     warning.to_owned()
 }
 
+fn flow_without_far_field() -> String {
+    "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
+     to the far field, or set keep = inside if the flow is internal"
+        .to_owned()
+}
+
+fn body_cut(facets: u64, total: u64) -> String {
+    let verb = if facets == 1 { "lies" } else { "lie" };
+    format!(
+        "{facets} of {total} facets {verb} wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the \
+         root unless the body is meant to extend beyond it"
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,18 +107,4 @@ mod tests {
         assert!(flow_at_boundary(true).starts_with("the flow reaches"));
         assert!(flow_at_boundary(false).starts_with("a component that is inside"));
     }
-}
-
-fn flow_without_far_field() -> String {
-    "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
-     to the far field, or set keep = inside if the flow is internal"
-        .to_owned()
-}
-
-fn body_cut(facets: u64, total: u64) -> String {
-    let verb = if facets == 1 { "lies" } else { "lie" };
-    format!(
-        "{facets} of {total} facets {verb} wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the \
-         root unless the body is meant to extend beyond it"
-    )
 }
