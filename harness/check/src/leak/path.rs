@@ -200,7 +200,12 @@ impl Path {
         let least = widest.iter().map(|&place| width(place, place)).fold(f32::INFINITY, f32::min);
         let route = search::shortest(&grid, from, goal, least, &mut width, memory, stop)?;
         let route = route.expect("the widest path is as wide");
-        let is_at_end = [from, to].iter().any(|&end| width(end, end) <= least);
+        // An end from a coarser grid is no limit if the grid's path is wider than before.
+        let is_stuck = least <= self.throat().clearance as f32 * (1.0 + 1e-6);
+        let ends = [(from, self.spots[first]), (to, self.spots[last])];
+        let is_at_end = ends
+            .iter()
+            .any(|&(end, spot)| width(end, end) <= least && (is_stuck || spot.step.is_infinite()));
         // Points near the grid's edge depend on where the path enters it, so they are not final.
         let coarse = self.spots[first].step.max(self.spots[last].step);
         let spot = |&place: &u32| Spot {
