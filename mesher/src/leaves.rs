@@ -3,9 +3,10 @@
 use crate::comm::{Comm, agree};
 use crate::digest::Digests;
 use crate::error::Error;
+use crate::manifest::{self, Manifest};
 use crate::mesh::Mesh;
 use crate::stream::Counts;
-use crate::write::{self, Manifest, OutDir, Written};
+use crate::write::{OutDir, Written};
 
 /// Sums over all ranks.
 pub struct Totals {
@@ -51,7 +52,7 @@ pub fn finish(
     comm: &dyn Comm,
 ) -> Result<Totals, Error> {
     let counts = counts.gather(comm);
-    let (digests, parts) = write::gather(written, comm);
+    let (digests, parts) = manifest::gather(written, comm);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
             let (rules, summary) = (&mesh.rules, &mesh.sides.summary);

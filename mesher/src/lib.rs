@@ -26,6 +26,7 @@ pub mod ingest;
 pub mod kept;
 pub mod lattice;
 pub mod leaves;
+pub mod manifest;
 mod mesh;
 pub mod octant;
 pub mod partition;

@@ -1,4 +1,4 @@
-//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the manifest.
+//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the [manifest](crate::manifest).
 //!
 //! Invariants of the output directory:
 //! - one run alone writes to it ([`Claim`]);
@@ -7,12 +7,8 @@
 //! - after an error or an interrupt, none of the mesh's files remains.
 
 use crate::comm::{Comm, agree};
-use crate::digest::{Digests, hex};
+use crate::digest::Digests;
 use crate::error::Error;
-use crate::lattice::{Enclosed, Keep, Rules};
-use crate::octant::LEVEL_MAX;
-use crate::sides::Summary;
-use crate::stream::Counts;
 use files::{Claim, ClaimError, Draft};
 use npyz::WriterBuilder;
 use serde::Serialize;
@@ -127,7 +123,7 @@ impl OutDir {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn manifest(&self, manifest: &Manifest) -> Result<(), Error> {
+    pub fn manifest(&self, manifest: &impl Serialize) -> Result<(), Error> {
         let write = |to: &mut dyn Write| write_json(to, manifest);
         self.claim.commit(write).map_err(|e| output(&self.path, &e))
     }
@@ -239,162 +235,6 @@ fn header(leaves: u64) -> io::Result<Vec<u8>> {
     head.extend(newline);
     head[BEFORE - 2..BEFORE].copy_from_slice(&((length - BEFORE) as u16).to_le_bytes());
     Ok(head)
-}
-
-/// Contents of `mesh.json`. Boxes are in lattice units, the root is in the geometry's unit.
-#[derive(Clone, Debug, Serialize)]
-pub struct Manifest {
-    schema: &'static str,
-    program: String,
-    tree: &'static str,
-    root: RootEntry,
-    level_surface: u32,
-    layer_cells_min: u32,
-    keep: Keep,
-    keep_crossing: bool,
-    boxes: Vec<BoxEntry>,
-    leaves: u64,
-    leaves_by_level: Vec<u64>,
-    leaves_by_side: SideEntry,
-    seeds: Vec<[i64; 3]>,
-    enclosed: Enclosed,
-    components: ComponentsEntry,
-    components_ambiguous: AmbiguousEntry,
-    digest: String,
-    octant_digests: Vec<String>,
-    parts: Vec<PartEntry>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    hyper_tree_grid: Option<&'static str>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct RootEntry {
-    origin: [f64; 3],
-    edge: f64,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct BoxEntry {
-    min: [i64; 3],
-    max: [i64; 3],
-    level: u32,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct SideEntry {
-    outside: u64,
-    inside: u64,
-    crossing: u64,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct ComponentsEntry {
-    outside: u64,
-    inside: u64,
-    enclosed: EnclosedEntry,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct EnclosedEntry {
-    count: u64,
-    leaves: u64,
-    example: Option<[f64; 3]>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct AmbiguousEntry {
-    count: u64,
-    example: Option<[f64; 3]>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct PartEntry {
-    file: String,
-    leaves: u64,
-    digest: String,
-}
-
-/// A part: its number of leaves, and the upper and the lower half of its digest.
-type PartWords = [u64; 3];
-
-/// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
-pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
-    let split = |d: u128| [(d >> 64) as u64, d as u64];
-    let whole = split(mine.digests.whole());
-    let mut words = vec![mine.leaves, whole[0], whole[1]];
-    // The leaves of a rank lie in few of the octants.
-    let octants = (0..).zip(&mine.digests.octants).filter(|(_, d)| **d != 0);
-    words.extend(octants.flat_map(|(i, &d)| [i, split(d)[0], split(d)[1]]));
-    let mut digests = Digests::default();
-    let mut parts = Vec::new();
-    for (_, theirs) in comm.all_gather(&words).messages() {
-        let (whole, octants) = theirs.split_at(3);
-        parts.push([whole[0], whole[1], whole[2]]);
-        let octants = octants.chunks_exact(3);
-        digests.merge(octants.map(|w| (w[0] as usize, u128::from(w[1]) << 64 | u128::from(w[2]))));
-    }
-    (digests, parts)
-}
-
-impl Manifest {
-    /// The manifest of a mesh with these leaves, digests and parts; parts and tree are named as far as `output` has them.
-    pub fn new(
-        output: &Output,
-        rules: &Rules,
-        base: bool,
-        counts: &Counts,
-        summary: &Summary,
-        digests: &Digests,
-        parts: &[PartWords],
-    ) -> Self {
-        let &Summary { outside, inside, enclosed, ambiguous, .. } = summary;
-        let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
-        let entry = |(i, p): (usize, &PartWords)| PartEntry {
-            file: part_name(i),
-            leaves: p[0],
-            digest: hex(u128::from(p[1]) << 64 | u128::from(p[2])),
-        };
-        Self {
-            schema: "octree-leaf-set/1",
-            program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
-            tree: if base { "base" } else { "final" },
-            root: RootEntry { origin: rules.root.origin, edge: rules.root.edge },
-            level_surface: rules.level_surface,
-            layer_cells_min: rules.layer_cells_min,
-            keep: rules.keep,
-            keep_crossing: rules.keep_crossing,
-            boxes: rules
-                .boxes
-                .iter()
-                .map(|b| BoxEntry { min: b.min, max: b.max, level: b.level })
-                .collect(),
-            leaves: counts.total(),
-            leaves_by_level: counts.by_level[..=LEVEL_MAX as usize]
-                .iter()
-                .map(|l| l.iter().sum())
-                .collect(),
-            leaves_by_side: SideEntry { outside: side(0), inside: side(1), crossing: side(2) },
-            seeds: rules.seeds.iter().map(|seed| seed.lattice).collect(),
-            enclosed: rules.enclosed,
-            components: ComponentsEntry {
-                outside,
-                inside,
-                enclosed: EnclosedEntry {
-                    count: enclosed.map_or(0, |e| e.count),
-                    leaves: enclosed.map_or(0, |e| e.leaves),
-                    example: enclosed.map(|e| rules.root.locate(e.example)),
-                },
-            },
-            components_ambiguous: AmbiguousEntry {
-                count: ambiguous.map_or(0, |a| a.count),
-                example: ambiguous.map(|a| rules.root.locate(a.example)),
-            },
-            digest: hex(digests.whole()),
-            octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
-            parts: parts.iter().enumerate().filter(|_| output.words).map(entry).collect(),
-            hyper_tree_grid: output.tree.then_some(TREE),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,224 @@
+use super::*;
+use crate::testing::{octants_of, random_words, words_of};
+use proptest::prelude::*;
+
+#[test]
+fn a_handle_is_a_leaf_part_of_a_coarser_one_a_node_or_neither() {
+    for handle in [Handle::HOLE, Handle::OUTSIDE_ROOT] {
+        assert_eq!(
+            (handle.as_leaf(), handle.as_coarser_leaf(), handle.is_node()),
+            (None, None, false)
+        );
+    }
+    for kind in 0..=DELETED {
+        let leaf = Handle::leaf(kind);
+        assert_eq!(
+            (leaf.as_leaf(), leaf.as_coarser_leaf(), leaf.is_node()),
+            (Some(kind), None, false)
+        );
+        for level in 0..=crate::octant::LEVEL_MAX {
+            let part = Handle::coarser_leaf(kind, level);
+            assert_eq!(
+                (part.as_leaf(), part.as_coarser_leaf(), part.is_node()),
+                (None, Some((kind, level)), false)
+            );
+        }
+    }
+    for index in [0, 1, 1 << 30] {
+        let node = Handle::node(index);
+        assert_eq!((node.as_leaf(), node.as_coarser_leaf(), node.is_node()), (None, None, true));
+        assert_eq!(node.index(), index);
+    }
+}
+
+#[test]
+fn summaries_of_holes_leaves_and_parts_of_leaves_agree() {
+    let tree = Tree::default();
+    let of =
+        |handle| (tree.finest_level(handle, 7), tree.coarsest_level(handle, 7), tree.kinds(handle));
+    assert_eq!(of(Handle::HOLE), (0, NO_LEAF, HOLES));
+    assert_eq!(of(Handle::OUTSIDE_ROOT), (0, NO_LEAF, 0));
+    for kind in 0..=DELETED {
+        let coarsest = |level| if kind == DELETED { NO_LEAF } else { level };
+        assert_eq!(of(Handle::leaf(kind)), (7, coarsest(7), 1 << kind));
+        assert_eq!(of(Handle::coarser_leaf(kind, 4)), (4, coarsest(4), 1 << kind));
+        assert_eq!(tree.child(Handle::leaf(kind), 3, 7), Handle::coarser_leaf(kind, 7));
+        let part = Handle::coarser_leaf(kind, 4);
+        assert_eq!(tree.child(part, 3, 7), part);
+    }
+    for handle in [Handle::HOLE, Handle::OUTSIDE_ROOT] {
+        assert_eq!(tree.child(handle, 5, 2), handle);
+    }
+}
+
+#[test]
+fn a_deleted_leaf_bounds_no_level_from_above_and_is_a_kind() {
+    let mut builder = Builder::default();
+    for digit in 0..8 {
+        let child = Octant::ROOT.child(digit);
+        let kind = if digit == 2 { DELETED } else { 0 };
+        let octants =
+            if digit == 5 { (0..8).map(|d| child.child(d)).collect() } else { vec![child] };
+        for octant in octants {
+            builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
+        }
+    }
+    assert_eq!(builder.push_leaf(word::KEY_END - 1, 19, 0), Err(Refusal::Overlap));
+    assert_eq!(builder.push(25 << 2), Err(Refusal::Fault(word::WordError::LevelTooDeep(25))));
+    let tree = builder.finish();
+    let root = tree.root();
+    assert_eq!(
+        (tree.finest_level(root, 0), tree.coarsest_level(root, 0), tree.kinds(root)),
+        (2, 1, 1 | 1 << DELETED)
+    );
+    let deleted = tree.child(root, 2, 0);
+    assert_eq!((deleted.as_leaf(), tree.coarsest_level(deleted, 1)), (Some(DELETED), NO_LEAF));
+    let only = Tree::of_words(&[0]);
+    assert_eq!((only.nodes(), only.locate([5; 3])), (0, Some((Octant::ROOT, 0))));
+}
+
+#[test]
+fn many_distinct_nodes_are_stored_and_found_again() {
+    // Every leaf of level 4 has a kind of its own digits, so that most nodes differ.
+    let kind = |o: &Octant| (crate::digest::mix(word::key_of(o.corner)) % 3) as u64;
+    let mut words = words_of(|o| o.level < 5);
+    words.iter_mut().for_each(|w| *w |= kind(&word::octant(*w)));
+    let tree = Tree::of_words(&words);
+    assert!(tree.nodes() > 2048);
+    for &w in words.iter().step_by(11) {
+        assert_eq!(tree.locate(word::octant(w).corner), Some((word::octant(w), (w & 3) as Kind)));
+    }
+}
+
+#[test]
+fn equal_subtrees_are_stored_once() {
+    let level_4 = words_of(|octant| octant.level < 4);
+    let tree = Tree::of_words(&level_4);
+    assert_eq!(level_4.len(), 4096);
+    assert_eq!(tree.nodes(), 4);
+    assert_eq!(tree.finest_level(tree.root(), 0), 4);
+    assert_eq!(tree.coarsest_level(tree.root(), 0), 4);
+}
+
+proptest! {
+    #[test]
+    fn locating_a_cell_agrees_with_a_linear_search(words in random_words(4), cells in prop::collection::vec(any::<[u32; 3]>(), 50)) {
+        let tree = Tree::of_words(&words);
+        for cell in cells {
+            let cell = cell.map(|c| c % CELLS_PER_EDGE);
+            let contains = |w: &&u64| word::octant(**w).contains(&Octant { corner: cell, level: 19 });
+            let expected = words.iter().find(contains).map(|&w| (word::octant(w), (w & 3) as Kind));
+            prop_assert_eq!(tree.locate(cell), expected);
+        }
+    }
+
+    #[test]
+    fn the_coarsest_leaf_in_a_region_agrees_with_a_linear_search(
+        words in random_words(3), at in any::<prop::sample::Index>(), margins in prop::array::uniform3(0i64..200_000), bound in 1u8..5,
+    ) {
+        prop_assume!(!words.is_empty());
+        let tree = Tree::of_words(&words);
+        let octant = word::octant(words[at.index(words.len())]);
+        let meets = |leaf: &Octant| (0..3).all(|a| {
+            let [from, to] = [octant, *leaf].map(|o| i64::from(o.corner[a]));
+            to < from + i64::from(octant.edge()) + margins[a] && from - margins[a] < to + i64::from(leaf.edge())
+        });
+        let levels = words.iter().map(|&w| word::octant(w)).filter(meets).map(|leaf| leaf.level);
+        let expected = levels.min().unwrap().min(bound);
+        let found = Neighbourhood::root(&tree).coarsest_within(&tree, &Region::along(&octant, margins), bound);
+        prop_assert_eq!(found.level, expected);
+        let leaf = found.leaf(&tree);
+        prop_assert_eq!(leaf.is_some(), expected < bound);
+        prop_assert!(leaf.is_none_or(|leaf| meets(&leaf) && leaf.level == expected));
+    }
+
+    #[test]
+    fn the_region_around_some_children_is_their_bounding_box_with_a_margin(
+        words in random_words(3), at in any::<prop::sample::Index>(), digits in 1u8..=255, margin in prop_oneof![(0i64..8).prop_map(|i| i << 14), 0i64..40_000],
+    ) {
+        prop_assume!(!words.is_empty());
+        let tree = Tree::of_words(&words);
+        let octant = word::octant(words[at.index(words.len())]).ancestor(0).child(words.len() as u8 % 8);
+        let children = (0..8).filter(|d| digits >> d & 1 == 1).map(|d| octant.child(d));
+        let (mut low, mut high) = ([i64::MAX; 3], [i64::MIN; 3]);
+        for child in children {
+            for a in 0..3 {
+                low[a] = low[a].min(i64::from(child.corner[a]) - margin);
+                high[a] = high[a].max(i64::from(child.corner[a] + child.edge()) + margin);
+            }
+        }
+        let meets = |leaf: &Octant| (0..3).all(|a| {
+            i64::from(leaf.corner[a]) < high[a] && low[a] < i64::from(leaf.corner[a] + leaf.edge())
+        });
+        let levels = words.iter().map(|&w| word::octant(w)).filter(meets).map(|leaf| leaf.level);
+        let region = Region::around_children(&octant, digits, margin);
+        let expected = levels.min().unwrap_or(NO_LEAF);
+        prop_assert_eq!(Neighbourhood::root(&tree).coarsest_within(&tree, &region, NO_LEAF).level, expected);
+        // The margin is within the octant's neighbours.
+        prop_assert_eq!(Neighbourhood::of(&tree, octant).coarsest_within(&tree, &region, NO_LEAF).level, expected);
+    }
+
+}
+
+proptest! {
+    // Each case searches among all leaves for every neighbour of every octant.
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn a_walk_visits_every_leaf_with_its_neighbourhood(words in random_words(3)) {
+        let tree = Tree::of_words(&words);
+        let mut found = Vec::new();
+        walk(&tree, &mut |neighbourhood, kind| {
+            let Octant { corner, level } = neighbourhood.octant;
+            found.push(word::key_of(corner) << 7 | u64::from(level) << 2 | u64::from(kind));
+            let same = Neighbourhood::of(&tree, neighbourhood.octant);
+            assert_eq!(same.handles, neighbourhood.handles);
+            let levels = same.handles.iter().map(|&h| tree.coarsest_level(h, level));
+            assert_eq!(same.coarsest_level(&tree), levels.min().unwrap());
+            for (i, offset) in OFFSETS.iter().enumerate() {
+                assert_eq!(same.at_offset(*offset), same.handles[i]);
+            }
+            for axis in 0..3 {
+                for side in [-1, 1] {
+                    let mut offset = [0; 3];
+                    offset[axis] = side;
+                    if level > 0 {
+                        let parent = Neighbourhood::of(&tree, neighbourhood.octant.ancestor(level - 1));
+                        let digit = neighbourhood.octant.digit();
+                        assert_eq!(parent.across(&tree, digit, axis, side), same.at_offset(offset));
+                    }
+                }
+            }
+        });
+        prop_assert_eq!(found, words);
+    }
+
+    #[test]
+    fn neighbourhoods_agree_with_a_search_for_each_neighbour(words in random_words(3)) {
+        let tree = Tree::of_words(&words);
+        for octant in octants_of(&words).into_iter().step_by(5) {
+            let neighbourhood = Neighbourhood::of(&tree, octant);
+            for (i, offset) in OFFSETS.iter().enumerate() {
+                let handle = neighbourhood.handles[i];
+                let Some(neighbour) = octant.neighbour(*offset) else {
+                    prop_assert_eq!(handle, Handle::OUTSIDE_ROOT);
+                    continue;
+                };
+                let inside: Vec<_> = words.iter().filter(|&&w| neighbour.contains(&word::octant(w))).collect();
+                let above = words.iter().find(|&&w| word::octant(w).contains(&neighbour));
+                if let Some(&w) = above {
+                    let (level, kind) = (word::level(w), (w & 3) as Kind);
+                    let expected = if level == octant.level { Handle::leaf(kind) } else { Handle::coarser_leaf(kind, level) };
+                    prop_assert_eq!(handle, expected);
+                } else if inside.is_empty() {
+                    prop_assert_eq!(handle, Handle::HOLE);
+                } else {
+                    prop_assert!(handle.is_node());
+                    let levels = inside.iter().map(|&&w| word::level(w));
+                    prop_assert_eq!(tree.finest_level(handle, octant.level), levels.clone().max().unwrap());
+                    prop_assert_eq!(tree.coarsest_level(handle, octant.level), levels.min().unwrap());
+                }
+            }
+        }
+    }
+}

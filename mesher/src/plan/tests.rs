@@ -1,0 +1,174 @@
+use super::*;
+use crate::comm::Solo;
+use crate::lattice::{Enclosed, ExtentBox, Keep, Root};
+
+const ROUGH: f64 = 268_435_456.0;
+
+fn rules(level_surface: Level) -> Rules {
+    Rules {
+        root: Root { origin: [-1.0; 3], edge: 2.0 },
+        level_surface,
+        layer_cells_min: 4,
+        keep: Keep::Outside,
+        keep_crossing: true,
+        boxes: Vec::new(),
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
+    }
+}
+
+/// Runs `test` with the problem of half of a face of the root: at level 13, [`ROUGH`] cells.
+fn with_problem<T>(
+    level_surface: Level,
+    boxes: &[ExtentBox],
+    test: impl FnOnce(&Problem) -> T,
+) -> T {
+    let h = ROOT_EDGE as i32;
+    let facets = [Facet { v: [[0, 0, 1], [h, 0, 1], [0, h, 1]] }];
+    test(&Problem {
+        rules: &rules(level_surface),
+        bounds: &Bounds { lo: [-1.0; 3], hi: [1.0; 3] },
+        facets: &facets,
+        facets_total: 1,
+        spacing_min: 0.5,
+        volumes: &Volumes::new(boxes),
+        time_cpu_s: 2.0,
+        comm: &Solo,
+    })
+}
+
+/// Cells and bytes of a mesh that is coarser by some levels.
+fn amounts(cells: f64, bytes: f64, shift: Level) -> Amounts {
+    let part = 0.25f64.powi(shift as i32);
+    Amounts {
+        cells: cells * part,
+        bytes_graded: bytes * part,
+        time_fixed_s: 3.0,
+        ..Amounts::default()
+    }
+}
+
+/// A plan of the case, and the levels by which the pilots were coarser.
+fn planned(cells: f64, bytes: f64) -> (Plan, Vec<Level>) {
+    let mut asked = Vec::new();
+    let plan = with_problem(13, &[], |problem| {
+        let rough = problem.cells_rough();
+        assert_eq!(rough, [ROUGH, 0.0]);
+        let mut pilot = |shift| {
+            asked.push(shift);
+            Ok(amounts(cells, bytes, shift))
+        };
+        from_pilots(problem, rough, cells_max(ROUGH, 1.0, 0.0), &mut pilot)
+    });
+    (plan.expect("the pilots succeed"), asked)
+}
+
+#[test]
+fn the_finer_pilot_has_a_64th_of_the_cells() {
+    let (plan, asked) = planned(ROUGH, 1.0);
+    assert_eq!(asked, [4, 3]);
+    assert!(plan.cells.abs_diff(ROUGH as u64) <= 1, "{}", plan.cells);
+    let cells: Vec<(f64, u64)> = plan.pilots.iter().map(|p| (p.spacing_factor, p.cells)).collect();
+    assert_eq!(cells, [(16.0, 1 << 20), (8.0, 1 << 22)]);
+    assert_eq!((plan.source, plan.fits, plan.spacing_factor_fits), (Source::Pilots, true, None));
+    assert_eq!((plan.time_cpu_s, plan.pilots[0].time_cpu_s), (Some(5.0), 3.0));
+    let words = ROUGH as u64 * 8 + WORDS_HEADER;
+    assert!(plan.words_bytes[0].abs_diff(words) <= 8, "{:?}", plan.words_bytes);
+    assert!(plan.tree_bytes.abs_diff((ROUGH * TREE_BYTES_PER_CELL) as u64) <= 1);
+    // Fewer cells than the areas suggest: the next pilots are finer, and the mesh itself if it is small.
+    assert_eq!(planned(ROUGH / 16.0, 1.0).1, [4, 2, 1]);
+    let (plan, asked) = planned(ROUGH / 64.0, 1.0);
+    assert_eq!((plan.source, plan.cells, asked), (Source::Mesh, 1 << 22, vec![4, 0]));
+    // More cells: the finer one is one level finer in any case.
+    assert_eq!(planned(ROUGH * 64.0, 1.0).1, [4, 3]);
+}
+
+#[test]
+fn the_least_factor_that_fits_is_found() {
+    let (plan, _) = planned(ROUGH, 1e18);
+    assert!(!plan.fits);
+    let factor = plan.spacing_factor_fits.expect("a spacing fits");
+    assert_eq!(plan.spacing_min_fits, Some(0.5 * factor));
+    let left = plan.tightest.expect("memory is limited").left_bytes as f64;
+    // The pilot has 1e18 / 64 bytes already.
+    let more = |factor: f64| 1e18 / (factor * factor) - 1e18 / 64.0;
+    assert!(more(factor) <= left && more(factor / 2.0) > left, "{factor} for {left} bytes");
+    let grown = plan.memory_peak_bytes[0] as f64 / (1e18 * 63.0 / 64.0);
+    assert!((grown - 1.0).abs() < 1e-6, "{grown}");
+}
+
+#[test]
+fn only_runs_that_may_not_fit_or_are_shown_are_planned() {
+    let unasked = &mut |_| panic!("no pilot is needed");
+    let before = |problem: &Problem, is_forced, is_shown, pilot: Pilot| {
+        before_run(problem, is_forced, is_shown, pilot)
+    };
+    // The extent makes it large, but not its area.
+    with_problem(10, &[], |problem| {
+        assert!(!problem.is_small());
+        assert_eq!(before(problem, false, false, unasked), Ok(None));
+        let plan = before(problem, false, true, unasked).unwrap().expect("a plan");
+        assert_eq!((plan.source, plan.cells), (Source::Areas, 1 << 22));
+        let used = |plan: &Plan| plan.tightest.expect("memory is limited").needed_bytes;
+        assert_eq!(used(&plan), ((1 << 22) as f64 * BYTES_USUAL) as u64);
+    });
+    let few = &mut |shift| Ok(amounts(ROUGH, 1.0, shift));
+    let many = &mut |shift| Ok(amounts(ROUGH, 1e18, shift));
+    with_problem(13, &[], |problem| {
+        assert_eq!(before(problem, true, false, unasked), Ok(None));
+        let source = |plan: Result<Option<Plan>, Error>| plan.unwrap().expect("a plan").source;
+        assert_eq!(source(before(problem, false, true, few)), Source::Pilots);
+        assert_eq!(source(before(problem, true, true, many)), Source::Pilots);
+        assert!(matches!(before(problem, false, true, many), Err(Error::Memory(_))));
+        // Pilots of many facets take long.
+        let facets_total = (ROUGH / CELLS_PER_FACET) as u64;
+        let shown = |facets_total: u64, pilot: Pilot| {
+            source(before(&Problem { facets_total, ..copy(problem) }, false, true, pilot))
+        };
+        assert_eq!(shown(facets_total, few), Source::Pilots);
+        assert_eq!(shown(facets_total + 1, unasked), Source::Areas);
+    });
+    // A small case is meshed.
+    let plan =
+        with_problem(8, &[], |problem| of_case(problem, &mut |shift| Ok(amounts(9.0, 1.0, shift))));
+    let plan = plan.unwrap();
+    assert_eq!((plan.source, plan.cells, plan.pilots.len()), (Source::Mesh, 9, 1));
+}
+
+fn copy<'a>(problem: &Problem<'a>) -> Problem<'a> {
+    Problem { ..*problem }
+}
+
+#[test]
+fn extents_and_boxes_decide_whether_a_run_is_small() {
+    let is_small = |cells: [f64; 3], boxes: &[ExtentBox]| {
+        let at = |cells: f64| -0.5 + cells * 2.0 / 1024.0;
+        let bounds = Bounds { lo: [-0.5; 3], hi: cells.map(at) };
+        let (volumes, rules) = (Volumes::new(boxes), rules(10));
+        with_problem(10, &[], |problem| {
+            Problem { bounds: &bounds, volumes: &volumes, rules: &rules, ..copy(problem) }
+                .is_small()
+        })
+    };
+    // Two times 32e6 cells are the limit; layers add 12 along each axis.
+    assert!(is_small([305.0, 305.0, 305.0], &[]) && !is_small([305.0, 306.0, 308.0], &[]));
+    // 4 x 1024 x 1024 cells of level 10 in each of eight.
+    let slab = |thickness: i64| ExtentBox {
+        min: [0; 3],
+        max: [thickness * edge(10), ROOT_EDGE, ROOT_EDGE],
+        level: 10,
+    };
+    assert!(is_small([0.0; 3], &[slab(30)]) && !is_small([0.0; 3], &[slab(31)]));
+    assert!(!is_small([101.0; 3], &[slab(30)]), "both are added");
+}
+
+#[test]
+fn pilots_of_runs_that_cannot_fit_are_short() {
+    assert_eq!(cells_max(6.4e9, 100.0, 0.0), 67e6);
+    assert_eq!(cells_max(6.4e9, 101.0, 0.0), 2.1e6);
+    assert_eq!(cells_max(6.4e8, 1.0, 0.0), 1e7);
+    assert_eq!(cells_max(6.4e8, 1.0, 2e7), 2e7);
+    let ranks = Ranks::gather(&Solo, Amounts::default(), 0);
+    let left = ranks.tightest(&[1.0]).expect("memory is limited").left_bytes as f64;
+    assert!((used(&ranks, left) - BYTES_ROUGH).abs() < 1e-6);
+}
