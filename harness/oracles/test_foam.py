@@ -228,7 +228,9 @@ class RunTest(unittest.TestCase):
     def start(self, *arguments, environment=None):
         environment = ENVIRONMENT | {"CARGO_TARGET_DIR": str(self.at / "target")} | (environment or {})
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen([TEMPLATE.parent / "run", *arguments], cwd=self.at, env=environment, **pipes)
+        # A shell ignores for ever what was ignored when it began, as in jobs in the background.
+        heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+        return subprocess.Popen([TEMPLATE.parent / "run", *arguments], cwd=self.at, env=environment, preexec_fn=heed, **pipes)
 
     def run_with(self, *arguments):
         process = self.start(*arguments)
