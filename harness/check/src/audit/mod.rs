@@ -219,6 +219,7 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::promises::Touching;
     use contract::leafset::LeafSet;
     use contract::manifest::Sides;
     use contract::testing::{leaf_set, random_words, words_of};
@@ -262,6 +263,48 @@ mod tests {
         unsorted.swap(3, 4);
         let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
         assert!(found(&report).contains(&"linear"));
+    }
+
+    #[test]
+    fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
+        // Level 1 touches level 4 in a corner.
+        let words = words_of(|o| o.level == 0 || "0.7.7".starts_with(&o.path()));
+        let dir = tempfile::tempdir().unwrap();
+        leaf_set(vec![words]).write(dir.path()).unwrap();
+        let names = |promises: &Promises| {
+            let requirements = Requirements::Promises(promises, None);
+            let report = audit_against(dir.path(), &AuditOptions::default(), requirements);
+            let names: Vec<_> = report.checks.iter().map(|check| check.name).collect();
+            (names, found(&report))
+        };
+        let balance = |touching, ratio| Promises {
+            balance: Some(touching),
+            ratio: Some(ratio),
+            ..Promises::default()
+        };
+        let checked = ["files", "manifest", "linear", "balance"];
+        let (names_of_balance, findings) = names(&balance(Touching::Corner, 4));
+        assert_eq!((&names_of_balance[..], &findings[..]), (&checked[..], &["balance"][..]));
+        assert_eq!(names(&balance(Touching::Corner, 8)), (names_of_balance, vec![]));
+        let of_definition = audit(dir.path(), &AuditOptions::default());
+        let expected: Vec<_> = of_definition.checks.iter().map(|check| check.name).collect();
+        let by_promise = names(&Promises::of_definition());
+        assert_eq!(by_promise, (expected, found(&of_definition)));
+        assert!(by_promise.0.contains(&"layer"));
+    }
+
+    #[test]
+    fn a_check_that_had_nothing_to_check_examined_nothing_and_the_others_every_leaf() {
+        let report = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
+        assert!(report.not_run().count() > 0 && report.checked_anything());
+        for check in &report.checks {
+            let expected = match check.name {
+                checks::FILES => 1,
+                _ if check.was_run() => report.leaves,
+                _ => 0,
+            };
+            assert_eq!(check.examined, expected, "{check}");
+        }
     }
 
     /// The codes of unknown sides are all `outside`, which must neither pass for sides nor fail for holes.

@@ -195,3 +195,44 @@ impl Survey<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+
+    /// A tetrahedron in a root of edge 8 with leaves of edge 1, without the facets from number `count`.
+    fn positions(count: usize, seeds: &str, paths: &[&[u8]]) -> Vec<Position> {
+        let [a, b, c, d] = [[1.1f32; 3], [6.9, 1.1, 1.1], [1.1, 6.9, 1.1], [1.1, 1.1, 6.9]];
+        let body = [[a, b, d], [a, c, d], [a, b, c], [b, c, d]];
+        let text = format!(
+            "spacing_min = 1.0\nkeep = 'inside'\nseeds = {seeds}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
+        );
+        let case = Case::from_parts(&text, body[..count].to_vec()).unwrap();
+        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let octant = |path: &&[u8]| path.iter().fold(Octant::ROOT, |o, &digit| o.child(digit));
+        paths.iter().map(|path| space.position(octant(path))).collect()
+    }
+
+    #[test]
+    fn a_place_is_near_the_surface_or_in_a_component_that_is_kept_or_not() {
+        let (outside, inside) =
+            (Position::On(Side::Outside, false), Position::On(Side::Inside, true));
+        // Within the body, far from it, in a leaf that a facet crosses, and in a child of it that none crosses.
+        let paths: [&[u8]; 4] = [&[0, 7, 0], &[7, 7], &[0, 0, 7], &[0, 0, 7, 7]];
+        let expected = [inside, outside, Position::Near, Position::Near];
+        assert_eq!(positions(4, "[]", &paths), expected);
+        // Seeds decide, so that rays are not asked, even if the body is open.
+        assert_eq!(positions(4, "[[2.5, 2.5, 2.5]]", &paths), expected);
+        let open = positions(3, "[[2.5, 2.5, 2.5]]", &paths[..2]);
+        assert_eq!(open, [inside, inside]);
+    }
+
+    #[test]
+    fn without_a_facet_a_place_is_undecided_where_rays_disagree() {
+        // The component of the far field reaches into the body, where the rays towards three sides hit facets.
+        let far = Position::On(Side::Outside, false);
+        assert_eq!(positions(3, "[]", &[&[0, 7, 0], &[7, 7]]), [Position::Undecided, far]);
+    }
+}

@@ -326,6 +326,17 @@ mod tests {
     }
 
     #[test]
+    fn leaves_of_both_meshes_decide_about_a_split() {
+        // Leaves of level 3 in octant 0.1 touch octant 1.
+        let refined = |o: &Octant| o.level == 0 || "0.1".starts_with(&o.path());
+        let (a, b) =
+            (written(words_of(refined)), written(words_of(|o| refined(o) || o.path() == "1")));
+        let found = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+        let [rule] = &found.rules[..] else { panic!("{found}") };
+        assert!(rule.contains("step 3 (balance)") && rule.ends_with("B is right"), "{rule}");
+    }
+
+    #[test]
     fn meshes_of_other_inputs_or_trees_are_not_judged() {
         let words = words_of(|o| o.level < 1);
         let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());

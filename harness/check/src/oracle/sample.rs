@@ -87,6 +87,7 @@ mod tests {
         assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
         assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));
         assert_eq!(sample.points[0], [-3.5; 3]);
+        assert_eq!(choose(&case(8.0, -4.0, BODY), &leaves(), 342, 0), sample);
     }
 
     #[test]

@@ -110,7 +110,7 @@ fn mirrored(s: &SelftestCase) -> Option<Mutation> {
 fn unsorted(s: &SelftestCase) -> Option<Mutation> {
     let mut mutation = Mutation::of(s);
     let mut parts = s.mesh.parts.clone();
-    let part = parts.iter_mut().find(|p| p.len() > 2)?;
+    let part = parts.iter_mut().find(|p| p.len() > 1)?;
     let middle = part.len() / 2;
     part.swap(middle, middle - 1);
     mutation.mesh = s.mesh.with_parts(parts);

@@ -10,6 +10,7 @@ use contract::case::{Case, Facet};
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
 use openings::{Body, ROTATIONS, bodies, pipe, two_holes};
+use std::cell::Cell;
 use std::convert::Infallible;
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
@@ -159,6 +160,37 @@ fn a_closed_body_never_opens_and_that_is_proven_without_refinement() {
     let report = from_centre(&closed, 4);
     assert!(!report.is_leak && report.is_separated && report.passage.is_none());
     assert_eq!(report.levels.len(), 1);
+}
+
+#[test]
+fn a_finer_base_tree_that_cannot_be_meshed_ends_the_refinement_and_is_reported() {
+    struct Interruptible(Cell<bool>);
+    impl Watch for Interruptible {
+        fn step(&self, _: &str) {}
+
+        fn is_interrupted(&self) -> bool {
+            self.0.get()
+        }
+    }
+    let case = case(&bodies()[0].facets, 3);
+    let ask = |interrupts: bool| {
+        let watch = Interruptible(Cell::new(false));
+        let tree = |level| match level {
+            3 => Ok(base_tree(&case.facets_lattice, level)),
+            _ => {
+                watch.0.set(interrupts);
+                Err(format!("no memory for level {level}"))
+            }
+        };
+        let question =
+            Question { case: &case, from: [0.0; 3], to: Target::Far, leaves_max: 1_000_000 };
+        answer(&question, tree, &watch).map(|answer| answer.report)
+    };
+    let report = ask(false).unwrap();
+    assert!(!report.is_leak && report.opens.is_none() && report.passage.is_none());
+    assert_eq!(report.limit.unwrap(), "level 4 could not be meshed: no memory for level 4");
+    // A mesher that the user's signal ended is no reason to answer.
+    assert!(matches!(ask(true), Err(LeakError::Source(_))));
 }
 
 #[test]

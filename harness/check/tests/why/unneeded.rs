@@ -40,6 +40,9 @@ proptest! {
             prop_assert_eq!(found.subtrees, found.first.len() as u64);
             let leaves: u64 = found.first.iter().map(|subtree| subtree.leaves).sum();
             prop_assert_eq!(leaves, 7 * found.unneeded + found.subtrees, "{}", found);
+            let largest = found.first.iter().map(|subtree| subtree.leaves).max();
+            let first = found.first.iter().find(|subtree| Some(subtree.leaves) == largest);
+            prop_assert_eq!(found.largest.as_ref(), first, "{}", found);
         }
     }
 }
