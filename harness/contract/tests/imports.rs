@@ -120,6 +120,27 @@ fn a_tree_of_the_mesher_has_the_leaves_of_the_reference_as_words_and_as_a_link()
     assert!(words.words.is_sorted());
 }
 
+/// A tree with another root than is wanted must be read cell by cell, as must other layouts; a damaged one is no tree at all.
+#[test]
+fn a_tree_is_opened_as_such_only_with_its_own_root() {
+    let path = sample("sphere.vtkhdf");
+    let open = |path: &Path, sides, root| {
+        ImportedTree::open(path, sides, root, None, "test".to_owned()).map(|tree| tree.is_some())
+    };
+    let own = root([-2.0, -2.0, -2.0, 4.0]);
+    assert!(open(&path, None, Some(own)).unwrap() && open(&path, Some("side"), None).unwrap());
+    assert!(!open(&path, None, Some(root([-2.0, -2.0, -2.0, 8.0]))).unwrap());
+    assert!(!open(&path, Some("body"), None).unwrap());
+    assert!(!open(&sample("cube.msh"), None, None).unwrap());
+    let (_place, damaged) = edited("sphere.vtkhdf", "", |bytes| {
+        let end = bytes.len() - 40;
+        bytes.truncate(end);
+    });
+    let why = open(&damaged, None, None).unwrap_err().to_string();
+    assert!(why.contains("is damaged"), "{why}");
+    assert!(open(&damaged, None, Some(own)).is_err());
+}
+
 #[test]
 fn the_leaves_of_an_octant_are_read_without_those_before_it() {
     let tree = TreeFile::open(&sample("sphere.vtkhdf"), Some("side")).unwrap();

@@ -74,6 +74,23 @@ mod tests {
     }
 
     #[test]
+    fn a_root_that_is_no_cube_is_refused() {
+        let cells = cells_of(&words_of(|o| o.level < 1), &ROOT);
+        for root in [
+            Root { edge: 0.0, ..ROOT },
+            Root { edge: -1.0, ..ROOT },
+            Root { edge: f64::INFINITY, ..ROOT },
+            Root { edge: f64::NAN, ..ROOT },
+            Root { origin: [1.0, f64::NAN, 1.0], ..ROOT },
+            Root { origin: [1.0, 1.0, f64::INFINITY], ..ROOT },
+        ] {
+            let why =
+                leaf_set(&cells, Some(root), None, "test".to_owned()).unwrap_err().to_string();
+            assert!(why.contains("has a root that is not a cube"), "{why}");
+        }
+    }
+
+    #[test]
     fn an_imported_mesh_has_a_complete_manifest() {
         let words = words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3]);
         let mut cells = cells_of(&words, &ROOT);

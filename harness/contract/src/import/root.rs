@@ -88,6 +88,15 @@ mod tests {
     }
 
     #[test]
+    fn the_root_begins_a_whole_number_of_coarsest_cells_below_the_first() {
+        let mut cells = Cells::default();
+        for (x, edge) in [(2.0, 2.0), (4.0, 2.0), (1.0, 1.0)] {
+            cells.push([x, 0.0, 0.0], edge);
+        }
+        assert_eq!(derive(&cells).unwrap(), Root { origin: [0.0; 3], edge: 8.0 });
+    }
+
+    #[test]
     fn single_precision_coordinates_are_precise_enough() {
         let words = words_of(|o| o.level == 0 || o.level < 10 && o.corner == [0; 3]);
         let mut cells = cells_of(&words, &Root { origin: [0.1, 0.2, 0.3], edge: 0.7 });
