@@ -11,6 +11,20 @@ pub const ROUNDING: f64 = 1.0;
 /// A point, in lattice units.
 pub type Point = [f64; 3];
 
+/// A point and its distance to the nearest facet, in lattice units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// The point.
+    pub at: Point,
+    /// The distance: half the free width.
+    pub clearance: f64,
+    /// Step of the grid that the point is from; infinite for a point of a leaf.
+    pub step: f64,
+}
+
+/// Step of a grid that is fine enough, in parts of the clearance.
+pub const PRECISION: f64 = 1e-3;
+
 /// The facets, arranged for nearest-facet queries. Facets without area count too: they cross leaves like all others.
 #[derive(Debug)]
 pub struct Clearance<'a> {
