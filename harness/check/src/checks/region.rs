@@ -202,13 +202,17 @@ mod tests {
     use contract::case::Case;
 
     /// A tetrahedron in a root of edge 8 with leaves of edge 1, without the facets from number `count`.
-    fn positions(count: usize, seeds: &str, paths: &[&[u8]]) -> Vec<Position> {
+    fn tetrahedron(count: usize, seeds: &str) -> Case {
         let [a, b, c, d] = [[1.1f32; 3], [6.9, 1.1, 1.1], [1.1, 6.9, 1.1], [1.1, 1.1, 6.9]];
         let body = [[a, b, d], [a, c, d], [a, b, c], [b, c, d]];
         let text = format!(
             "spacing_min = 1.0\nkeep = 'inside'\nseeds = {seeds}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
         );
-        let case = Case::from_parts(&text, body[..count].to_vec()).unwrap();
+        Case::from_parts(&text, body[..count].to_vec()).unwrap()
+    }
+
+    fn positions(count: usize, seeds: &str, paths: &[&[u8]]) -> Vec<Position> {
+        let case = tetrahedron(count, seeds);
         let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
         let space = Space::new(&terms, &facets, &case.facets_lattice);
         let octant = |path: &&[u8]| path.iter().fold(Octant::ROOT, |o, &digit| o.child(digit));
@@ -227,6 +231,21 @@ mod tests {
         assert_eq!(positions(4, "[[2.5, 2.5, 2.5]]", &paths), expected);
         let open = positions(3, "[[2.5, 2.5, 2.5]]", &paths[..2]);
         assert_eq!(open, [inside, inside]);
+    }
+
+    #[test]
+    fn a_band_wider_than_the_root_leaves_nothing_to_check() {
+        let case = tetrahedron(4, "[]");
+        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let tree = Tree::of_words(&contract::testing::words_of(|o| o.level < 2));
+        for (band_cells, was_run) in [(0.0, true), (8.0, false)] {
+            let survey = Survey { tree: &tree, space: &space, band_cells };
+            assert_eq!(
+                [survey.check_sides().was_run(), survey.check_complete().was_run()],
+                [was_run; 2]
+            );
+        }
     }
 
     #[test]

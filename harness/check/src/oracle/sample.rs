@@ -108,5 +108,10 @@ mod tests {
         let sample = choose(&case(8.0, 4.0e6 - 4.0, far), &leaves(), 1000, 0);
         assert!(sample.band > 1.0);
         assert_eq!((sample.words.len(), sample.in_band), (0, 342));
+        // The band is 7.63 wide, and the centroids are half an edge, a sixteenth of the root's, away from the surface.
+        for (edge, in_band) in [(120.0, 342), (128.0, 0)] {
+            let sample = choose(&case(edge, 4.0e6 - 4.0, far), &leaves(), 1000, 0);
+            assert_eq!(sample.in_band, in_band, "{edge}");
+        }
     }
 }

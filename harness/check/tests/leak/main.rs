@@ -210,6 +210,18 @@ fn refinement_ends_at_the_limit_of_leaves_and_that_is_reported() {
 }
 
 #[test]
+fn a_base_tree_is_meshed_if_it_is_expected_to_have_just_as_many_leaves_as_allowed() {
+    let case = case(&bodies()[0].facets, 3);
+    let tree = |level| Ok::<_, Infallible>(base_tree(&case.facets_lattice, level));
+    let expected = 4 * base_tree(&case.facets_lattice, 3).len() as u64;
+    for (leaves_max, levels) in [(expected - 1, 1), (expected, 2)] {
+        let question = Question { case: &case, from: [0.0; 3], to: Target::Far, leaves_max };
+        let report = answer(&question, tree, &Silent).unwrap().report;
+        assert_eq!(report.levels.len(), levels, "at most {leaves_max}");
+    }
+}
+
+#[test]
 fn a_path_to_a_point_ends_in_its_leaf_and_bad_points_are_input_errors() {
     let body = bodies().remove(0);
     let case = case(&body.facets, 8);

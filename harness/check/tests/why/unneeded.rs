@@ -74,6 +74,22 @@ fn a_needless_split_is_found_wherever_it_is() {
 }
 
 #[test]
+fn a_layer_thicker_than_the_root_refines_all_of_it_and_a_single_leaf_has_no_split() {
+    for (layer_cells_min, spacing, leaves, splits) in [(40, 1.0, 512, 73), (40, 8.0, 1, 0)] {
+        let text = format!(
+            "spacing_min = {spacing:?}\nlayer_cells_min = {layer_cells_min}\nkeep = 'all'\n\
+             root = {{ origin = [-4.0, -4.0, -4.0], edge = 8.0 }}\ngenerator = {{ shape = 'cube', facets = 12 }}\n"
+        );
+        let correct = support::selftest_case("thick", &text);
+        assert_eq!(correct.mesh.words.len(), leaves);
+        for case in [None, Some(&correct.case)] {
+            let found = with_mesh(&correct.mesh, case, |mesh| mesh.unneeded(1).unwrap());
+            assert_eq!((found.unneeded, found.splits), (0, splits), "{found}");
+        }
+    }
+}
+
+#[test]
 fn without_crossing_leaves_the_case_is_required() {
     let text = include_str!("../../../selftest-cases/inside.toml");
     let correct = support::selftest_case("inside", text);
