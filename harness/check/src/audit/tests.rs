@@ -78,6 +78,7 @@ fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
 fn a_check_that_had_nothing_to_check_examined_nothing_and_the_others_every_leaf() {
     let report = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
     assert!(report.not_run().count() > 0 && report.checked_anything());
+    assert_eq!(report.nodes, Tree::of_words(&correct()).nodes() as u64);
     for check in &report.checks {
         let expected = match check.name {
             checks::FILES => 1,

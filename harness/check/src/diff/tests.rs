@@ -145,7 +145,7 @@ fn a_tree_is_compared_with_parts_like_other_parts() {
     let set = leafset::read(&parts).unwrap();
     for at in [0, 5000, 9055] {
         let mut words = set.words.clone();
-        words[at] = words[at] & !3 | (words[at] & 3 ^ 1) % 3;
+        words[at] = (words[at] & !3) | (((words[at] & 3) + 1) % 3);
         let changed = tempfile::tempdir().unwrap();
         set.with_parts(vec![words]).write(changed.path()).unwrap();
         for [a, b] in [[tree.as_path(), changed.path()], [changed.path(), &tree]] {

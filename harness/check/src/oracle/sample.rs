@@ -114,4 +114,12 @@ mod tests {
             assert_eq!(sample.in_band, in_band, "{edge}");
         }
     }
+
+    /// The first numbers of the published generator with seed 0.
+    #[test]
+    fn leaves_are_shuffled_by_splitmix64() {
+        let gamma = 0x9e37_79b9_7f4a_7c15u64;
+        let numbers = [0u64, 1, 2].map(|i| shuffle_key(i.wrapping_mul(gamma)));
+        assert_eq!(numbers, [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f]);
+    }
 }

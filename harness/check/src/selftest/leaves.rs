@@ -64,7 +64,7 @@ fn kept_beside_children(s: &SelftestCase) -> Option<Mutation> {
 }
 
 fn enlarged(s: &SelftestCase) -> Option<Mutation> {
-    let first = |w| word::level(w) > 0 && word::octant(w).digit() == 0;
+    let first = |w| word::octant(w).digit() == 0;
     let sibling = |w| word::octant(edit::parent(w));
     let words = &s.mesh.words;
     let i = (1..words.len()).find(|&i| {

@@ -40,6 +40,7 @@ proptest! {
             prop_assert_eq!(found.subtrees, found.first.len() as u64);
             let leaves: u64 = found.first.iter().map(|subtree| subtree.leaves).sum();
             prop_assert_eq!(leaves, 7 * found.unneeded + found.subtrees, "{}", found);
+            prop_assert_eq!(found.unneeded_leaves, leaves, "{}", found);
             let largest = found.first.iter().map(|subtree| subtree.leaves).max();
             let first = found.first.iter().find(|subtree| Some(subtree.leaves) == largest);
             prop_assert_eq!(found.largest.as_ref(), first, "{}", found);
@@ -70,6 +71,14 @@ fn a_needless_split_is_found_wherever_it_is() {
             let planted = word::octant(words[at]);
             assert_eq!(found.largest.as_ref().unwrap().octant.octant, planted, "{name}: {found}");
         }
+        // No layer and no balance requires a split of the base tree.
+        let words = &correct.base.words;
+        for at in (0..words.len()).step_by(words.len() / 12) {
+            let mut mutated = words.clone();
+            split(&mut mutated, at);
+            let found = count(&correct.base.with_parts(vec![mutated]));
+            assert_eq!((found.unneeded, found.unneeded_leaves), (1, 8), "{name}: {found}");
+        }
     }
 }
 
@@ -87,6 +96,40 @@ fn a_layer_thicker_than_the_root_refines_all_of_it_and_a_single_leaf_has_no_spli
             assert_eq!((found.unneeded, found.splits), (0, splits), "{found}");
         }
     }
+}
+
+#[test]
+fn the_report_lists_as_many_octants_as_wanted_and_the_largest() {
+    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
+    let correct = support::selftest_case(name, text);
+    let report = |words: Vec<u64>, first| {
+        let mutated = correct.mesh.with_parts(vec![words]);
+        with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(first).unwrap().to_string())
+    };
+    let mut words = correct.mesh.words.clone();
+    let (splits, leaves) = ((words.len() - 1) / 7, words.len());
+    let every = report(words.clone(), 1);
+    assert!(
+        every.starts_with("every split has a cause: ")
+            && every.contains(&format!("{leaves} leaves")),
+        "{every}"
+    );
+    split(&mut words, 0);
+    split(&mut words, 0);
+    let last = words.len() - 1;
+    split(&mut words, last);
+    assert!(splits > 3);
+    let both = report(words.clone(), 2);
+    let lines: Vec<&str> = both.lines().collect();
+    assert!(
+        lines[0].starts_with("3 of ") && lines[0].ends_with("23 leaves, in 2 octants:"),
+        "{both}"
+    );
+    assert!(lines[1].ends_with(", 15 leaves") && lines[2].ends_with(", 8 leaves"), "{both}");
+    assert!(lines[3].starts_with("the largest: ") && lines[3].ends_with(", 15 leaves"), "{both}");
+    assert_eq!(lines.len(), 4, "{both}");
+    let one = report(words, 1);
+    assert_eq!(one.lines().nth(2), Some("  and 1 more (--first)"), "{one}");
 }
 
 #[test]

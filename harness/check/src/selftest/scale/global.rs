@@ -90,11 +90,13 @@ mod tests {
     use contract::testing::{leaf_set, words_with_sides};
 
     /// A mesh that is refined towards a corner, with crossing leaves there or in the opposite one.
-    fn words(crossing: u32) -> Vec<u64> {
+    fn words(crossing: u32, has_corner: bool) -> Vec<u64> {
         let is_crossing = |o: &Octant| o.corner == [crossing * (CELLS_PER_EDGE - o.edge()); 3];
+        let corner = Octant::ROOT.child(0).child(0);
+        let side = |o: &Octant| if is_crossing(o) { Side::Crossing } else { Side::Outside };
         words_with_sides(
             |o| o.level < 2 || o.level < 5 && o.corner == [0; 3],
-            |o| Some(if is_crossing(o) { Side::Crossing } else { Side::Outside }),
+            |o| (has_corner || !corner.contains(o)).then(|| side(o)),
         )
     }
 
@@ -110,11 +112,11 @@ mod tests {
             leaves::OCTANT_EMPTIED,
             leaves::TRUNCATED,
         ];
-        for crossing in [0, 1] {
+        for (crossing, has_corner) in [(0, true), (1, true), (1, false)] {
             let place = tempfile::tempdir().unwrap();
             let mesh = place.path().join("given");
             std::fs::create_dir(&mesh).unwrap();
-            let set = leaf_set(vec![words(crossing)]);
+            let set = leaf_set(vec![words(crossing, has_corner)]);
             set.write(&mesh).unwrap();
             let source = Source { name: "given".into(), mesh, base: None };
             let original = DistributedMesh::new(&source, place.path()).unwrap();
@@ -126,7 +128,7 @@ mod tests {
                 let Some(change) = change else { continue };
                 let applied = change.map(|change| change.apply(&set.words));
                 let whole = (mutant.make)(&correct).map(|mutation| mutation.mesh.words);
-                assert_eq!(applied, whole, "{}, {crossing}", mutant.name);
+                assert_eq!(applied, whole, "{}, {crossing}, {has_corner}", mutant.name);
             }
         }
     }
