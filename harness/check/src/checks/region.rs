@@ -249,6 +249,28 @@ mod tests {
     }
 
     #[test]
+    fn places_within_the_band_are_not_judged() {
+        let case = tetrahedron(4, "[]");
+        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let words = contract::testing::words_of(|o| o.level < 3);
+        let tree = Tree::of_words(&words);
+        for band_cells in [0.0, 0.5, 1.0, 1.5] {
+            // A cell has edge 1.
+            let band = (band_cells * (UNITS_PER_EDGE / 8) as f64) as i64;
+            let is_beyond = |word: &&u64| {
+                let (low, high) = word::octant(**word).bounds();
+                let (low, high) = (low.map(|c| c - band), high.map(|c| c + band));
+                facets.meeting(&facets.all(), low, high).is_empty()
+            };
+            let expected = words.iter().filter(is_beyond).count() as u64;
+            let survey = Survey { tree: &tree, space: &space, band_cells };
+            assert_eq!(survey.check_complete().examined, expected, "{band_cells}");
+            assert!((1..512).contains(&expected), "{expected}");
+        }
+    }
+
+    #[test]
     fn without_a_facet_a_place_is_undecided_where_rays_disagree() {
         // The component of the far field reaches into the body, where the rays towards three sides hit facets.
         let far = Position::On(Side::Outside, false);

@@ -28,6 +28,8 @@ fn without_the_sides_of_one_mesh_the_cells_are_compared() {
     unknown(leaf_set(vec![words[1..].to_vec()]));
     let other = compare();
     assert!(!other.same_leaves() && other.rules.is_empty(), "{other}");
+    let leaf = other.leaf.expect("the first difference");
+    assert!(!leaf.contains("outside") && !leaf.contains("inside"), "{leaf}");
 }
 
 #[test]

@@ -97,6 +97,8 @@ fn counts_of_enclosed_components_must_be_possible() {
     };
     assert_eq!(counted(|_| ()), NONE);
     assert_eq!(counted(|e| e.leaves = 1), NONE);
+    let none = counted(|e| e.count = 0);
+    assert!(none[0].contains("0 of 2 outside components cannot be enclosed with 8"), "{none:?}");
     let changes: [fn(&mut EnclosedComponents); 4] = [
         |e| e.leaves = 0,
         |e| e.example = None,
