@@ -119,5 +119,16 @@ mod tests {
             let message = derive(&cells).unwrap_err().to_string();
             assert!(message.contains("--root"), "{message}");
         }
+        for corner in [f64::NAN, f64::INFINITY, -f64::INFINITY] {
+            let mut cells = Cells::default();
+            cells.push([0.0; 3], 1.0);
+            cells.push([1.0, corner, 0.0], 1.0);
+            let message = derive(&cells).map_err(|error| error.to_string());
+            // A coordinate that is not a number bounds nothing, and is found when the cells become leaves.
+            assert!(
+                corner.is_nan() || message.is_err_and(|why| why.contains("--root")),
+                "{corner}"
+            );
+        }
     }
 }

@@ -108,3 +108,43 @@ fn a_grid_widens_a_path_that_leads_past_the_middle_of_an_opening() {
     let mut blocked = Path { spots: blocked.to_vec(), narrowest: 1, approaches: [0, 0] };
     assert!(blocked.widen(step, &clearance, &mut scratch, &|| false).unwrap().is_none());
 }
+
+/// The sides of a duct along x, 1000 wide.
+fn duct() -> Vec<FacetLattice> {
+    let corner = |x: i64, [y, z]: [i64; 2]| [x, y, z];
+    let corners = [[0, 0], [1000, 0], [1000, 1000], [0, 1000]];
+    let side = |i: usize| {
+        let (a, b) = (corners[i], corners[(i + 1) % 4]);
+        let [p, q, r, s] = [corner(0, a), corner(0, b), corner(9000, b), corner(9000, a)];
+        [[p, q, r], [p, r, s]]
+    };
+    (0..4).flat_map(side).collect()
+}
+
+#[test]
+fn a_path_through_a_long_passage_is_moved_to_its_middle_unless_it_is_there() {
+    let facets = duct();
+    let clearance = Clearance::new(&facets);
+    let spot =
+        |at: Point| Spot { at, clearance: clearance.at(at, f64::INFINITY), step: f64::INFINITY };
+    let through = |y: f64, z: f64| Path {
+        spots: [2000.0, 3500.0, 5000.0].map(|x| spot([x, y, z])).to_vec(),
+        narrowest: 1,
+        approaches: [0, 0],
+    };
+    let mut path = through(300.0, 600.0);
+    path.centre(501.0, &clearance);
+    assert!(
+        path.spots.len() > 3 && path.spots.iter().all(|spot| spot.clearance > 498.0),
+        "{path:?}"
+    );
+    let mut path = through(500.0, 500.0);
+    path.centre(501.0, &clearance);
+    assert_eq!(path.spots, through(500.0, 500.0).spots);
+    // An approach stays where it is.
+    let mut path = Path { approaches: [1, 0], ..through(300.0, 600.0) };
+    path.centre(501.0, &clearance);
+    let (approach, rest) = path.spots.split_first().expect("points");
+    assert_eq!(*approach, through(300.0, 600.0).spots[0]);
+    assert!(rest.len() > 2 && rest.iter().all(|spot| spot.clearance > 498.0), "{rest:?}");
+}
