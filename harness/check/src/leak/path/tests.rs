@@ -78,8 +78,14 @@ fn wall_with_hole(width: i64) -> Vec<FacetLattice> {
 
 #[test]
 fn a_grid_widens_a_path_that_leads_past_the_middle_of_an_opening() {
-    let facets = wall_with_hole(1000);
-    let clearance = Clearance::new(&facets);
+    // Few facets, and more than are searched one by one.
+    for copies in [1, 40] {
+        assert_widened(&wall_with_hole(1000).repeat(copies));
+    }
+}
+
+fn assert_widened(facets: &[FacetLattice]) {
+    let clearance = Clearance::new(facets);
     // Through the opening near its rim.
     let points: Vec<Point> = (-8..=8).map(|x| [f64::from(x) * 250.0, 300.0, -350.0]).collect();
     let spot =
@@ -97,6 +103,9 @@ fn a_grid_widens_a_path_that_leads_past_the_middle_of_an_opening() {
     assert!((500.0 - 2.0 * step..=500.0).contains(&throat.clearance), "{throat:?}");
     assert!(throat.at[0].abs() <= step && path.direction()[0] > 0.9, "{throat:?}");
     assert_eq!([path.spots[0], path.spots[path.spots.len() - 1]], ends);
+    for spot in &path.spots {
+        assert!((spot.clearance - clearance.at(spot.at, f64::INFINITY)).abs() < 1e-3, "{spot:?}");
+    }
     // Balls at neighbours overlap.
     for pair in path.spots.windows(2) {
         let apart = length(sub(pair[0].at, pair[1].at));
