@@ -12,19 +12,23 @@
 //! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`cell_files`]: those with a label for each cell; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
 pub mod cell_files;
+pub mod corners;
 pub mod face_list;
 pub mod faces;
 pub mod lists;
 pub mod notes;
+pub mod own;
 pub mod patches;
 pub mod points;
 pub mod poly_mesh;
 pub mod processors;
 pub mod regions;
+pub mod solids;
 pub mod survey;
 #[cfg(test)]
 mod tests;
 pub mod tree;
+pub mod walk;
 
 use std::fs;
 use std::io;
@@ -44,11 +48,11 @@ use crate::ordered::in_order;
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
 use patches::Patches;
-use points::Points;
+use points::{POINTS_MAX, Points};
 use poly_mesh::Counts;
 use processors::Distribution;
-use regions::{Regions, Size};
-use survey::{Domain, Model, survey, visit};
+use regions::{Regions, Size, visit_retained};
+use survey::{Domain, Model, survey};
 use tree::{CELLS_MAX, Tree};
 
 /// Writes the selected leaves as `path`, which is a case's `constant/polyMesh`, or as one
@@ -63,13 +67,18 @@ pub fn write(
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
     let mut model = read(mesh, selection, options)?;
-    let regions = connect(&mut model, options.foam.regions)?;
+    let regions = connect(&mut model, options.foam.regions);
+    model.points = corners::points(&model.tree).ok_or_else(|| {
+        ExportError::Request(format!(
+            "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
+        ))
+    })?;
     let distribution = distribute(&model, mesh, options.foam.processors)?;
     let targets = targets(path, distribution.as_ref().map(Distribution::processors))?;
     let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
         .map_err(ExportError::Request)?;
 
-    let survey = survey(&mut model, &mut patches, distribution.as_ref())?;
+    let survey = survey(&model, &mut patches, distribution.as_ref())?;
 
     let named = |error| ExportError::write(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
@@ -171,27 +180,17 @@ fn read<'a>(
 }
 
 /// Finds the regions, and removes those that are not to be exported.
-fn connect(model: &mut Model, keep: options::Regions) -> Result<Vec<Size>, ExportError> {
-    let blocks = model.tree.blocks();
-    let mut regions = Regions::new(blocks.cells());
-    visit(&blocks, 0..blocks.cells(), model.options, |block, _, squares| {
-        let high = squares.iter().filter(|square| square.is_high);
-        high.filter_map(|s| s.across.as_cell()).for_each(|across| regions.join(block, across));
-        Ok(())
-    })?;
-    let sizes = regions.sizes(&model.tree, &blocks);
+fn connect(model: &mut Model, keep: options::Regions) -> Vec<Size> {
+    let regions = Regions::new(&model.tree);
+    let sizes = regions.sizes();
     if keep == options::Regions::Largest && sizes.len() > 1 {
-        let keep = regions.members(sizes[0].0);
+        let retained = regions.retain(sizes[0].0);
         if let Some(ranks) = &mut model.ranks {
-            let mut kept = Vec::new();
-            model.tree.visit_blocks(&blocks, &mut |block, _, cells| {
-                kept.extend(keep[block as usize].then_some(cells));
-            });
-            *ranks = ranks.retain(kept.into_iter());
+            *ranks = ranks.retain(|visit| visit_retained(&model.tree, &retained, visit));
         }
-        model.tree.retain(&blocks, &keep);
+        model.tree = retained;
     }
-    Ok(sizes.into_iter().map(|(_, size)| size).collect())
+    sizes.into_iter().map(|(_, size)| size).collect()
 }
 
 /// The cells of each processor directory.

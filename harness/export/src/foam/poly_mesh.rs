@@ -7,12 +7,13 @@ use std::path::Path;
 use contract::octant::UNITS_PER_CELL;
 
 use super::cell_files::{CellFiles, labels};
-use super::face_list::FaceList;
 use super::faces::Square;
 use super::lists::{self, Faces, List};
+use super::own::Own;
 use super::patches::Patches;
-use super::points::{Own, Point};
+use super::points::Near;
 use super::survey::{Domain, Model, Survey, owned, visit, visit_faces};
+use super::walk::Around;
 use crate::error::ExportError;
 use crate::options::Style;
 
@@ -39,13 +40,11 @@ impl Counts {
         self.faces_internal + patches.chain(between).sum::<u64>()
     }
 
-    /// What the header of `owner` and `neighbour` states. Its length does not depend on the number of points.
+    /// What the header of `owner` and `neighbour` states.
     fn note(&self) -> String {
         let Self { points, cells, faces_internal, .. } = self;
         let faces = self.faces();
-        format!(
-            "nPoints:{points:<20} nCells:{cells} nFaces:{faces} nInternalFaces:{faces_internal}"
-        )
+        format!("nPoints:{points} nCells:{cells} nFaces:{faces} nInternalFaces:{faces_internal}")
     }
 }
 
@@ -61,12 +60,12 @@ pub fn write(
     dir: &Path,
 ) -> Result<Counts, ExportError> {
     let boundary = survey.of(domain);
-    let by_patch = boundary.by_patch.iter().map(FaceList::count);
-    let mut counts = Counts {
+    let own = domain.0.map(|_| own(model, domain)).transpose()?;
+    let counts = Counts {
         cells: u64::from(domain.count(model.tree.cells())),
-        points: model.points.count(),
+        points: own.as_ref().map_or(model.points.count(), Own::count),
         faces_internal: boundary.internal,
-        patches: patches.names.iter().cloned().zip(by_patch).collect(),
+        patches: patches.names.iter().cloned().zip(boundary.by_patch.iter().copied()).collect(),
         faces_between: boundary.by_processor.iter().map(|(&p, faces)| (p, faces.count())).collect(),
     };
     // The vertices of the faces are counted as they are written; there are at least four each.
@@ -74,12 +73,11 @@ pub fn write(
     {
         return Err(narrow());
     }
-    let own = write_faces(model, domain, survey, &mut counts, dir)?;
+    write_faces(model, patches, survey, domain, own.as_ref(), &counts, dir)?;
     match &own {
-        None => write_points(model, model.points.iter(), &counts, dir)?,
+        None => write_points(model, 0..counts.points as u32, &counts, dir)?,
         Some(own) => {
-            let points = own.points.iter().map(|&number| model.points.point(number.into()));
-            write_points(model, points, &counts, dir)?;
+            write_points(model, own.iter(), &counts, dir)?;
             if survey.has_addressing(model) {
                 write_addressing(model, domain, own, &counts, dir)?;
             }
@@ -87,6 +85,32 @@ pub fn write(
     }
     write_boundary(model, patches, domain, &counts, dir)?;
     Ok(counts)
+}
+
+/// The points of the faces of a directory.
+fn own(model: &Model, domain: Domain) -> Result<Own, ExportError> {
+    let is_elsewhere = |across: Option<u32>| across.is_some_and(|c| domain.number(c).is_none());
+    Own::new(model.points.count(), |mark| {
+        let mut polygon = Vec::new();
+        let cells = domain.cells(model.tree.cells());
+        visit(
+            model,
+            model.points.near(),
+            cells,
+            |_| true,
+            |_, around, squares| {
+                for square in squares {
+                    // A face between two cells of the directory is that of the cell on its low side.
+                    let across = square.across.as_cell();
+                    if across.is_none() || square.is_high || is_elsewhere(across) {
+                        square.polygon(around, false, &mut polygon);
+                        polygon.iter().for_each(|&number| mark(number));
+                    }
+                }
+                Ok(())
+            },
+        )
+    })
 }
 
 fn narrow() -> ExportError {
@@ -97,27 +121,26 @@ fn narrow() -> ExportError {
 
 fn write_points(
     model: &Model,
-    points: impl Iterator<Item = Point>,
+    numbers: impl Iterator<Item = u32>,
     counts: &Counts,
     dir: &Path,
 ) -> Result<(), ExportError> {
     let mut list =
         List::create(dir, model.options.foam.style, "vectorField", "points", "", counts.points)?;
-    for point in points {
-        list.point(model.root.to_user(point.map(|c| i64::from(c) * UNITS_PER_CELL)))?;
-    }
+    model.points.visit(numbers, &mut |point| {
+        list.point(model.root.to_user(point.map(|c| i64::from(c) * UNITS_PER_CELL)))
+    })?;
     Ok(list.finish()?)
 }
 
 /// The lists that are written face by face.
 struct FaceFiles<'a> {
-    model: &'a Model<'a>,
     faces: Faces,
     owner: List,
-    polygon: Vec<(Point, u64)>,
+    polygon: Vec<u32>,
     vertices: Vec<u64>,
     /// The points of a directory that has not all cells.
-    own: Option<Own>,
+    own: Option<&'a Own>,
     /// The numbers of its faces in the whole mesh.
     addressing: Option<List>,
 }
@@ -127,19 +150,15 @@ impl FaceFiles<'_> {
     fn push(
         &mut self,
         owner: u32,
-        square: &Square,
+        (around, square): (&Around<Near>, &Square),
         number: u64,
         is_turned: bool,
     ) -> Result<(), ExportError> {
         // Normals point away from the owner. Between two cells that is the one on the low side, whose number is lower.
-        square.polygon(&self.model.points, !square.is_high, &mut self.polygon);
+        square.polygon(around, square.is_high == is_turned, &mut self.polygon);
         self.vertices.clear();
-        match &mut self.own {
-            None => self.vertices.extend(self.polygon.iter().map(|&(_, number)| number)),
-            Some(own) => {
-                self.vertices.extend(self.polygon.iter().map(|&(_, number)| own.number(number)));
-            }
-        }
+        let number_here = |&point: &u32| u64::from(self.own.map_or(point, |own| own.rank(point)));
+        self.vertices.extend(self.polygon.iter().map(number_here));
         if let Some(addressing) = &mut self.addressing {
             // Counted from 1, so that every number has a sign.
             let number = number as i64 + 1;
@@ -150,23 +169,23 @@ impl FaceFiles<'_> {
     }
 }
 
-/// Writes the files of faces and cells, and returns the points of a directory that has not all cells; its number of points is known then.
+/// Writes the files of faces and cells.
 fn write_faces(
     model: &Model,
-    domain: Domain,
+    patches: &Patches,
     survey: &Survey,
-    counts: &mut Counts,
+    domain: Domain,
+    own: Option<&Own>,
+    counts: &Counts,
     dir: &Path,
-) -> Result<Option<Own>, ExportError> {
+) -> Result<(), ExportError> {
     let (all, internal) = (counts.faces(), counts.faces_internal);
     let labels = |object: &str, note: &str, count: u64| labels(model, object, note, count, dir);
     let mut neighbours = labels("neighbour", &counts.note(), internal)?;
     let mut cells = CellFiles::create(model, counts.cells, dir)?;
-    let own = domain.0.map(|_| Own::new(&model.points));
     let has_addressing = own.is_some() && survey.has_addressing(model);
     let addressing = has_addressing.then(|| labels("faceProcAddressing", "", all)).transpose()?;
     let mut files = FaceFiles {
-        model,
         faces: Faces::create(dir, model.options.foam.style, all)?,
         owner: labels("owner", &counts.note(), all)?,
         polygon: Vec::new(),
@@ -174,55 +193,88 @@ fn write_faces(
         own,
         addressing,
     };
-    let (mut of_cell, mut number) = (Vec::new(), 0);
+    let (mut of_cell, mut last, mut number) = (Vec::new(), None, 0);
     let numbers = domain.cells(model.tree.cells());
-    visit(&model.tree, numbers, model.options, |cell, around, squares| {
-        cells.push(model, cell, around)?;
-        number = survey.first_face(cell).unwrap_or(number);
-        let owner = domain.number(cell).expect("only cells of the directory are visited");
-        owned(squares, &mut of_cell);
-        for &(across, square) in &of_cell {
-            if let Some(neighbour) = domain.number(across) {
-                neighbours.label(i64::from(neighbour))?;
-                files.push(owner, &squares[square], number, false)?;
+    visit(
+        model,
+        model.points.near(),
+        numbers,
+        |_| true,
+        |cell, around, squares| {
+            cells.push(model, cell, around)?;
+            let owner = domain.number(cell).expect("only cells of the directory are visited");
+            let run = survey.run(cell);
+            if last.replace(run) != Some(run) {
+                number = survey.first_face(run);
             }
-            number += 1;
-        }
-        Ok(())
-    })?;
+            owned(squares, &mut of_cell);
+            for &(across, square) in &of_cell {
+                if let Some(neighbour) = domain.number(across) {
+                    neighbours.label(i64::from(neighbour))?;
+                    files.push(owner, (around, &squares[square]), number, false)?;
+                }
+                number += 1;
+            }
+            Ok(())
+        },
+    )?;
     cells.finish()?;
-    write_boundary_faces(survey, domain, &mut files)?;
-    let FaceFiles { faces, owner, own, addressing, .. } = files;
+    neighbours.finish()?;
+    for patch in (0..patches.names.len()).filter(|&patch| counts.patches[patch].1 > 0) {
+        write_patch(model, patches, survey, domain, patch, &mut files)?;
+    }
+    write_faces_between(model, survey, domain, &mut files)?;
+    let FaceFiles { faces, owner, addressing, .. } = files;
     faces.finish()?;
     addressing.map_or(Ok(()), List::finish)?;
-    counts.points = own.as_ref().map_or(counts.points, |own| own.points.len() as u64);
-    neighbours.finish_with_note("labelList", "neighbour", &counts.note())?;
-    owner.finish_with_note("labelList", "owner", &counts.note())?;
-    Ok(own)
+    Ok(owner.finish()?)
 }
 
-/// Writes the faces of the patches, and then those at other processors.
-fn write_boundary_faces(
+/// Writes the faces of a patch.
+fn write_patch(
+    model: &Model,
+    patches: &Patches,
+    survey: &Survey,
+    domain: Domain,
+    patch: usize,
+    files: &mut FaceFiles,
+) -> Result<(), ExportError> {
+    let (mut last, mut number) = (None, 0);
+    let numbers = domain.cells(model.tree.cells());
+    let enter = |around: &Around<Near>| survey.may_touch(model, patches, patch, around);
+    visit(model, model.points.near(), numbers, enter, |cell, around, squares| {
+        let owner = domain.number(cell).expect("only cells of the directory are visited");
+        let run = survey.run(cell);
+        if last.replace(run) != Some(run) {
+            number = survey.first_of_patch(run, patch);
+        }
+        for (index, square) in squares.iter().enumerate() {
+            if square.across.as_cell().is_none()
+                && survey.patch(patches, cell, index, square) == patch
+            {
+                files.push(owner, (around, square), number, false)?;
+                number += 1;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Writes the faces at other processors.
+fn write_faces_between(
+    model: &Model,
     survey: &Survey,
     domain: Domain,
     files: &mut FaceFiles,
 ) -> Result<(), ExportError> {
-    let boundary = survey.of(domain);
-    for (patch, faces) in boundary.by_patch.iter().enumerate() {
-        visit_faces(files.model, faces, |face, square| {
-            let owner =
-                domain.number(face.cell).expect("a patch has faces of its directory's cells");
-            files.push(owner, square, survey.start(patch) + face.number, false)
-        })?;
-    }
-    for faces in boundary.by_processor.values() {
-        visit_faces(files.model, faces, |face, square| {
+    for faces in survey.of(domain).by_processor.values() {
+        visit_faces(model, model.points.near(), faces, |face, around, square| {
             // Seen from the cell that the directory has.
             let is_turned = domain.number(face.cell).is_none();
             let cell = if is_turned { square.across.as_cell() } else { Some(face.cell) };
             let owner =
                 cell.and_then(|cell| domain.number(cell)).expect("one of the cells is here");
-            files.push(owner, &Square { is_high: !is_turned, ..*square }, face.number, is_turned)
+            files.push(owner, (around, square), face.number, is_turned)
         })?;
     }
     Ok(())
@@ -240,9 +292,9 @@ fn write_addressing(
     let write = |object: &str, count: u64, numbers: &mut dyn Iterator<Item = i64>| {
         write_labels(model, object, count, numbers, dir)
     };
-    let mut points = own.points.iter().map(|&number| i64::from(number));
+    let mut points = own.iter().map(i64::from);
     write("pointProcAddressing", counts.points, &mut points)?;
-    let mut cells = domain.cells(model.tree.cells()).map(i64::from);
+    let mut cells = domain.cells(model.tree.cells()).flatten().map(i64::from);
     write("cellProcAddressing", counts.cells, &mut cells)?;
     let (of_mesh, between) = (counts.patches.len(), counts.faces_between.len());
     let mut patches = (0..of_mesh as i64).chain(std::iter::repeat_n(-1, between));
