@@ -8,8 +8,10 @@ use std::hash::BuildHasher;
 
 use rustc_hash::FxBuildHasher;
 
-use super::points::{Builder, Handle as Set, Points};
+use super::points::{Builder, Handle as Set, POINTS_MAX, Points};
 use super::tree::{CUTS, HOLES, Handle, OUTSIDE, Tree};
+use crate::error::ExportError;
+use crate::options::Options;
 
 /// Number of surroundings that are remembered, of a tree with many nodes.
 const REMEMBERED_MAX: usize = 1 << 16;
@@ -18,43 +20,59 @@ const REMEMBERED_MAX: usize = 1 << 16;
 /// set if the octant is on the high side along axis `a`.
 type Surroundings = ([Handle; 8], bool);
 
-/// The points of the cells of a tree; `None` if there are too many.
-pub fn points(tree: &Tree) -> Option<Points> {
+/// The points of the cells of a tree.
+///
+/// # Errors
+/// If there are too many, or if the user interrupts.
+pub fn points(tree: &Tree, options: &Options) -> Result<Points, ExportError> {
     let slots = (4 * tree.nodes().len()).next_power_of_two().min(REMEMBERED_MAX);
     let remembered = vec![((Default::default(), false), Set::NONE); slots];
-    let mut search = Search { tree, builder: Builder::default(), remembered };
+    let mut search = Search { tree, options, builder: Builder::default(), remembered, steps: 0 };
     let root = tree.root().what;
     let is_cell = root.as_cell().is_some();
     // The root and the octants on its high sides, each with the root opposite to itself.
-    let octants = std::array::from_fn(|digit| {
+    let mut octants = [Set::NONE; 8];
+    for (digit, octant) in octants.iter_mut().enumerate() {
         let mut around = [Handle::OUTSIDE; 8];
         around[7 ^ digit] = root;
-        search.points((around, is_cell))
-    });
+        *octant = search.points((around, is_cell))?;
+    }
     let all = search.builder.intern(octants);
-    search.builder.finish(all)
+    search.builder.finish(all).ok_or_else(|| {
+        ExportError::Request(format!(
+            "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
+        ))
+    })
 }
 
 struct Search<'a> {
     tree: &'a Tree,
+    options: &'a Options<'a>,
     builder: Builder,
     remembered: Vec<(Surroundings, Set)>,
+    /// Number of surroundings that have been looked at.
+    steps: u64,
 }
 
 impl Search<'_> {
-    fn points(&mut self, around: Surroundings) -> Set {
+    fn points(&mut self, around: Surroundings) -> Result<Set, ExportError> {
         let (contents, has_corner) = around;
         if contents.iter().all(|content| content.as_node().is_none()) {
-            return Set::corner(has_corner);
+            return Ok(Set::corner(has_corner));
         }
         let slot = FxBuildHasher.hash_one(around) as usize & (self.remembered.len() - 1);
         if self.remembered[slot].0 == around {
-            return self.remembered[slot].1;
+            return Ok(self.remembered[slot].1);
         }
-        let children = std::array::from_fn(|digit| self.points(self.child(&around, digit)));
+        self.options.check_at(self.steps)?;
+        self.steps += 1;
+        let mut children = [Set::NONE; 8];
+        for (digit, child) in children.iter_mut().enumerate() {
+            *child = self.points(self.child(&around, digit))?;
+        }
         let points = self.builder.intern(children);
         self.remembered[slot] = (around, points);
-        points
+        Ok(points)
     }
 
     /// The surroundings of the minimum corner of a child.

@@ -4,15 +4,19 @@
 //! and every cell is closed. `checkMesh -allTopology` verifies that. Cells are numbered in Morton order, which yields
 //! OpenFOAM's upper-triangular order of faces: a cell on the high side of another has the higher number.
 //!
-//! Tree, points and boundary are kept in memory, 2.3 bytes per cell of a mesh of 50 million. Each thread that writes the directory of a
-//! processor adds 8 bytes per point in it. The files are written cell by cell.
+//! The files are written cell by cell. The tree of the cells and that of the points, which store equal subtrees once, are all that is kept
+//! in memory of one directory: 0.2 to 0.3 bytes per cell of large meshes, less the larger the mesh. Directories of processors need the faces
+//! between them, 3 to 5 bytes each, and each thread one bit for those points whose neighbours are in other directories.
 //!
-//! - [`tree`]: the cells and what is across their faces; [`faces`]: the faces and their vertices; [`points`]: the numbers of points;
-//! - [`regions`], [`patches`], [`processors`]; [`face_list`]: the faces of a boundary;
-//! - [`survey`](mod@survey): the boundary of a directory; [`poly_mesh`]: its files; [`cell_files`]: those with a label for each cell; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
+//! - [`tree`]: the cells; [`walk`](mod@walk): what is across their faces; [`faces`]: the faces; [`points`]: the numbers of points; [`corners`]: where they are;
+//! - [`regions`], [`patches`], [`solids`], [`processors`]; [`face_list`]: the faces between processors; [`own`]: the points of one;
+//! - [`survey`](mod@survey): the numbers of faces in all directories; [`directory`]: what one has; [`poly_mesh`]: its files; [`face_files`]: those with the faces;
+//!   [`cell_files`]: those with a label for each cell; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
 pub mod cell_files;
 pub mod corners;
+pub mod directory;
+pub mod face_files;
 pub mod face_list;
 pub mod faces;
 pub mod lists;
@@ -47,9 +51,9 @@ use crate::options::{Options, Processors, Summary};
 use crate::ordered::in_order;
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
+use directory::{Counts, Directory};
 use patches::Patches;
-use points::{POINTS_MAX, Points};
-use poly_mesh::Counts;
+use points::Points;
 use processors::Distribution;
 use regions::{Regions, Size, visit_retained};
 use survey::{Domain, Model, survey};
@@ -67,12 +71,8 @@ pub fn write(
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
     let mut model = read(mesh, selection, options)?;
-    let regions = connect(&mut model, options.foam.regions);
-    model.points = corners::points(&model.tree).ok_or_else(|| {
-        ExportError::Request(format!(
-            "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
-        ))
-    })?;
+    let regions = connect(&mut model, options.foam.regions)?;
+    model.points = corners::points(&model.tree, options)?;
     let distribution = distribute(&model, mesh, options.foam.processors)?;
     let targets = targets(path, distribution.as_ref().map(Distribution::processors))?;
     let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
@@ -86,7 +86,11 @@ pub fn write(
         let dir = staging.path().join(processor.to_string());
         fs::create_dir(&dir).map_err(named)?;
         let domain = Domain(distribution.as_ref().map(|of_cells| (of_cells, processor as u32)));
-        poly_mesh::write(&model, &patches, &survey, domain, &dir).map_err(|error| match error {
+        let write = || {
+            let directory = Directory::new(&model, &patches, &survey, domain, &dir)?;
+            poly_mesh::write(&directory).map(|()| directory.counts)
+        };
+        write().map_err(|error| match error {
             ExportError::Write(error) => named(error),
             error => error,
         })
@@ -148,9 +152,7 @@ fn read<'a>(
     let (mut builder, mut visited, mut cells) = (Builder::default(), 0u64, 0);
     mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
         visited += 1;
-        if visited.is_multiple_of(1 << 16) {
-            options.check()?;
-        }
+        options.check_at(visited)?;
         let is_exported = selection.has(&leaf);
         cells += u64::from(is_exported);
         if cells > CELLS_MAX {
@@ -180,8 +182,8 @@ fn read<'a>(
 }
 
 /// Finds the regions, and removes those that are not to be exported.
-fn connect(model: &mut Model, keep: options::Regions) -> Vec<Size> {
-    let regions = Regions::new(&model.tree);
+fn connect(model: &mut Model, keep: options::Regions) -> Result<Vec<Size>, ExportError> {
+    let regions = Regions::new(&model.tree, model.options)?;
     let sizes = regions.sizes();
     if keep == options::Regions::Largest && sizes.len() > 1 {
         let retained = regions.retain(sizes[0].0);
@@ -190,7 +192,7 @@ fn connect(model: &mut Model, keep: options::Regions) -> Vec<Size> {
         }
         model.tree = retained;
     }
-    sizes.into_iter().map(|(_, size)| size).collect()
+    Ok(sizes.into_iter().map(|(_, size)| size).collect())
 }
 
 /// The cells of each processor directory.

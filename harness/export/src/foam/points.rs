@@ -102,7 +102,7 @@ impl Builder {
                 node
             }
         };
-        Handle(2 * (node + 1) | u32::from(children[0].has_corner()))
+        Handle(2 * (node + 1) + u32::from(children[0].has_corner()))
     }
 
     /// The points of the octant that is twice as large as the root; `None` if there are too many.

@@ -12,6 +12,8 @@ use contract::word;
 use rustc_hash::FxBuildHasher;
 
 use super::tree::{ANYWHERE, CELLS, CUTS, Content, Handle, Tree};
+use crate::error::ExportError;
+use crate::options::Options;
 
 /// The components of all nodes.
 #[derive(Debug)]
@@ -43,11 +45,17 @@ pub struct Size {
 
 impl<'a> Regions<'a> {
     /// The regions of a tree.
-    pub fn new(tree: &'a Tree) -> Self {
+    ///
+    /// # Errors
+    /// If the user interrupts.
+    pub fn new(tree: &'a Tree, options: &Options) -> Result<Self, ExportError> {
         let mut regions =
             Self { tree, nodes: Vec::new(), components: Vec::new(), sizes: Vec::new() };
-        tree.nodes().for_each(|children| regions.push(&children));
-        regions
+        for children in tree.nodes() {
+            options.check_at(regions.nodes.len() as u64)?;
+            regions.push(&children);
+        }
+        Ok(regions)
     }
 
     /// The regions, those of largest volume first.

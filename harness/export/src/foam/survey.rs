@@ -139,7 +139,7 @@ impl Survey {
     }
 }
 
-/// Visits the cells of a tree in ascending intervals, except in octants that `enter` rejects, with their squares.
+/// Visits the cells in ascending intervals with their squares.
 ///
 /// # Errors
 /// The first error of `visit`, or the user's interrupt.
@@ -147,17 +147,27 @@ pub fn visit<P: Follow>(
     model: &Model,
     more: P,
     cells: impl Iterator<Item = Range<u32>>,
+    visit: impl FnMut(u32, &Around<P>, &[Square]) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    visit_some(model, more, cells, |_| true, visit)
+}
+
+/// The same except in octants that `enter` rejects.
+///
+/// # Errors
+/// As [`visit`].
+pub fn visit_some<P: Follow>(
+    model: &Model,
+    more: P,
+    cells: impl Iterator<Item = Range<u32>>,
     enter: impl Fn(&Around<P>) -> bool,
     mut visit: impl FnMut(u32, &Around<P>, &[Square]) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let mut squares = Vec::new();
-    let mut until_look = 0u32;
+    let mut visited = 0;
     walk(&model.tree, more, cells, &enter, &mut |cell, around| {
-        if until_look == 0 {
-            until_look = 1 << 14;
-            model.options.check()?;
-        }
-        until_look -= 1;
+        model.options.check_at(visited)?;
+        visited += 1;
         squares.clear();
         faces::squares(&model.tree, around, &mut squares);
         visit(cell, around, &squares)
@@ -176,18 +186,12 @@ pub fn visit_faces<P: Follow>(
 ) -> Result<(), ExportError> {
     let mut next = faces.iter().peekable();
     let cells = faces.iter().map(|face| face.cell..face.cell + 1);
-    visit(
-        model,
-        more,
-        cells,
-        |_| true,
-        |cell, around, squares| {
-            while let Some(of_cell) = next.next_if(|next| next.cell == cell) {
-                face(&of_cell, around, &squares[of_cell.square])?;
-            }
-            Ok(())
-        },
-    )
+    visit(model, more, cells, |cell, around, squares| {
+        while let Some(of_cell) = next.next_if(|next| next.cell == cell) {
+            face(&of_cell, around, &squares[of_cell.square])?;
+        }
+        Ok(())
+    })
 }
 
 /// Replaces `owned` by the faces that a cell owns: the cell across and the index of the square. They are those on the cell's high sides, because the cell there
@@ -216,42 +220,36 @@ pub fn survey(
     let (mut runs, mut last) = (Vec::new(), None);
     let (mut of_cell, mut number) = (Vec::new(), 0);
     let mut solids = Solids::default();
-    visit(
-        model,
-        (),
-        std::iter::once(0..model.tree.cells()),
-        |_| true,
-        |cell, _, squares| {
-            let here = place(cell);
-            if last.replace(here) != Some(here) {
-                runs.push(Run { cell, face: number, of_patches: of_patches.clone().into() });
-            }
-            owned(squares, &mut of_cell);
-            for &(across, square) in &of_cell {
-                let there = place(across);
-                if here == there {
-                    boundaries[here as usize].internal += 1;
-                } else {
-                    for (of, with) in [(here, there), (there, here)] {
-                        let between = boundaries[of as usize].by_processor.entry(with).or_default();
-                        between.push(Face { cell, square, number });
-                    }
+    visit(model, (), std::iter::once(0..model.tree.cells()), |cell, _, squares| {
+        let here = place(cell);
+        if last.replace(here) != Some(here) {
+            runs.push(Run { cell, face: number, of_patches: of_patches.clone().into() });
+        }
+        owned(squares, &mut of_cell);
+        for &(across, square) in &of_cell {
+            let there = place(across);
+            if here == there {
+                boundaries[here as usize].internal += 1;
+            } else {
+                for (of, with) in [(here, there), (there, here)] {
+                    let between = boundaries[of as usize].by_processor.entry(with).or_default();
+                    between.push(Face { cell, square, number });
                 }
-                number += 1;
             }
-            let at_boundary = |(_, square): &(usize, &Square)| square.across.as_cell().is_none();
-            for (index, square) in squares.iter().enumerate().filter(at_boundary) {
-                let patch = patches.of(square).unwrap_or_else(|| {
-                    let nearest = patches.nearest(square);
-                    solids.push(cell, index, nearest);
-                    nearest
-                });
-                boundaries[here as usize].by_patch[patch] += 1;
-                of_patches[patch] += 1;
-            }
-            Ok(())
-        },
-    )?;
+            number += 1;
+        }
+        let at_boundary = |(_, square): &(usize, &Square)| square.across.as_cell().is_none();
+        for (index, square) in squares.iter().enumerate().filter(at_boundary) {
+            let patch = patches.of(square).unwrap_or_else(|| {
+                let nearest = patches.nearest(square);
+                solids.push(cell, index, nearest);
+                nearest
+            });
+            boundaries[here as usize].by_patch[patch] += 1;
+            of_patches[patch] += 1;
+        }
+        Ok(())
+    })?;
     // The patches follow the faces between cells.
     let mut starts = vec![number];
     for faces in of_patches {

@@ -90,7 +90,7 @@ fn model_of<'a>(
     }
     let tree = Tree::new(&builder.finish());
     Model {
-        points: corners::points(&tree).unwrap(),
+        points: corners::points(&tree, options).unwrap(),
         tree,
         ranks: None,
         root: Root { origin: [0.0; 3], edge: 1.0 },
@@ -116,7 +116,7 @@ impl Model<'_> {
             each(cell, around, squares);
             Ok(())
         };
-        survey::visit(self, self.points.near(), all, |_| true, each).unwrap();
+        survey::visit(self, self.points.near(), all, each).unwrap();
     }
 }
 
