@@ -4,9 +4,10 @@
 //! and every cell is closed. `checkMesh -allTopology` verifies that. Cells are numbered in Morton order, which yields
 //! OpenFOAM's upper-triangular order of faces: a cell on the high side of another has the higher number.
 //!
-//! The files are written cell by cell. The tree of the cells and that of the points, which store equal subtrees once, are all that is kept
-//! in memory of one directory: 0.2 to 0.3 bytes per cell of large meshes, less the larger the mesh. Directories of processors need the faces
-//! between them, 3 to 5 bytes each, and each thread one bit for those points whose neighbours are in other directories.
+//! The files are written cell by cell. Only the tree of the cells and that of the points are kept, both with equal subtrees stored once, so
+//! memory does not grow with the number of cells but with the detail of the surface: 18 MB for 50 million cells around an aircraft, 190 MB for 938
+//! million. Directories of processors need the faces between them, 3 to 5 bytes each, and each thread a bit for every point near other
+//! directories and 0.004 bytes for all others.
 //!
 //! - [`tree`]: the cells; [`walk`](mod@walk): what is across their faces; [`faces`]: the faces; [`points`]: the numbers of points; [`corners`]: where they are;
 //! - [`regions`], [`patches`], [`solids`], [`processors`]; [`face_list`]: the faces between processors; [`own`]: the points of one;

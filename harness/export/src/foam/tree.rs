@@ -7,8 +7,7 @@
 
 use contract::tree::DELETED;
 
-/// What an octant is, without the numbers of its cells: one of the contents without cells, or [`FIRST_CELL`] and the code of a cell's
-/// side, or [`FIRST_NODE`] and the index of a node.
+/// What an octant is, without the numbers of its cells: a content without cells, a cell with its side, or a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Handle(u32);
 
@@ -23,7 +22,9 @@ pub struct Content {
 
 /// Number of cells that can be distinguished.
 pub const CELLS_MAX: u64 = u32::MAX as u64;
+/// Handles from here on are cells; the code of the side is added.
 const FIRST_CELL: u32 = 3;
+/// Handles from here on are nodes; the index is added.
 const FIRST_NODE: u32 = 6;
 
 /// A set of the following.
