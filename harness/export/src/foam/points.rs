@@ -269,3 +269,18 @@ impl OnFace<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_points_than_can_be_numbered_are_refused() {
+        for (levels, count) in [(10, Some(1 << 30)), (11, None)] {
+            let mut builder = Builder::default();
+            let full =
+                (0..levels).fold(Handle::corner(true), |child, _| builder.intern([child; 8]));
+            assert_eq!(builder.finish(full).map(|points| points.count()), count);
+        }
+    }
+}
