@@ -13,7 +13,7 @@ use contract::case::Case;
 use contract::import::{self, Format, Request};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::testing::{leaf_set, random_words, words_with_sides};
 use contract::word::{self, Side};
 use proptest::prelude::*;
