@@ -76,6 +76,14 @@ impl Options<'_> {
     pub fn check(&self) -> Result<(), ExportError> {
         if self.watch.is_interrupted() { Err(ExportError::Interrupted) } else { Ok(()) }
     }
+
+    /// The same in a loop of fast steps, of which `count` are done. Most calls do not ask.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn check_at(&self, count: u64) -> Result<(), ExportError> {
+        if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
+    }
 }
 
 /// Shows progress and passes on the user's interrupt. Threads call it at least every tenth of a second or so.

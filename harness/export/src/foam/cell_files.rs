@@ -4,8 +4,9 @@ use std::io;
 use std::path::Path;
 
 use super::lists::List;
+use super::points::Near;
 use super::survey::Model;
-use super::tree::Around;
+use super::walk::Around;
 
 /// The lists that are written cell by cell: the level of each, and its side and rank where they are known.
 pub struct CellFiles {
@@ -32,7 +33,7 @@ impl CellFiles {
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn push(&mut self, model: &Model, cell: u32, around: &Around) -> io::Result<()> {
+    pub fn push(&mut self, model: &Model, cell: u32, around: &Around<Near>) -> io::Result<()> {
         self.level.label(i64::from(around.octant.level))?;
         if let Some(side) = &mut self.side {
             side.label(i64::from(around.side()))?;

@@ -1,4 +1,4 @@
-//! The faces at a boundary of a directory, which are written after all others, in 3 to 5 bytes each.
+//! The faces between two directories, which are written after all others, in 3 to 5 bytes each.
 
 /// A face of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,10 +5,11 @@
 //! and so on. Two polygons with a common piece of an edge therefore divide it in the same way, which closes every cell: a
 //! point that bisects an edge of one face is a corner of a smaller square beside it, or lies where no cell needs it.
 
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::CELLS_PER_EDGE;
 
-use super::points::{Point, Points};
-use super::tree::{Around, Content, Tree};
+use super::points::{Near, Point};
+use super::tree::{Content, Tree};
+use super::walk::{Around, Follow};
 
 /// A square that a cell shares with another cell or with a boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +27,7 @@ pub struct Square {
 }
 
 /// Appends the squares of a cell.
-pub fn squares(tree: &Tree, around: &Around, squares: &mut Vec<Square>) {
+pub fn squares<P: Follow>(tree: &Tree, around: &Around<P>, squares: &mut Vec<Square>) {
     let edge = around.octant.edge();
     for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
         let mut corner = around.octant.corner;
@@ -83,46 +84,15 @@ impl Square {
         })
     }
 
-    /// Replaces `polygon` by the vertices of the face, with their numbers in `points`: counterclockwise around the positive
-    /// axis, or clockwise, the minimum corner first in both cases.
-    pub fn polygon(&self, points: &Points, clockwise: bool, polygon: &mut Vec<(Point, u64)>) {
-        polygon.clear();
-        let corners = self.corners();
-        for (i, &from) in corners.iter().enumerate() {
-            let number = points.find(from).expect("the corners of a face are points");
-            edge(points, (from, number), corners[(i + 1) % 4], self.edge(), polygon);
+    /// Replaces `polygon` by the numbers of the vertices of the face of a cell: counterclockwise around the positive axis, or clockwise, the
+    /// minimum corner first in both cases.
+    pub fn polygon(&self, around: &Around<Near>, clockwise: bool, polygon: &mut Vec<u32>) {
+        let axis = usize::from(self.axis);
+        let mut face = around.more.on_face(axis, self.is_high);
+        for level in around.octant.level + 1..=self.level {
+            let bit = |a: usize| usize::from(self.corner[a % 3] & CELLS_PER_EDGE >> level != 0);
+            face = face.quarter(bit(axis + 1) | bit(axis + 2) << 1);
         }
-        if clockwise {
-            polygon[1..].reverse();
-        }
+        face.polygon(clockwise, polygon);
     }
-}
-
-/// Appends the points on an edge without its end.
-fn edge(
-    points: &Points,
-    from: (Point, u64),
-    to: Point,
-    length: u32,
-    polygon: &mut Vec<(Point, u64)>,
-) {
-    let middle = std::array::from_fn(|a| from.0[a].midpoint(to[a]));
-    match if points.may_halve(length) { points.find(middle) } else { None } {
-        Some(number) => {
-            edge(points, from, middle, length / 2, polygon);
-            edge(points, (middle, number), to, length / 2, polygon);
-        }
-        None => polygon.push(from),
-    }
-}
-
-/// Adds the corners of a cell and of its squares.
-pub fn insert_corners(octant: &Octant, squares: &[Square], points: &mut Points) {
-    let edge = octant.edge();
-    for digit in 0..8 {
-        points.insert(std::array::from_fn(|a| octant.corner[a] + edge * (digit >> a & 1)));
-    }
-    // The corners of squares that touch a cell are corners of that cell.
-    let parts = squares.iter().filter(|s| s.level > octant.level && s.across.as_cell().is_none());
-    parts.flat_map(Square::corners).for_each(|corner| points.insert(corner));
 }

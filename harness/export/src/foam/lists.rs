@@ -120,16 +120,6 @@ impl List {
         if self.style.is_ascii { self.out.write_all(b"\n") } else { Ok(()) }
     }
 
-    /// The same as [`Self::finish`], with another note of the same length.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn finish_with_note(self, class: &str, object: &str, note: &str) -> io::Result<()> {
-        let header = header(self.style, class, object, note);
-        self.out.get_ref().write_all_at(header.as_bytes(), 0)?;
-        self.finish()
-    }
-
     /// Ends the list, and waits until the file is on disk.
     ///
     /// # Errors

@@ -2,8 +2,8 @@
 
 use contract::word::Side;
 
+use super::directory::Counts;
 use super::patches::{CUT, SIDES};
-use super::poly_mesh::Counts;
 use super::regions::Size;
 use crate::mesh::Mesh;
 use crate::options;

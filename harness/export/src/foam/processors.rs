@@ -50,17 +50,17 @@ impl Distribution {
         self.cells += cells;
     }
 
-    /// The distribution of the cells in ascending intervals, which are renumbered.
-    pub fn retain(&self, kept: impl Iterator<Item = Range<u32>>) -> Self {
+    /// The distribution of the cells in ascending intervals, which are renumbered. `visit` calls its argument for each.
+    pub fn retain(&self, visit: impl FnOnce(&mut dyn FnMut(Range<u32>))) -> Self {
         let mut retained = Self::new(self.processors());
-        for Range { mut start, end } in kept {
+        visit(&mut |Range { mut start, end }| {
             while start < end {
                 let run = self.run(start);
                 let end_of_run = self.cells_of(run).end.min(end);
                 retained.push(self.runs[run].processor, end_of_run - start);
                 start = end_of_run;
             }
-        }
+        });
         retained
     }
 
@@ -74,10 +74,10 @@ impl Distribution {
         self.counts[processor as usize]
     }
 
-    /// The cells of a processor, ascending.
-    pub fn cells(&self, processor: u32) -> impl Iterator<Item = u32> {
+    /// The cells of a processor, in ascending intervals.
+    pub fn cells(&self, processor: u32) -> impl Iterator<Item = Range<u32>> {
         let runs = (0..self.runs.len()).filter(move |&run| self.runs[run].processor == processor);
-        runs.flat_map(|run| self.cells_of(run))
+        runs.map(|run| self.cells_of(run))
     }
 
     /// Processor of a cell, and the cell's number there.
@@ -106,7 +106,7 @@ mod tests {
         [1, 0, 1, 3, 3, 0].into_iter().for_each(|p| distribution.push(p, 1));
         let check = |distribution: &Distribution, expected: [&[u32]; 4]| {
             for (processor, cells) in (0..).zip(expected) {
-                assert!(distribution.cells(processor).eq(cells.iter().copied()));
+                assert!(distribution.cells(processor).flatten().eq(cells.iter().copied()));
                 assert_eq!(distribution.count(processor) as usize, cells.len());
                 for (number, &cell) in cells.iter().enumerate() {
                     assert_eq!(distribution.place(cell), (processor, number as u32));
@@ -114,8 +114,11 @@ mod tests {
             }
         };
         check(&distribution, [&[1, 5], &[0, 2], &[], &[3, 4]]);
-        check(&distribution.retain([0..1, 2..4, 4..6].into_iter()), [&[4], &[0, 1], &[], &[2, 3]]);
+        check(
+            &distribution.retain(|visit| [0..1, 2..4, 4..6].map(visit).into_iter().collect()),
+            [&[4], &[0, 1], &[], &[2, 3]],
+        );
         let equal = Distribution::equal(10, 3);
-        assert_eq!([0, 1, 2].map(|p| equal.cells(p).count()), [4, 3, 3]);
+        assert_eq!([0, 1, 2].map(|p| equal.cells(p).flatten().count()), [4, 3, 3]);
     }
 }

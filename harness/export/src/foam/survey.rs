@@ -1,7 +1,8 @@
-//! A walk over all cells and their faces, and what it finds: the points, the boundary of every directory, and the numbers that its
-//! faces have in the whole mesh.
+//! A walk over all cells and their faces, and what it finds: the boundary of every directory, and the numbers that its faces have in the
+//! whole mesh.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use contract::lattice::Root;
 
@@ -11,7 +12,9 @@ use super::lists::label_max;
 use super::patches::Patches;
 use super::points::Points;
 use super::processors::Distribution;
-use super::tree::{Around, Tree, walk};
+use super::solids::Solids;
+use super::tree::Tree;
+use super::walk::{Around, Follow, walk};
 use crate::error::ExportError;
 use crate::options::Options;
 
@@ -21,7 +24,7 @@ pub struct Model<'a> {
     pub tree: Tree,
     /// The rank that wrote each cell, if there are several.
     pub ranks: Option<Distribution>,
-    /// The points of all cells, which the survey finds.
+    /// The points of all cells.
     pub points: Points,
     /// The root.
     pub root: Root,
@@ -36,10 +39,10 @@ pub struct Model<'a> {
 pub struct Domain<'a>(pub Option<(&'a Distribution, u32)>);
 
 impl<'a> Domain<'a> {
-    /// The cells, ascending, of `all` in the mesh.
-    pub fn cells(self, all: u32) -> Box<dyn Iterator<Item = u32> + 'a> {
+    /// The cells, in ascending intervals, of `all` in the mesh.
+    pub fn cells(self, all: u32) -> Box<dyn Iterator<Item = Range<u32>> + 'a> {
         match self.0 {
-            None => Box::new(0..all),
+            None => Box::new(std::iter::once(0..all)),
             Some((distribution, processor)) => Box::new(distribution.cells(processor)),
         }
     }
@@ -57,13 +60,13 @@ impl<'a> Domain<'a> {
     }
 }
 
-/// The faces of a directory at its boundary, and the number of others.
+/// The faces of a directory.
 #[derive(Default)]
 pub struct Boundary {
     /// Number of faces between two cells of the directory.
     pub internal: u64,
-    /// The faces of each patch of the mesh, with their numbers there.
-    pub by_patch: Vec<FaceList>,
+    /// Number of faces in each patch of the mesh.
+    pub by_patch: Vec<u64>,
     /// The faces at the cells of each other processor, in the same order as there: as faces of the cell with the lower number, in
     /// whichever directory that is, with their numbers in the whole mesh.
     pub by_processor: BTreeMap<u32, FaceList>,
@@ -73,10 +76,21 @@ pub struct Boundary {
 pub struct Survey {
     /// The boundary of each.
     boundaries: Vec<Boundary>,
-    /// The cells that follow one of another directory, ascending, and the number of the first face that each owns.
-    runs: Vec<(u32, u64)>,
+    /// Intervals of cells in the same directory.
+    runs: Vec<Run>,
     /// Number of the first face of each patch, and the number of all faces.
     starts: Vec<u64>,
+    solids: Solids,
+}
+
+/// Consecutive cells of a directory.
+struct Run {
+    /// The first.
+    cell: u32,
+    /// Number of the first face that it owns.
+    face: u64,
+    /// How many faces of each patch the cells before have.
+    of_patches: Box<[u64]>,
 }
 
 impl Survey {
@@ -86,43 +100,76 @@ impl Survey {
         faces.max(model.points.count()) < label_max(model.options.foam.style.label)
     }
 
-    /// The number of the first face that a cell owns, if the cell before it is in another directory.
-    pub fn first_face(&self, cell: u32) -> Option<u64> {
-        let run = self.runs.binary_search_by_key(&cell, |&(first, _)| first);
-        run.ok().map(|run| self.runs[run].1)
+    /// The run of a cell.
+    pub fn run(&self, cell: u32) -> usize {
+        self.runs.partition_point(|run| run.cell <= cell) - 1
+    }
+
+    /// The number of the first face that the cells of a run own.
+    pub fn first_face(&self, run: usize) -> u64 {
+        self.runs[run].face
+    }
+
+    /// The number in the whole mesh of the first face of a patch that the cells of a run have.
+    pub fn first_of_patch(&self, run: usize, patch: usize) -> u64 {
+        self.starts[patch] + self.runs[run].of_patches[patch]
+    }
+
+    /// The patch of a face that no cell is across.
+    pub fn patch(&self, patches: &Patches, cell: u32, square: usize, of: &Square) -> usize {
+        patches.of(of).unwrap_or_else(|| self.solids.patch(cell, square))
+    }
+
+    /// Whether an octant may have cells with faces in a patch.
+    pub fn may_touch<P: Follow>(
+        &self,
+        model: &Model,
+        patches: &Patches,
+        patch: usize,
+        around: &Around<P>,
+    ) -> bool {
+        patches.may_touch(patch, &model.tree, around)
+            && (!patches.is_of_several(patch)
+                || self.solids.may_have(&around.cells(&model.tree), patch))
     }
 
     /// The boundary of a directory.
     pub fn of(&self, domain: Domain) -> &Boundary {
         &self.boundaries[domain.0.map_or(0, |(_, here)| here as usize)]
     }
-
-    /// The number of the first face of a patch in the whole mesh.
-    pub fn start(&self, patch: usize) -> u64 {
-        self.starts[patch]
-    }
 }
 
-/// Visits cells of a tree, given by ascending numbers, with their squares.
+/// Visits the cells in ascending intervals with their squares.
 ///
 /// # Errors
 /// The first error of `visit`, or the user's interrupt.
-pub fn visit(
-    tree: &Tree,
-    cells: impl Iterator<Item = u32>,
-    options: &Options<'_>,
-    mut visit: impl FnMut(u32, &Around, &[Square]) -> Result<(), ExportError>,
+pub fn visit<P: Follow>(
+    model: &Model,
+    more: P,
+    cells: impl Iterator<Item = Range<u32>>,
+    visit: impl FnMut(u32, &Around<P>, &[Square]) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    visit_some(model, more, cells, |_| true, visit)
+}
+
+/// The same except in octants that `enter` rejects.
+///
+/// # Errors
+/// As [`visit`].
+pub fn visit_some<P: Follow>(
+    model: &Model,
+    more: P,
+    cells: impl Iterator<Item = Range<u32>>,
+    enter: impl Fn(&Around<P>) -> bool,
+    mut visit: impl FnMut(u32, &Around<P>, &[Square]) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let mut squares = Vec::new();
-    let mut until_look = 0u32;
-    walk(tree, cells, &mut |cell, around| {
-        if until_look == 0 {
-            until_look = 1 << 14;
-            options.check()?;
-        }
-        until_look -= 1;
+    let mut visited = 0;
+    walk(&model.tree, more, cells, &enter, &mut |cell, around| {
+        model.options.check_at(visited)?;
+        visited += 1;
         squares.clear();
-        faces::squares(tree, around, &mut squares);
+        faces::squares(&model.tree, around, &mut squares);
         visit(cell, around, &squares)
     })
 }
@@ -131,16 +178,19 @@ pub fn visit(
 ///
 /// # Errors
 /// As [`visit`].
-pub fn visit_faces(
+pub fn visit_faces<P: Follow>(
     model: &Model,
+    more: P,
     faces: &FaceList,
-    mut face: impl FnMut(&Face, &Square) -> Result<(), ExportError>,
+    mut face: impl FnMut(&Face, &Around<P>, &Square) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
-    let mut next = faces.iter();
-    let cells = faces.iter().map(|face| face.cell);
-    visit(&model.tree, cells, model.options, |_, _, squares| {
-        let of_cell = next.next().expect("a cell is visited once per face");
-        face(&of_cell, &squares[of_cell.square])
+    let mut next = faces.iter().peekable();
+    let cells = faces.iter().map(|face| face.cell..face.cell + 1);
+    visit(model, more, cells, |cell, around, squares| {
+        while let Some(of_cell) = next.next_if(|next| next.cell == cell) {
+            face(&of_cell, around, &squares[of_cell.square])?;
+        }
+        Ok(())
     })
 }
 
@@ -153,31 +203,27 @@ pub fn owned(squares: &[Square], owned: &mut Vec<(u32, usize)>) {
     owned.sort_unstable();
 }
 
-/// Numbers the points, collects the faces at the boundary of every directory, and counts and numbers the others.
+/// Counts the faces of every directory, and collects those between directories.
 ///
 /// # Errors
 /// If the user interrupts.
 pub fn survey(
-    model: &mut Model,
+    model: &Model,
     patches: &mut Patches,
     distribution: Option<&Distribution>,
 ) -> Result<Survey, ExportError> {
     let directories = distribution.map_or(1, Distribution::processors);
     let place = |cell| distribution.map_or(0, |distribution| distribution.place(cell).0);
-    let empty = || Boundary {
-        by_patch: patches.names.iter().map(|_| FaceList::default()).collect(),
-        ..Boundary::default()
-    };
+    let empty = || Boundary { by_patch: vec![0; patches.names.len()], ..Boundary::default() };
     let mut boundaries: Vec<Boundary> = (0..directories).map(|_| empty()).collect();
     let mut of_patches = vec![0; patches.names.len()];
     let (mut runs, mut last) = (Vec::new(), None);
     let (mut of_cell, mut number) = (Vec::new(), 0);
-    let mut points = Points::default();
-    visit(&model.tree, 0..model.tree.cells(), model.options, |cell, around, squares| {
-        faces::insert_corners(&around.octant, squares, &mut points);
+    let mut solids = Solids::default();
+    visit(model, (), std::iter::once(0..model.tree.cells()), |cell, _, squares| {
         let here = place(cell);
         if last.replace(here) != Some(here) {
-            runs.push((cell, number));
+            runs.push(Run { cell, face: number, of_patches: of_patches.clone().into() });
         }
         owned(squares, &mut of_cell);
         for &(across, square) in &of_cell {
@@ -194,20 +240,21 @@ pub fn survey(
         }
         let at_boundary = |(_, square): &(usize, &Square)| square.across.as_cell().is_none();
         for (index, square) in squares.iter().enumerate().filter(at_boundary) {
-            let patch = patches.of(square);
-            let face = Face { cell, square: index, number: of_patches[patch] };
-            boundaries[here as usize].by_patch[patch].push(face);
+            let patch = patches.of(square).unwrap_or_else(|| {
+                let nearest = patches.nearest(square);
+                solids.push(cell, index, nearest);
+                nearest
+            });
+            boundaries[here as usize].by_patch[patch] += 1;
             of_patches[patch] += 1;
         }
         Ok(())
     })?;
-    points.number();
-    model.points = points;
     // The patches follow the faces between cells.
     let mut starts = vec![number];
     for faces in of_patches {
         number += faces;
         starts.push(number);
     }
-    Ok(Survey { boundaries, runs, starts })
+    Ok(Survey { boundaries, runs, starts, solids })
 }

@@ -98,8 +98,19 @@ pub(super) fn forget_child(id: u32) {
 }
 
 /// Notes a directory that must not outlive the harness.
-pub(super) fn note_directory(path: &Path) {
+pub fn note_directory(path: &Path) {
     leftovers().directories.push(path.to_owned());
+}
+
+/// Forgets a directory that is complete, and is kept.
+pub fn forget_directory(path: &Path) {
+    leftovers().directories.retain(|directory| directory != path);
+}
+
+/// Whether a directory will not outlive the harness.
+#[cfg(test)]
+pub fn has_directory(path: &Path) -> bool {
+    leftovers().directories.iter().any(|directory| directory == path)
 }
 
 /// Ends the harness, whatever its other threads do.

@@ -1,10 +1,11 @@
 //! The directories of results: where they are, and which of them are kept.
 //!
 //! Invariants: only directories that a verification made are removed, which a marker file proves; without `--out` and
-//! `--keep`, only the directories of failed cases are kept.
+//! `--keep`, only the directories of failed cases are kept; that of a case under way does not outlive an interrupt.
 
 use super::VerifyError;
 use super::options::Options;
+use crate::engine::interrupt;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -57,7 +58,11 @@ impl Workplace {
                 VerifyError::Input(format!("{shown} cannot be replaced: {error}"))
             })?;
         }
-        let made = fs::create_dir(&place).and_then(|()| fs::write(place.join(MARKER), ""));
+        let mark = |()| {
+            interrupt::note_directory(&place);
+            fs::write(place.join(MARKER), "")
+        };
+        let made = fs::create_dir(&place).and_then(mark);
         made.map_err(|error| VerifyError::Input(format!("{shown} cannot be made: {error}")))?;
         Ok(place)
     }
@@ -66,6 +71,7 @@ impl Workplace {
     pub fn leave(&mut self, place: &Path, keep: bool) -> Option<PathBuf> {
         if keep {
             self.kept = true;
+            interrupt::forget_directory(place);
             return Some(place.to_owned());
         }
         // Failing to remove a directory is no reason to lose the report.
@@ -100,6 +106,20 @@ mod tests {
             assert_eq!((root.exists(), place.exists()), (keep, keep));
             let _ = fs::remove_dir_all(root);
         }
+    }
+
+    #[test]
+    fn an_interrupt_removes_the_results_of_the_case_under_way_but_not_those_that_are_kept() {
+        let out = tempfile::tempdir().unwrap();
+        let options = Options { out: Some(out.path().to_owned()), ..options() };
+        let mut workplace = Workplace::new(&options).unwrap();
+        let [failed, under_way] = ["failed", "under-way"].map(|case| {
+            let place = workplace.enter(case).unwrap();
+            assert!(interrupt::has_directory(&place));
+            place
+        });
+        workplace.leave(&failed, true);
+        assert!(!interrupt::has_directory(&failed) && interrupt::has_directory(&under_way));
     }
 
     #[test]

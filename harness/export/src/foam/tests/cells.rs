@@ -25,6 +25,14 @@ proptest! {
     }
 }
 
+/// At both ends of the root's diagonal.
+#[test]
+fn cells_of_the_finest_level_are_closed() {
+    let is_at_end = |o: &Octant| [0, CELLS_PER_EDGE - o.edge()].iter().any(|&c| o.corner == [c; 3]);
+    let words = contract::testing::words_of(|o| o.level < LEVEL_MAX && is_at_end(o));
+    complex_of(&words).assert_closed(words.len());
+}
+
 /// Every octant of level 1 is a hole, a leaf, or eight leaves: 6,560 trees.
 #[test]
 fn cells_of_every_tree_of_two_levels_are_closed() {

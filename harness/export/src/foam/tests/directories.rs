@@ -219,6 +219,18 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
         boundary_in(&target).into_iter().map(|(name, faces, _)| (name, faces)).collect();
     let expected = [("left_wing", 6), ("body", 24 - 4 - 4), ("tail", 6)];
     assert_eq!(faces[6..], expected.map(|(name, faces)| (name.to_owned(), faces)));
+    options.foam.processors = Some(Processors::Equal(5));
+    write(&mesh, &Selection::default(), &dir.path().join("parallel/constant/polyMesh"), &options)
+        .unwrap();
+    for (patch, faces) in expected {
+        let of_processor = |p: i32| {
+            let boundary =
+                boundary_in(&dir.path().join(format!("parallel/processor{p}/constant/polyMesh")));
+            boundary.into_iter().find(|(name, ..)| name == patch).unwrap().1
+        };
+        assert_eq!((0..5).map(of_processor).sum::<usize>(), faces);
+    }
+    options.foam.processors = None;
     options.foam.case = Some(&other);
     let error = write(&mesh, &Selection::default(), &target, &options).unwrap_err().to_string();
     assert!(error.contains("another root"), "{error}");

@@ -3,6 +3,7 @@
 mod cells;
 mod directories;
 mod round_trip;
+mod whole;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZero;
@@ -12,11 +13,14 @@ use contract::case::Case;
 use contract::import::{self, Format, Request};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::testing::{leaf_set, random_words, words_with_sides};
 use contract::word::{self, Side};
 use proptest::prelude::*;
 
+use super::faces::Square;
+use super::points::{Near, Point};
+use super::walk::Around;
 use super::*;
 use crate::options::{Foam, Label, Style};
 use crate::testing::Unwatched;
@@ -72,24 +76,61 @@ fn complex_in(dir: &Path) -> Complex {
     }
 }
 
-/// The complex of sorted words, without files. Faces are in the order of their owners.
-fn complex_of(words: &[u64]) -> Complex {
-    let mut model = Model {
-        tree: Tree::new(&contract::tree::Tree::of_words(words)),
+/// Sorted words as cells, without those that are cut.
+fn model_of<'a>(
+    words: &[u64],
+    is_cut: impl Fn(u64) -> bool,
+    options: &'a Options<'a>,
+) -> Model<'a> {
+    let mut builder = Builder::default();
+    for &w in words {
+        let (octant, side) = (word::octant(w), (w & 3) as u8);
+        let kind = if is_cut(w) { DELETED } else { side };
+        builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
+    }
+    let tree = Tree::new(&builder.finish());
+    Model {
+        points: corners::points(&tree, options).unwrap(),
+        tree,
         ranks: None,
-        points: Points::default(),
         root: Root { origin: [0.0; 3], edge: 1.0 },
         has_sides: true,
-        options: &options(ASCII),
-    };
-    survey(&mut model, &mut Patches::new(None, false).unwrap(), None).unwrap();
-    let points = model.points.iter().map(|p| p.map(f64::from)).collect();
+        options,
+    }
+}
+
+impl Model<'_> {
+    fn all_points(&self) -> Vec<Point> {
+        let mut points = Vec::new();
+        let add = &mut |point| {
+            points.push(point);
+            Ok::<(), ()>(())
+        };
+        self.points.visit(0..self.points.count() as u32, add).unwrap();
+        points
+    }
+
+    fn visit_all(&self, mut each: impl FnMut(u32, &Around<Near>, &[Square])) {
+        let all = std::iter::once(0..self.tree.cells());
+        let each = |cell, around: &Around<Near>, squares: &[Square]| {
+            each(cell, around, squares);
+            Ok(())
+        };
+        survey::visit(self, self.points.near(), all, each).unwrap();
+    }
+}
+
+/// The complex of sorted words, without files. Faces are in the order of their owners.
+fn complex_of(words: &[u64]) -> Complex {
+    let options = options(ASCII);
+    let model = model_of(words, |_| false, &options);
+    let points = model.all_points().into_iter().map(|p| p.map(f64::from)).collect();
     let mut complex = Complex { points, ..Complex::default() };
     let (mut boundary, mut polygon) = (Vec::new(), Vec::new());
-    visit(&model.tree, 0..model.tree.cells(), model.options, |cell, _, squares| {
+    model.visit_all(|cell, around, squares| {
         for square in squares {
-            square.polygon(&model.points, !square.is_high, &mut polygon);
-            let vertices = polygon.iter().map(|&(_, number)| number as usize).collect();
+            square.polygon(around, !square.is_high, &mut polygon);
+            let vertices = polygon.iter().map(|&number| number as usize).collect();
             match square.across.as_cell() {
                 Some(_) if !square.is_high => {}
                 Some(across) => {
@@ -100,9 +141,7 @@ fn complex_of(words: &[u64]) -> Complex {
                 None => boundary.push((cell as usize, vertices)),
             }
         }
-        Ok(())
-    })
-    .unwrap();
+    });
     for (cell, vertices) in boundary {
         complex.faces.push(vertices);
         complex.owner.push(cell);
