@@ -267,6 +267,12 @@ mod tests {
             let survey = Survey { tree: &tree, space: &space, band_cells };
             assert_eq!(survey.check_complete().examined, expected, "{band_cells}");
             assert!((1..512).contains(&expected), "{expected}");
+            let findings = survey.check_complete().findings;
+            assert!(!findings.is_empty(), "{band_cells}");
+            for detail in findings.iter().map(|finding| &finding.detail) {
+                let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
+                assert!(words.iter().any(names), "{detail}");
+            }
         }
     }
 
