@@ -11,6 +11,7 @@
 //! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
 
 pub mod boxes;
+pub mod bundles;
 pub mod distance;
 pub mod edges;
 pub mod extent;
@@ -20,9 +21,13 @@ pub mod input;
 pub mod intersections;
 pub mod junctions;
 pub mod meaning;
+pub mod narrowest;
 pub mod openings;
 pub mod opposite;
+pub mod pairs;
+pub mod patches;
 pub mod report;
+pub mod settled;
 pub mod sheets;
 pub mod shells;
 pub mod text;
@@ -65,8 +70,7 @@ pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
         findings.extend(intersections::intersections(input, &boxes, options.first));
     }
     if let Some(cell) = input.cell {
-        let boxes = Boxes::by_normal(&input.lattice);
-        findings.extend(sheets::sheets(input, (&edges, &shells), &boxes, cell, options.first));
+        findings.extend(sheets::sheets(input, (&edges, &shells), cell, options.first));
     }
     findings.extend(extent::findings(input, options.first));
     Diagnosis::new(input, &edges, &shells.all, findings, options.first)

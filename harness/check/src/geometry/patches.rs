@@ -1,0 +1,262 @@
+//! Patches: the facets of each node of a tree, with bounds on where they are, on their normals and on their heights along a
+//! common normal. They decide for all pairs of a facet of one patch and a facet of another at once whether the pairs are
+//! opposite, as [`opposite`](super::opposite) defines it, where the bounds suffice.
+//!
+//! Facets with other normals are far apart in the order of the tree: on a wing that is thin, the bounds on the normals of
+//! nodes would else be those of both its sides.
+
+
+use std::ops::Range;
+
+use contract::lattice::FacetLattice;
+
+pub use super::boxes::GROUP;
+use super::boxes::{Bounds, Boxes, unit_normal};
+use super::bundles::{Bundle, greater, less};
+use super::facets::normal;
+use super::shells::Shells;
+
+/// The parts of a face of a cube along an axis, in bits, that tell classes of normals apart.
+const CLASS_BITS: u32 = 2;
+
+/// Upper bound on the rounding errors of heights, in lattice units.
+const HEIGHT_ERROR: f64 = 1e-5;
+
+/// Upper bound on the rounding errors of cosines and of ratios of lengths.
+const ROUNDING: f64 = 1e-5;
+
+/// Some facets.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    bounds: Bounds,
+    /// A vector in the middle of the unit normals.
+    normal: [f32; 3],
+    /// Greatest differences of the components of the unit normals from those of `normal`.
+    spread: [f32; 3],
+    /// Least and greatest scalar product of `normal` and a vertex.
+    heights: [f64; 2],
+    /// The shell of the facets; none if they belong to several.
+    pub shell: Option<u32>,
+}
+
+impl Patch {
+    fn of(facet: &FacetLattice, bounds: Bounds, shell: u32) -> Self {
+        let unit = unit_normal(facet);
+        let normal = unit.map(|x| x as f32);
+        let spread = std::array::from_fn(|a| above((unit[a] - f64::from(normal[a])).abs()));
+        let heights = facet.map(|v| (0..3).map(|a| f64::from(normal[a]) * v[a] as f64).sum());
+        let fold = |f: fn(f64, f64) -> f64| f(f(heights[0], heights[1]), heights[2]);
+        let heights = [fold(f64::min), fold(f64::max)];
+        Self { bounds, normal, spread, heights, shell: Some(shell) }
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        let (mut normal, mut spread) = ([0.0; 3], [0.0; 3]);
+        for a in 0..3 {
+            let end = |patch: &Self, sign: f64| {
+                f64::from(patch.normal[a]) + sign * f64::from(patch.spread[a])
+            };
+            let low = less(end(self, -1.0), end(other, -1.0));
+            let high = greater(end(self, 1.0), end(other, 1.0));
+            normal[a] = ((low + high) / 2.0) as f32;
+            let middle = f64::from(normal[a]);
+            spread[a] = above(greater(high - middle, middle - low));
+        }
+        let ([a, b], [c, d]) = (self.heights_along(&normal), other.heights_along(&normal));
+        let heights = [less(a, c), greater(b, d)];
+        let shell = self.shell.filter(|_| self.shell == other.shell);
+        Self { bounds: self.bounds.union(&other.bounds), normal, spread, heights, shell }
+    }
+
+    /// Bounds on the scalar products of another vector and the vertices.
+    fn heights_along(&self, vector: &[f32; 3]) -> [f64; 2] {
+        let (mut middle, mut half) = (0.0, 0.0);
+        for a in 0..3 {
+            let turn = f64::from(vector[a]) - f64::from(self.normal[a]);
+            let (centre, extent) = self.along(a);
+            middle += turn * centre;
+            half += turn.abs() * extent;
+        }
+        [self.heights[0] + middle - half, self.heights[1] + middle + half]
+    }
+
+    /// The middle and half the length of the bounding box along an axis.
+    fn along(&self, a: usize) -> (f64, f64) {
+        let (low, high) = (f64::from(self.bounds.low[a]), f64::from(self.bounds.high[a]));
+        ((low + high) / 2.0, (high - low) / 2.0)
+    }
+
+    /// A lower bound on the squared distance of the facets.
+    pub fn squared_min(&self, other: &Self) -> f64 {
+        let (mut boxes, mut between, mut extents, mut others) = (0.0, [0.0; 3], 0.0, 0.0);
+        let (mut turned, mut turned_half, mut height, mut length) = (0.0, 0.0, 0.0, 0.0);
+        for a in 0..3 {
+            let ((p, r), (q, s)) = (self.along(a), other.along(a));
+            between[a] = q - p;
+            let gap = greater((q - p).abs() - (r + s), 0.0);
+            boxes += gap * gap;
+            extents += r * r;
+            others += s * s;
+            let normal = f64::from(self.normal[a]);
+            let turn = normal + f64::from(other.normal[a]);
+            turned += turn * q;
+            turned_half += turn.abs() * s;
+            height += normal * between[a];
+            length += normal * normal;
+        }
+        // The normals of a large patch may have a short mean, or none.
+        if length < 0.25 {
+            return boxes;
+        }
+        let low = turned - turned_half - other.heights[1] - self.heights[1];
+        let high = turned + turned_half - other.heights[0] - self.heights[0];
+        let gap = greater(greater(low, -high) - HEIGHT_ERROR, 0.0);
+        let squared: f64 = between.iter().map(|x| x * x).sum();
+        let lateral = (squared - height * height / length).max(0.0).sqrt();
+        let lateral = greater(lateral * (1.0 - ROUNDING) - extents.sqrt() - others.sqrt(), 0.0);
+        greater(boxes, (gap * gap / length + lateral * lateral) * (1.0 - 1e-9))
+    }
+
+    /// The same bounds in f32, relative to a point from which no coordinate is farther than `radius`.
+    fn bundle(&self, origin: [f64; 3], radius: f64) -> Bundle<1> {
+        // The error of a coordinate is a quarter of this.
+        let error = radius * 2.0f64.powi(-22);
+        let mut bundle = Bundle::EMPTY;
+        let mut middle = 0.0;
+        for (a, origin) in origin.into_iter().enumerate() {
+            let (centre, half) = self.along(a);
+            bundle.centre[a][0] = (centre - origin) as f32;
+            bundle.half[a][0] = above(half + error);
+            bundle.normal[a][0] = self.normal[a];
+            // With the errors of a sum of products.
+            bundle.spread[a][0] = self.spread[a] + 2e-6;
+            middle += f64::from(self.normal[a]) * centre;
+        }
+        bundle.low[0] = -above(middle - self.heights[0] + error);
+        bundle.high[0] = above(self.heights[1] - middle + error);
+        bundle
+    }
+}
+
+/// A float that is no less.
+fn above(x: f64) -> f32 {
+    (x as f32).next_up()
+}
+
+/// The class of a facet with an area: the part of a cube's surface that the normal points to.
+fn class(facet: &FacetLattice) -> u16 {
+    let n = normal(facet);
+    let longest = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
+    let mut class = 2 * longest as u16 + u16::from(n[longest] > 0);
+    let parts = (1 << CLASS_BITS) as f64;
+    let [u, v] = [1, 2].map(|turn| {
+        let ratio = n[(longest + turn) % 3] as f64 / n[longest].abs() as f64;
+        ((ratio + 1.0) / 2.0 * parts).min(parts - 1.0) as u16
+    });
+    for bit in (0..CLASS_BITS).rev() {
+        class = class << 2 | (u >> bit & 1) << 1 | (v >> bit & 1);
+    }
+    class
+}
+
+/// The patches of a tree, and each facet as a patch.
+#[derive(Debug)]
+pub struct Patches {
+    boxes: Boxes,
+    nodes: Vec<Patch>,
+    bundles: Vec<Bundle<1>>,
+    /// The facets of each leaf.
+    leaves: Vec<Bundle<GROUP>>,
+    /// The index of each node's leaf, if it is one.
+    leaf_of: Vec<u32>,
+}
+
+impl Patches {
+    /// The patches of those facets that have an area.
+    pub fn new(lattice: &[FacetLattice], shells: &Shells) -> Self {
+        let boxes = Boxes::by_class(lattice, class);
+        let mut patches =
+            Self { boxes, nodes: vec![], bundles: vec![], leaves: vec![], leaf_of: vec![] };
+        if !patches.boxes.facets.is_empty() {
+            patches.build(lattice, shells);
+        }
+        patches
+    }
+
+    fn build(&mut self, lattice: &[FacetLattice], shells: &Shells) {
+        let Self { boxes, .. } = self;
+        let root = boxes.bounds(0);
+        let side = |a: usize| f64::from(root.high[a]) - f64::from(root.low[a]);
+        let origin = [0, 1, 2].map(|a| f64::from(root.low[a]) + side(a) / 2.0);
+        let radius = [0, 1, 2].map(side).into_iter().fold(0.0, f64::max) / 2.0;
+        let count = boxes.nodes();
+        self.nodes.reserve(count);
+        self.leaf_of.resize(count, 0);
+        // Children follow their parents.
+        for node in (0..count).rev() {
+            let patch = match boxes.children(node) {
+                // Nodes are in reverse order.
+                Some([a, b]) => {
+                    let [a, b] = [a, b].map(|child| &self.nodes[count - 1 - child]);
+                    a.union(b)
+                }
+                None => {
+                    let mut leaf = Bundle::EMPTY;
+                    let mut all: Option<Patch> = None;
+                    for (i, position) in boxes.members(node).enumerate() {
+                        let f = boxes.facets[position] as usize;
+                        let one = Patch::of(&lattice[f], boxes.bounds[position], shells.of(f));
+                        leaf.set(i, &one.bundle(origin, radius));
+                        all = Some(all.map_or(one, |all| all.union(&one)));
+                    }
+                    self.leaf_of[node] = self.leaves.len() as u32;
+                    self.leaves.push(leaf);
+                    all.expect("a leaf has facets")
+                }
+            };
+            self.nodes.push(patch);
+        }
+        self.nodes.reverse();
+        self.bundles = self.nodes.iter().map(|patch| patch.bundle(origin, radius)).collect();
+    }
+
+    /// Number of nodes, 0 if there are no facets; the root is node 0.
+    pub fn nodes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Number of facets.
+    pub fn facets(&self) -> usize {
+        self.boxes.facets.len()
+    }
+
+    /// The patch of a node.
+    pub fn node(&self, node: usize) -> &Patch {
+        &self.nodes[node]
+    }
+
+    /// The patch of a node, as a bundle.
+    pub fn bundle(&self, node: usize) -> &Bundle<1> {
+        &self.bundles[node]
+    }
+
+    /// The facets of a leaf, each as a patch.
+    pub fn leaf(&self, node: usize) -> &Bundle<GROUP> {
+        &self.leaves[self.leaf_of[node] as usize]
+    }
+
+    /// The number of the facet at a position in the tree.
+    pub fn number(&self, position: usize) -> u32 {
+        self.boxes.facets[position]
+    }
+
+    /// The positions of a node's facets.
+    pub fn members(&self, node: usize) -> Range<usize> {
+        self.boxes.members(node)
+    }
+
+    /// The children of a node; none for a leaf.
+    pub fn children(&self, node: usize) -> Option<[usize; 2]> {
+        self.boxes.children(node)
+    }
+}
