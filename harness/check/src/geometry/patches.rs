@@ -42,26 +42,60 @@ pub struct Patch {
 impl Patch {
     fn of(facet: &FacetLattice, bounds: Bounds, shell: u32) -> Self {
         let unit = unit_normal(facet);
-        let normal = unit.map(|x| x as f32);
-        let spread = std::array::from_fn(|a| above((unit[a] - f64::from(normal[a])).abs()));
-        let heights = facet.map(|v| (0..3).map(|a| f64::from(normal[a]) * v[a] as f64).sum());
-        let fold = |f: fn(f64, f64) -> f64| f(f(heights[0], heights[1]), heights[2]);
-        let heights = [fold(f64::min), fold(f64::max)];
-        Self { bounds, normal, spread, heights, shell: Some(shell) }
+        let mut patch = Self {
+            bounds,
+            normal: unit.map(|x| x as f32),
+            spread: [0.0; 3],
+            heights: [f64::INFINITY, f64::NEG_INFINITY],
+            shell: Some(shell),
+        };
+        for a in 0..3 {
+            patch.spread[a] = above((unit[a] - f64::from(patch.normal[a])).abs());
+        }
+        patch.add_heights(facet);
+        patch
+    }
+
+    /// The patch of some facets, each given with its own patch. Its heights are those of the vertices, unlike those of a union.
+    fn of_all<'a>(facets: impl Iterator<Item = (&'a FacetLattice, Self)> + Clone) -> Option<Self> {
+        let mut ends = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        let mut all: Option<Self> = None;
+        for (_, one) in facets.clone() {
+            for a in 0..3 {
+                let (middle, spread) = (f64::from(one.normal[a]), f64::from(one.spread[a]));
+                ends[0][a] = less(ends[0][a], middle - spread);
+                ends[1][a] = greater(ends[1][a], middle + spread);
+            }
+            all = Some(all.map_or(one, |all| Self {
+                bounds: all.bounds.union(&one.bounds),
+                shell: all.shell.filter(|_| all.shell == one.shell),
+                ..all
+            }));
+        }
+        let mut all = all?;
+        (all.normal, all.spread) = middle(ends);
+        all.heights = [f64::INFINITY, f64::NEG_INFINITY];
+        facets.for_each(|(facet, _)| all.add_heights(facet));
+        Some(all)
+    }
+
+    fn add_heights(&mut self, facet: &FacetLattice) {
+        for vertex in facet {
+            let height: f64 =
+                (0..3).map(|a| f64::from(self.normal[a]) * vertex[a] as f64).sum();
+            self.heights = [less(self.heights[0], height), greater(self.heights[1], height)];
+        }
     }
 
     fn union(&self, other: &Self) -> Self {
-        let (mut normal, mut spread) = ([0.0; 3], [0.0; 3]);
-        for a in 0..3 {
-            let end = |patch: &Self, sign: f64| {
-                f64::from(patch.normal[a]) + sign * f64::from(patch.spread[a])
-            };
-            let low = less(end(self, -1.0), end(other, -1.0));
-            let high = greater(end(self, 1.0), end(other, 1.0));
-            normal[a] = ((low + high) / 2.0) as f32;
-            let middle = f64::from(normal[a]);
-            spread[a] = above(greater(high - middle, middle - low));
-        }
+        let end = |sign: f64| {
+            [0, 1, 2].map(|a| {
+                let end = |p: &Self| f64::from(p.normal[a]) + sign * f64::from(p.spread[a]);
+                let [p, q] = [end(self), end(other)];
+                if sign < 0.0 { less(p, q) } else { greater(p, q) }
+            })
+        };
+        let (normal, spread) = middle([end(-1.0), end(1.0)]);
         let ([a, b], [c, d]) = (self.heights_along(&normal), other.heights_along(&normal));
         let heights = [less(a, c), greater(b, d)];
         let shell = self.shell.filter(|_| self.shell == other.shell);
@@ -138,6 +172,16 @@ impl Patch {
     }
 }
 
+/// The middles of intervals, and upper bounds on half their lengths.
+fn middle([low, high]: [[f64; 3]; 2]) -> ([f32; 3], [f32; 3]) {
+    let normal = [0, 1, 2].map(|a| ((low[a] + high[a]) / 2.0) as f32);
+    let half = |a: usize| {
+        let middle = f64::from(normal[a]);
+        above(greater(high[a] - middle, middle - low[a]))
+    };
+    (normal, [half(0), half(1), half(2)])
+}
+
 /// A float that is no less.
 fn above(x: f64) -> f32 {
     (x as f32).next_up()
@@ -191,6 +235,7 @@ impl Patches {
         let radius = [0, 1, 2].map(side).into_iter().fold(0.0, f64::max) / 2.0;
         let count = boxes.nodes();
         self.nodes.reserve(count);
+        self.leaves.reserve(count.div_ceil(2));
         self.leaf_of.resize(count, 0);
         // Children follow their parents.
         for node in (0..count).rev() {
@@ -202,13 +247,20 @@ impl Patches {
                 }
                 None => {
                     let mut leaf = Bundle::EMPTY;
-                    let mut all: Option<Patch> = None;
-                    for (i, position) in boxes.members(node).enumerate() {
-                        let f = boxes.facets[position] as usize;
-                        let one = Patch::of(&lattice[f], boxes.bounds[position], shells.of(f));
+                    let members = boxes.members(node);
+                    let facet = |position: usize| &lattice[boxes.facets[position] as usize];
+                    let one = |position: usize| {
+                        let shell = shells.of(boxes.facets[position] as usize);
+                        Patch::of(facet(position), boxes.bounds[position], shell)
+                    };
+                    let mut ones = [None; GROUP];
+                    for (i, position) in members.clone().enumerate() {
+                        let one = one(position);
                         leaf.set(i, &one.bundle(origin, radius));
-                        all = Some(all.map_or(one, |all| all.union(&one)));
+                        ones[i] = Some(one);
                     }
+                    let each = members.zip(ones).filter_map(|(at, one)| Some((facet(at), one?)));
+                    let all = Patch::of_all(each);
                     self.leaf_of[node] = self.leaves.len() as u32;
                     self.leaves.push(leaf);
                     all.expect("a leaf has facets")
