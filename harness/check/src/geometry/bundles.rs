@@ -124,7 +124,8 @@ impl<const N: usize> Bundle<N> {
             // bounding box, and is perhaps thinner along its own normals, which are nearly opposite.
             let low = middles[0][i] + greater(-boxes[0][i], -turned[0][i] - other.high[0]);
             let high = middles[0][i] + less(boxes[0][i], turned[0][i] - other.low[0]);
-            let (low, high) = (low - self.high[i] - slacks[0][i], high - self.low[i] + slacks[0][i]);
+            let (low, high) =
+                (low - self.high[i] - slacks[0][i], high - self.low[i] + slacks[0][i]);
             let low_back = middles[1][i] + greater(-boxes[1][i], -turned[1][i] - self.high[i]);
             let high_back = middles[1][i] + less(boxes[1][i], turned[1][i] - self.low[i]);
             let low_back = low_back - other.high[0] - slacks[1][i];
@@ -132,15 +133,21 @@ impl<const N: usize> Bundle<N> {
             squared_min[i] *= 1.0 - ROUNDING;
             squared_max[i] *= 1.0 + ROUNDING;
             // Normals differ by at least 120 degrees iff their sum is no longer than 1.
-            let [may_avert, must_avert] = [1.0 + ROUNDING - sums[0][i], 1.0 - ROUNDING - sums[1][i]];
+            let [may_avert, must_avert] =
+                [1.0 + ROUNDING - sums[0][i], 1.0 - ROUNDING - sums[1][i]];
             // Each is below the other in walls, and above it in gaps. The least and the greatest of both heights, and the greatest of
             // the least.
-            let walls = [less(-high, -high_back), less(-low, -low_back), greater(-high, -high_back)];
+            let walls =
+                [less(-high, -high_back), less(-low, -low_back), greater(-high, -high_back)];
             let gaps = [less(low, low_back), less(high, high_back), greater(low, low_back)];
             let may = |[_, upper, nearest]: [f32; 3], limit: f32| {
                 let nearest = greater(nearest, 0.0);
-                let nearest = less(limit - squared_min[i], limit - nearest * nearest * (1.0 - ROUNDING));
-                less(less(may_avert, nearest), less(upper, upper * upper - COSINES_SQUARED[0] * squared_min[i]))
+                let nearest =
+                    less(limit - squared_min[i], limit - nearest * nearest * (1.0 - ROUNDING));
+                less(
+                    less(may_avert, nearest),
+                    less(upper, upper * upper - COSINES_SQUARED[0] * squared_min[i]),
+                )
             };
             let must = |[lower, ..]: [f32; 3], limit: f32| {
                 let along = lower * lower - COSINES_SQUARED[1] * squared_max[i];
@@ -151,7 +158,12 @@ impl<const N: usize> Bundle<N> {
             walls_must[i] = must(walls, limits[0]);
             gaps_must[i] = must(gaps, limits[1]);
         }
-        Verdicts { may: [walls_may, gaps_may], must: [walls_must, gaps_must], squared_min, squared_max }
+        Verdicts {
+            may: [walls_may, gaps_may],
+            must: [walls_must, gaps_must],
+            squared_min,
+            squared_max,
+        }
     }
 }
 

@@ -111,8 +111,7 @@ impl<'a> Narrowest<'a> {
                 Sheet { squared, facets: [f.min(g), f.max(g)] }
             };
             let mut sheets: Vec<Sheet> = self.found[side].iter().map(sheet).collect();
-            sheets
-                .sort_by(|a, b| a.squared.total_cmp(&b.squared).then(a.facets.cmp(&b.facets)));
+            sheets.sort_by(|a, b| a.squared.total_cmp(&b.squared).then(a.facets.cmp(&b.facets)));
             sheets.dedup_by_key(|sheet| sheet.facets);
             sheets
         })
@@ -125,13 +124,13 @@ impl<'a> Narrowest<'a> {
             return;
         }
         let patches = self.pairs.patches;
-        let squared_min = patches.node(a).squared_min(patches.node(b));
-        let may = self.pairs.may(a, b);
+        let squared_min = patches.patch(a).squared_min(patches.patch(b));
+        let may = [may[0] && self.pairs.may_be_walls(a, b), may[1]];
         let limits = [0, 1].map(|side| match may[side] && squared_min < limits[side] {
             true => limits[side],
             false => 0.0,
         });
-        let verdict = patches.bundle(a).verdicts(patches.bundle(b), limits);
+        let verdict = patches.node(a).bundle.verdicts(&patches.node(b).bundle, limits);
         let may = verdict.may.map(|[may]| may > 0.0);
         if may != [false; 2] {
             self.queue.push(Reverse((squared_min.to_bits(), [a as u32, b as u32], may)));
@@ -151,7 +150,7 @@ impl<'a> Narrowest<'a> {
                 [(p, p), (q, q), (p, q)].into_iter().for_each(|(a, b)| self.push(a, b, may));
             }
             (Some(children), other) => {
-                let is_larger = patches.bundle(a).size() > patches.bundle(b).size();
+                let is_larger = patches.node(a).bundle.size() > patches.node(b).bundle.size();
                 let (children, other) = match other {
                     Some(others) if !is_larger => (others, a),
                     _ => (children, b),
@@ -169,7 +168,7 @@ impl<'a> Narrowest<'a> {
         let (x, others) = (patches.leaf(a), patches.members(b));
         let mut has_fallen = false;
         let limits = self.limits(may, self.limits_of_nodes[a], self.limits_of_nodes[b]);
-        let near = x.verdicts(patches.bundle(b), limits);
+        let near = x.verdicts(&patches.node(b).bundle, limits);
         for (turn, i) in patches.members(a).enumerate() {
             if a != b && near.may[0][turn] <= 0.0 && near.may[1][turn] <= 0.0 {
                 continue;

@@ -22,17 +22,16 @@ pub struct Pairs<'a> {
 }
 
 impl Pairs<'_> {
-    /// Whether the facets of two nodes may be walls and gaps by their shells: two solids that overlap have inner sides that face each
-    /// other, but no wall.
-    pub fn may(&self, a: usize, b: usize) -> [bool; 2] {
-        let [p, q] = [a, b].map(|node| self.patches.node(node).shell);
-        let are_different = |p: u32, q: u32| p != q && self.shells.are_different_solids(p, q);
-        [!p.zip(q).is_some_and(|(p, q)| are_different(p, q)), true]
+    /// Whether the facets of two nodes may be walls by their shells: two solids that overlap have inner sides that face each other, but
+    /// no wall.
+    pub fn may_be_walls(&self, a: usize, b: usize) -> bool {
+        let [p, q] = [a, b].map(|node| self.patches.node(node).shell());
+        p == q || !p.zip(q).is_some_and(|(p, q)| self.shells.are_different_solids(p, q))
     }
 
-    /// Whether the facets of two nodes are of known shells.
+    /// Whether the facets of two nodes that may be walls are all of known shells.
     pub fn have_shells(&self, a: usize, b: usize) -> bool {
-        [a, b].iter().all(|&node| self.patches.node(node).shell.is_some())
+        [a, b].iter().all(|&node| self.patches.node(node).shell().is_some())
     }
 
     /// Whether the facets at two positions may be a wall by their shells.

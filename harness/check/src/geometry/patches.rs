@@ -5,7 +5,6 @@
 //! Facets with other normals are far apart in the order of the tree: on a wing that is thin, the bounds on the normals of
 //! nodes would else be those of both its sides.
 
-
 use std::ops::Range;
 
 use contract::lattice::FacetLattice;
@@ -36,7 +35,26 @@ pub struct Patch {
     /// Least and greatest scalar product of `normal` and a vertex.
     heights: [f64; 2],
     /// The shell of the facets; none if they belong to several.
-    pub shell: Option<u32>,
+    shell: Option<u32>,
+}
+
+/// A node of the tree, in one line of a cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct Node {
+    /// Its patch.
+    pub bundle: Bundle<1>,
+    /// The shell of its facets; [`u32::MAX`] if they belong to several.
+    shell: u32,
+    /// The second child, the first one follows the node; 0 for a leaf.
+    second: u32,
+}
+
+impl Node {
+    /// The shell of the facets; none if they belong to several.
+    pub fn shell(&self) -> Option<u32> {
+        (self.shell != u32::MAX).then_some(self.shell)
+    }
 }
 
 impl Patch {
@@ -81,8 +99,7 @@ impl Patch {
 
     fn add_heights(&mut self, facet: &FacetLattice) {
         for vertex in facet {
-            let height: f64 =
-                (0..3).map(|a| f64::from(self.normal[a]) * vertex[a] as f64).sum();
+            let height: f64 = (0..3).map(|a| f64::from(self.normal[a]) * vertex[a] as f64).sum();
             self.heights = [less(self.heights[0], height), greater(self.heights[1], height)];
         }
     }
@@ -207,8 +224,9 @@ fn class(facet: &FacetLattice) -> u16 {
 #[derive(Debug)]
 pub struct Patches {
     boxes: Boxes,
-    nodes: Vec<Patch>,
-    bundles: Vec<Bundle<1>>,
+    nodes: Vec<Node>,
+    /// The patches of the nodes.
+    patches: Vec<Patch>,
     /// The facets of each leaf.
     leaves: Vec<Bundle<GROUP>>,
     /// The index of each node's leaf, if it is one.
@@ -220,7 +238,7 @@ impl Patches {
     pub fn new(lattice: &[FacetLattice], shells: &Shells) -> Self {
         let boxes = Boxes::by_class(lattice, class);
         let mut patches =
-            Self { boxes, nodes: vec![], bundles: vec![], leaves: vec![], leaf_of: vec![] };
+            Self { boxes, nodes: vec![], patches: vec![], leaves: vec![], leaf_of: vec![] };
         if !patches.boxes.facets.is_empty() {
             patches.build(lattice, shells);
         }
@@ -234,7 +252,7 @@ impl Patches {
         let origin = [0, 1, 2].map(|a| f64::from(root.low[a]) + side(a) / 2.0);
         let radius = [0, 1, 2].map(side).into_iter().fold(0.0, f64::max) / 2.0;
         let count = boxes.nodes();
-        self.nodes.reserve(count);
+        self.patches.reserve(count);
         self.leaves.reserve(count.div_ceil(2));
         self.leaf_of.resize(count, 0);
         // Children follow their parents.
@@ -242,7 +260,7 @@ impl Patches {
             let patch = match boxes.children(node) {
                 // Nodes are in reverse order.
                 Some([a, b]) => {
-                    let [a, b] = [a, b].map(|child| &self.nodes[count - 1 - child]);
+                    let [a, b] = [a, b].map(|child| &self.patches[count - 1 - child]);
                     a.union(b)
                 }
                 None => {
@@ -266,10 +284,15 @@ impl Patches {
                     all.expect("a leaf has facets")
                 }
             };
-            self.nodes.push(patch);
+            self.patches.push(patch);
         }
-        self.nodes.reverse();
-        self.bundles = self.nodes.iter().map(|patch| patch.bundle(origin, radius)).collect();
+        self.patches.reverse();
+        let node = |(node, patch): (usize, &Patch)| Node {
+            bundle: patch.bundle(origin, radius),
+            shell: patch.shell.unwrap_or(u32::MAX),
+            second: boxes.children(node).map_or(0, |[_, second]| second as u32),
+        };
+        self.nodes = self.patches.iter().enumerate().map(node).collect();
     }
 
     /// Number of nodes, 0 if there are no facets; the root is node 0.
@@ -282,14 +305,14 @@ impl Patches {
         self.boxes.facets.len()
     }
 
-    /// The patch of a node.
-    pub fn node(&self, node: usize) -> &Patch {
+    /// A node.
+    pub fn node(&self, node: usize) -> &Node {
         &self.nodes[node]
     }
 
-    /// The patch of a node, as a bundle.
-    pub fn bundle(&self, node: usize) -> &Bundle<1> {
-        &self.bundles[node]
+    /// The patch of a node.
+    pub fn patch(&self, node: usize) -> &Patch {
+        &self.patches[node]
     }
 
     /// The facets of a leaf, each as a patch.
@@ -309,6 +332,7 @@ impl Patches {
 
     /// The children of a node; none for a leaf.
     pub fn children(&self, node: usize) -> Option<[usize; 2]> {
-        self.boxes.children(node)
+        let second = self.nodes[node].second as usize;
+        (second != 0).then_some([node + 1, second])
     }
 }

@@ -57,13 +57,14 @@ impl<'a> Settled<'a> {
         if may == [false; 2] {
             return false;
         }
-        let may = both(may, self.pairs.may(a, b));
-        let [x, y] = [a, b].map(|node| patches.bundle(node));
+        let [x, y] = [a, b].map(|node| &patches.node(node).bundle);
         let verdict = x.verdicts(y, self.limits(may));
         let mut may = [verdict.may[0][0] > 0.0, verdict.may[1][0] > 0.0];
+        may[0] = may[0] && self.pairs.may_be_walls(a, b);
         let mut has_settled = false;
         for side in [0, 1] {
-            if verdict.must[side][0] > 0.0 && (side == 1 || self.pairs.have_shells(a, b)) {
+            let must = may[side] && verdict.must[side][0] > 0.0;
+            if must && (side == 1 || self.pairs.have_shells(a, b)) {
                 self.settle(a, side, verdict.squared_max[0]);
                 self.settle(b, side, verdict.squared_max[0]);
                 (may[side], has_settled) = (false, true);
@@ -94,7 +95,7 @@ impl<'a> Settled<'a> {
     fn visit_children(&mut self, [a, b]: [usize; 2], other: usize, may: [bool; 2]) -> bool {
         let [p, q] = [a, b].map(|child| {
             let patches = self.pairs.patches;
-            patches.bundle(child).distance_of_middles(patches.bundle(other))
+            patches.node(child).bundle.distance_of_middles(&patches.node(other).bundle)
         });
         let [near, far] = if p <= q { [a, b] } else { [b, a] };
         self.visit(near, other, may) | self.visit(far, other, may)
@@ -140,7 +141,7 @@ impl<'a> Settled<'a> {
         let members = patches.members(a).len();
         let mut may = match a == b {
             true => may.map(|may| [f32::from(u8::from(may)); GROUP]),
-            false => patches.leaf(a).verdicts(patches.bundle(b), self.limits(may)).may,
+            false => patches.leaf(a).verdicts(&patches.node(b).bundle, self.limits(may)).may,
         };
         may.iter_mut().for_each(|may| may[members..].fill(0.0));
         may
@@ -154,14 +155,15 @@ impl<'a> Settled<'a> {
         if may == [false; 2] {
             return false;
         }
-        let found = match [0, 1].into_iter().find(|&side| may[side] && verdicts.must[side][at] > 0.0) {
-            Some(side) => Some((side, verdicts.squared_max[at])),
-            None => {
-                let squared_min = f64::from(verdicts.squared_min[at]);
-                let found = self.pairs.opposite([i, j], squared_min, self.limits(may));
-                found.map(|(side, squared)| (side, squared as f32))
-            }
-        };
+        let found =
+            match [0, 1].into_iter().find(|&side| may[side] && verdicts.must[side][at] > 0.0) {
+                Some(side) => Some((side, verdicts.squared_max[at])),
+                None => {
+                    let squared_min = f64::from(verdicts.squared_min[at]);
+                    let found = self.pairs.opposite([i, j], squared_min, self.limits(may));
+                    found.map(|(side, squared)| (side, squared as f32))
+                }
+            };
         let Some((side, squared)) = found else { return false };
         self.settle_facet(i, side, squared);
         self.settle_facet(j, side, squared);
@@ -198,9 +200,7 @@ impl<'a> Settled<'a> {
     fn update(&mut self, node: usize) {
         self.open_nodes[node] = match self.pairs.patches.children(node) {
             Some([a, b]) => either(self.open_nodes[a], self.open_nodes[b]),
-            None => {
-                self.pairs.patches.members(node).map(|i| self.open[i]).fold([false; 2], either)
-            }
+            None => self.pairs.patches.members(node).map(|i| self.open[i]).fold([false; 2], either),
         };
     }
 }
