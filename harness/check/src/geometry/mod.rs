@@ -25,6 +25,7 @@ pub mod narrowest;
 pub mod openings;
 pub mod opposite;
 pub mod pairs;
+pub mod patch;
 pub mod patches;
 pub mod report;
 pub mod settled;

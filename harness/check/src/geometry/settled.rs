@@ -2,7 +2,7 @@
 //!
 //! The search ends for a facet with its first opposite one, and where all facets of two nodes are opposite, for all of them at once.
 
-use super::bundles::{Verdicts, less};
+use super::bundles::Verdicts;
 use super::narrowest::Least;
 use super::pairs::Pairs;
 use super::patches::GROUP;
@@ -102,54 +102,64 @@ impl<'a> Settled<'a> {
     }
 
     fn visit_leaves(&mut self, a: usize, b: usize, may: [bool; 2]) -> bool {
-        let mut has_settled = false;
         let patches = self.pairs.patches;
-        let (ours, others) = (patches.members(a), patches.members(b));
-        let ours_may = self.candidates(a, b, may);
-        let others_may = self.candidates(b, a, may);
-        if !others_may.as_flattened().iter().any(|&may| may > 0.0) {
+        let [ours, others] = [patches.members(a), patches.members(b)];
+        let near = self.candidates(a, b, may);
+        if near == [0; 2] {
             return false;
         }
-        let (x, y) = (patches.leaf(a), patches.leaf(b));
+        let others_near = self.candidates(b, a, may);
+        let mut has_settled = false;
         for (turn, i) in ours.enumerate() {
-            let may = [ours_may[0][turn] > 0.0, ours_may[1][turn] > 0.0];
-            let may = both(may, either(self.open[i], self.open_nodes[b]));
-            if may == [false; 2] {
+            let open = self.open_mask(b);
+            let lanes = [0, 1].map(|side| match near[side] >> turn & 1 == 1 {
+                true if self.open[i][side] => others_near[side],
+                true => others_near[side] & open[side],
+                false => 0,
+            });
+            if lanes == [0; 2] {
                 continue;
             }
-            let mut verdicts = y.verdicts(&x.one(turn), self.limits(may));
-            for side in 0..2 {
-                for at in 0..GROUP {
-                    verdicts.may[side][at] = less(verdicts.may[side][at], others_may[side][at]);
-                }
-            }
+            let limits = self.limits(lanes.map(|lanes| lanes != 0));
+            let one = patches.leaf(a).one(turn);
+            let verdicts = patches.leaf(b).verdicts(&one, limits);
             // Every facet begins with another one, so that most of them find one that is not settled yet.
             for at in (turn..others.len()).chain(0..turn.min(others.len())) {
                 let j = others.start + at;
-                let may = verdicts.may[0][at] > 0.0 || verdicts.may[1][at] > 0.0;
-                if may && (a != b || i < j) {
-                    has_settled |= self.compare([i, j], &verdicts, at);
+                let may = [0, 1].map(|s| lanes[s] >> at & 1 == 1 && verdicts.may[s][at] > 0.0);
+                if may != [false; 2] && (a != b || i < j) {
+                    has_settled |= self.compare([i, j], may, &verdicts, at);
                 }
             }
         }
         has_settled
     }
 
-    /// Which facets of leaf `a` may be opposite to one of leaf `b`.
-    fn candidates(&self, a: usize, b: usize, may: [bool; 2]) -> [[f32; GROUP]; 2] {
+    /// Which facets of leaf `a` may be opposite to one of leaf `b`: a bit for each, as wall and as gap.
+    fn candidates(&self, a: usize, b: usize, may: [bool; 2]) -> [u8; 2] {
         let patches = self.pairs.patches;
-        let members = patches.members(a).len();
-        let mut may = match a == b {
-            true => may.map(|may| [f32::from(u8::from(may)); GROUP]),
-            false => patches.leaf(a).verdicts(&patches.node(b).bundle, self.limits(may)).may,
-        };
-        may.iter_mut().for_each(|may| may[members..].fill(0.0));
-        may
+        let all = mask(patches.members(a).len(), |_| true);
+        if a == b {
+            return may.map(|may| if may { all } else { 0 });
+        }
+        let verdicts = patches.leaf(a).verdicts(&patches.node(b).bundle, self.limits(may));
+        [0, 1].map(|side| all & mask(GROUP, |i| verdicts.may[side][i] > 0.0))
+    }
+
+    /// Which facets of a leaf have no opposite one yet, as wall and as gap.
+    fn open_mask(&self, leaf: usize) -> [u8; 2] {
+        let open = &self.open[self.pairs.patches.members(leaf)];
+        [0, 1].map(|side| mask(open.len(), |i| open[i][side]))
     }
 
     /// Settles the facets at two positions if they are opposite. Returns whether they are.
-    fn compare(&mut self, [i, j]: [usize; 2], verdicts: &Verdicts<GROUP>, at: usize) -> bool {
-        let may = [verdicts.may[0][at] > 0.0, verdicts.may[1][at] > 0.0];
+    fn compare(
+        &mut self,
+        [i, j]: [usize; 2],
+        may: [bool; 2],
+        verdicts: &Verdicts<GROUP>,
+        at: usize,
+    ) -> bool {
         let mut may = both(may, either(self.open[i], self.open[j]));
         may[0] = may[0] && self.pairs.may_be_wall(i, j);
         if may == [false; 2] {
@@ -203,6 +213,11 @@ impl<'a> Settled<'a> {
             None => self.pairs.patches.members(node).map(|i| self.open[i]).fold([false; 2], either),
         };
     }
+}
+
+/// The bits of the lowest `count` numbers for which a condition holds.
+fn mask(count: usize, holds: impl Fn(usize) -> bool) -> u8 {
+    (0..count).fold(0, |mask, i| mask | u8::from(holds(i)) << i)
 }
 
 fn both(a: [bool; 2], b: [bool; 2]) -> [bool; 2] {
