@@ -1,6 +1,6 @@
 //! A binary tree of bounding boxes over facets.
 //!
-//! Facets are sorted along the Morton curve of their centres, after the directions of their normals if asked. A node with more
+//! Facets are sorted along the Morton curve of their centres, after a class if there are classes. A node with more
 //! than `GROUP` facets is split where the highest bit changes in which their codes differ, so that the centres of a node are within
 //! one cell of the curve; nodes of equal numbers of facets would contain jumps of the curve, and be many times larger.
 

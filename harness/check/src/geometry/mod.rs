@@ -3,7 +3,9 @@
 //! - [`input`]: the file, its root and the cell's edge length;
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates;
-//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search; [`opposite`]: when two facets are a sheet;
+//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] searches;
+//! - [`sheets`]: thin sheets; [`opposite`]: when two facets are one; [`patches`]: the tree of their searches, [`settled`] and
+//!   [`narrowest`]; [`patch`], [`bundles`] and [`pairs`]: what a node implies for its facets;
 //! - [`extent`]: the body's position in the root;
 //! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
 //!

@@ -51,6 +51,10 @@ impl Least {
     }
 }
 
+/// Maximum number of pairs of nodes that wait. Where nearly all of a body is equally thin, those beyond it are visited at once: many
+/// more would have to be visited in any order.
+const QUEUE_MAX: usize = 1 << 14;
+
 /// Two nodes, first in order the bits of a lower bound on their squared distance.
 type Visit = Reverse<(u64, [u32; 2], [bool; 2])>;
 
@@ -132,8 +136,13 @@ impl<'a> Narrowest<'a> {
         });
         let verdict = patches.node(a).bundle.verdicts(&patches.node(b).bundle, limits);
         let may = verdict.may.map(|[may]| may > 0.0);
-        if may != [false; 2] {
+        if may == [false; 2] {
+            return;
+        }
+        if self.queue.len() < QUEUE_MAX {
             self.queue.push(Reverse((squared_min.to_bits(), [a as u32, b as u32], may)));
+        } else {
+            self.visit(squared_min, [a, b], may);
         }
     }
 
