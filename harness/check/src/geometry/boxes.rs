@@ -1,9 +1,8 @@
 //! A binary tree of bounding boxes over facets.
 //!
-//! Facets are sorted along the Morton curve of their centres, after the directions of their normals if asked. A node with more
+//! Facets are sorted along the Morton curve of their centres, after a class if there are classes. A node with more
 //! than `GROUP` facets is split where the highest bit changes in which their codes differ, so that the centres of a node are within
-//! one cell of the curve; nodes of equal numbers of facets would contain jumps of the curve, and be many times larger. Every node
-//! encloses its facets and their unit normals in boxes.
+//! one cell of the curve; nodes of equal numbers of facets would contain jumps of the curve, and be many times larger.
 
 #[cfg(test)]
 mod tests;
@@ -18,45 +17,32 @@ use contract::word;
 use super::facets::{is_degenerate, normal};
 
 /// Maximum number of facets per leaf of the tree.
-const GROUP: usize = 8;
+pub const GROUP: usize = 8;
 
-/// The extent of some facets and of their normals.
+/// The extent of some facets.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// Least coordinates, on the lattice.
     pub low: [i32; 3],
     /// Greatest coordinates, on the lattice.
     pub high: [i32; 3],
-    /// Least components of the unit normals.
-    pub normal_low: [f32; 3],
-    /// Greatest components of the unit normals.
-    pub normal_high: [f32; 3],
 }
 
 impl Bounds {
-    const EMPTY: Self = Self {
-        low: [i32::MAX; 3],
-        high: [i32::MIN; 3],
-        normal_low: [f32::INFINITY; 3],
-        normal_high: [f32::NEG_INFINITY; 3],
-    };
+    const EMPTY: Self = Self { low: [i32::MAX; 3], high: [i32::MIN; 3] };
 
     fn of(facet: &FacetLattice) -> Self {
-        let unit = unit_normal(facet).map(|x| x as f32);
-        // Bounds on what was rounded.
-        let [normal_low, normal_high] = [unit.map(f32::next_down), unit.map(f32::next_up)];
         let fold = |f: fn(i64, i64) -> i64| -> [i32; 3] {
             std::array::from_fn(|a| f(f(facet[0][a], facet[1][a]), facet[2][a]) as i32)
         };
-        Self { low: fold(i64::min), high: fold(i64::max), normal_low, normal_high }
+        Self { low: fold(i64::min), high: fold(i64::max) }
     }
 
-    fn union(&self, other: &Self) -> Self {
+    /// The extent of the facets of both.
+    pub fn union(&self, other: &Self) -> Self {
         Self {
             low: std::array::from_fn(|a| self.low[a].min(other.low[a])),
             high: std::array::from_fn(|a| self.high[a].max(other.high[a])),
-            normal_low: std::array::from_fn(|a| self.normal_low[a].min(other.normal_low[a])),
-            normal_high: std::array::from_fn(|a| self.normal_high[a].max(other.normal_high[a])),
         }
     }
 
@@ -73,50 +59,6 @@ impl Bounds {
         };
         (0..3).map(|a| along(a) * along(a)).sum()
     }
-
-    /// The squared distance of the boxes, in lattice units.
-    pub fn distance_squared(&self, other: &Self) -> f64 {
-        let along = |a: usize| {
-            let gap = i64::from(self.low[a].max(other.low[a]))
-                - i64::from(self.high[a].min(other.high[a]));
-            gap.max(0) as f64
-        };
-        (0..3).map(|a| along(a) * along(a)).sum()
-    }
-
-    /// Bounds on the height of a point of the other box over a point of this one, along any normal of this one.
-    pub fn height_range(&self, other: &Self) -> (f64, f64) {
-        let (mut lowest, mut highest) = (0.0, 0.0);
-        for a in 0..3 {
-            let from = f64::from(other.low[a]) - f64::from(self.high[a]);
-            let to = f64::from(other.high[a]) - f64::from(self.low[a]);
-            let (l, h) = (f64::from(self.normal_low[a]), f64::from(self.normal_high[a]));
-            let (p, q, r, s) = (from * l, from * h, to * l, to * h);
-            lowest += less(less(p, q), less(r, s));
-            highest += greater(greater(p, q), greater(r, s));
-        }
-        (lowest, highest)
-    }
-
-    /// A lower bound on the cosine between any normal of one and any normal of the other.
-    pub fn cosine_min(&self, other: &Self) -> f32 {
-        let along = |a: usize| {
-            let (l, h) = (self.normal_low[a], self.normal_high[a]);
-            let (m, n) = (other.normal_low[a], other.normal_high[a]);
-            less(less(l * m, l * n), less(h * m, h * n))
-        };
-        (0..3).map(along).sum()
-    }
-}
-
-/// The lesser of two numbers, neither NaN; unlike `min` one instruction.
-pub fn less<T: PartialOrd>(a: T, b: T) -> T {
-    if a < b { a } else { b }
-}
-
-/// The greater of two numbers, neither NaN; unlike `max` one instruction.
-pub fn greater<T: PartialOrd>(a: T, b: T) -> T {
-    if a > b { a } else { b }
 }
 
 /// The unit normal of a facet; zero if the facet has no area.
@@ -124,13 +66,6 @@ pub fn unit_normal(facet: &FacetLattice) -> [f64; 3] {
     let n = normal(facet).map(|x| x as f64);
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
     if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
-}
-
-/// The direction along an axis that is nearest to the normal, from 0 to 5.
-fn direction(facet: &FacetLattice) -> u8 {
-    let n = normal(facet);
-    let longest = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
-    2 * longest as u8 + u8::from(n[longest] > 0)
 }
 
 /// A node: some facets that are contiguous in the order of the tree.
@@ -160,10 +95,9 @@ impl Boxes {
         Self::of(lattice, |facet| !is_degenerate(facet), |_| 0)
     }
 
-    /// The same tree, but facets with other normals are far apart in its order. On a wing that is thin, bounds on the normals
-    /// of nodes would else be those of both its sides.
-    pub fn by_normal(lattice: &[FacetLattice]) -> Self {
-        Self::of(lattice, |facet| !is_degenerate(facet), direction)
+    /// The same tree, but facets of other classes are far apart in its order.
+    pub fn by_class(lattice: &[FacetLattice], class: impl Fn(&FacetLattice) -> u16) -> Self {
+        Self::of(lattice, |facet| !is_degenerate(facet), class)
     }
 
     /// The tree over all of at least one facet.
@@ -174,7 +108,7 @@ impl Boxes {
     fn of(
         lattice: &[FacetLattice],
         is_included: impl Fn(&FacetLattice) -> bool,
-        class: impl Fn(&FacetLattice) -> u8,
+        class: impl Fn(&FacetLattice) -> u16,
     ) -> Self {
         let code = codes(lattice);
         let key = |(i, facet): (usize, &FacetLattice)| {

@@ -3,7 +3,9 @@
 //! - [`input`]: the file, its root and the cell's edge length;
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates;
-//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] and [`sheets`] search; [`opposite`]: when two facets are a sheet;
+//! - [`boxes`]: a tree of bounding boxes, which [`intersections`] searches;
+//! - [`sheets`]: thin sheets; [`opposite`]: when two facets are one; [`patches`]: the tree of their searches, [`settled`] and
+//!   [`narrowest`]; [`patch`], [`bundles`] and [`pairs`]: what a node implies for its facets;
 //! - [`extent`]: the body's position in the root;
 //! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
 //!
@@ -11,6 +13,7 @@
 //! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
 
 pub mod boxes;
+pub mod bundles;
 pub mod distance;
 pub mod edges;
 pub mod extent;
@@ -20,9 +23,14 @@ pub mod input;
 pub mod intersections;
 pub mod junctions;
 pub mod meaning;
+pub mod narrowest;
 pub mod openings;
 pub mod opposite;
+pub mod pairs;
+pub mod patch;
+pub mod patches;
 pub mod report;
+pub mod settled;
 pub mod sheets;
 pub mod shells;
 pub mod text;
@@ -65,8 +73,7 @@ pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
         findings.extend(intersections::intersections(input, &boxes, options.first));
     }
     if let Some(cell) = input.cell {
-        let boxes = Boxes::by_normal(&input.lattice);
-        findings.extend(sheets::sheets(input, (&edges, &shells), &boxes, cell, options.first));
+        findings.extend(sheets::sheets(input, (&edges, &shells), cell, options.first));
     }
     findings.extend(extent::findings(input, options.first));
     Diagnosis::new(input, &edges, &shells.all, findings, options.first)

@@ -7,11 +7,11 @@
 
 use contract::lattice::FacetLattice;
 
-use super::boxes::{Bounds, greater, less, unit_normal};
+use super::boxes::unit_normal;
 use super::distance::{dot, nearest, sub};
 
 /// The cosine of 60 degrees.
-const COSINE: f64 = 0.5;
+pub const COSINE: f64 = 0.5;
 
 /// An upper bound on the rounding error of a cosine.
 const ROUNDING: f64 = 1e-9;
@@ -19,14 +19,14 @@ const ROUNDING: f64 = 1e-9;
 type Corners = [[f64; 3]; 3];
 
 /// A facet on the lattice.
-pub struct Triangle {
+struct Triangle {
     corners: Corners,
     normal: [f64; 3],
 }
 
 impl Triangle {
     /// A facet with an area.
-    pub fn new(facet: &FacetLattice) -> Self {
+    fn new(facet: &FacetLattice) -> Self {
         Self { corners: corners(facet), normal: unit_normal(facet) }
     }
 
@@ -34,7 +34,7 @@ impl Triangle {
     /// limits, by the heights of its corners over the plane of this one.
     fn may_oppose(&self, other: &Corners, squared_min: f64, limits: [f64; 2]) -> [bool; 2] {
         let [a, b, c] = other.map(|v| dot(sub(v, self.corners[0]), self.normal));
-        let (least, greatest) = (less(less(a, b), c), greater(greater(a, b), c));
+        let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
         let along = is_along(least, greatest, squared_min);
         // A facet that is wholly on one side of a plane is no nearer to the other facet than to the plane.
         [
@@ -58,30 +58,6 @@ fn is_along(least: f64, greatest: f64, squared_min: f64) -> [bool; 2] {
     ]
 }
 
-/// Whether normals of two nodes may differ by 120 degrees.
-pub fn is_averted(a: &Bounds, b: &Bounds) -> bool {
-    // Sums of f32 are rounded.
-    f64::from(a.cosine_min(b)) <= 1e-5 - COSINE
-}
-
-/// Whether facets of two nodes may be walls, and whether gaps, nearer than the squared limits.
-pub fn may_oppose(a: &Bounds, b: &Bounds, limits: [f64; 2]) -> [bool; 2] {
-    if !is_averted(a, b) {
-        return [false; 2];
-    }
-    let squared = a.distance_squared(b);
-    let mut may = limits.map(|limit| squared < limit);
-    // Each facet is as far below the other one, or above it.
-    for (from, to) in [(a, b), (b, a)] {
-        if may == [false; 2] {
-            break;
-        }
-        let (least, greatest) = from.height_range(to);
-        may = both(may, is_along(least, greatest, squared));
-    }
-    may
-}
-
 fn both(a: [bool; 2], b: [bool; 2]) -> [bool; 2] {
     [a[0] && b[0], a[1] && b[1]]
 }
@@ -89,11 +65,12 @@ fn both(a: [bool; 2], b: [bool; 2]) -> [bool; 2] {
 /// The side and the squared distance of two facets if they are opposite and nearer than the squared limit of that side,
 /// provided that they have no common vertex and do not meet. `squared_min` is a lower bound on their squared distance.
 pub fn opposite(
-    f: &Triangle,
+    f: &FacetLattice,
     g: &FacetLattice,
     squared_min: f64,
     limits: [f64; 2],
 ) -> Option<(usize, f64)> {
+    let f = Triangle::new(f);
     let may = f.may_oppose(&corners(g), squared_min, limits);
     if may == [false; 2] {
         return None;

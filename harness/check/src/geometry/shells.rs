@@ -126,14 +126,18 @@ impl Shells {
         }
     }
 
-    /// Whether two facets belong to different solids: to closed shells neither of which can contain the other, by their bounding
-    /// boxes.
-    pub fn are_of_different_solids(&self, f: usize, g: usize) -> bool {
-        let shell = |facet: usize| self.all.get(self.of[facet] as usize);
-        let (Some(a), Some(b)) = (shell(f), shell(g)) else { return false };
-        self.of[f] != self.of[g]
-            && (a.is_closed && b.is_closed)
-            && !(a.may_be_in(b) || b.may_be_in(a))
+    /// The index of a facet's shell; [`u32::MAX`] for a facet that belongs to none.
+    pub fn of(&self, facet: usize) -> u32 {
+        self.of[facet]
+    }
+
+    /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
+    pub fn are_different_solids(&self, a: u32, b: u32) -> bool {
+        let shell = |index: u32| self.all.get(index as usize);
+        let (Some(one), Some(other)) = (shell(a), shell(b)) else { return false };
+        a != b
+            && (one.is_closed && other.is_closed)
+            && !(one.may_be_in(other) || other.may_be_in(one))
     }
 
     /// Closed shells that are wound inward: those that are inside out, and those that may be cavities of another one.
