@@ -5,7 +5,7 @@ use super::search::Graph;
 use crate::geometry::distance::{Prepared, length, sub};
 
 /// Half of a grid's edge, in steps.
-pub const STEPS: i32 = 16;
+pub const STEPS: i32 = 8;
 
 /// A cubic grid of points, each joined to the 26 around it.
 #[derive(Clone, Copy, Debug)]

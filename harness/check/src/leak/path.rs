@@ -23,6 +23,15 @@ pub struct Spot {
     pub step: f64,
 }
 
+impl Spot {
+    /// Radius of a ball that passes from this point of a grid to its neighbours on a path: a facet that leaves this clearance at
+    /// both of two points can be nearer between them.
+    fn passing(&self) -> f64 {
+        let apart = 3f64.sqrt() * self.step;
+        (self.clearance.powi(2) - apart.powi(2) / 4.0).max(0.0).sqrt()
+    }
+}
+
 /// Step of a grid that is fine enough, in parts of the clearance.
 pub const PRECISION: f64 = 1e-3;
 
@@ -73,25 +82,29 @@ impl Path {
         /// Edge of the first grid, in radii.
         const EDGE: f64 = 6.0;
         /// Ratio of the steps of successive grids.
-        const FINER: f64 = 3.0;
+        const FINER: f64 = 2.0;
         let mut path = Self {
             spots: raw(leaves, route.leaves, goal, clearance),
             narrowest: 0,
             approaches: route.approaches.map(|count| 2 * count),
         };
-        path.widen_ends(goal, clearance);
         // No ball of a greater radius passes the grids.
         let mut bound = f64::INFINITY;
-        let mut is_centred = false;
+        let (mut is_centred, mut are_ends_wide) = (false, false);
         for grids in 1..=GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
-            let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.clearance;
+            let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
+            if !are_ends_wide && path.reaches_end(f64::from(STEPS) * step) {
+                path.widen_ends(goal, clearance);
+                are_ends_wide = true;
+                continue;
+            }
+            let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.passing();
             let is_fine = spot.step <= PRECISION * spot.clearance;
             if path.is_narrowest_at_end() || is_precise || is_fine || bound < route.wanted {
                 break;
             }
-            let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
             let Some(found) = path.widen(step, clearance, scratch, stop)? else { break };
             if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
                 path.centre(bound.min(route.radius), clearance);
@@ -146,6 +159,12 @@ impl Path {
         let first = (begin..self.narrowest).rev().take_while(is_near).last();
         let last = (self.narrowest + 1..=end).take_while(is_near).last();
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
+    }
+
+    /// Whether an end is among the points in a cube around the narrowest one.
+    fn reaches_end(&self, half: f64) -> bool {
+        let (first, last) = self.surroundings(half);
+        first == self.inner().0 || last == self.inner().1
     }
 
     /// Moves the ends, approaches excepted, to the widest places near them: the centre of a leaf is rarely one.
