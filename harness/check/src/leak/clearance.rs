@@ -61,19 +61,25 @@ impl<'a> Clearance<'a> {
         found
     }
 
-    /// The facets that can be the nearest one of a point at most `radius` from `centre`; none if they are more than `most`.
-    pub fn near(&self, centre: Point, radius: f64, most: usize) -> Vec<Prepared> {
+    /// The facets that can be the nearest one of a point at most `radius` from `centre`, with their distances from the centre,
+    /// nearest first; none if they are more than `most`.
+    pub fn near(&self, centre: Point, radius: f64, most: usize) -> Vec<(Prepared, f64)> {
         // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
         let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + ROUNDING;
         let (mut found, mut limit) = (Vec::new(), reach * reach);
-        self.within(centre, &mut limit, &mut |_, facet, limit| {
-            found.push(Prepared::new(&self.triangle(facet)));
+        self.within(centre, &mut limit, &mut |squared, facet, limit| {
+            found.push((facet, squared.sqrt()));
             if found.len() > most {
                 // Nothing is nearer, so the search ends.
                 *limit = 0.0;
             }
         });
-        if found.len() > most { Vec::new() } else { found }
+        if found.len() > most {
+            return Vec::new();
+        }
+        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let prepared = |(facet, from)| (Prepared::new(&self.triangle(facet)), from);
+        found.into_iter().map(prepared).collect()
     }
 
     /// A nearest point of the nearest facet.
@@ -131,6 +137,24 @@ impl<'a> Clearance<'a> {
             &from_box,
         );
     }
+}
+
+/// Distance from a point to the nearest of some triangles, given with their distances from a centre, nearest first. The point is
+/// `offset` from this centre.
+pub fn nearest<'a>(
+    triangles: impl Iterator<Item = (&'a Prepared, f64)>,
+    point: Point,
+    offset: f64,
+) -> f64 {
+    let mut best = f64::INFINITY;
+    for (triangle, from_centre) in triangles {
+        let least = from_centre - offset - ROUNDING;
+        if least > 0.0 && least * least > best {
+            break;
+        }
+        best = triangle.squared(point).min(best);
+    }
+    best.sqrt()
 }
 
 #[cfg(test)]

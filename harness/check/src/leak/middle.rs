@@ -4,7 +4,7 @@
 //! middle, like all points that are centres of leaves, and limit what the grid can find. So every point is moved to where
 //! the passage is widest, in the plane across the path.
 
-use super::clearance::{Clearance, Point};
+use super::clearance::{Clearance, Point, nearest};
 use super::path::{PRECISION, Spot};
 use crate::geometry::distance::{dot, length, sub};
 
@@ -34,9 +34,9 @@ const HALVINGS_MAX: u32 = 8;
 fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
     let start = clearance.at(from, f64::INFINITY);
     let near = clearance.near(from, REACH * start, FACETS_FEW);
-    let free = |at: Point| match near.is_empty() {
-        true => clearance.at(at, f64::INFINITY),
-        false => near.iter().map(|t| t.squared(at)).fold(f64::INFINITY, f64::min).sqrt(),
+    let free = |at: Point, best: &Spot| match near.is_empty() {
+        true => clearance.at(at, best.bound(at)),
+        false => nearest(near.iter().map(|(t, from)| (t, *from)), at, length(sub(at, from))),
     };
     let [u, v] = plane(normal);
     let step_min = PRECISION / 2.0 * start;
@@ -50,7 +50,7 @@ fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
             let angle = turn + f64::from(i) * std::f64::consts::TAU / f64::from(AROUND);
             let (sin, cos) = angle.sin_cos();
             let at = std::array::from_fn(|a| best.at[a] + step * (cos * u[a] + sin * v[a]));
-            Spot { at, clearance: free(at), step: step_min }
+            Spot { at, clearance: free(at, &best), step: step_min }
         });
         let within = around.filter(|spot| length(sub(spot.at, from)) <= REACH * start);
         match within.max_by(|p, q| p.clearance.total_cmp(&q.clearance)) {
@@ -125,7 +125,7 @@ impl Passage<'_> {
             return;
         }
         let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
-        let clearance = self.clearance.at(at, f64::INFINITY);
+        let clearance = self.clearance.at(at, from.bound(at));
         let middle = self.moved(Spot { at, clearance, step: f64::INFINITY }, gap);
         self.fill(from, middle, halvings - 1, path);
         path.push(middle);

@@ -24,10 +24,15 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// Radius of a ball that passes from this point of a grid to its neighbours on a path: a facet that leaves this clearance at
-    /// both of two points can be nearer between them.
+    /// Upper bound of the clearance at another point.
+    pub fn bound(&self, at: Point) -> f64 {
+        self.clearance + length(sub(at, self.at))
+    }
+
+    /// Radius of a ball that passes from this point to its neighbours on a path through a grid: a facet that leaves this clearance
+    /// at two points can be nearer between them. For a point of a leaf, its clearance.
     fn passing(&self) -> f64 {
-        let apart = 3f64.sqrt() * self.step;
+        let apart = if self.step.is_finite() { 3f64.sqrt() * self.step } else { 0.0 };
         (self.clearance.powi(2) - apart.powi(2) / 4.0).max(0.0).sqrt()
     }
 }
@@ -111,8 +116,8 @@ impl Path {
                 is_centred = true;
                 continue;
             }
-            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
-            bound = bound.min(found.least + 3f64.sqrt() * step);
+            // The points of a grid nearest to those of a path, half a step's diagonal away at most, are a path through the grid.
+            bound = bound.min(found.least + 3f64.sqrt() / 2.0 * step);
         }
         path.narrowest = path.find_narrowest();
         Ok(path)
@@ -145,9 +150,9 @@ impl Path {
     }
 
     fn find_narrowest(&self) -> usize {
-        let clearance = |i: &usize| self.spots[*i].clearance;
+        let passing = |i: &usize| self.spots[*i].passing();
         let (first, last) = self.inner();
-        let least = (first..=last).min_by(|i, j| clearance(i).total_cmp(&clearance(j)));
+        let least = (first..=last).min_by(|i, j| passing(i).total_cmp(&passing(j)));
         least.expect("a path has points")
     }
 
@@ -291,6 +296,10 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
     if goal == Goal::Far {
         points.push(nearest_boundary(points[points.len() - 1]));
     }
-    let spot = |at| Spot { at, clearance: clearance.at(at, f64::INFINITY), step: f64::INFINITY };
-    points.into_iter().map(spot).collect()
+    let mut spots: Vec<Spot> = Vec::with_capacity(points.len());
+    for at in points {
+        let bound = spots.last().map_or(f64::INFINITY, |last| last.bound(at));
+        spots.push(Spot { at, clearance: clearance.at(at, bound), step: f64::INFINITY });
+    }
+    spots
 }
