@@ -139,22 +139,26 @@ impl<'a> Clearance<'a> {
     }
 }
 
-/// Distance from a point to the nearest of some triangles, given with their distances from a centre, nearest first. The point is
-/// `offset` from this centre.
+/// Distance from a point to the nearest of some triangles, given with their distances from a centre, nearest first; the point is
+/// `offset` from this centre. The index of a triangle as an error if the distance is not greater than `least`.
 pub fn nearest<'a>(
     triangles: impl Iterator<Item = (&'a Prepared, f64)>,
     point: Point,
     offset: f64,
-) -> f64 {
+    least: f64,
+) -> Result<f64, usize> {
     let mut best = f64::INFINITY;
-    for (triangle, from_centre) in triangles {
-        let least = from_centre - offset - ROUNDING;
-        if least > 0.0 && least * least > best {
+    for (i, (triangle, from_centre)) in triangles.enumerate() {
+        let possible = from_centre - offset - ROUNDING;
+        if possible > 0.0 && possible * possible > best {
             break;
         }
         best = triangle.squared(point).min(best);
+        if best <= least * least {
+            return Err(i);
+        }
     }
-    best.sqrt()
+    Ok(best.sqrt())
 }
 
 #[cfg(test)]

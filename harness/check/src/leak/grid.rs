@@ -72,7 +72,7 @@ impl<'a> Distances<'a> {
         match &self.blocks[block] {
             Some(Block { centre, near }) if !near.is_empty() => {
                 let triangles = near.iter().map(|&(i, from)| (&self.triangles[i as usize].0, from));
-                nearest(triangles, point, length(sub(point, *centre)))
+                nearest(triangles, point, length(sub(point, *centre)), 0.0).unwrap_or(0.0)
             }
             _ => self.clearance.at(point, bound),
         }
