@@ -62,7 +62,7 @@ fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
     let mut near = Near { clearance, centre: from, triangles, obstacle: 0 };
     let [u, v] = plane(normal);
     let step_min = PRECISION / 2.0 * start;
-    let mut best = Spot { at: from, clearance: start, step: step_min };
+    let mut best = Spot { at: from, clearance: start, step: step_min, apart: 0.0 };
     let (mut step, mut turn) = (start / 2.0, 0.0);
     for _ in 0..MOVES_MAX {
         if step < step_min {
@@ -76,7 +76,7 @@ fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
             if length(sub(at, from)) <= REACH * start
                 && let Some(clearance) = near.beyond(at, best.clearance, before.bound(at))
             {
-                best = Spot { at, clearance, step: step_min };
+                best = Spot { at, clearance, step: step_min, apart: 0.0 };
             }
         }
         if best == before {
@@ -151,7 +151,7 @@ impl Passage<'_> {
         }
         let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
         let clearance = self.clearance.at(at, from.bound(at));
-        let middle = self.moved(Spot { at, clearance, step: f64::INFINITY }, gap);
+        let middle = self.moved(Spot { at, clearance, step: f64::INFINITY, apart: 0.0 }, gap);
         self.fill(from, middle, halvings - 1, path);
         path.push(middle);
         self.fill(middle, to, halvings - 1, path);

@@ -19,8 +19,10 @@ pub struct Spot {
     pub at: Point,
     /// The distance: half the free width.
     pub clearance: f64,
-    /// Step of the grid that the point is from; infinite for a point of a leaf.
+    /// Step of the grid that the point is from; infinite for a point of a leaf, and near the edge of a first grid.
     pub step: f64,
+    /// Greatest distance of the next points if they are of the same grid; 0 otherwise.
+    pub apart: f64,
 }
 
 impl Spot {
@@ -29,11 +31,10 @@ impl Spot {
         self.clearance + length(sub(at, self.at))
     }
 
-    /// Radius of a ball that passes from this point to its neighbours on a path through a grid: a facet that leaves this clearance
-    /// at two points can be nearer between them. For a point of a leaf, its clearance.
+    /// Radius of a ball that passes from this point to the next ones: a facet that leaves this clearance at two points of a grid can
+    /// be nearer between them.
     fn passing(&self) -> f64 {
-        let apart = if self.step.is_finite() { 3f64.sqrt() * self.step } else { 0.0 };
-        (self.clearance.powi(2) - apart.powi(2) / 4.0).max(0.0).sqrt()
+        (self.clearance.powi(2) - self.apart.powi(2) / 4.0).max(0.0).sqrt()
     }
 }
 
@@ -236,6 +237,7 @@ impl Path {
             at: grid.position(place),
             clearance: f64::from(width(place, place)),
             step: if Grid::is_inner(place) { step } else { coarse },
+            apart: 3f64.sqrt() * step,
         };
         let widened: Vec<Spot> = route.iter().map(spot).collect();
         let (begin, end) = self.inner();
@@ -299,7 +301,12 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
     let mut spots: Vec<Spot> = Vec::with_capacity(points.len());
     for at in points {
         let bound = spots.last().map_or(f64::INFINITY, |last| last.bound(at));
-        spots.push(Spot { at, clearance: clearance.at(at, bound), step: f64::INFINITY });
+        spots.push(Spot {
+            at,
+            clearance: clearance.at(at, bound),
+            step: f64::INFINITY,
+            apart: 0.0,
+        });
     }
     spots
 }
