@@ -30,7 +30,7 @@ fn help_is_printed_once_per_job() {
     }
 }
 
-/// Several ranks that were told not to communicate would each mesh the case; a single one may.
+/// Several ranks without communication would each mesh the case; a single one may.
 #[test]
 fn ranks_of_a_job_are_not_started_without_communication() {
     let workspace = Workspace::new();

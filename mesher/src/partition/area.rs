@@ -190,20 +190,12 @@ fn centre(f: &Facet) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::comm::Solo;
-    use crate::lattice::{Enclosed, Keep, Root};
+    use crate::lattice::Keep;
     use crate::partition::curve;
+    use crate::tree::tests::rules as plain_rules;
 
     fn rules(level_surface: Level) -> Rules {
-        Rules {
-            root: Root { origin: [0.0; 3], edge: 1.0 },
-            level_surface,
-            layer_cells_min: 4,
-            keep: Keep::Outside,
-            keep_crossing: true,
-            boxes: Vec::new(),
-            seeds: Vec::new(),
-            enclosed: Enclosed::Delete,
-        }
+        Rules { level_surface, layer_cells_min: 4, keep: Keep::Outside, ..plain_rules() }
     }
 
     #[test]
@@ -268,16 +260,8 @@ mod tests {
         let h = 1i64 << (ROOT_BITS - 6);
         // 5 x 20 x 33 cells of level 6, at odd positions.
         let (min, max) = ([h * 3, h * 7, h * 11], [h * 8, h * 27, h * 44]);
-        let rules = Rules {
-            root: Root { origin: [0.0; 3], edge: 1.0 },
-            level_surface: 6,
-            layer_cells_min: 1,
-            keep: Keep::All,
-            keep_crossing: true,
-            boxes: vec![ExtentBox { min, max, level: 6 }],
-            seeds: Vec::new(),
-            enclosed: Enclosed::Delete,
-        };
+        let boxes = vec![ExtentBox { min, max, level: 6 }];
+        let rules = Rules { level_surface: 6, boxes, ..plain_rules() };
         let weights = |level: Level, light: u64, within: &Range<u64>| {
             let mut bins = Vec::new();
             add_boxes(&mut bins, &rules, level, light, 10, within);

@@ -204,24 +204,15 @@ fn assign_metis(_: &[Subtree], _: &[u64], _: usize) -> Result<Vec<usize>, Error>
 mod tests {
     use super::*;
     use crate::comm::Solo;
-    use crate::lattice::{Enclosed, Keep, Root};
     use crate::octant::ROOT_EDGE;
     use crate::refine::refine_top;
+    use crate::tree::tests::rules as plain_rules;
 
     const LEVEL: Level = 5;
 
     #[test]
     fn base_leaves_are_as_deep_as_the_division_asks_for() {
-        let rules = Rules {
-            root: Root { origin: [0.0; 3], edge: 1.0 },
-            level_surface: 9,
-            layer_cells_min: 4,
-            keep: Keep::All,
-            keep_crossing: true,
-            boxes: Vec::new(),
-            seeds: Vec::new(),
-            enclosed: Enclosed::Delete,
-        };
+        let rules = Rules { level_surface: 9, layer_cells_min: 4, ..plain_rules() };
         let h = ROOT_EDGE as i32;
         let facets = [Facet { v: [[1, 1, 5], [h / 2, 1, 5], [1, h / 4, h / 8]] }];
         let marked = refine_top(&facets, &rules, LEVEL).0.split;

@@ -153,23 +153,14 @@ fn coarse_bins(local: &[Bin], rules: &Rules, level: Level, comm: &dyn Comm) -> (
 mod tests {
     use super::*;
     use crate::comm::sim;
-    use crate::lattice::{Enclosed, Keep, Root};
     use crate::octant::{ROOT_EDGE, start57};
+    use crate::tree::tests::rules as plain_rules;
 
     const RANKS: usize = 9;
     const FINE: Level = 7;
 
     fn rules(boxes: Vec<ExtentBox>) -> Rules {
-        Rules {
-            root: Root { origin: [0.0; 3], edge: 1.0 },
-            level_surface: 9,
-            layer_cells_min: 4,
-            keep: Keep::All,
-            keep_crossing: true,
-            boxes,
-            seeds: Vec::new(),
-            enclosed: Enclosed::Delete,
-        }
+        Rules { level_surface: 9, layer_cells_min: 4, boxes, ..plain_rules() }
     }
 
     /// A sheet of facets, oblique and of all sizes, denser to one side.

@@ -1,20 +1,13 @@
 use super::*;
 use crate::comm::Solo;
-use crate::lattice::{Enclosed, ExtentBox, Keep, Root};
+use crate::lattice::{ExtentBox, Keep, Root};
+use crate::tree::tests::rules as plain_rules;
 
 const ROUGH: f64 = 268_435_456.0;
 
 fn rules(level_surface: Level) -> Rules {
-    Rules {
-        root: Root { origin: [-1.0; 3], edge: 2.0 },
-        level_surface,
-        layer_cells_min: 4,
-        keep: Keep::Outside,
-        keep_crossing: true,
-        boxes: Vec::new(),
-        seeds: Vec::new(),
-        enclosed: Enclosed::Delete,
-    }
+    let root = Root { origin: [-1.0; 3], edge: 2.0 };
+    Rules { root, level_surface, layer_cells_min: 4, keep: Keep::Outside, ..plain_rules() }
 }
 
 /// Runs `test` with the problem of half of a face of the root: at level 13, [`ROUGH`] cells.

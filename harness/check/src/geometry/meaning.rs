@@ -240,6 +240,8 @@ mod tests {
             Kind::NonManifoldOdd,
             Kind::NonManifoldEven,
             Kind::Winding,
+            Kind::InsideOut,
+            Kind::Cavities,
             Kind::Duplicates,
             Kind::Degenerate,
             Kind::Slivers,
@@ -253,8 +255,8 @@ mod tests {
         let text = |kind, changing| of_width(kind, 3.0, changing, true);
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
         meanings.push(text(Kind::Intersections, 0));
-        assert!(meanings[14].starts_with("No effect: the facets overlap within one plane"));
-        assert!(meanings[8].starts_with("Where two closed shells overlap"));
+        assert!(meanings[16].starts_with("No effect: the facets overlap within one plane"));
+        assert!(meanings[10].starts_with("Where two closed shells overlap"));
         meanings.sort();
         meanings.dedup();
         assert_eq!(meanings.len(), kinds.len() + 1);

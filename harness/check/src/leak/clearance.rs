@@ -3,13 +3,42 @@
 use contract::lattice::FacetLattice;
 
 use crate::geometry::boxes::{Bounds, Boxes};
-use crate::geometry::distance::{self, Prepared};
+use crate::geometry::distance::{self, Prepared, length, sub};
 
 /// Exceeds the rounding of a distance, in lattice units.
 pub const ROUNDING: f64 = 1.0;
 
 /// A point, in lattice units.
 pub type Point = [f64; 3];
+
+/// A point and its distance to the nearest facet, in lattice units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// The point.
+    pub at: Point,
+    /// The distance: half the free width.
+    pub clearance: f64,
+    /// Step of the grid that the point is from; infinite for a point of a leaf, and near the edge of a first grid.
+    pub step: f64,
+    /// Greatest distance of the next points if they are of the same grid; 0 otherwise.
+    pub apart: f64,
+}
+
+impl Spot {
+    /// Upper bound of the clearance at another point.
+    pub fn bound(&self, at: Point) -> f64 {
+        self.clearance + length(sub(at, self.at))
+    }
+
+    /// Radius of a ball that passes from this point to the next ones: a facet that leaves this clearance at two points of a grid can
+    /// be nearer between them.
+    pub fn passing(&self) -> f64 {
+        (self.clearance.powi(2) - self.apart.powi(2) / 4.0).max(0.0).sqrt()
+    }
+}
+
+/// Step of a grid that is fine enough, in parts of the clearance.
+pub const PRECISION: f64 = 1e-3;
 
 /// The facets, arranged for nearest-facet queries. Facets without area count too: they cross leaves like all others.
 #[derive(Debug)]

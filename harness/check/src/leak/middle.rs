@@ -4,8 +4,7 @@
 //! middle, like all points that are centres of leaves, and limit what the grid can find. So every point is moved to where
 //! the passage is widest, in the plane across the path.
 
-use super::clearance::{Clearance, Point, nearest};
-use super::path::{PRECISION, Spot};
+use super::clearance::{Clearance, PRECISION, Point, Spot, nearest};
 use crate::geometry::distance::{Prepared, dot, length, sub};
 
 /// Places that are tried around a point.

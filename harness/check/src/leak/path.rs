@@ -5,41 +5,12 @@
 //! surroundings are replaced by the widest path through a cubic grid. That is repeated with finer grids until the
 //! narrowest point of the path is one of the finest grid: its ball is the largest that passes.
 
-use super::clearance::{Clearance, Point};
+use super::clearance::{Clearance, PRECISION, Point, Spot};
 use super::grid::{Distances, Grid, STEPS};
 use super::leaves::{Leaves, shared_face_centre};
 use super::middle;
 use super::search::{self, Goal, Graph, Interrupted, Memory, nearest_boundary};
 use crate::geometry::distance::{length, sub};
-
-/// A point and its distance to the nearest facet, in lattice units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
-    /// The point.
-    pub at: Point,
-    /// The distance: half the free width.
-    pub clearance: f64,
-    /// Step of the grid that the point is from; infinite for a point of a leaf, and near the edge of a first grid.
-    pub step: f64,
-    /// Greatest distance of the next points if they are of the same grid; 0 otherwise.
-    pub apart: f64,
-}
-
-impl Spot {
-    /// Upper bound of the clearance at another point.
-    pub fn bound(&self, at: Point) -> f64 {
-        self.clearance + length(sub(at, self.at))
-    }
-
-    /// Radius of a ball that passes from this point to the next ones: a facet that leaves this clearance at two points of a grid can
-    /// be nearer between them.
-    fn passing(&self) -> f64 {
-        (self.clearance.powi(2) - self.apart.powi(2) / 4.0).max(0.0).sqrt()
-    }
-}
-
-/// Step of a grid that is fine enough, in parts of the clearance.
-pub const PRECISION: f64 = 1e-3;
 
 /// Grids that are searched at most.
 const GRIDS_MAX: usize = 150;

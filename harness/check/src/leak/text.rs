@@ -84,9 +84,11 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         "width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes"
     )?;
     if !narrowest.is_end {
+        // The width is found to 1 %.
+        let closing = number(1.01 * narrowest.width);
         writeln!(
             f,
-            "          Spacings above {width} close it wherever the lattice lies; a finer one may close it on this lattice only."
+            "          Spacings above {closing} close it wherever the lattice lies; a finer one may close it on this lattice only."
         )?;
     }
     writeln!(f, "at        {}", point(&narrowest.at))?;
@@ -199,7 +201,7 @@ mod tests {
         let expected = "LEAK: free leaves join start and end; closed at spacing 2.00 (level 2), where the end is in a wall\n\
             \nThe narrowest place of the widest path (level 4)\n\
             width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes\n          \
-            Spacings above 0.125 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
+            Spacings above 0.126 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
             at        (0.5, 0, -1.25)\ndirection (0.000, 0.600, -0.800)\nfacets    3, 4\n\
             \nThe path: 3 points, length 12.5\n  free width  point\n       0.500  (0, 0, 1)\n        \
             1.50  (1, 0, 1)  narrowest\n        2.50  (2, 0, 1)\n";

@@ -28,6 +28,16 @@ mod table;
 
 pub use mutant::{Mutant, Mutation};
 
+/// The built-in cases, by name, as case files: every corruption applies to at least one of them.
+pub const CASES: [(&str, &str); 6] = [
+    ("outside", include_str!("../../../selftest-cases/outside.toml")),
+    ("inside", include_str!("../../../selftest-cases/inside.toml")),
+    ("all", include_str!("../../../selftest-cases/all.toml")),
+    ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
+    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
+    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
+];
+
 /// All corruptions.
 pub fn catalogue() -> Vec<Mutant> {
     [

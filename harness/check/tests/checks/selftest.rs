@@ -1,21 +1,12 @@
 //! The self test on meshes of the reference: the responsible check reports every corruption.
 
 use crate::support;
-use check::selftest::{self, Mutation, SelftestCase};
+use check::selftest::{self, CASES, Mutation, SelftestCase};
 use contract::manifest::Manifest;
 use contract::testing::assert_text;
 use contract::word;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-
-const CASES: [(&str, &str); 6] = [
-    ("outside", include_str!("../../../selftest-cases/outside.toml")),
-    ("inside", include_str!("../../../selftest-cases/inside.toml")),
-    ("all", include_str!("../../../selftest-cases/all.toml")),
-    ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
-    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
-    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
-];
 
 fn case(index: usize) -> SelftestCase {
     let (name, text) = CASES[index];

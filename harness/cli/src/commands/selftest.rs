@@ -50,16 +50,6 @@ pub struct Arguments {
     pub programs: ProgramArguments,
 }
 
-/// The built-in cases: every corruption applies to at least one of them.
-const BUILT_IN: [(&str, &str); 6] = [
-    ("outside", include_str!("../../../selftest-cases/outside.toml")),
-    ("inside", include_str!("../../../selftest-cases/inside.toml")),
-    ("all", include_str!("../../../selftest-cases/all.toml")),
-    ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
-    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
-    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
-];
-
 /// Meshes the cases, corrupts the meshes and prints the table; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
     match try_run(arguments) {
@@ -180,7 +170,7 @@ fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {
         let path = scratch.join(format!("{name}.toml"));
         fs::write(&path, text).map(|()| path).map_err(|error| (EXIT_INPUT, error.to_string()))
     };
-    BUILT_IN.into_iter().map(write).collect()
+    selftest::CASES.into_iter().map(write).collect()
 }
 
 fn find(arguments: &Arguments) -> Result<Programs, Failure> {

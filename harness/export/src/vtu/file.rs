@@ -39,7 +39,7 @@ impl VtuFile {
         self.file.write_all(&piece.bytes)?;
         // The user's interrupt waits for a flush to end, so none may have much to flush.
         self.file.sync_data()?;
-        self.places.push(Place::new(piece, self.data_bytes));
+        self.places.push(piece.place(self.data_bytes));
         self.data_bytes += piece.bytes.len() as u64;
         self.content.digest.merge(piece.digest);
         Ok(())

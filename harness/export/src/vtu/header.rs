@@ -5,8 +5,6 @@ use std::fmt::Write;
 use contract::digest::Digest;
 use contract::lattice::Root;
 
-use super::piece::Encoded;
-
 /// The line that marks files of this program, which it may replace.
 pub const MARK: &str = "<!-- Written by harness export. -->\n";
 
@@ -55,20 +53,14 @@ pub struct Content {
 #[derive(Clone, Debug)]
 pub struct Place {
     /// Number of points.
-    points: u64,
+    pub points: u64,
     /// Number of cells.
-    cells: u64,
-    /// Position of each array in the appended data.
-    offsets: Vec<u64>,
+    pub cells: u64,
+    /// Position of each array in the appended data, in the order of [`ARRAYS`].
+    pub offsets: Vec<u64>,
 }
 
 impl Place {
-    /// The place of a piece whose bytes begin at `start` of the appended data.
-    pub fn new(piece: &Encoded, start: u64) -> Self {
-        let offsets = piece.offsets.iter().map(|offset| start + offset).collect();
-        Self { points: piece.points, cells: piece.cells, offsets }
-    }
-
     /// A place whose XML is as long as any.
     pub fn longest() -> Self {
         Self { points: u64::MAX, cells: u64::MAX, offsets: vec![u64::MAX; ARRAYS.len()] }

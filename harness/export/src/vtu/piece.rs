@@ -7,7 +7,7 @@ use contract::lattice::Root;
 use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
-use super::header::Content;
+use super::header::{Content, Place};
 use super::points::{Points, unpacked};
 use super::zlib::{Known, Zlib};
 use crate::leaf::Leaf;
@@ -79,6 +79,12 @@ impl Encoder {
 }
 
 impl Encoded {
+    /// Its place if its bytes begin at `start` of the appended data.
+    pub fn place(&self, start: u64) -> Place {
+        let offsets = self.offsets.iter().map(|offset| start + offset).collect();
+        Place { points: self.points, cells: self.cells, offsets }
+    }
+
     fn push<const N: usize>(
         &mut self,
         zlib: &mut Zlib,
