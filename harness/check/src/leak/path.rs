@@ -88,8 +88,9 @@ impl Path {
                 is_centred = true;
                 continue;
             }
-            // The points of a grid nearest to those of a path, half a step's diagonal away at most, are a path through the grid.
-            bound = bound.min(found.least + 3f64.sqrt() / 2.0 * step);
+            // The points of a grid nearest to those of a path are a path through the grid, half a step's diagonal away at most. As much
+            // again for the grid's own ends, which need not lie in the middle of a passage.
+            bound = bound.min(found.least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
         Ok(path)
@@ -156,8 +157,7 @@ impl Path {
     /// Moves points less than `below` from the facets to the middle of a passage, unless that makes the path narrower.
     fn centre(&mut self, below: f64, clearance: &Clearance) {
         let (first, last) = self.inner();
-        let least =
-            |spots: &[Spot]| spots.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min);
+        let least = |spots: &[Spot]| spots.iter().map(Spot::passing).fold(f64::INFINITY, f64::min);
         let centred = middle::centred(&self.spots[first..=last], below, clearance);
         if least(&centred) > least(&self.spots[first..=last]) {
             self.spots.splice(first..=last, centred);
