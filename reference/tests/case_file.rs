@@ -99,7 +99,7 @@ fn an_unknown_key_is_refused_with_the_most_similar_known_one() {
 
 #[test]
 fn invalid_case_files_are_refused() {
-    assert_refused(GENERATED, "missing field `spacing_min`");
+    assert_refused(GENERATED, "missing field `spacing_min`; correct the case file");
     assert_refused("spacing_min = 1", "either `geometry` or a [generator] table");
     let both = format!("spacing_min = 1\ngeometry = \"body.stl\"\n{GENERATED}");
     assert_refused(&both, "either `geometry` or a [generator] table");

@@ -140,6 +140,20 @@ mod tests {
     }
 
     #[test]
+    fn the_definition_includes_determinism_and_every_independence() {
+        use Independence::{Partitioner, Ranks, Threads};
+        let independent = |promises: &Promises| {
+            [Ranks, Partitioner, Threads].map(|c| promises.is_independent_of(c))
+        };
+        let definition = Promises::of_definition();
+        assert!(definition.is_deterministic() && independent(&definition) == [true; 3]);
+        let none = Promises::default();
+        assert!(!none.is_deterministic() && independent(&none) == [false; 3]);
+        let some = Promises { deterministic: true, independent_of: vec![Ranks, Threads], ..none };
+        assert!(some.is_deterministic() && independent(&some) == [true, false, true]);
+    }
+
+    #[test]
     fn a_ratio_is_a_number_of_levels() {
         let levels = |ratio| Promises { ratio, ..Promises::default() }.levels();
         assert_eq!([levels(None), levels(Some(2)), levels(Some(8))], [1, 1, 3]);

@@ -302,6 +302,14 @@ mod tests {
         assert!((0..mapped.len()).all(|i| mapped.word(i) == words[i]));
         assert!(!part.is_empty() && !mapped.is_empty() && part.path() == file.path());
         assert!(std::panic::catch_unwind(|| mapped.word(100)).is_err());
+        // A file from which another process has cut words off.
+        std::fs::OpenOptions::new()
+            .write(true)
+            .open(file.path())
+            .unwrap()
+            .set_len(128 + 99 * 8)
+            .unwrap();
+        assert!(part.map().is_err());
     }
 
     #[test]

@@ -134,6 +134,22 @@ mod tests {
     }
 
     #[test]
+    fn a_base_tree_is_split_where_a_facet_crosses_it() {
+        const UNIT: i64 = crate::lattice::UNITS_PER_EDGE / 8;
+        let facet = [[1, 1, 1], [2, 1, 1], [1, 2, 1]].map(|v: [i64; 3]| v.map(|c| c * UNIT + 5));
+        let crosses = |octant: &Octant| {
+            let (low, high) = octant.bounds();
+            Triangle::new(&facet).meets(low, high)
+        };
+        let side = |o: &Octant| if crosses(o) { Side::Crossing } else { Side::Outside };
+        for level in 0..4 {
+            let expected = words_with_sides(|o| o.level < level && crosses(o), |o| Some(side(o)));
+            assert_eq!(base_tree(&[facet], level), expected);
+            assert!(expected.len() > 7 * usize::from(level), "level {level}");
+        }
+    }
+
+    #[test]
     fn pseudorandom_numbers_differ_by_octant_seed_and_salt() {
         let octants = octants_of(&words_of(|o| o.level < 2));
         let numbers = |seed, salt| octants.iter().map(move |o| pick(seed, o, salt));

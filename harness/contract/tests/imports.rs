@@ -120,6 +120,27 @@ fn a_tree_of_the_mesher_has_the_leaves_of_the_reference_as_words_and_as_a_link()
     assert!(words.words.is_sorted());
 }
 
+/// A tree with another root than is wanted must be read cell by cell, as must other layouts; a damaged one is no tree at all.
+#[test]
+fn a_tree_is_opened_as_such_only_with_its_own_root() {
+    let path = sample("sphere.vtkhdf");
+    let open = |path: &Path, sides, root| {
+        ImportedTree::open(path, sides, root, None, "test".to_owned()).map(|tree| tree.is_some())
+    };
+    let own = root([-2.0, -2.0, -2.0, 4.0]);
+    assert!(open(&path, None, Some(own)).unwrap() && open(&path, Some("side"), None).unwrap());
+    assert!(!open(&path, None, Some(root([-2.0, -2.0, -2.0, 8.0]))).unwrap());
+    assert!(!open(&path, Some("body"), None).unwrap());
+    assert!(!open(&sample("cube.msh"), None, None).unwrap());
+    let (_place, damaged) = edited("sphere.vtkhdf", "", |bytes| {
+        let end = bytes.len() - 40;
+        bytes.truncate(end);
+    });
+    let why = open(&damaged, None, None).unwrap_err().to_string();
+    assert!(why.contains("is damaged"), "{why}");
+    assert!(open(&damaged, None, Some(own)).is_err());
+}
+
 #[test]
 fn the_leaves_of_an_octant_are_read_without_those_before_it() {
     let tree = TreeFile::open(&sample("sphere.vtkhdf"), Some("side")).unwrap();
@@ -312,6 +333,24 @@ fn counts_beyond_the_file_are_errors() {
     assert!(why.ends_with(&format!("owner: states {half} items: it is incomplete")), "{why}");
 }
 
+/// The connectivity's header follows 32 bytes, and the forest's its own.
+#[test]
+fn a_forest_of_another_format_is_refused() {
+    for (number, value) in [(0, 7u64), (1, 8)] {
+        let of_connectivity = refusal("brick.p8est", "", |bytes| {
+            bytes[32 + 8 * number..][..8].copy_from_slice(&value.to_le_bytes());
+        });
+        assert!(of_connectivity.contains("is supported"), "{of_connectivity}");
+        let of_forest = refusal("brick.p8est", "", |bytes| {
+            let format = bytes[32..40].to_vec();
+            let after = bytes[40..].windows(8).position(|eight| eight == format);
+            let at = 40 + after.expect("the forest has the format, too") + 8 * number;
+            bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        });
+        assert!(of_forest.contains("has another format than the connectivity"), "{of_forest}");
+    }
+}
+
 /// The number at this place in the header of a connectivity.
 fn head_of_forest(bytes: &[u8], number: usize) -> usize {
     u64::from_le_bytes(bytes[32 + 8 * number..][..8].try_into().unwrap()) as usize
@@ -322,7 +361,9 @@ fn head_of_forest(bytes: &[u8], number: usize) -> usize {
 #[test]
 fn edges_corners_and_attributes_of_a_connectivity_are_skipped() {
     let expected = imported(&sample("brick.p8est"), &Request::default()).unwrap().words;
-    for (edges, corners, attributes) in [(0, 0, 0), (1, 0, 0), (3, 0, 5), (0, 1, 0), (2, 4, 3)] {
+    for (edges, corners, attributes) in
+        [(0, 0, 0), (1, 0, 0), (3, 0, 5), (0, 1, 0), (0, 30, 0), (2, 4, 3)]
+    {
         let (_place, copy) = edited("brick.p8est", "", |bytes| {
             let head = [2, 3, 4, 6, 8].map(|number| head_of_forest(bytes, number));
             let [vertices, trees, own_edges, own_corners, own_attributes] = head;

@@ -26,6 +26,24 @@ fn all_tricky_files_contain_the_same_facets() {
 }
 
 #[test]
+fn a_case_names_its_geometry_relative_to_its_own_file_or_has_none() {
+    let place = tempfile::tempdir().unwrap();
+    let tricky = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../geometries/tricky/binary.stl");
+    std::fs::create_dir(place.path().join("parts")).unwrap();
+    std::fs::copy(tricky, place.path().join("parts/body.stl")).unwrap();
+    let read = |geometry: &str| {
+        let path = place.path().join("a.toml");
+        let text = "spacing_min = 1.0\nroot = { origin = [-8.0, -8.0, -8.0], edge = 16.0 }\n";
+        std::fs::write(&path, format!("{geometry}\n{text}")).unwrap();
+        Case::read(&path).unwrap()
+    };
+    let case = read("geometry = 'parts/body.stl'");
+    assert_eq!((case.name.as_str(), case.facets.len()), ("a", 8));
+    assert_eq!(case.geometry, Some(place.path().join("parts/body.stl")));
+    assert_eq!(read("generator = { shape = 'cube', facets = 12 }").geometry, None);
+}
+
+#[test]
 fn bad_files_are_rejected_by_the_reader_or_by_the_case() {
     let text = "spacing_min = 1.0\n[root]\norigin = [-8.0, -8.0, -8.0]\nedge = 16.0";
     for path in files("bad") {

@@ -6,6 +6,9 @@
 //! definition; they use the requirements in the manifest, without T0, facets or another mesh, and the head of each names
 //! what it cannot detect without them. With promises, exactly those are checked, against a case if there is one.
 
+#[cfg(test)]
+mod tests;
+
 use std::fmt;
 use std::path::Path;
 use std::time::Instant;
@@ -214,106 +217,4 @@ fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
         }
     };
     results.into_iter().map(|result| checks::with_premise(result, tree, None, &terms)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use contract::leafset::LeafSet;
-    use contract::manifest::Sides;
-    use contract::testing::{leaf_set, random_words, words_of};
-    use proptest::prelude::*;
-
-    fn audited(set: &LeafSet, options: &AuditOptions) -> AuditReport {
-        let dir = tempfile::tempdir().unwrap();
-        set.write(dir.path()).unwrap();
-        audit(dir.path(), options)
-    }
-
-    fn found(report: &AuditReport) -> Vec<&'static str> {
-        report.checks.iter().filter(|c| !c.holds()).map(|c| c.name).collect()
-    }
-
-    /// A balanced mesh of three levels.
-    fn correct() -> Vec<u64> {
-        words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3])
-    }
-
-    proptest! {
-        #[test]
-        fn the_result_does_not_depend_on_the_partition(words in random_words(3), part_of in prop::collection::vec(0usize..5, 600)) {
-            let mut parts = vec![Vec::new(); 5];
-            words.iter().zip(&part_of).for_each(|(&w, &part)| parts[part].push(w));
-            let words: Vec<u64> = words.into_iter().take(part_of.len()).collect();
-            let (leaves, options) = (words.len() as u64, AuditOptions::default());
-            let one = audited(&leaf_set(vec![words]), &options);
-            let several = audited(&leaf_set(parts), &options);
-            prop_assert_eq!(found(&one), found(&several));
-            prop_assert!(!found(&several).contains(&"manifest") && !found(&several).contains(&"linear"));
-            prop_assert_eq!(several.leaves, leaves);
-        }
-    }
-
-    #[test]
-    fn a_correct_mesh_passes_and_an_unsorted_part_fails() {
-        let words = correct();
-        assert!(audited(&leaf_set(vec![words.clone(), vec![]]), &AuditOptions::default()).holds());
-        let mut unsorted = words;
-        unsorted.swap(3, 4);
-        let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
-        assert!(found(&report).contains(&"linear"));
-    }
-
-    /// The codes of unknown sides are all `outside`, which must neither pass for sides nor fail for holes.
-    #[test]
-    fn what_needs_unknown_sides_is_not_checked() {
-        let mut words = correct();
-        words.pop();
-        let mut set = leaf_set(vec![words]);
-        let found = |set: &LeafSet, name: &str| {
-            let checks = audited(set, &AuditOptions::default()).checks;
-            checks.into_iter().find(|c| c.name == name).expect("a check of the audit")
-        };
-        let is_withdrawn = |set: &LeafSet, name: &str| {
-            found(set, name).nothing_to_check.is_some_and(|why| why.contains("sides of the leaves"))
-        };
-        assert!(!found(&set, "complete").holds() && !is_withdrawn(&set, "sides"));
-        set.manifest.sides = Sides::Unknown;
-        assert!(!found(&set, "complete").holds() && is_withdrawn(&set, "sides"));
-        set.manifest.keep = Keep::Outside;
-        for name in ["complete", "sides", "kept"] {
-            assert!(is_withdrawn(&set, name), "{name}");
-        }
-    }
-
-    #[test]
-    fn the_report_states_each_check_and_whether_leaves_were_checked() {
-        let mut report = AuditReport {
-            checks: vec![CheckResult::new("manifest"), CheckResult::nothing("layer", "no layer")],
-            leaves: 3_000_000,
-            nodes: 12,
-            time_read_s: 0.25,
-            time_wall_s: 1.5,
-        };
-        let expected = "manifest   holds, 0 examined\nlayer      nothing to check: no layer\n\
-            left out: the mesh gave no check of its leaves anything to check\n\
-            3000000 leaves (12 distinct octants) in 1.50 s, of which reading 0.25 s: 2.0 M leaves/s";
-        assert_eq!(report.to_string(), expected);
-        assert_eq!(report.not_run().map(|check| check.name).collect::<Vec<_>>(), ["layer"]);
-        assert!(report.holds() && !report.checked_anything());
-        report.checks.push(CheckResult::new("balance"));
-        assert!(report.holds() && report.checked_anything());
-        report.checks.remove(2);
-        report.checks[0].report("a finding".to_owned());
-        assert!(!report.holds() && report.checked_anything());
-    }
-
-    /// The audit must not pass if memory does not suffice, but it still checks counts and digests.
-    #[test]
-    fn an_exceeded_memory_limit_is_a_finding() {
-        let mut set = leaf_set(vec![words_of(|o| o.level < 5 && o.corner[0] < 1 << 18)]);
-        set.manifest.leaves += 1;
-        let report = audited(&set, &AuditOptions { nodes_max: 1 });
-        assert_eq!(found(&report), ["manifest", CAPACITY]);
-    }
 }

@@ -140,3 +140,24 @@ impl Pair<'_> {
         self.result.report_with(|| format!("{what} {}", root.describe(&octant)));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+    use contract::testing::{leaf_set, words_with_sides};
+
+    #[test]
+    fn the_note_states_which_part_of_the_root_is_filled() {
+        let text =
+            "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        for (lacks, percent) in [("", "100.000000"), ("7", "87.500000"), ("3.7", "98.437500")] {
+            let side = |o: &Octant| (o.path() != lacks).then_some(Side::Outside);
+            let words = words_with_sides(|o| o.level == 0 || o.path() == "3", side);
+            let result = check(&Subject::new(&case, &leaf_set(vec![words])));
+            assert_eq!(result.note, format!("the mesh fills {percent} % of the root"));
+        }
+    }
+}

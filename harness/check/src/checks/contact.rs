@@ -102,11 +102,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn contacts_agree_with_a_comparison_of_all_pairs(words in random_words(3)) {
+        fn contacts_agree_with_a_comparison_of_all_pairs(
+            words in random_words(3), matter in prop::array::uniform3(any::<bool>()), deepest in 0u8..=3,
+        ) {
             let tree = Tree::of_words(&words);
             let mut seen = 0;
-            let contacts = Contacts { tree: &tree, sought: !0, matters: &|_, _| true };
-            contacts.visit(&mut |octant, _, kinds| {
+            let matters = |kind: Kind, level| matter[usize::from(kind)] && level <= deepest;
+            let contacts = Contacts { tree: &tree, sought: !0, matters: &matters };
+            contacts.visit(&mut |octant, kind, kinds| {
+                assert!(matters(kind, octant.level), "{octant}");
                 let mut expected = 0;
                 let mut area = 0;
                 for &w in &words {
@@ -125,7 +129,8 @@ mod tests {
                 assert_eq!(kinds, expected, "{octant}");
                 seen += 1;
             });
-            prop_assert_eq!(seen, words.len());
+            let selected = words.iter().filter(|&&w| matters((w & 3) as Kind, word::level(w)));
+            prop_assert_eq!(seen, selected.count());
         }
     }
 }

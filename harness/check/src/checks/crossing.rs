@@ -96,3 +96,39 @@ fn without_base(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+    use contract::testing::{leaf_set, words_with_sides};
+
+    /// The facet lies in octant 0 of level 1, the surface's level, and there in its child 0. Leaves have level 2.
+    #[test]
+    fn without_a_base_tree_a_leaf_finer_than_the_surface_inherits_its_side() {
+        let text =
+            "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let findings = |crossing: fn(&str) -> bool| {
+            let side = |path: &str| if crossing(path) { Side::Crossing } else { Side::Outside };
+            let words = words_with_sides(|o| o.level < 2, |o| Some(side(&o.path())));
+            let mesh = leaf_set(vec![words]);
+            let result = check(&Subject::new(&case, &mesh));
+            assert_eq!(result.examined, 64);
+            result.findings.into_iter().map(|finding| finding.detail).collect::<Vec<_>>()
+        };
+        assert_eq!(findings(|path| path.starts_with('0')), Vec::<String>::new());
+        let [missing] = &findings(|path| path != "0.0" && path.starts_with('0'))[..] else {
+            panic!("one finding")
+        };
+        assert!(missing.starts_with("a facet crosses the") && missing.contains("0.0"), "{missing}");
+        let [spurious] = &findings(|path| path == "3.1" || path.starts_with('0'))[..] else {
+            panic!("one finding")
+        };
+        assert!(
+            spurious.starts_with("no facet crosses the") && spurious.contains("3.1"),
+            "{spurious}"
+        );
+    }
+}

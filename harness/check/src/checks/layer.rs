@@ -124,7 +124,9 @@ mod tests {
     use super::*;
     use contract::lattice::Root;
     use contract::manifest::Enclosed;
-    use contract::testing::graded_words;
+    use contract::octant::Octant;
+    use contract::testing::{graded_words, words_of};
+    use contract::tree::Builder;
     use contract::word;
     use proptest::prelude::*;
 
@@ -161,6 +163,30 @@ mod tests {
                 layer || at_surface && coarse.level < surface && surface_layer
             })
         })
+    }
+
+    /// Leaves of level 2, and in one octant of level 3, the surface's: the first of them is crossing or deleted, and one cell
+    /// away from a coarser leaf.
+    #[test]
+    fn a_deleted_leaf_requires_only_its_neighbours_to_be_fine() {
+        let findings = |kind, digit, n, keep_crossing| {
+            let split = |o: &Octant| o.level < 2 || o.corner == [0; 3] && o.level == 2;
+            let mut builder = Builder::default();
+            for octant in words_of(split).into_iter().map(word::octant) {
+                let is_it = octant.level == 3 && octant.digit() == digit;
+                let kind = if is_it { kind } else { Side::Outside as Kind };
+                builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
+            }
+            let terms = terms(n, 3, Keep::Outside, keep_crossing);
+            check_tree(&builder.finish(), &terms).findings_total
+        };
+        const CROSSING: Kind = Side::Crossing as Kind;
+        for n in 1..=4 {
+            assert_eq!(findings(DELETED, 0, n, false), 0, "{n}");
+            assert_eq!(findings(DELETED, 7, n, false), 1, "{n}");
+            assert_eq!(findings(CROSSING, 0, n, true), u64::from(n > 2), "{n}");
+            assert_eq!(findings(CROSSING, 7, n, true), u64::from(n > 1), "{n}");
+        }
     }
 
     proptest! {

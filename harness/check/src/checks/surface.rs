@@ -95,3 +95,70 @@ impl<'a> Crossed<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::lattice::FacetLattice;
+    use contract::testing::{leaf_set, words_of};
+
+    /// Lattice units of a root of edge 8 per unit of length.
+    const UNIT: f64 = (UNITS_PER_EDGE / 8) as f64;
+
+    /// Leaves of edge 4 but in the first octant, where they have edge 2, that of the surface.
+    fn tree() -> Tree {
+        Tree::of_words(&words_of(|o| o.level == 0 || o.level == 1 && o.digit() == 0))
+    }
+
+    fn terms() -> Terms {
+        let mut manifest = leaf_set(vec![]).manifest;
+        manifest.level_surface = 2;
+        Terms::of_manifest(&manifest)
+    }
+
+    fn facet(corners: [[f64; 3]; 3]) -> FacetLattice {
+        corners.map(|corner| corner.map(|c| (c * UNIT) as i64))
+    }
+
+    fn checked(facet: FacetLattice, tolerance_cells: f64) -> CheckResult {
+        let surface = Some(Surface { tolerance_cells });
+        Crossed::new(&Facets::new(&[facet]), &terms(), surface).check(&tree())
+    }
+
+    #[test]
+    fn a_crossed_leaf_coarser_than_the_surface_is_a_finding_and_a_finer_one_is_not() {
+        let fine = facet([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]]);
+        let result = checked(fine, 0.0);
+        assert_eq!((result.examined, result.findings_total, result.was_run()), (1, 0, true));
+        let coarse = facet([[6.5, 6.5, 6.5], [7.5, 6.5, 6.5], [6.5, 7.5, 6.5]]);
+        let result = checked(coarse, 0.0);
+        assert_eq!((result.examined, result.findings_total), (1, 1));
+        let text = &result.findings[0].detail;
+        assert!(text.starts_with("facet 0 crosses the leaf") && text.contains(" 7 "), "{text}");
+        let beyond = facet([[9.0, 1.0, 1.0], [9.5, 1.0, 1.0], [9.0, 2.0, 1.0]]);
+        assert!(!checked(beyond, 0.0).was_run());
+    }
+
+    #[test]
+    fn a_facet_may_reach_into_a_coarser_leaf_as_deep_as_the_tolerance() {
+        // From the first octant it reaches one unit, half a cell, into the second.
+        let facet = facet([[3.5, 1.0, 1.0], [5.0, 1.0, 1.0], [3.5, 1.5, 1.0]]);
+        for (tolerance_cells, findings) in [(0.0, 1), (0.45, 1), (0.5, 1), (0.51, 0), (0.9, 0)] {
+            let found = checked(facet, tolerance_cells).findings_total;
+            assert_eq!(found, findings, "{tolerance_cells} cells");
+        }
+    }
+
+    #[test]
+    fn crossed_leaves_of_the_surface_level_are_labelled_crossing_and_all_others_outside() {
+        let facet = facet([[0.5, 0.5, 0.5], [5.0, 0.5, 0.5], [0.5, 1.5, 0.5]]);
+        let (facets, terms) = (Facets::new(&[facet]), terms());
+        let labelled = Crossed::new(&facets, &terms, None).labelled(&tree());
+        let words = words_of(|o| o.level == 0 || o.level == 1 && o.digit() == 0);
+        for octant in words.into_iter().map(word::octant) {
+            let is_crossing = ["0.0", "0.1"].contains(&&*octant.path());
+            let side = if is_crossing { Side::Crossing } else { Side::Outside };
+            assert_eq!(labelled.locate(octant.corner), Some((octant, side as Kind)), "{octant}");
+        }
+    }
+}

@@ -251,6 +251,26 @@ mod tests {
             prop_assert!((from_square(&square, &t) - expected).abs() <= 1e-9 * expected);
         }
 
+        #[test]
+        fn no_points_of_two_segments_are_nearer_than_the_nearest(
+            p in prop::array::uniform2(point()), q in prop::array::uniform2(point()), is_parallel in any::<bool>(),
+        ) {
+            let q = if is_parallel { [q[0], along(q[0], sub(p[1], p[0]), 0.7)] } else { q };
+            prop_assume!(p[0] != p[1] && q[0] != q[1]);
+            let (on_p, on_q) = segments(p[0], p[1], q[0], q[1]);
+            let least = length(sub(on_p, on_q));
+            for ([from, to], at) in [(p, on_p), (q, on_q)] {
+                let detour = length(sub(at, from)) + length(sub(to, at)) - length(sub(to, from));
+                prop_assert!(detour.abs() < 1e-9, "{:?} is not on its segment", at);
+            }
+            let part = |i: i32| f64::from(i) / 20.0;
+            for (i, j) in (0..=20).flat_map(|i| (0..=20).map(move |j| (i, j))) {
+                let a = along(p[0], sub(p[1], p[0]), part(i));
+                let b = along(q[0], sub(q[1], q[0]), part(j));
+                prop_assert!(least <= length(sub(a, b)) + 1e-9, "{:?} and {:?} are nearer", a, b);
+            }
+        }
+
         /// Two points of convex sets are nearest iff the planes through them, normal to their difference, separate the sets.
         #[test]
         fn nearest_points_lie_in_their_triangles_and_separate_them(

@@ -131,6 +131,35 @@ mod tests {
     }
 
     #[test]
+    fn a_case_file_gives_root_and_cell_unless_others_are_requested() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("body.toml");
+        let own = Root { origin: [-4.0, -3.0, -2.0], edge: 8.0 };
+        let text = format!(
+            "spacing_min = 0.5\nkeep = 'inside'\nroot = {{ origin = {:?}, edge = {:?} }}\n\
+             generator = {{ shape = 'cube', facets = 12 }}\n",
+            own.origin, own.edge
+        );
+        std::fs::write(&path, text).unwrap();
+        let read = |requested| {
+            let input = Input::read(&path, &requested).unwrap();
+            assert_eq!((input.keep, input.facets.len()), (Keep::Inside, 12));
+            (input.root, input.cell)
+        };
+        assert_eq!(read(Requested::default()), (own, Some(0.5)));
+        let spacing_min = Some(0.125);
+        assert_eq!(read(Requested { spacing_min, ..Requested::default() }), (own, Some(0.125)));
+        let other = Root { origin: [-2.0; 3], edge: 4.0 };
+        assert_eq!(
+            read(Requested { root: Some(other), ..Requested::default() }),
+            (other, Some(0.5))
+        );
+        // The generated cube has edge 1.
+        let (root, cell) = read(Requested { root_scale: Some(4.0), ..Requested::default() });
+        assert_eq!((root.edge, cell), (4.0, Some(0.5)));
+    }
+
+    #[test]
     fn a_geometry_that_cannot_be_meshed_is_refused() {
         let why = |facets: Vec<Facet>, requested| Input::new(facets, &requested).unwrap_err();
         let mut broken = FACET;

@@ -111,5 +111,8 @@ mod tests {
         assert_eq!(rest(&[[0, 4], [4, 5], [5, 0]]).len(), 3);
         // Opposite directions at vertex 2.
         assert_eq!(rest(&[[0, 2], [2, 4]]).len(), 2);
+        // An edge across another one is no part of it, however short it is.
+        let across = [[0, 1], [0, 5]].map(|ends| Segment { ends, facet: 0 });
+        assert_eq!(uncancelled(across.to_vec(), &POINTS, 1.5).len(), 2);
     }
 }

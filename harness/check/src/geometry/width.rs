@@ -160,6 +160,23 @@ mod tests {
         }
     }
 
+    #[test]
+    fn extreme_points_lie_in_every_direction() {
+        let angles = |count: usize, to: f64| (0..count).map(move |i| i as f64 / count as f64 * to);
+        let sphere: Vec<Point> = angles(120, std::f64::consts::PI)
+            .flat_map(|polar| {
+                angles(240, std::f64::consts::TAU).map(move |around| {
+                    [polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()]
+                })
+            })
+            .collect();
+        let found = extremes(&sphere);
+        let nearest = |p: &Point| found.iter().map(|q| dot(*p, *q)).fold(-1.0, f64::max);
+        // Within 11.5 degrees.
+        let farthest = sphere.iter().step_by(7).map(nearest).fold(1.0, f64::min);
+        assert!(farthest > 0.98, "{farthest}");
+    }
+
     proptest! {
         /// The least distance of two parallel lines, one through two of the points, with all points between them.
         #[test]

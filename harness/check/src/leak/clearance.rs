@@ -216,9 +216,28 @@ mod tests {
             let expected = distances.iter().copied().fold(f64::INFINITY, f64::min);
             prop_assert_eq!(clearance.at(point, f64::INFINITY), expected);
             prop_assert_eq!(clearance.at(point, expected), expected);
+            let nearest = clearance.nearest(point).map(|at| distance::length(distance::sub(at, point)));
+            prop_assert!(nearest.is_some_and(|found| (found - expected).abs() <= 1e-9 * (1.0 + expected)));
             let within = clearance.facets_within(point, expected * 1.5 + 1.0);
             prop_assert_eq!(within.len(), distances.iter().filter(|&&d| d < expected * 1.5 + 1.0).count());
             prop_assert_eq!(within[0].1, expected);
+        }
+
+        #[test]
+        fn the_nearest_facet_of_every_point_of_a_ball_is_near_it(
+            facets in facets(), centre in prop::array::uniform3(0.0f64..4000.0), radius in 0.0f64..900.0,
+            points in prop::collection::vec((prop::array::uniform3(-1.0f64..1.0), 0.0f64..1.0), 20),
+        ) {
+            let clearance = Clearance::new(&facets);
+            let near = clearance.near(centre, radius, usize::MAX);
+            for (direction, part) in points {
+                let length = direction.map(|c| c * c).iter().sum::<f64>().sqrt().max(1e-9);
+                let at = [0, 1, 2].map(|a| centre[a] + direction[a] * part * radius / length);
+                let found = near.iter().map(|t| t.squared(at)).fold(f64::INFINITY, f64::min).sqrt();
+                prop_assert_eq!(found, clearance.at(at, f64::INFINITY));
+            }
+            prop_assert_eq!(clearance.near(centre, radius, near.len()).len(), near.len());
+            prop_assert!(clearance.near(centre, radius, near.len() - 1).is_empty());
         }
 
         #[test]

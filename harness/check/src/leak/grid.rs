@@ -173,9 +173,13 @@ mod tests {
         #[test]
         fn distances_of_grid_points_are_those_of_a_search_among_all_facets(
             facets in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(0i64..4000)), 1..300),
-            centre in prop::array::uniform3(0.0f64..4000.0), step in 0.01f64..100.0
+            centre in prop::array::uniform3(0.0f64..4000.0), step in 0.01f64..100.0, is_repeated in any::<bool>(),
         ) {
-            let clearance = Clearance::new(&facets as &[FacetLattice]);
+            // More facets may be near a point than are searched one by one.
+            let copies = if is_repeated { 2 * FACETS_FEW } else { 0 };
+            let facets: Vec<FacetLattice> =
+                facets.iter().copied().chain(std::iter::repeat_n(facets[0], copies)).collect();
+            let clearance = Clearance::new(&facets);
             let grid = Grid { centre, step };
             let mut distances = Distances::new(&grid, &clearance);
             for place in (0..grid.count() as u32).step_by(97) {

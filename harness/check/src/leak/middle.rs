@@ -167,3 +167,64 @@ fn direction(spots: &[Spot], i: usize) -> Point {
         _ => [1.0, 0.0, 0.0],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::lattice::FacetLattice;
+    use proptest::prelude::*;
+
+    /// The sides of a box with these edges and a corner in the origin.
+    fn box_of(edges: [i64; 3]) -> Vec<FacetLattice> {
+        let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { edges[a] } else { 0 });
+        let sides =
+            [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+        let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
+        sides.into_iter().flat_map(halves).map(|facet| facet.map(corner)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn a_plane_has_two_unit_vectors_across_its_normal(normal in prop::array::uniform3(-9.0f64..9.0)) {
+            let [u, v] = plane(normal);
+            for (product, expected) in [
+                (dot(u, u), 1.0), (dot(v, v), 1.0), (dot(u, v), 0.0), (dot(u, normal), 0.0), (dot(v, normal), 0.0),
+            ] {
+                prop_assert!((product - expected).abs() < 1e-9, "{u:?}, {v:?}");
+            }
+        }
+
+        #[test]
+        fn the_widest_place_near_a_point_is_as_wide_as_it_says_and_not_narrower_than_the_point(
+            edges in prop::array::uniform3(9_000i64..11_000), at in prop::array::uniform3(0.2f64..0.8),
+        ) {
+            let facets = box_of(edges);
+            let clearance = Clearance::new(&facets);
+            let at = [0, 1, 2].map(|a| at[a] * edges[a] as f64);
+            let (start, found) = (clearance.at(at, f64::INFINITY), widest_near(at, &clearance));
+            prop_assert_eq!(found.clearance, clearance.at(found.at, f64::INFINITY));
+            prop_assert!(found.clearance >= start, "{found:?} from {start}");
+        }
+
+        /// A path that enters and leaves a duct off its middle.
+        #[test]
+        fn a_path_through_a_duct_is_moved_to_its_middle(
+            from in prop::array::uniform2(300.0f64..700.0), to in prop::array::uniform2(300.0f64..700.0),
+        ) {
+            let duct = &box_of([10_000, 1_000, 1_000])[..8];
+            let clearance = Clearance::new(duct);
+            let spot = |x: f64, [y, z]: [f64; 2]| {
+                Spot { at: [x, y, z], clearance: clearance.at([x, y, z], f64::INFINITY), step: f64::INFINITY }
+            };
+            let path = centred(&[spot(2_000.0, from), spot(8_000.0, to)], 600.0, &clearance);
+            prop_assert!(path.iter().all(|spot| spot.clearance > 498.0), "{path:?}");
+            prop_assert!(path.windows(2).all(|pair| pair[0].at[0] < pair[1].at[0]), "{path:?}");
+            let gaps = path.windows(2).map(|pair| length(sub(pair[1].at, pair[0].at)));
+            prop_assert!(gaps.fold(0.0, f64::max) <= 0.5 * 500.0, "{path:?}");
+            prop_assert!(path.len() < 60, "{} points", path.len());
+            // What is wide enough stays.
+            let ends = [spot(2_000.0, from), spot(8_000.0, to)];
+            prop_assert_eq!(centred(&ends, 100.0, &clearance), ends);
+        }
+    }
+}

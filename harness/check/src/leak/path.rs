@@ -5,6 +5,9 @@
 //! surroundings are replaced by the widest path through a cubic grid. That is repeated with finer grids until the
 //! narrowest point of the path is one of the finest grid: its ball is the largest that passes.
 
+#[cfg(test)]
+mod tests;
+
 use super::clearance::{Clearance, PRECISION, Point, Spot};
 use super::grid::{Distances, Grid, STEPS};
 use super::leaves::{Leaves, shared_face_centre};

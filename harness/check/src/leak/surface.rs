@@ -123,6 +123,11 @@ mod tests {
             assert_eq!(welded(&[[a, b, c], thin]), [[a, b, c]]);
         }
         for axis in 0..3 {
+            for by in [-WELD, -1, 1, WELD] {
+                let mut near = b;
+                near[axis] += by;
+                assert_eq!(welded(&[[a, b, c], [near, d, a]]), [[a, b, c], [b, d, a]]);
+            }
             for by in [-WELD - 1, WELD + 1] {
                 let mut apart = b;
                 apart[axis] += by;

@@ -87,6 +87,7 @@ mod tests {
         assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
         assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));
         assert_eq!(sample.points[0], [-3.5; 3]);
+        assert_eq!(choose(&case(8.0, -4.0, BODY), &leaves(), 342, 0), sample);
     }
 
     #[test]
@@ -107,5 +108,18 @@ mod tests {
         let sample = choose(&case(8.0, 4.0e6 - 4.0, far), &leaves(), 1000, 0);
         assert!(sample.band > 1.0);
         assert_eq!((sample.words.len(), sample.in_band), (0, 342));
+        // The band is 7.63 wide, and the centroids are half an edge, a sixteenth of the root's, away from the surface.
+        for (edge, in_band) in [(120.0, 342), (128.0, 0)] {
+            let sample = choose(&case(edge, 4.0e6 - 4.0, far), &leaves(), 1000, 0);
+            assert_eq!(sample.in_band, in_band, "{edge}");
+        }
+    }
+
+    /// The first numbers of the published generator with seed 0.
+    #[test]
+    fn leaves_are_shuffled_by_splitmix64() {
+        let gamma = 0x9e37_79b9_7f4a_7c15u64;
+        let numbers = [0u64, 1, 2].map(|i| shuffle_key(i.wrapping_mul(gamma)));
+        assert_eq!(numbers, [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f]);
     }
 }

@@ -197,6 +197,14 @@ mod tests {
     }
 
     #[test]
+    fn a_note_counts_where_the_exact_rays_support_an_oracle() {
+        let (_, _, notes) = vote([Some(true), Some(true), None], [YES, &[1, 0, 0], YES], true);
+        let expected = "oracle 1 differs from the mesh at 3 of 3 points; by exact rays it is right at 1, wrong at 1, \
+            undecided at 1";
+        assert_eq!(notes, [expected]);
+    }
+
+    #[test]
     fn exact_rays_that_contradict_the_mesh_are_a_failure() {
         let exact = [Some(false), Some(false), Some(true)];
         let (count, failure, _) = vote(exact, [YES, &[0, 0, 1], YES], true);

@@ -64,7 +64,7 @@ fn kept_beside_children(s: &SelftestCase) -> Option<Mutation> {
 }
 
 fn enlarged(s: &SelftestCase) -> Option<Mutation> {
-    let first = |w| word::level(w) > 0 && word::octant(w).digit() == 0;
+    let first = |w| word::octant(w).digit() == 0;
     let sibling = |w| word::octant(edit::parent(w));
     let words = &s.mesh.words;
     let i = (1..words.len()).find(|&i| {
@@ -110,7 +110,7 @@ fn mirrored(s: &SelftestCase) -> Option<Mutation> {
 fn unsorted(s: &SelftestCase) -> Option<Mutation> {
     let mut mutation = Mutation::of(s);
     let mut parts = s.mesh.parts.clone();
-    let part = parts.iter_mut().find(|p| p.len() > 2)?;
+    let part = parts.iter_mut().find(|p| p.len() > 1)?;
     let middle = part.len() / 2;
     part.swap(middle, middle - 1);
     mutation.mesh = s.mesh.with_parts(parts);

@@ -61,9 +61,13 @@ fn by_level(m: &mut Manifest) {
 
 fn by_side(m: &mut Manifest) {
     let sides = &mut m.leaves_by_side;
-    let from = if sides.outside > 0 { &mut sides.outside } else { &mut sides.inside };
+    let (from, to) = match (sides.outside, sides.inside) {
+        (0, 0) => (&mut sides.crossing, &mut sides.outside),
+        (0, _) => (&mut sides.inside, &mut sides.crossing),
+        _ => (&mut sides.outside, &mut sides.crossing),
+    };
     *from -= 1;
-    sides.crossing += 1;
+    *to += 1;
 }
 
 fn octant_digest(m: &mut Manifest) {

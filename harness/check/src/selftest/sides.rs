@@ -91,12 +91,13 @@ fn swap(words: &[u64], predicate: impl Fn(u64) -> bool) -> Vec<u64> {
     words.iter().map(|&w| swap(w)).collect()
 }
 
-/// Swaps inside and outside in mesh and T0, if nothing is deleted.
+/// Swaps inside and outside in mesh and T0, if nothing is deleted and not all leaves are crossing.
 fn flipped(s: &SelftestCase, predicate: impl Fn(u64) -> bool) -> Option<Mutation> {
-    if s.case.keep != Keep::All {
+    let words = swap(&s.mesh.words, &predicate);
+    if s.case.keep != Keep::All || words == s.mesh.words {
         return None;
     }
-    let mut mutation = Mutation::with_words(s, swap(&s.mesh.words, &predicate));
+    let mut mutation = Mutation::with_words(s, words);
     mutation.base = edit::with_words(&s.base, swap(&s.base.words, &predicate));
     Some(mutation)
 }

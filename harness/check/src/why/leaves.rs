@@ -193,3 +193,18 @@ impl Leaves {
         spans
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::{octants_of, words_of};
+    use std::collections::HashSet;
+
+    #[test]
+    fn octants_have_ids_of_their_own() {
+        let octants =
+            octants_of(&words_of(|o| o.level < 3 || o.level < LEVEL_MAX && o.corner == [0; 3]));
+        let ids: HashSet<u64> = octants.iter().map(id).collect();
+        assert_eq!(ids.len(), octants.len());
+    }
+}

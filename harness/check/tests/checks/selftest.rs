@@ -8,6 +8,20 @@ use contract::word;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// The smallest mesh and the deepest: no search for a place to corrupt may leave the levels or the leaves.
+const EXTREMES: [(&str, &str); 2] = [
+    (
+        "one leaf",
+        "spacing_min = 8.0\nlayer_cells_min = 2\nkeep = \"all\"\nroot = { origin = [-4.0, -4.0, -4.0], edge = 8.0 }\n\
+         generator = { shape = \"cube\", facets = 12 }\n",
+    ),
+    (
+        "deepest level",
+        "spacing_min = 1.0\nlayer_cells_min = 2\nkeep = \"all\"\nroot = { origin = [-3.5, -3.5, -3.5], edge = 524288.0 }\n\
+         generator = { shape = \"cube\", facets = 12 }\n",
+    ),
+];
+
 fn case(index: usize) -> SelftestCase {
     let (name, text) = CASES[index];
     support::selftest_case(name, text)
@@ -63,7 +77,9 @@ fn every_corruption_of_a_mesh_with_seeds_is_reported() {
 #[test]
 fn every_corruption_changes_the_leaves_and_files_that_are_listed() {
     let mut lines = Vec::new();
-    let cases: Vec<SelftestCase> = (0..CASES.len()).map(|index| in_parts(case(index))).collect();
+    let texts = CASES.iter().chain(&EXTREMES);
+    let cases: Vec<SelftestCase> =
+        texts.map(|(name, text)| in_parts(support::selftest_case(name, text))).collect();
     for mutant in selftest::catalogue() {
         let before = lines.len();
         for case in &cases {

@@ -5,6 +5,7 @@ use check::selftest::scale::{self, Options, Source};
 use check::selftest::{self, SelftestCase, SelftestReport};
 use contract::testing::assert_text;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Every corruption that a mesh can have applies to at least one of these cases. The first has more than 20 000
 /// leaves.
@@ -36,7 +37,19 @@ fn written(name: &str, correct: &SelftestCase, place: &Path) -> Source {
 fn run(sources: &[Source], seed: u64, jobs: usize) -> SelftestReport {
     let scratch = tempfile::tempdir().unwrap();
     let options = Options { seed, jobs, interrupted: || false };
-    let report = scale::run(sources, &options, scratch.path(), &|_, _| {}).unwrap();
+    let trials = sources.len() * selftest::catalogue().len();
+    let finished = AtomicUsize::new(0);
+    let progress = |done: usize, all: usize| {
+        assert!(all == trials && (1..=all).contains(&done), "{done} of {all}");
+        finished.fetch_add(1, Ordering::Relaxed);
+    };
+    let report = scale::run(sources, &options, scratch.path(), &progress).unwrap();
+    let finished = finished.into_inner();
+    // A mesh that is already wrong is not tried.
+    assert!(
+        finished == trials || report.kills.is_empty() && finished == 0,
+        "{finished} of {trials}"
+    );
     let left: Vec<_> = std::fs::read_dir(scratch.path()).unwrap().collect();
     assert!(left.is_empty(), "scratch files remain: {left:?}");
     report
@@ -60,6 +73,9 @@ fn every_corruption_that_a_mesh_can_have_is_planted_and_reported() {
         let of_base =
             mutant.name.contains("T0") && report.left_out.iter().any(|l| l.0 == mutant.name);
         assert!(planted || of_base, "{} was left out", mutant.name);
+    }
+    for (name, reason) in &report.left_out {
+        assert!(!reason.contains("unknown"), "T0 is known, {name}: {reason}");
     }
     // Manifests agree with corrupted leaves, so no digest shows the corruption.
     let of_leaves = |kill: &&selftest::Kill| {

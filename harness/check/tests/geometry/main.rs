@@ -190,6 +190,35 @@ fn a_vertex_on_an_edge_is_a_t_junction_and_not_an_opening() {
     assert!(!found.changes_region);
 }
 
+/// A lattice unit is 2^-26 of this root, and vertices of large coordinates are far from one another.
+#[test]
+fn a_vertex_farther_from_an_edge_than_two_lattice_units_leaves_an_opening() {
+    for (scale, edge) in [(1.0, 8.0), (1024.0, 8192.0)] {
+        let unit = edge / (1u64 << 27) as f32;
+        for (units, kind) in [(1.0, Kind::Junctions), (4.0, Kind::Openings)] {
+            let mut facets: Vec<Facet> =
+                cube().into_iter().map(|facet| facet.map(|v| v.map(|c| scale * c))).collect();
+            // The facets of the face z = 0 have the vertices (0, 0), (0, 4), (4, 4) and (4, 0); that at (0, 2) is off the edge.
+            let [a, b, c] = facets[0];
+            let middle = [units * unit, 2.0 * scale, 0.0];
+            facets[0] = [a, middle, c];
+            facets.push([middle, b, c]);
+            let root = Some(Root {
+                origin: [-1.0; 3].map(|c| c * f64::from(scale)),
+                edge: f64::from(edge),
+            });
+            let requested = Requested { spacing_min: None, root, root_scale: None };
+            let input = Input::new(facets, &requested).unwrap();
+            let found = diagnose(&input, &Options::default());
+            assert_eq!(
+                counts(&found).first().map(|found| found.0),
+                Some(kind),
+                "{units} units, {scale}"
+            );
+        }
+    }
+}
+
 #[test]
 fn edges_with_more_than_two_facets_are_even_or_odd() {
     let adjacent = [cube(), cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0])].concat();

@@ -10,6 +10,7 @@ use contract::case::{Case, Facet};
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
 use openings::{Body, ROTATIONS, bodies, pipe, two_holes};
+use std::cell::Cell;
 use std::convert::Infallible;
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
@@ -115,40 +116,54 @@ fn the_answer_about_a_slit_and_a_crack_is_the_expected_text() {
     }
 }
 
-#[test]
-fn of_several_openings_the_widest_is_reported_even_if_they_differ_little() {
+/// The radii of the two openings differ by an eighth of a cell.
+fn assert_widest(level: u8, radius: f64, opposite: f64) {
     for rotation in ROTATIONS {
-        // The radii differ by an eighth of a cell.
-        for (level, radius, opposite) in [(7, 0.2, 0.19), (8, 0.15, 0.145), (8, 0.1, 0.096)] {
-            let body = two_holes(radius, opposite);
-            let body = body.rotated(rotation);
-            let report = from_centre(&body.facets, level);
-            assert_describes(&report, &body, &format!("level {level}, radius {radius}"));
-        }
+        let body = two_holes(radius, opposite).rotated(rotation);
+        let report = from_centre(&body.facets, level);
+        assert_describes(&report, &body, &format!("level {level}, radius {radius}"));
     }
 }
 
+#[test]
+fn of_several_openings_the_widest_is_reported_even_if_they_differ_little() {
+    assert_widest(7, 0.2, 0.19);
+}
+
+#[test]
+fn of_several_narrow_openings_the_widest_is_reported() {
+    assert_widest(8, 0.15, 0.145);
+    assert_widest(8, 0.1, 0.096);
+}
+
 /// Every place of a pipe is equally narrow, and more of them than a search can refine.
+fn assert_wide_everywhere(radius: f64, length: f32) {
+    for rotation in ROTATIONS {
+        let body = pipe(length, radius).rotated(rotation);
+        let what = format!("radius {radius}, length {length}");
+        let from_inside = from_centre(&body.facets, 7).passage.unwrap().narrowest;
+        let error = from_inside.width / body.width - 1.0;
+        assert!(error.abs() < 0.01 && !from_inside.is_end, "{what}: error {error}");
+        // The start is in the pipe.
+        let case = case(&body.facets, 8);
+        let start = std::array::from_fn(|i| {
+            let mean = body.rim.iter().map(|v| v[i]).sum::<f64>() / body.rim.len() as f64;
+            mean + 0.3 * body.axis()[i]
+        });
+        let in_pipe = ask(&case, start, Target::Far).unwrap().passage.unwrap().narrowest;
+        let error = in_pipe.width / body.width - 1.0;
+        assert!(error.abs() < 0.01, "{what}, from {start:?}: error {error}");
+    }
+}
+
 #[test]
 fn a_long_pipe_is_as_wide_as_it_is_wherever_the_lattice_lies() {
-    for rotation in ROTATIONS {
-        for (level, radius, length) in [(7, 0.1, 2.0), (7, 0.13, 1.0)] {
-            let body = pipe(length, radius).rotated(rotation);
-            let what = format!("level {level}, radius {radius}, length {length}");
-            let from_inside = from_centre(&body.facets, level).passage.unwrap().narrowest;
-            let error = from_inside.width / body.width - 1.0;
-            assert!(error.abs() < 0.01 && !from_inside.is_end, "{what}: error {error}");
-            // The start is in the pipe.
-            let case = case(&body.facets, 8);
-            let start = std::array::from_fn(|i| {
-                let mean = body.rim.iter().map(|v| v[i]).sum::<f64>() / body.rim.len() as f64;
-                mean + 0.3 * body.axis()[i]
-            });
-            let in_pipe = ask(&case, start, Target::Far).unwrap().passage.unwrap().narrowest;
-            let error = in_pipe.width / body.width - 1.0;
-            assert!(error.abs() < 0.01, "{what}, from {start:?}: error {error}");
-        }
-    }
+    assert_wide_everywhere(0.1, 2.0);
+}
+
+#[test]
+fn a_pipe_is_as_wide_as_it_is_wherever_the_lattice_lies() {
+    assert_wide_everywhere(0.13, 1.0);
 }
 
 #[test]
@@ -159,6 +174,37 @@ fn a_closed_body_never_opens_and_that_is_proven_without_refinement() {
     let report = from_centre(&closed, 4);
     assert!(!report.is_leak && report.is_separated && report.passage.is_none());
     assert_eq!(report.levels.len(), 1);
+}
+
+#[test]
+fn a_finer_base_tree_that_cannot_be_meshed_ends_the_refinement_and_is_reported() {
+    struct Interruptible(Cell<bool>);
+    impl Watch for Interruptible {
+        fn step(&self, _: &str) {}
+
+        fn is_interrupted(&self) -> bool {
+            self.0.get()
+        }
+    }
+    let case = case(&bodies()[0].facets, 3);
+    let ask = |interrupts: bool| {
+        let watch = Interruptible(Cell::new(false));
+        let tree = |level| match level {
+            3 => Ok(base_tree(&case.facets_lattice, level)),
+            _ => {
+                watch.0.set(interrupts);
+                Err(format!("no memory for level {level}"))
+            }
+        };
+        let question =
+            Question { case: &case, from: [0.0; 3], to: Target::Far, leaves_max: 1_000_000 };
+        answer(&question, tree, &watch).map(|answer| answer.report)
+    };
+    let report = ask(false).unwrap();
+    assert!(!report.is_leak && report.opens.is_none() && report.passage.is_none());
+    assert_eq!(report.limit.unwrap(), "level 4 could not be meshed: no memory for level 4");
+    // A mesher that the user's signal ended is no reason to answer.
+    assert!(matches!(ask(true), Err(LeakError::Source(_))));
 }
 
 #[test]
@@ -175,6 +221,18 @@ fn refinement_ends_at_the_limit_of_leaves_and_that_is_reported() {
     assert!(!report.is_leak && report.opens.is_none());
     assert!(report.limit.unwrap().contains("more than the limit of 10000"));
     assert!(report.levels.len() > 1 && report.levels.iter().all(|l| l.leaves <= 10_000));
+}
+
+#[test]
+fn a_base_tree_is_meshed_if_it_is_expected_to_have_just_as_many_leaves_as_allowed() {
+    let case = case(&bodies()[0].facets, 3);
+    let tree = |level| Ok::<_, Infallible>(base_tree(&case.facets_lattice, level));
+    let expected = 4 * base_tree(&case.facets_lattice, 3).len() as u64;
+    for (leaves_max, levels) in [(expected - 1, 1), (expected, 2)] {
+        let question = Question { case: &case, from: [0.0; 3], to: Target::Far, leaves_max };
+        let report = answer(&question, tree, &Silent).unwrap().report;
+        assert_eq!(report.levels.len(), levels, "at most {leaves_max}");
+    }
 }
 
 #[test]

@@ -4,6 +4,8 @@ use super::*;
 use check::checks::Terms;
 use check::checks::components;
 use check::why::answer::{Answer, SideReason};
+use contract::manifest::Tree;
+use contract::testing::words_of;
 use contract::word::{self, Side};
 
 /// Two nested spheres: the far field, a wall and a cavity.
@@ -114,4 +116,40 @@ fn a_point_in_an_enclosed_part_names_the_rule() {
             .centre(),
     );
     assert!(rule(wall).contains("keep is outside"));
+}
+
+/// A thin wall divides the root but for an opening, and the component around it has too many leaves for a search.
+#[test]
+fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
+    let ends = [[0.1f32, 0.3], [-8.0, 7.0], [-8.0, 8.0]];
+    let at = |i: usize| [0, 1, 2].map(|a| ends[a][i >> a & 1]);
+    let faces =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
+    let wall: Vec<Facet> = faces.into_iter().flat_map(halves).map(|facet| facet.map(at)).collect();
+    let whole = "[[box]]\nmin = [-8.0, -8.0, -8.0]\nmax = [8.0, 8.0, 8.0]\nspacing = 0.25\n";
+    let explain = |seeds: &str, point: [f64; 3]| {
+        let text = format!(
+            "spacing_min = 0.25\nlayer_cells_min = 1\nkeep = 'all'\nseeds = {seeds}\n{ROOT}{whole}"
+        );
+        let case = Case::from_parts(&text, wall.clone()).unwrap();
+        let manifest = case.manifest(Tree::Base, "test".to_owned());
+        let set = LeafSet::new(manifest, vec![]).with_parts(vec![words_of(|o| o.level < 6)]);
+        let answer = with_mesh(&set, Some(&case), |mesh| mesh.at(point).unwrap());
+        match answer.side_decided_by {
+            SideReason::Component { decision, candidate, is_complete, is_proven, .. } => {
+                assert!(!is_complete, "{decision}");
+                (candidate.map(|place| place.octant.path()), is_proven, decision)
+            }
+            _ => panic!("{answer}"),
+        }
+    };
+    let (candidate, is_proven, _) = explain("[]", [-4.0; 3]);
+    assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.0"), true));
+    let (candidate, is_proven, _) = explain("[]", [4.0, -4.0, -4.0]);
+    assert_eq!((candidate.as_deref(), is_proven), (Some("1.0.0.0.1.0"), false));
+    let (_, is_proven, decision) = explain("[[7.9, 7.9, 7.9]]", [-4.0; 3]);
+    assert_eq!((decision.as_str(), is_proven), ("no seed was found in its component", false));
+    let (_, is_proven, decision) = explain("[[-7.9, -7.9, -7.9]]", [-4.0; 3]);
+    assert_eq!((decision.as_str(), is_proven), ("seed 0 lies in its component", true));
 }

@@ -40,6 +40,10 @@ proptest! {
             prop_assert_eq!(found.subtrees, found.first.len() as u64);
             let leaves: u64 = found.first.iter().map(|subtree| subtree.leaves).sum();
             prop_assert_eq!(leaves, 7 * found.unneeded + found.subtrees, "{}", found);
+            prop_assert_eq!(found.unneeded_leaves, leaves, "{}", found);
+            let largest = found.first.iter().map(|subtree| subtree.leaves).max();
+            let first = found.first.iter().find(|subtree| Some(subtree.leaves) == largest);
+            prop_assert_eq!(found.largest.as_ref(), first, "{}", found);
         }
     }
 }
@@ -67,7 +71,65 @@ fn a_needless_split_is_found_wherever_it_is() {
             let planted = word::octant(words[at]);
             assert_eq!(found.largest.as_ref().unwrap().octant.octant, planted, "{name}: {found}");
         }
+        // No layer and no balance requires a split of the base tree.
+        let words = &correct.base.words;
+        for at in (0..words.len()).step_by(words.len() / 12) {
+            let mut mutated = words.clone();
+            split(&mut mutated, at);
+            let found = count(&correct.base.with_parts(vec![mutated]));
+            assert_eq!((found.unneeded, found.unneeded_leaves), (1, 8), "{name}: {found}");
+        }
     }
+}
+
+#[test]
+fn a_layer_thicker_than_the_root_refines_all_of_it_and_a_single_leaf_has_no_split() {
+    for (layer_cells_min, spacing, leaves, splits) in [(40, 1.0, 512, 73), (40, 8.0, 1, 0)] {
+        let text = format!(
+            "spacing_min = {spacing:?}\nlayer_cells_min = {layer_cells_min}\nkeep = 'all'\n\
+             root = {{ origin = [-4.0, -4.0, -4.0], edge = 8.0 }}\ngenerator = {{ shape = 'cube', facets = 12 }}\n"
+        );
+        let correct = support::selftest_case("thick", &text);
+        assert_eq!(correct.mesh.words.len(), leaves);
+        for case in [None, Some(&correct.case)] {
+            let found = with_mesh(&correct.mesh, case, |mesh| mesh.unneeded(1).unwrap());
+            assert_eq!((found.unneeded, found.splits), (0, splits), "{found}");
+        }
+    }
+}
+
+#[test]
+fn the_report_lists_as_many_octants_as_wanted_and_the_largest() {
+    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
+    let correct = support::selftest_case(name, text);
+    let report = |words: Vec<u64>, first| {
+        let mutated = correct.mesh.with_parts(vec![words]);
+        with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(first).unwrap().to_string())
+    };
+    let mut words = correct.mesh.words.clone();
+    let (splits, leaves) = ((words.len() - 1) / 7, words.len());
+    let every = report(words.clone(), 1);
+    assert!(
+        every.starts_with("every split has a cause: ")
+            && every.contains(&format!("{leaves} leaves")),
+        "{every}"
+    );
+    split(&mut words, 0);
+    split(&mut words, 0);
+    let last = words.len() - 1;
+    split(&mut words, last);
+    assert!(splits > 3);
+    let both = report(words.clone(), 2);
+    let lines: Vec<&str> = both.lines().collect();
+    assert!(
+        lines[0].starts_with("3 of ") && lines[0].ends_with("23 leaves, in 2 octants:"),
+        "{both}"
+    );
+    assert!(lines[1].ends_with(", 15 leaves") && lines[2].ends_with(", 8 leaves"), "{both}");
+    assert!(lines[3].starts_with("the largest: ") && lines[3].ends_with(", 15 leaves"), "{both}");
+    assert_eq!(lines.len(), 4, "{both}");
+    let one = report(words, 1);
+    assert_eq!(one.lines().nth(2), Some("  and 1 more (--first)"), "{one}");
 }
 
 #[test]
@@ -76,4 +138,15 @@ fn without_crossing_leaves_the_case_is_required() {
     let correct = support::selftest_case("inside", text);
     let why = with_mesh(&correct.mesh, None, |mesh| mesh.unneeded(1).unwrap_err());
     assert!(why.contains("--case"), "{why}");
+}
+
+#[test]
+fn a_word_that_is_no_leaf_is_refused() {
+    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
+    let correct = support::selftest_case(name, text);
+    let mut words = correct.mesh.words.clone();
+    words[0] |= 3;
+    let mutated = correct.mesh.with_parts(vec![words.clone()]);
+    let why = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap_err());
+    assert!(why.contains(&format!("the invalid word {:#018x}", words[0])), "{why}");
 }

@@ -15,6 +15,8 @@ struct Nodes {
     split: Vec<bool>,
     masked: Vec<bool>,
     sides: Vec<u8>,
+    /// One for each node, or none.
+    ranks: Vec<i32>,
 }
 
 fn nodes_of(words: &[u64]) -> Nodes {
@@ -46,19 +48,24 @@ fn packed(bits: &[bool]) -> Vec<u8> {
 fn file_of(nodes: &Nodes, edit: impl FnOnce(&mut Group)) -> NamedTempFile {
     let file = NamedTempFile::new().unwrap();
     let mut out = Writer::new(fs::File::create(file.path()).unwrap()).unwrap();
-    let mut array = |bytes: &[u8]| {
-        let mut array = Chunked::new(Kind::Byte, bytes.len() as u64, 512);
-        for (slot, chunk) in array.chunks.iter_mut().zip(bytes.chunks(array.chunk_len as usize)) {
+    let mut array_of = |kind: Kind, bytes: &[u8]| {
+        let mut array = Chunked::new(kind, (bytes.len() / kind.bytes()) as u64, 512);
+        let chunk_bytes = array.chunk_bytes();
+        for (slot, chunk) in array.chunks.iter_mut().zip(bytes.chunks(chunk_bytes)) {
             let mut chunk = chunk.to_vec();
-            chunk.resize(array.chunk_len as usize, 0);
+            chunk.resize(chunk_bytes, 0);
             *slot = Deflater::default().compress(&chunk).map(|chunk| out.append(&chunk).unwrap());
         }
         Member::Chunked(array)
     };
+    let ranks: Vec<u8> = nodes.ranks.iter().flat_map(|rank| rank.to_le_bytes()).collect();
+    let ranks = (!ranks.is_empty()).then(|| (RANK.to_owned(), array_of(Kind::Int32, &ranks)));
+    let mut array = |bytes: &[u8]| array_of(Kind::Byte, bytes);
     let total = nodes.split.len();
     let described = (total - *nodes.by_level.last().unwrap() as usize).max(1);
     let ints = |numbers: Vec<i64>| Member::Small(Value::Ints(numbers));
-    let data = Group { members: vec![(SIDE.to_owned(), array(&nodes.sides))], ..Group::default() };
+    let data = [(SIDE.to_owned(), array(&nodes.sides))].into_iter().chain(ranks);
+    let data = Group { members: data.collect(), ..Group::default() };
     let mut members = vec![
         ("NumberOfTrees", ints(vec![1])),
         ("NumberOfCellsPerTreeDepth", ints(nodes.by_level.clone())),
@@ -150,6 +157,40 @@ fn trees_of_one_leaf_and_without_leaves_are_read() {
         let tree = TreeFile::open(file.path(), Some(SIDE)).unwrap();
         assert_eq!((words_in(&tree).unwrap(), tree.index().unwrap().leaves), (words, leaves));
     }
+}
+
+#[test]
+fn ranks_are_read_with_the_words_if_there_is_one_for_each_node() {
+    let words = words();
+    let ranked = |count: usize, rank: fn(usize) -> i32| {
+        let mut nodes = nodes_of(&words);
+        nodes.ranks = (0..nodes.split.len().min(count)).map(rank).collect();
+        let file = file_of(&nodes, |_| ());
+        (TreeFile::open(file.path(), Some(SIDE)).unwrap(), nodes, file)
+    };
+    let read = |tree: &TreeFile| {
+        let (mut found, mut ranks) = (Vec::new(), Vec::new());
+        let index = tree.index().unwrap();
+        let read = Cursor::new(tree, &index).words_and_ranks(0, 0, &mut found, &mut ranks);
+        read.map(|()| (found, ranks))
+    };
+    let (tree, nodes, _file) = ranked(usize::MAX, |node| node as i32 % 77);
+    let (found, ranks) = read(&tree).unwrap();
+    assert!(tree.has_ranks() && found == words && ranks.len() == words.len());
+    // Nodes are counted level by level, so the rank of the first leaf of a level is known.
+    for by_level in [3, 4, 5] {
+        let first: i64 = nodes.by_level[..by_level].iter().sum();
+        let is_leaf = |&i: &usize| !nodes.split[i] && !nodes.masked[i];
+        let node = (first as usize..nodes.split.len()).find(is_leaf).unwrap();
+        let leaf = words.iter().position(|&w| usize::from(level(w)) == by_level);
+        assert_eq!(leaf.map(|leaf| ranks[leaf]), Some(node as u32 % 77), "level {by_level}");
+    }
+    for (tree, _, _file) in [ranked(0, |_| 0), ranked(5, |_| 0)] {
+        assert!(!tree.has_ranks());
+        assert_eq!(read(&tree).unwrap(), (words.clone(), vec![]));
+    }
+    let (tree, _, _file) = ranked(usize::MAX, |_| -1);
+    assert!(read(&tree).unwrap_err().to_string().ends_with("has the rank -1"));
 }
 
 #[test]

@@ -200,3 +200,33 @@ fn fixed<T, const N: usize>(numbers: Vec<T>, what: &str) -> Result<[T; N], Impor
         .try_into()
         .map_err(|_| ImportError::content(format!("has {found} numbers for {what}, which has {N}")))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The file has the upper end of z: its corner follows from all of the rounded edges.
+    #[test]
+    fn a_root_is_that_of_a_grid_if_rounding_explains_the_difference() {
+        let grid = Grid { shape: [8; 3], origin: [1.0, 2.0, 3.0], edge: 0.25 };
+        let exact = grid.root();
+        assert!(agrees(&exact, &grid));
+        let along = |axis: usize, by: f64| {
+            let mut root = exact;
+            root.origin[axis] += by;
+            agrees(&root, &grid)
+        };
+        for (axis, most) in
+            [(0, ROUNDING_CORNER), (1, ROUNDING_CORNER), (2, ROUNDING_CORNER + 8.0 * ROUNDING_EDGE)]
+        {
+            for sign in [1.0, -1.0] {
+                assert!(
+                    along(axis, 0.99 * sign * most) && !along(axis, 1.01 * sign * most),
+                    "{axis}"
+                );
+            }
+        }
+        let with_edge = |by: f64| agrees(&Root { edge: exact.edge + by, ..exact }, &grid);
+        assert!(with_edge(0.99 * 8.0 * ROUNDING_EDGE) && !with_edge(1.01 * 8.0 * ROUNDING_EDGE));
+    }
+}

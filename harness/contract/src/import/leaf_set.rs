@@ -74,6 +74,38 @@ mod tests {
     }
 
     #[test]
+    fn a_root_that_is_no_cube_is_refused() {
+        let cells = cells_of(&words_of(|o| o.level < 1), &ROOT);
+        for root in [
+            Root { edge: 0.0, ..ROOT },
+            Root { edge: -1.0, ..ROOT },
+            Root { edge: f64::INFINITY, ..ROOT },
+            Root { edge: f64::NAN, ..ROOT },
+            Root { origin: [1.0, f64::NAN, 1.0], ..ROOT },
+            Root { origin: [1.0, 1.0, f64::INFINITY], ..ROOT },
+        ] {
+            let why =
+                leaf_set(&cells, Some(root), None, "test".to_owned()).unwrap_err().to_string();
+            assert!(why.contains("has a root that is not a cube"), "{why}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_has_the_requirements_of_its_case_and_the_root_that_is_given() {
+        let text = "spacing_min = 1.0\nlayer_cells_min = 3\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[1.0, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let words = words_of(|o| o.level < 1);
+        for (given, expected) in [(None, case.root), (Some(ROOT), ROOT)] {
+            let cells = cells_of(&words, &expected);
+            let set = leaf_set(&cells, given, Some(&case), "test".to_owned()).unwrap();
+            let Manifest { root, level_surface, layer_cells_min, .. } = set.manifest;
+            assert_eq!((root, level_surface, layer_cells_min), (expected, 3, 3));
+            assert_eq!(set.words, words);
+        }
+    }
+
+    #[test]
     fn an_imported_mesh_has_a_complete_manifest() {
         let words = words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3]);
         let mut cells = cells_of(&words, &ROOT);

@@ -289,3 +289,35 @@ fn tree_length([x, y, z, level]: [i32; 4]) -> Option<u32> {
             .filter(|&length| length.is_power_of_two() && length - length / cells == before),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_length_of_a_tree_is_that_of_the_version_that_wrote_it() {
+        for length in [1 << 19, 1 << 29, 1u32 << 30] {
+            for level in [1, 2, 5, 18] {
+                let last = (length - (length >> level)) as i32;
+                let length_found = tree_length([last, last, last, level]);
+                assert_eq!(length_found, Some(length), "level {level}");
+            }
+        }
+        assert_eq!(tree_length([0, 0, 0, 0]), Some(1));
+        // Not the last quadrant of any tree: off its diagonal, outside it, too fine, or not at its end.
+        for quadrant in [
+            [4, 4, 2, 1],
+            [4, 2, 4, 1],
+            [2, 4, 4, 1],
+            [-4, -4, -4, 1],
+            [4, 4, 4, -1],
+            [4, 4, 4, 31],
+            [4, 4, 4, 2],
+            [6, 6, 6, 1],
+            [1, 1, 1, 0],
+            [0, 0, 0, 1],
+        ] {
+            assert_eq!(tree_length(quadrant), None, "{quadrant:?}");
+        }
+    }
+}

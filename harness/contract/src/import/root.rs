@@ -88,6 +88,15 @@ mod tests {
     }
 
     #[test]
+    fn the_root_begins_a_whole_number_of_coarsest_cells_below_the_first() {
+        let mut cells = Cells::default();
+        for (x, edge) in [(2.0, 2.0), (4.0, 2.0), (1.0, 1.0)] {
+            cells.push([x, 0.0, 0.0], edge);
+        }
+        assert_eq!(derive(&cells).unwrap(), Root { origin: [0.0; 3], edge: 8.0 });
+    }
+
+    #[test]
     fn single_precision_coordinates_are_precise_enough() {
         let words = words_of(|o| o.level == 0 || o.level < 10 && o.corner == [0; 3]);
         let mut cells = cells_of(&words, &Root { origin: [0.1, 0.2, 0.3], edge: 0.7 });
@@ -109,6 +118,17 @@ mod tests {
             cells.push([0.0; 3], 1.0);
             let message = derive(&cells).unwrap_err().to_string();
             assert!(message.contains("--root"), "{message}");
+        }
+        for corner in [f64::NAN, f64::INFINITY, -f64::INFINITY] {
+            let mut cells = Cells::default();
+            cells.push([0.0; 3], 1.0);
+            cells.push([1.0, corner, 0.0], 1.0);
+            let message = derive(&cells).map_err(|error| error.to_string());
+            // A coordinate that is not a number bounds nothing, and is found when the cells become leaves.
+            assert!(
+                corner.is_nan() || message.is_err_and(|why| why.contains("--root")),
+                "{corner}"
+            );
         }
     }
 }

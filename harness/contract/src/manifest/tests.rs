@@ -17,6 +17,18 @@ fn keys_of_seeds_and_components_are_optional_and_survive_a_round_trip() {
 }
 
 #[test]
+fn only_unknown_sides_are_written() {
+    let mut manifest = crate::testing::leaf_set(vec![vec![0]]).manifest;
+    for (sides, key) in [(Sides::Known, None), (Sides::Unknown, Some("\"sides\":\"unknown\""))] {
+        manifest.sides = sides;
+        let text = serde_json::to_string(&manifest).unwrap();
+        assert_eq!(text.contains("\"sides\""), key.is_some(), "{text}");
+        assert!(key.is_none_or(|key| text.contains(key)), "{text}");
+        assert_eq!(serde_json::from_str::<Manifest>(&text).unwrap(), manifest);
+    }
+}
+
+#[test]
 fn numbers_out_of_range_are_faults() {
     let manifest = crate::testing::leaf_set(vec![vec![0]]).manifest;
     assert_eq!(manifest.fault(), None);

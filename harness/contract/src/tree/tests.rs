@@ -27,7 +27,12 @@ fn a_handle_is_a_leaf_part_of_a_coarser_one_a_node_or_neither() {
     for index in [0, 1, 1 << 30] {
         let node = Handle::node(index);
         assert_eq!((node.as_leaf(), node.as_coarser_leaf(), node.is_node()), (None, None, true));
-        assert_eq!(node.index(), index);
+        assert_eq!((node.index(), node.as_node()), (index, Some(index)));
+    }
+    for handle in
+        [Handle::HOLE, Handle::OUTSIDE_ROOT, Handle::leaf(2), Handle::coarser_leaf(DELETED, 19)]
+    {
+        assert_eq!(handle.as_node(), None, "{handle:?}");
     }
 }
 

@@ -6,6 +6,9 @@
 //! components as the manifest counts. The check cannot detect that a whole component is missing if the manifest has no
 //! counts, or any wrong component if the surface is larger than some millions of octants (a note says so).
 
+#[cfg(test)]
+mod tests;
+
 use super::NAME;
 use crate::checks::{CheckResult, Terms, components, contact};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};

@@ -225,3 +225,24 @@ fn with_a_case_facets_and_rays_decide() {
     );
     assert!(rule(&coarse, &[coarse[0] | 2]).contains("crossing: B is right"));
 }
+
+#[test]
+fn a_leaf_within_a_closed_body_is_inside() {
+    let [a, b, c, d] = [[1.0f32; 3], [7.5, 1.0, 1.0], [1.0, 7.5, 1.0], [1.0, 1.0, 7.5]];
+    let keys = "spacing_min = 1.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+    let body = vec![[a, b, c], [a, b, d], [a, c, d], [b, c, d]];
+    let case = Case::from_parts(keys, body.clone()).unwrap();
+    let outside = mesh(&[&[0, 7, 0]])[0];
+    let rule = |case: &Case, a: u64, b: u64| {
+        let terms = Terms::of_case(case);
+        Dispute { a: &[], b: &[], terms: &terms, case: Some(case) }.rule(Some(a), Some(b)).join("")
+    };
+    let text = rule(&case, outside, outside | 1);
+    assert!(text.contains("6 of its 6 rays are inside: B is right, if"), "{text}");
+    let text = rule(&case, outside | 1, outside);
+    assert!(text.contains("6 of its 6 rays are inside: A is right, if"), "{text}");
+    // Without the facet across the diagonal, the rays towards it leave the body where it is open.
+    let open = Case::from_parts(keys, body[..3].to_vec()).unwrap();
+    let text = rule(&open, outside, outside | 1);
+    assert!(text.contains("3 of its 6 rays are inside: another candidate"), "{text}");
+}

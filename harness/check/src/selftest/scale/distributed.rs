@@ -292,6 +292,25 @@ mod tests {
     }
 
     #[test]
+    fn parts_do_not_depend_on_how_many_words_are_written_at_once() {
+        let words = words_of(|o| o.level < 2);
+        let written = |run: usize| {
+            let place = tempfile::tempdir().unwrap();
+            let mut writer = PartWriter::new(place.path(), words.len() as u64, 3, 5).unwrap();
+            words.chunks(run).for_each(|run| writer.write(run).unwrap());
+            let parts = writer.finish().unwrap();
+            let read = |part: &Part| std::fs::read(place.path().join(&part.file)).unwrap();
+            let files: Vec<_> = parts.iter().map(read).collect();
+            (parts, files)
+        };
+        let (parts, files) = written(words.len());
+        assert_eq!(parts.iter().map(|part| part.leaves).collect::<Vec<_>>(), [24, 20, 20]);
+        for run in [1, 2, 3, 7] {
+            assert_eq!(written(run), (parts.clone(), files.clone()), "{run} words at once");
+        }
+    }
+
+    #[test]
     fn a_window_is_an_octant_of_one_part() {
         let place = tempfile::tempdir().unwrap();
         let (original, words) = distributed(place.path());

@@ -80,3 +80,56 @@ fn emptied(original: &DistributedMesh) -> io::Result<Option<GlobalChange>> {
     }
     Ok((any && !surface).then_some(GlobalChange::Emptied(octant)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selftest::scale::Source;
+    use crate::selftest::{SelftestCase, catalogue};
+    use contract::case::Case;
+    use contract::testing::{leaf_set, words_with_sides};
+
+    /// A mesh that is refined towards a corner, with crossing leaves there or in the opposite one.
+    fn words(crossing: u32, has_corner: bool) -> Vec<u64> {
+        let is_crossing = |o: &Octant| o.corner == [crossing * (CELLS_PER_EDGE - o.edge()); 3];
+        let corner = Octant::ROOT.child(0).child(0);
+        let side = |o: &Octant| if is_crossing(o) { Side::Crossing } else { Side::Outside };
+        words_with_sides(
+            |o| o.level < 2 || o.level < 5 && o.corner == [0; 3],
+            |o| (has_corner || !corner.contains(o)).then(|| side(o)),
+        )
+    }
+
+    #[test]
+    fn a_change_of_every_part_is_the_corruption_of_the_whole_mesh() {
+        let text = "spacing_min = 1.0\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let case =
+            Case::from_parts(text, vec![[[0.5; 3], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]]]).unwrap();
+        let names = [
+            leaves::SHIFTED_BY_CELL,
+            leaves::SHIFTED_BY_HALF,
+            leaves::MIRRORED,
+            leaves::OCTANT_EMPTIED,
+            leaves::TRUNCATED,
+        ];
+        for (crossing, has_corner) in [(0, true), (1, true), (1, false)] {
+            let place = tempfile::tempdir().unwrap();
+            let mesh = place.path().join("given");
+            std::fs::create_dir(&mesh).unwrap();
+            let set = leaf_set(vec![words(crossing, has_corner)]);
+            set.write(&mesh).unwrap();
+            let source = Source { name: "given".into(), mesh, base: None };
+            let original = DistributedMesh::new(&source, place.path()).unwrap();
+            let correct =
+                SelftestCase { case: case.clone(), mesh: set.clone(), base: leaf_set(vec![]) };
+            for mutant in catalogue() {
+                let change = GlobalChange::named(mutant.name, &original).unwrap();
+                assert_eq!(change.is_some(), names.contains(&mutant.name), "{}", mutant.name);
+                let Some(change) = change else { continue };
+                let applied = change.map(|change| change.apply(&set.words));
+                let whole = (mutant.make)(&correct).map(|mutation| mutation.mesh.words);
+                assert_eq!(applied, whole, "{}, {crossing}, {has_corner}", mutant.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+use super::*;
+use crate::promises::Touching;
+use contract::import::htg::ImportedTree;
+use contract::leafset::LeafSet;
+use contract::manifest::Sides;
+use contract::testing::{leaf_set, random_words, words_of};
+use proptest::prelude::*;
+
+fn audited(set: &LeafSet, options: &AuditOptions) -> AuditReport {
+    let dir = tempfile::tempdir().unwrap();
+    set.write(dir.path()).unwrap();
+    audit(dir.path(), options)
+}
+
+fn found(report: &AuditReport) -> Vec<&'static str> {
+    report.checks.iter().filter(|c| !c.holds()).map(|c| c.name).collect()
+}
+
+/// A balanced mesh of three levels.
+fn correct() -> Vec<u64> {
+    words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3])
+}
+
+proptest! {
+    #[test]
+    fn the_result_does_not_depend_on_the_partition(words in random_words(3), part_of in prop::collection::vec(0usize..5, 600)) {
+        let mut parts = vec![Vec::new(); 5];
+        words.iter().zip(&part_of).for_each(|(&w, &part)| parts[part].push(w));
+        let words: Vec<u64> = words.into_iter().take(part_of.len()).collect();
+        let (leaves, options) = (words.len() as u64, AuditOptions::default());
+        let one = audited(&leaf_set(vec![words]), &options);
+        let several = audited(&leaf_set(parts), &options);
+        prop_assert_eq!(found(&one), found(&several));
+        prop_assert!(!found(&several).contains(&"manifest") && !found(&several).contains(&"linear"));
+        prop_assert_eq!(several.leaves, leaves);
+    }
+}
+
+#[test]
+fn a_correct_mesh_passes_and_an_unsorted_part_fails() {
+    let words = correct();
+    assert!(audited(&leaf_set(vec![words.clone(), vec![]]), &AuditOptions::default()).holds());
+    let mut unsorted = words;
+    unsorted.swap(3, 4);
+    let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
+    assert!(found(&report).contains(&"linear"));
+}
+
+#[test]
+fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
+    // Level 1 touches level 4 in a corner.
+    let words = words_of(|o| o.level == 0 || "0.7.7".starts_with(&o.path()));
+    let dir = tempfile::tempdir().unwrap();
+    leaf_set(vec![words]).write(dir.path()).unwrap();
+    let names = |promises: &Promises| {
+        let requirements = Requirements::Promises(promises, None);
+        let report = audit_against(dir.path(), &AuditOptions::default(), requirements);
+        let names: Vec<_> = report.checks.iter().map(|check| check.name).collect();
+        (names, found(&report))
+    };
+    let balance = |touching, ratio| Promises {
+        balance: Some(touching),
+        ratio: Some(ratio),
+        ..Promises::default()
+    };
+    let checked = ["files", "manifest", "linear", "balance"];
+    let (names_of_balance, findings) = names(&balance(Touching::Corner, 4));
+    assert_eq!((&names_of_balance[..], &findings[..]), (&checked[..], &["balance"][..]));
+    assert_eq!(names(&balance(Touching::Corner, 8)), (names_of_balance, vec![]));
+    let of_definition = audit(dir.path(), &AuditOptions::default());
+    let expected: Vec<_> = of_definition.checks.iter().map(|check| check.name).collect();
+    let by_promise = names(&Promises::of_definition());
+    assert_eq!(by_promise, (expected, found(&of_definition)));
+    assert!(by_promise.0.contains(&"layer"));
+}
+
+#[test]
+fn a_check_that_had_nothing_to_check_examined_nothing_and_the_others_every_leaf() {
+    let report = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
+    assert!(report.not_run().count() > 0 && report.checked_anything());
+    assert_eq!(report.nodes, Tree::of_words(&correct()).nodes() as u64);
+    for check in &report.checks {
+        let expected = match check.name {
+            checks::FILES => 1,
+            _ if check.was_run() => report.leaves,
+            _ => 0,
+        };
+        assert_eq!(check.examined, expected, "{check}");
+    }
+}
+
+/// The codes of unknown sides are all `outside`, which must neither pass for sides nor fail for holes.
+#[test]
+fn what_needs_unknown_sides_is_not_checked() {
+    let mut words = correct();
+    words.pop();
+    let mut set = leaf_set(vec![words]);
+    let found = |set: &LeafSet, name: &str| {
+        let checks = audited(set, &AuditOptions::default()).checks;
+        checks.into_iter().find(|c| c.name == name).expect("a check of the audit")
+    };
+    let is_withdrawn = |set: &LeafSet, name: &str| {
+        found(set, name).nothing_to_check.is_some_and(|why| why.contains("sides of the leaves"))
+    };
+    assert!(!found(&set, "complete").holds() && !is_withdrawn(&set, "sides"));
+    set.manifest.sides = Sides::Unknown;
+    assert!(!found(&set, "complete").holds() && is_withdrawn(&set, "sides"));
+    set.manifest.keep = Keep::Outside;
+    for name in ["complete", "sides", "kept"] {
+        assert!(is_withdrawn(&set, name), "{name}");
+    }
+}
+
+#[test]
+fn the_report_states_each_check_and_whether_leaves_were_checked() {
+    let mut report = AuditReport {
+        checks: vec![CheckResult::new("manifest"), CheckResult::nothing("layer", "no layer")],
+        leaves: 3_000_000,
+        nodes: 12,
+        time_read_s: 0.25,
+        time_wall_s: 1.5,
+    };
+    let expected = "manifest   holds, 0 examined\nlayer      nothing to check: no layer\n\
+        left out: the mesh gave no check of its leaves anything to check\n\
+        3000000 leaves (12 distinct octants) in 1.50 s, of which reading 0.25 s: 2.0 M leaves/s";
+    assert_eq!(report.to_string(), expected);
+    assert_eq!(report.not_run().map(|check| check.name).collect::<Vec<_>>(), ["layer"]);
+    assert!(report.holds() && !report.checked_anything());
+    report.checks.push(CheckResult::new("balance"));
+    assert!(report.holds() && report.checked_anything());
+    report.checks.remove(2);
+    report.checks[0].report("a finding".to_owned());
+    assert!(!report.holds() && report.checked_anything());
+}
+
+/// The audit must not pass if memory does not suffice, but it still checks counts and digests.
+#[test]
+fn an_exceeded_memory_limit_is_a_finding() {
+    let mut set = leaf_set(vec![words_of(|o| o.level < 5 && o.corner[0] < 1 << 18)]);
+    set.manifest.leaves += 1;
+    let report = audited(&set, &AuditOptions { nodes_max: 1 });
+    assert_eq!(found(&report), ["manifest", CAPACITY]);
+}
+
+/// A mesh of the contract's samples as parts and as a tree, in one directory.
+#[test]
+fn a_tree_beside_parts_must_have_their_leaves() {
+    const TREE_FILE: &str = "mesh.vtkhdf";
+    let sample = Path::new("../contract/tests/samples/sphere.vtkhdf");
+    let open = ImportedTree::open(sample, None, None, None, "test".to_owned());
+    let place = tempfile::tempdir().unwrap();
+    let parts = place.path().join("parts");
+    open.unwrap().expect("a tree").create(&parts).unwrap();
+    let mut correct = leafset::read(&parts).unwrap();
+    correct.manifest.hyper_tree_grid = Some(TREE_FILE.to_owned());
+    let tree_file = |set: &LeafSet, tree: &[u8]| {
+        let dir = tempfile::tempdir().unwrap();
+        set.write(dir.path()).unwrap();
+        std::fs::write(dir.path().join(TREE_FILE), tree).unwrap();
+        let checks = audit(dir.path(), &AuditOptions::default()).checks;
+        assert_eq!((checks[0].name, checks[0].examined), (checks::FILES, 2));
+        let result = checks.into_iter().find(|check| check.name == TREE).expect("its check");
+        let details = result.findings.iter().map(|finding| finding.detail.clone());
+        (result.examined, details.collect::<Vec<_>>().join("\n"))
+    };
+    let bytes = std::fs::read(sample).unwrap();
+    assert_eq!(tree_file(&correct, &bytes), (9056, String::new()));
+    let other = correct.with_parts(vec![correct.words[1..].to_vec()]);
+    let (examined, text) = tree_file(&other, &bytes);
+    assert!(
+        examined == 9056 && text.starts_with("the leaves of the tree have the digest"),
+        "{text}"
+    );
+    assert!(text.ends_with(&other.manifest.digest.to_string()), "{text}");
+    let (_, text) = tree_file(&correct, &bytes[..bytes.len() / 2]);
+    assert!(text.contains(TREE_FILE) && text.contains("is damaged"), "{text}");
+}

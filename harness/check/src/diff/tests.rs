@@ -1,0 +1,161 @@
+use super::*;
+use contract::import::htg::ImportedTree;
+use contract::leafset;
+use contract::manifest::octant_index;
+use contract::testing::{leaf_set, words_of};
+
+fn written(words: Vec<u64>) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    leaf_set(vec![words]).write(dir.path()).unwrap();
+    dir
+}
+
+#[test]
+fn without_the_sides_of_one_mesh_the_cells_are_compared() {
+    let words = words_of(|o| o.level < 2);
+    let with_sides = words.iter().map(|word| word | 1).collect();
+    let (a, b) = (written(with_sides), written(words.clone()));
+    let compare = || diff(a.path(), b.path(), None, Trust::Manifests).unwrap();
+    assert!(!compare().same_leaves());
+    let unknown = |mut set: contract::leafset::LeafSet| {
+        set.manifest.sides = Sides::Unknown;
+        set.write(b.path()).unwrap();
+    };
+    unknown(leaf_set(vec![words.clone()]));
+    let same = compare();
+    assert!(same.same_leaves(), "{same}");
+    assert!(same.to_string().starts_with("the sides of B are unknown"), "{same}");
+    unknown(leaf_set(vec![words[1..].to_vec()]));
+    let other = compare();
+    assert!(!other.same_leaves() && other.rules.is_empty(), "{other}");
+    let leaf = other.leaf.expect("the first difference");
+    assert!(!leaf.contains("outside") && !leaf.contains("inside"), "{leaf}");
+}
+
+#[test]
+fn the_octants_that_differ_are_listed_up_to_eight() {
+    let octants: Vec<Octant> = (0..8).map(level_3).collect();
+    let mut report =
+        DiffReport { octants, leaf: Some("a leaf".to_owned()), ..DiffReport::default() };
+    report.rules = vec!["one".to_owned(), "two".to_owned()];
+    report.fields = vec!["a field".to_owned()];
+    let eight = "0.0.0, 0.0.1, 0.0.2, 0.0.3, 0.0.4, 0.0.5, 0.0.6, 0.0.7";
+    let expected = format!(
+        "a field\nthe leaves differ in 8 of 512 level-3 octants: {eight}\na leaf\n  rule: one\n  rule: two"
+    );
+    assert_eq!(report.to_string(), expected);
+    report.octants.push(level_3(511));
+    report.leaf = None;
+    let contradiction = "but the leaves in them are the same: a manifest contradicts its files";
+    let expected = format!(
+        "a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\n{contradiction}"
+    );
+    assert_eq!(report.to_string(), expected);
+    let same = DiffReport { compared: Trust::Manifests, leaves: 5, ..DiffReport::default() };
+    assert_eq!(same.to_string(), "the leaves are the same (5, by the digests in the manifests)");
+}
+
+#[test]
+fn the_first_difference_is_found_in_any_octant_and_part() {
+    let words = words_of(|o| o.level < 3);
+    for index in [0, 100, 511] {
+        let mut changed = words.clone();
+        changed[index] |= 1;
+        // Three parts, which interleave.
+        let mut parts = vec![Vec::new(); 3];
+        changed.iter().enumerate().for_each(|(i, &word)| parts[i % 3].push(word));
+        let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
+        leaf_set(parts).write(b.path()).unwrap();
+        for trust in [Trust::Leaves, Trust::Manifests] {
+            let found = diff(a.path(), b.path(), None, trust).unwrap();
+            assert_eq!((found.octants, found.leaves), (vec![level_3(index)], 512));
+            let octant = word::octant(words[index]);
+            let leaf = leaf_set(vec![]).manifest.root.describe(&octant);
+            let text = format!(
+                "first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}"
+            );
+            assert_eq!(found.leaf, Some(text));
+            assert_eq!(found.rules, ["section 4 (side): give the case file (--case) to decide it"]);
+            assert_eq!(found.contradictions, [""; 0]);
+        }
+    }
+    // A mesh that ends early.
+    let (a, b) = (written(words.clone()), written(words[..511].to_vec()));
+    let found = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+    assert!(found.leaf.unwrap().ends_with("\n  B has no more leaves"));
+}
+
+#[test]
+fn leaves_of_both_meshes_decide_about_a_split() {
+    // Leaves of level 3 in octant 0.1 touch octant 1.
+    let refined = |o: &Octant| o.level == 0 || "0.1".starts_with(&o.path());
+    let (a, b) = (written(words_of(refined)), written(words_of(|o| refined(o) || o.path() == "1")));
+    let found = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+    let [rule] = &found.rules[..] else { panic!("{found}") };
+    assert!(rule.contains("step 3 (balance)") && rule.ends_with("B is right"), "{rule}");
+}
+
+#[test]
+fn meshes_of_other_inputs_or_trees_are_not_judged() {
+    let words = words_of(|o| o.level < 1);
+    let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
+    let rules = |change: fn(&mut Manifest)| {
+        let mut set = leaf_set(vec![words.iter().map(|word| word | 1).collect()]);
+        change(&mut set.manifest);
+        set.write(b.path()).unwrap();
+        diff(a.path(), b.path(), None, Trust::Leaves).unwrap().rules.concat()
+    };
+    assert!(rules(|_| ()).starts_with("section 4"));
+    assert!(
+        rules(|m| m.tree = contract::manifest::Tree::Base).starts_with("none: one is a base tree")
+    );
+    assert!(rules(|m| m.layer_cells_min = 2).starts_with("none: the inputs differ"));
+}
+
+#[test]
+fn a_leaf_that_its_manifest_does_not_show_is_found_unless_manifests_are_trusted() {
+    let words = words_of(|o| o.level < 2);
+    let (a, b) = (written(words.clone()), written(words.clone()));
+    let compare = |trust| diff(a.path(), b.path(), None, trust).unwrap();
+    assert!(compare(Trust::Leaves).contradictions.is_empty());
+    assert_eq!(compare(Trust::Leaves).to_string(), "the leaves are the same (64 compared)");
+
+    let manifest = std::fs::read(b.path().join("mesh.json")).unwrap();
+    let mut changed = words;
+    changed[9] |= 1;
+    leaf_set(vec![changed]).write(b.path()).unwrap();
+    std::fs::write(b.path().join("mesh.json"), manifest).unwrap();
+    assert!(compare(Trust::Manifests).same_leaves());
+    let found = compare(Trust::Leaves);
+    assert!(!found.same_leaves() && found.leaf.is_some());
+    assert!(found.to_string().contains("manifest of B contradicts"), "{found}");
+}
+
+#[test]
+fn a_tree_is_compared_with_parts_like_other_parts() {
+    let sample = Path::new("../contract/tests/samples/sphere.vtkhdf");
+    let open = ImportedTree::open(sample, None, None, None, "test".to_owned());
+    let imported = open.unwrap().expect("a tree");
+    let place = tempfile::tempdir().unwrap();
+    let [tree, parts] = ["tree", "parts"].map(|name| place.path().join(name));
+    std::fs::create_dir(&tree).unwrap();
+    imported.link(&tree).unwrap();
+    imported.create(&parts).unwrap();
+    let compared = |a: &Path, b: &Path| diff(a, b, None, Trust::Leaves).unwrap();
+    let same = compared(&tree, &parts);
+    assert!(same.same_leaves() && same.leaves == 9056, "{same}");
+    let set = leafset::read(&parts).unwrap();
+    for at in [0, 5000, 9055] {
+        let mut words = set.words.clone();
+        words[at] = (words[at] & !3) | (((words[at] & 3) + 1) % 3);
+        let changed = tempfile::tempdir().unwrap();
+        set.with_parts(vec![words]).write(changed.path()).unwrap();
+        for [a, b] in [[tree.as_path(), changed.path()], [changed.path(), &tree]] {
+            let found = compared(a, b);
+            assert_eq!(found.octants, [level_3(octant_index(set.words[at]))], "{found}");
+            let leaf = set.manifest.root.describe(&word::octant(set.words[at]));
+            let text = found.leaf.as_ref().expect("the first difference");
+            assert_eq!(text.matches(&leaf).count(), 2, "{text}");
+        }
+    }
+}
