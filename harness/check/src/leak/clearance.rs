@@ -3,7 +3,7 @@
 use contract::lattice::FacetLattice;
 
 use crate::geometry::boxes::{Bounds, Boxes};
-use crate::geometry::distance::{self, Prepared};
+use crate::geometry::distance::{self, Prepared, length, sub};
 
 /// Exceeds the rounding of a distance, in lattice units.
 pub const ROUNDING: f64 = 1.0;
@@ -18,8 +18,23 @@ pub struct Spot {
     pub at: Point,
     /// The distance: half the free width.
     pub clearance: f64,
-    /// Step of the grid that the point is from; infinite for a point of a leaf.
+    /// Step of the grid that the point is from; infinite for a point of a leaf, and near the edge of a first grid.
     pub step: f64,
+    /// Greatest distance of the next points if they are of the same grid; 0 otherwise.
+    pub apart: f64,
+}
+
+impl Spot {
+    /// Upper bound of the clearance at another point.
+    pub fn bound(&self, at: Point) -> f64 {
+        self.clearance + length(sub(at, self.at))
+    }
+
+    /// Radius of a ball that passes from this point to the next ones: a facet that leaves this clearance at two points of a grid can
+    /// be nearer between them.
+    pub fn passing(&self) -> f64 {
+        (self.clearance.powi(2) - self.apart.powi(2) / 4.0).max(0.0).sqrt()
+    }
 }
 
 /// Step of a grid that is fine enough, in parts of the clearance.
@@ -75,19 +90,25 @@ impl<'a> Clearance<'a> {
         found
     }
 
-    /// The facets that can be the nearest one of a point at most `radius` from `centre`; none if they are more than `most`.
-    pub fn near(&self, centre: Point, radius: f64, most: usize) -> Vec<Prepared> {
+    /// The facets that can be the nearest one of a point at most `radius` from `centre`, with their distances from the centre,
+    /// nearest first; none if they are more than `most`.
+    pub fn near(&self, centre: Point, radius: f64, most: usize) -> Vec<(Prepared, f64)> {
         // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
         let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + ROUNDING;
         let (mut found, mut limit) = (Vec::new(), reach * reach);
-        self.within(centre, &mut limit, &mut |_, facet, limit| {
-            found.push(Prepared::new(&self.triangle(facet)));
+        self.within(centre, &mut limit, &mut |squared, facet, limit| {
+            found.push((facet, squared.sqrt()));
             if found.len() > most {
                 // Nothing is nearer, so the search ends.
                 *limit = 0.0;
             }
         });
-        if found.len() > most { Vec::new() } else { found }
+        if found.len() > most {
+            return Vec::new();
+        }
+        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let prepared = |(facet, from)| (Prepared::new(&self.triangle(facet)), from);
+        found.into_iter().map(prepared).collect()
     }
 
     /// A nearest point of the nearest facet.
@@ -145,6 +166,28 @@ impl<'a> Clearance<'a> {
             &from_box,
         );
     }
+}
+
+/// Distance from a point to the nearest of some triangles, given with their distances from a centre, nearest first; the point is
+/// `offset` from this centre. The index of a triangle as an error if the distance is not greater than `least`.
+pub fn nearest<'a>(
+    triangles: impl Iterator<Item = (&'a Prepared, f64)>,
+    point: Point,
+    offset: f64,
+    least: f64,
+) -> Result<f64, usize> {
+    let mut best = f64::INFINITY;
+    for (i, (triangle, from_centre)) in triangles.enumerate() {
+        let possible = from_centre - offset - ROUNDING;
+        if possible > 0.0 && possible * possible > best {
+            break;
+        }
+        best = triangle.squared(point).min(best);
+        if best <= least * least {
+            return Err(i);
+        }
+    }
+    Ok(best.sqrt())
 }
 
 #[cfg(test)]

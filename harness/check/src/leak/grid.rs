@@ -1,11 +1,11 @@
 //! A cubic grid of points with their distances to the nearest facet.
 
-use super::clearance::{Clearance, Point, ROUNDING};
+use super::clearance::{Clearance, Point, ROUNDING, nearest};
 use super::search::Graph;
 use crate::geometry::distance::{Prepared, length, sub};
 
 /// Half of a grid's edge, in steps.
-pub const STEPS: i32 = 16;
+pub const STEPS: i32 = 8;
 
 /// A cubic grid of points, each joined to the 26 around it.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +22,9 @@ pub struct Grid {
 pub struct Distances<'a> {
     grid: &'a Grid,
     clearance: &'a Clearance<'a>,
-    /// The facets that can be the nearest of any point; none if they are many. Then those of the blocks.
-    triangles: Vec<Prepared>,
+    /// The facets that can be the nearest of any point, with their distances from the grid's centre, nearest first; none if they are
+    /// many. Then those of the blocks, with their distances from these.
+    triangles: Vec<(Prepared, f64)>,
     /// Number of [`Self::triangles`] that are of the whole grid.
     shared: usize,
     blocks: Vec<Option<Block>>,
@@ -70,23 +71,11 @@ impl<'a> Distances<'a> {
         let point = self.grid.position(place);
         match &self.blocks[block] {
             Some(Block { centre, near }) if !near.is_empty() => {
-                self.among(near, point, length(sub(point, *centre)))
+                let triangles = near.iter().map(|&(i, from)| (&self.triangles[i as usize].0, from));
+                nearest(triangles, point, length(sub(point, *centre)), 0.0).unwrap_or(0.0)
             }
             _ => self.clearance.at(point, bound),
         }
-    }
-
-    /// Distance from a point to the nearest of the triangles near a centre, which is `offset` from the point.
-    fn among(&self, near: &[(u32, f64)], point: Point, offset: f64) -> f64 {
-        let mut best = f64::INFINITY;
-        for &(triangle, from_centre) in near {
-            let least = from_centre - offset - ROUNDING;
-            if least > 0.0 && least * least > best {
-                break;
-            }
-            best = self.triangles[triangle as usize].squared(point).min(best);
-        }
-        best.sqrt()
     }
 
     fn block(&mut self, indices: [i32; 3]) -> Block {
@@ -103,11 +92,19 @@ impl<'a> Distances<'a> {
             self.triangles.extend(near);
             first..self.triangles.len()
         };
-        let from_centre = |i: usize| (i as u32, self.triangles[i].squared(centre).sqrt());
-        let mut near: Vec<(u32, f64)> = candidates.map(from_centre).collect();
-        let least = near.iter().map(|&(_, from)| from).fold(f64::INFINITY, f64::min);
-        // As in `Clearance::near`, which searches for the same among all facets.
-        near.retain(|&(_, from)| from <= least + 2.0 * radius + ROUNDING);
+        let (mut near, mut reach) = (Vec::new(), f64::INFINITY);
+        let offset = if self.shared > 0 { length(sub(centre, self.grid.centre)) } else { 0.0 };
+        for i in candidates {
+            let (triangle, from) = &self.triangles[i];
+            if from - offset > reach {
+                break;
+            }
+            let from = triangle.squared(centre).sqrt();
+            // As in `Clearance::near`, which searches for the same among all facets.
+            reach = reach.min(from + 2.0 * radius + ROUNDING);
+            near.push((i as u32, from));
+        }
+        near.retain(|&(_, from)| from <= reach);
         near.sort_by(|a, b| a.1.total_cmp(&b.1));
         Block { centre, near }
     }
@@ -185,7 +182,7 @@ mod tests {
             let clearance = Clearance::new(&facets);
             let grid = Grid { centre, step };
             let mut distances = Distances::new(&grid, &clearance);
-            for place in (0..grid.count() as u32).step_by(977) {
+            for place in (0..grid.count() as u32).step_by(97) {
                 let expected = clearance.at(grid.position(place), f64::INFINITY);
                 prop_assert_eq!(distances.at(place, f64::INFINITY), expected);
             }

@@ -4,8 +4,8 @@
 //! middle, like all points that are centres of leaves, and limit what the grid can find. So every point is moved to where
 //! the passage is widest, in the plane across the path.
 
-use super::clearance::{Clearance, PRECISION, Point, Spot};
-use crate::geometry::distance::{dot, length, sub};
+use super::clearance::{Clearance, PRECISION, Point, Spot, nearest};
+use crate::geometry::distance::{Prepared, dot, length, sub};
 
 /// Places that are tried around a point.
 const AROUND: u32 = 16;
@@ -20,7 +20,7 @@ const MOVES_MAX: usize = 200;
 const REACH: f64 = 2.0;
 
 /// More facets than this near a point are searched in the tree.
-const FACETS_FEW: usize = 128;
+const FACETS_FEW: usize = 1024;
 
 /// Distance of successive points that need none between them, in clearances.
 const GAP: f64 = 0.5;
@@ -28,33 +28,58 @@ const GAP: f64 = 0.5;
 /// Points between two, at most: 2^8 - 1.
 const HALVINGS_MAX: u32 = 8;
 
+/// Clearances near a point.
+struct Near<'a> {
+    clearance: &'a Clearance<'a>,
+    centre: Point,
+    /// The triangles that can be the nearest, with their distances from the centre, nearest first; none if they are many.
+    triangles: Vec<(Prepared, f64)>,
+    /// The triangle that refused a place last, and probably refuses the next.
+    obstacle: usize,
+}
+
+impl Near<'_> {
+    /// The clearance at a place if it is greater than `least`; `bound` is an upper bound that the caller knows.
+    fn beyond(&mut self, at: Point, least: f64, bound: f64) -> Option<f64> {
+        let Some((obstacle, _)) = self.triangles.get(self.obstacle) else {
+            return Some(self.clearance.at(at, bound)).filter(|&clearance| clearance > least);
+        };
+        if obstacle.squared(at) <= least * least {
+            return None;
+        }
+        let triangles = self.triangles.iter().map(|(triangle, from)| (triangle, *from));
+        let clearance = nearest(triangles, at, length(sub(at, self.centre)), least);
+        clearance.map_err(|obstacle| self.obstacle = obstacle).ok()
+    }
+}
+
 /// The point of greatest clearance near a point, in the plane through it that has this normal. Every move ends in the ball
 /// around the point before it.
 fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
     let start = clearance.at(from, f64::INFINITY);
-    let near = clearance.near(from, REACH * start, FACETS_FEW);
-    let free = |at: Point| match near.is_empty() {
-        true => clearance.at(at, f64::INFINITY),
-        false => near.iter().map(|t| t.squared(at)).fold(f64::INFINITY, f64::min).sqrt(),
-    };
+    let triangles = clearance.near(from, REACH * start, FACETS_FEW);
+    let mut near = Near { clearance, centre: from, triangles, obstacle: 0 };
     let [u, v] = plane(normal);
     let step_min = PRECISION / 2.0 * start;
-    let mut best = Spot { at: from, clearance: start, step: step_min };
+    let mut best = Spot { at: from, clearance: start, step: step_min, apart: 0.0 };
     let (mut step, mut turn) = (start / 2.0, 0.0);
     for _ in 0..MOVES_MAX {
         if step < step_min {
             break;
         }
-        let around = (0..AROUND).map(|i| {
+        let before = best;
+        for i in 0..AROUND {
             let angle = turn + f64::from(i) * std::f64::consts::TAU / f64::from(AROUND);
             let (sin, cos) = angle.sin_cos();
-            let at = std::array::from_fn(|a| best.at[a] + step * (cos * u[a] + sin * v[a]));
-            Spot { at, clearance: free(at), step: step_min }
-        });
-        let within = around.filter(|spot| length(sub(spot.at, from)) <= REACH * start);
-        match within.max_by(|p, q| p.clearance.total_cmp(&q.clearance)) {
-            Some(spot) if spot.clearance > best.clearance => best = spot,
-            _ => step /= 2.0,
+            let at = std::array::from_fn(|a| before.at[a] + step * (cos * u[a] + sin * v[a]));
+            if length(sub(at, from)) <= REACH * start
+                && let Some(clearance) = near.beyond(at, best.clearance, before.bound(at))
+            {
+                best = Spot { at, clearance, step: step_min, apart: 0.0 };
+            }
+        }
+        if best == before {
+            step /= 2.0;
         }
         turn += TURN;
     }
@@ -124,8 +149,8 @@ impl Passage<'_> {
             return;
         }
         let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
-        let clearance = self.clearance.at(at, f64::INFINITY);
-        let middle = self.moved(Spot { at, clearance, step: f64::INFINITY }, gap);
+        let clearance = self.clearance.at(at, from.bound(at));
+        let middle = self.moved(Spot { at, clearance, step: f64::INFINITY, apart: 0.0 }, gap);
         self.fill(from, middle, halvings - 1, path);
         path.push(middle);
         self.fill(middle, to, halvings - 1, path);

@@ -1,7 +1,7 @@
 //! Leaks: does a path of free leaves of the base tree join two places, how wide is it, and at which spacing does it
 //! close or open?
 //!
-//! - [`leaves`]: a base tree with neighbours; [`ends`]: the ends of the path; [`search`]: the path through the leaves;
+//! - [`leaves`]: a base tree with neighbours; [`coarser`]: the same of a coarser level; [`ends`]: the ends of the path; [`search`]: the path through the leaves;
 //! - [`clearance`]: distances to facets; [`grid`]: the same for the points of a grid;
 //! - [`path`]: free widths along a path and its narrowest place; [`middle`]: the middle of a long passage;
 //! - [`passage`]: the widest path; [`surface`]: whether the facets form a closed surface between the ends;
@@ -12,6 +12,7 @@
 //! opening wider than 2 sqrt(3) e always joins leaves of edge e: the leaf that contains the centre of the ball is free.
 
 pub mod clearance;
+pub mod coarser;
 pub mod ends;
 pub mod grid;
 pub mod leaves;
@@ -201,7 +202,7 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         Ok(is_joined)
     }
 
-    /// Meshes coarser until the ends are not joined. Returns the tree to search for the widest path, and the level that
+    /// Coarsens the surface until the ends are not joined. Returns the tree to search for the widest path, and the level that
     /// closes it.
     ///
     /// The coarsest leaves that join the ends have edge e, so the widest opening is at least e wide. It joins leaves of
@@ -211,7 +212,9 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         let mut open = std::collections::VecDeque::from([tree]);
         let mut closes = None;
         for level in (0..self.question.case.level_surface).rev() {
-            let coarser = self.tree(level)?;
+            let finer = open.back().expect("at least the tree given");
+            let words = coarser::coarser(&finer.words, &self.question.case.boxes, level);
+            let coarser = Tree { level, words };
             if !self.is_joined(&coarser)? {
                 closes = Some(level);
                 break;

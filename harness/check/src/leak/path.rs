@@ -62,32 +62,37 @@ impl Path {
         /// Edge of the first grid, in radii.
         const EDGE: f64 = 6.0;
         /// Ratio of the steps of successive grids.
-        const FINER: f64 = 3.0;
+        const FINER: f64 = 2.0;
         let mut path = Self {
             spots: raw(leaves, route.leaves, goal, clearance),
             narrowest: 0,
             approaches: route.approaches.map(|count| 2 * count),
         };
-        path.widen_ends(goal, clearance);
         // No ball of a greater radius passes the grids.
         let mut bound = f64::INFINITY;
-        let mut is_centred = false;
+        let (mut is_centred, mut are_ends_wide) = (false, false);
         for grids in 1..=GRIDS_MAX {
             path.narrowest = path.find_narrowest();
             let spot = path.throat();
-            let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.clearance;
+            let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
+            if !are_ends_wide && path.reaches_end(f64::from(STEPS) * step) {
+                path.widen_ends(goal, clearance);
+                are_ends_wide = true;
+                continue;
+            }
+            let is_precise = bound <= (1.0 + 3f64.sqrt() * PRECISION) * spot.passing();
             let is_fine = spot.step <= PRECISION * spot.clearance;
             if path.is_narrowest_at_end() || is_precise || is_fine || bound < route.wanted {
                 break;
             }
-            let step = (spot.step / FINER).min(EDGE * route.radius / f64::from(2 * STEPS));
             let Some(found) = path.widen(step, clearance, scratch, stop)? else { break };
             if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
                 path.centre(bound.min(route.radius), clearance);
                 is_centred = true;
                 continue;
             }
-            // The widest path through points of a grid is narrower than the widest of all by at most a step's diagonal.
+            // The points of a grid nearest to those of a path are a path through the grid, half a step's diagonal away at most. As much
+            // again for the grid's own ends, which need not lie in the middle of a passage.
             bound = bound.min(found.least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
@@ -121,9 +126,9 @@ impl Path {
     }
 
     fn find_narrowest(&self) -> usize {
-        let clearance = |i: &usize| self.spots[*i].clearance;
+        let passing = |i: &usize| self.spots[*i].passing();
         let (first, last) = self.inner();
-        let least = (first..=last).min_by(|i, j| clearance(i).total_cmp(&clearance(j)));
+        let least = (first..=last).min_by(|i, j| passing(i).total_cmp(&passing(j)));
         least.expect("a path has points")
     }
 
@@ -135,6 +140,12 @@ impl Path {
         let first = (begin..self.narrowest).rev().take_while(is_near).last();
         let last = (self.narrowest + 1..=end).take_while(is_near).last();
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
+    }
+
+    /// Whether an end is among the points in a cube around the narrowest one.
+    fn reaches_end(&self, half: f64) -> bool {
+        let (first, last) = self.surroundings(half);
+        first == self.inner().0 || last == self.inner().1
     }
 
     /// Moves the ends, approaches excepted, to the widest places near them: the centre of a leaf is rarely one.
@@ -149,8 +160,7 @@ impl Path {
     /// Moves points less than `below` from the facets to the middle of a passage, unless that makes the path narrower.
     fn centre(&mut self, below: f64, clearance: &Clearance) {
         let (first, last) = self.inner();
-        let least =
-            |spots: &[Spot]| spots.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min);
+        let least = |spots: &[Spot]| spots.iter().map(Spot::passing).fold(f64::INFINITY, f64::min);
         let centred = middle::centred(&self.spots[first..=last], below, clearance);
         if least(&centred) > least(&self.spots[first..=last]) {
             self.spots.splice(first..=last, centred);
@@ -201,6 +211,7 @@ impl Path {
             at: grid.position(place),
             clearance: f64::from(width(place, place)),
             step: if Grid::is_inner(place) { step } else { coarse },
+            apart: 3f64.sqrt() * step,
         };
         let widened: Vec<Spot> = route.iter().map(spot).collect();
         let (begin, end) = self.inner();
@@ -261,6 +272,15 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
     if goal == Goal::Far {
         points.push(nearest_boundary(points[points.len() - 1]));
     }
-    let spot = |at| Spot { at, clearance: clearance.at(at, f64::INFINITY), step: f64::INFINITY };
-    points.into_iter().map(spot).collect()
+    let mut spots: Vec<Spot> = Vec::with_capacity(points.len());
+    for at in points {
+        let bound = spots.last().map_or(f64::INFINITY, |last| last.bound(at));
+        spots.push(Spot {
+            at,
+            clearance: clearance.at(at, bound),
+            step: f64::INFINITY,
+            apart: 0.0,
+        });
+    }
+    spots
 }

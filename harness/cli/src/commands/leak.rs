@@ -93,7 +93,7 @@ fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
     })?;
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
-    let mut trees = BaseTrees::new(engine, &path, case.root, limit).map_err(input)?;
+    let mut trees = BaseTrees::new(engine, &path, &case, limit).map_err(input)?;
     let question =
         Question { case: &case, from, to: arguments.to, leaves_max: arguments.leaves_max };
     let progress = Progress::new();
