@@ -233,7 +233,7 @@ mod tests {
             for (direction, part) in points {
                 let length = direction.map(|c| c * c).iter().sum::<f64>().sqrt().max(1e-9);
                 let at = [0, 1, 2].map(|a| centre[a] + direction[a] * part * radius / length);
-                let found = near.iter().map(|t| t.squared(at)).fold(f64::INFINITY, f64::min).sqrt();
+                let found = near.iter().map(|t| t.0.squared(at)).fold(f64::INFINITY, f64::min).sqrt();
                 prop_assert_eq!(found, clearance.at(at, f64::INFINITY));
             }
             prop_assert_eq!(clearance.near(centre, radius, near.len()).len(), near.len());

@@ -214,7 +214,7 @@ mod tests {
             let duct = &box_of([10_000, 1_000, 1_000])[..8];
             let clearance = Clearance::new(duct);
             let spot = |x: f64, [y, z]: [f64; 2]| {
-                Spot { at: [x, y, z], clearance: clearance.at([x, y, z], f64::INFINITY), step: f64::INFINITY }
+                Spot { at: [x, y, z], clearance: clearance.at([x, y, z], f64::INFINITY), step: f64::INFINITY, apart: 0.0 }
             };
             let path = centred(&[spot(2_000.0, from), spot(8_000.0, to)], 600.0, &clearance);
             prop_assert!(path.iter().all(|spot| spot.clearance > 498.0), "{path:?}");

@@ -1,6 +1,6 @@
 //! The processes of a session, read from `/proc`.
 
-use rustix::process::{Pid, Signal, getsid, kill_process};
+use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 
 pub(super) fn pid_of(id: u32) -> Option<Pid> {
@@ -14,8 +14,10 @@ pub(super) fn members(leader: u32) -> Vec<Pid> {
     };
     let ids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     // A machine has hundreds of processes. To read a file of each takes longer than to mesh a small case.
-    let is_of_session = |id: u32| getsid(pid_of(id)).ok() == pid_of(leader);
-    let of_session = ids.filter(|&id| is_of_session(id)).filter(|&id| {
+    // SAFETY: getsid touches no memory. That of rustix has no result for kernel threads, whose session is 0.
+    let session = |id: u32| libc::pid_t::try_from(id).map(|id| unsafe { libc::getsid(id) });
+    let is_of_session = |&id: &u32| session(id).is_ok_and(|s| u32::try_from(s) == Ok(leader));
+    let of_session = ids.filter(is_of_session).filter(|&id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
         session_and_liveness(&stat) == Some((leader, true))
     });
