@@ -135,7 +135,8 @@ fn fail(e: &Error, prints: bool) -> i32 {
 
 /// Prints a line on the standard error; returns whether that was possible.
 fn complain(line: &dyn Display) -> bool {
-    writeln!(stderr(), "{line}").is_ok()
+    // A launcher puts lines of its own between two writes.
+    stderr().write_all(format!("{line}\n").as_bytes()).is_ok()
 }
 
 /// The result of a run.

@@ -5,7 +5,7 @@
 use files::interrupt;
 use mesher::error::OUT_OF_MEMORY;
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::io::{Write, stderr};
+use std::io::{Cursor, Write, stderr};
 use std::process::exit;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -68,11 +68,13 @@ fn end(bytes: usize) -> ! {
     static IS_ENDING: AtomicBool = AtomicBool::new(false);
     if !IS_ENDING.swap(true, Ordering::AcqRel) {
         interrupt::abandon();
-        // The exit code remains if the standard error is full.
+        // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
+        let mut line = Cursor::new([0; 256]);
         let _ = writeln!(
-            stderr(),
+            line,
             "mesher: memory ran out at a request for {bytes} bytes: choose a larger spacing (--plan estimates what fits) or use more machines"
         );
+        let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
         if let Some(end) = END.get() {
             end(OUT_OF_MEMORY);
         }

@@ -5,6 +5,8 @@
 mod process;
 
 use process::{MESHER, Workspace, refused, run};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixDatagram;
 use std::process::Command;
 
 /// Exit code of too little memory.
@@ -121,6 +123,25 @@ fn a_run_without_enough_memory_ends_with_a_sentence_and_no_files() {
     };
     let failed = limits.take_while(ran_out).count();
     assert!((3..40).contains(&failed), "{failed} limits were too low");
+}
+
+/// A launcher puts lines of its own between two writes of a rank.
+#[test]
+fn a_sentence_is_one_write() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", format!("spacing_min = 0.006\n{BODY}"));
+    let args = [&["case.toml"], &OUTPUT[..]].concat();
+    for mut command in [workspace.mesher(&["absent.toml"]), workspace.enter(limited(32_000, &args))]
+    {
+        let (ours, theirs) = UnixDatagram::pair().expect("a pair of sockets");
+        command.stderr(OwnedFd::from(theirs));
+        assert!(!command.status().expect("a mesher").success());
+        drop(command);
+        let mut line = [0; 512];
+        let length = ours.recv(&mut line).expect("a sentence");
+        let line = String::from_utf8_lossy(&line[..length]);
+        assert!(line.starts_with("mesher: ") && line.ends_with('\n'), "{line:?}");
+    }
 }
 
 #[test]

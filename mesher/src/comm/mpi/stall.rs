@@ -103,14 +103,15 @@ impl Watch {
             .filter(|r| !answered.contains(r))
             .map(|r| r.to_string())
             .collect();
-        let _ = writeln!(
-            stderr(),
+        let line = format!(
             "mesher: the other ranks have waited in phase {} for {} s, and rank {} does not answer: look at it with a debugger, or \
-             give a greater --stall-limit",
+             give a greater --stall-limit\n",
             self.phase.get(),
             self.limit.as_secs_f64(),
             silent.join(", ")
         );
+        // A launcher puts lines of its own between two writes.
+        let _ = stderr().write_all(line.as_bytes());
         interrupt::abandon();
         super::abort(STALLED)
     }
