@@ -108,14 +108,18 @@ fn ran_out(workspace: &Workspace, command: Command, of: &str) -> bool {
 
 const OUTPUT: [&str; 6] = ["--quiet", "--force", "--out", "mesh", "--json", "run.json"];
 
+/// Just what the program takes itself, in KiB.
+fn first_limit(workspace: &Workspace) -> u64 {
+    let args = ["case.toml", "--plan", "--quiet"];
+    let starts = |kib: &u64| run(workspace.enter(limited(*kib, &args))).code == Some(MEMORY);
+    (4..64).map(|i| i * 1000).find(starts).expect("a limit between start and plan")
+}
+
 #[test]
 fn a_run_without_enough_memory_ends_with_a_sentence_and_no_files() {
     let workspace = Workspace::new();
     workspace.write("case.toml", format!("spacing_min = 0.006\n{BODY}"));
-    // Just what the program takes itself, from which the limits go up.
-    let args = ["case.toml", "--plan", "--quiet"];
-    let starts = |kib: &u64| run(workspace.enter(limited(*kib, &args))).code == Some(MEMORY);
-    let first = (4..64).map(|i| i * 1000).find(starts).expect("a limit between start and plan");
+    let first = first_limit(&workspace);
     let limits = (0..40).map(|i| first + i * 500);
     let ran_out = |kib: &u64| {
         let args = [&["case.toml"], &OUTPUT[..]].concat();
@@ -131,8 +135,8 @@ fn a_sentence_is_one_write() {
     let workspace = Workspace::new();
     workspace.write("case.toml", format!("spacing_min = 0.006\n{BODY}"));
     let args = [&["case.toml"], &OUTPUT[..]].concat();
-    for mut command in [workspace.mesher(&["absent.toml"]), workspace.enter(limited(32_000, &args))]
-    {
+    let without_memory = workspace.enter(limited(first_limit(&workspace), &args));
+    for mut command in [workspace.mesher(&["absent.toml"]), without_memory] {
         let (ours, theirs) = UnixDatagram::pair().expect("a pair of sockets");
         command.stderr(OwnedFd::from(theirs));
         assert!(!command.status().expect("a mesher").success());
