@@ -4,8 +4,8 @@
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates;
 //! - [`boxes`]: a tree of bounding boxes, which [`intersections`] searches;
-//! - [`sheets`]: thin sheets; [`opposite`]: when two facets are one; [`patches`]: the tree of their searches, [`settled`] and
-//!   [`narrowest`]; [`patch`], [`bundles`] and [`pairs`]: what a node implies for its facets;
+//! - [`sheets`]: thin sheets; [`opposite`]: when two facets are one; [`patches`]: the tree of their searches, [`settled`],
+//!   [`least`] and [`narrowest`]; [`patch`], [`bundles`] and [`pairs`]: what a node implies for its facets;
 //! - [`extent`]: the body's position in the root;
 //! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
 //!
@@ -22,6 +22,7 @@ pub mod finding;
 pub mod input;
 pub mod intersections;
 pub mod junctions;
+pub mod least;
 pub mod meaning;
 pub mod narrowest;
 pub mod openings;

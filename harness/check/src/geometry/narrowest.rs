@@ -8,6 +8,7 @@ use std::collections::BinaryHeap;
 
 use rustc_hash::FxHashMap;
 
+use super::least::Least;
 use super::pairs::Pairs;
 use super::settled::Settled;
 
@@ -17,38 +18,6 @@ pub struct Sheet {
     pub squared: f64,
     /// Their numbers.
     pub facets: [u32; 2],
-}
-
-/// The least squared distances of facets from opposite ones, as many as determine the places to list.
-pub struct Least {
-    /// Bits of the distances, which have the order of the distances.
-    least: BinaryHeap<u64>,
-    /// Maximum number of distances: a place is listed for at most two facets.
-    count: usize,
-    /// Distances that are not below it are not needed.
-    pub bound: f64,
-}
-
-impl Least {
-    /// No distances yet, for this number of places.
-    pub fn new(first: usize) -> Self {
-        Self { least: BinaryHeap::new(), count: first.saturating_mul(2), bound: f64::INFINITY }
-    }
-
-    /// Adds an upper bound on the distance of a facet that was not added before.
-    pub fn add(&mut self, squared: f64) {
-        if squared >= self.bound {
-            return;
-        }
-        self.least.push(squared.to_bits());
-        if self.least.len() > self.count {
-            self.least.pop();
-        }
-        if self.least.len() == self.count {
-            let greatest = self.least.peek().map_or(0.0, |&bits| f64::from_bits(bits));
-            self.bound = self.bound.min(greatest);
-        }
-    }
 }
 
 /// Maximum number of pairs of nodes that wait. Where nearly all of a body is equally thin, those beyond it are visited at once: many
@@ -90,7 +59,7 @@ impl<'a> Narrowest<'a> {
             limits: (0..patches.facets()).map(|i| [limit(i, 0), limit(i, 1)]).collect(),
             limits_of_nodes: vec![[0.0; 2]; patches.nodes()],
             parents,
-            least: [0, 1].map(|side| Least { bound: settled.bound(side), ..Least::new(first) }),
+            least: [0, 1].map(|side| Least::new(first, settled.bound(side))),
             found: Default::default(),
             queue: BinaryHeap::new(),
         };

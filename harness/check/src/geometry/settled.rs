@@ -3,7 +3,7 @@
 //! The search ends for a facet with its first opposite one, and where all facets of two nodes are opposite, for all of them at once.
 
 use super::bundles::Verdicts;
-use super::narrowest::Least;
+use super::least::Least;
 use super::pairs::Pairs;
 use super::patches::GROUP;
 
@@ -25,7 +25,7 @@ impl<'a> Settled<'a> {
             pairs,
             open: vec![[true; 2]; pairs.patches.facets()],
             open_nodes: vec![[true; 2]; pairs.patches.nodes()],
-            least: [Least::new(first), Least::new(first)],
+            least: [0, 1].map(|_| Least::new(first, f64::INFINITY)),
         };
         if pairs.patches.nodes() > 0 {
             settled.visit(0, 0, [true; 2]);
