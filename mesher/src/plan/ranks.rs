@@ -20,6 +20,7 @@ const FREED_PER_FACET: f64 = 60.0;
 /// own; and bytes at most.
 const HOLES: [f64; 2] = [0.3, 5e6];
 
+#[derive(Debug, PartialEq)]
 struct Rank {
     amounts: Amounts,
     /// Facets of its slice.
@@ -27,6 +28,32 @@ struct Rank {
     room: Room,
     /// Peak resident memory so far, in bytes.
     peak: f64,
+}
+
+impl Rank {
+    fn to_words(&self) -> Vec<u64> {
+        let Room { resident, address_space, control_group, machine, node } = self.room;
+        let room = [resident, address_space, control_group, machine, self.peak, self.facets];
+        let numbers = self.amounts.to_array().into_iter().chain(room);
+        numbers.map(f64::to_bits).chain([node]).collect()
+    }
+
+    fn from_words(words: &[u64]) -> Self {
+        let (amounts, room) = words.split_at(AMOUNTS);
+        let number = |i: usize| f64::from_bits(room[i]);
+        Self {
+            amounts: Amounts::from_array(std::array::from_fn(|i| f64::from_bits(amounts[i]))),
+            room: Room {
+                resident: number(0),
+                address_space: number(1),
+                control_group: number(2),
+                machine: number(3),
+                node: room[6],
+            },
+            peak: number(4),
+            facets: number(5),
+        }
+    }
 }
 
 /// The limit that a run comes closest to.
@@ -43,28 +70,14 @@ pub struct Tightest {
 impl Ranks {
     /// Gathers the amounts and limits of all ranks. Collective.
     pub fn gather(comm: &dyn Comm, amounts: Amounts, facets: usize) -> Self {
-        let Room { resident, address_space, control_group, machine, node } = Room::read();
+        let room = Room::read();
         let peak = peak_rss_bytes() as f64;
-        let room = [resident, address_space, control_group, machine, peak, facets as f64];
-        let words = amounts.to_array().into_iter().chain(room).map(f64::to_bits);
-        let words: Vec<u64> = words.chain([node]).collect();
-        let rank = |(_, words): (usize, &[u64])| {
-            let (amounts, room) = words.split_at(AMOUNTS);
-            let number = |i: usize| f64::from_bits(room[i]);
-            Rank {
-                amounts: Amounts::from_array(std::array::from_fn(|i| f64::from_bits(amounts[i]))),
-                room: Room {
-                    resident: number(0),
-                    address_space: number(1),
-                    control_group: number(2),
-                    machine: number(3),
-                    node: room[6],
-                },
-                peak: number(4),
-                facets: number(5),
-            }
-        };
-        let all = comm.all_gather(&words).messages().map(rank).collect();
+        Self::gather_each(comm, &Rank { amounts, facets: facets as f64, room, peak })
+    }
+
+    fn gather_each(comm: &dyn Comm, mine: &Rank) -> Self {
+        let all = comm.all_gather(&mine.to_words());
+        let all = all.messages().map(|(_, words)| Rank::from_words(words)).collect();
         Self { all, in_process: comm.ranks_in_process() as f64 }
     }
 
@@ -169,29 +182,38 @@ mod tests {
         assert_eq!(growth(one(0.5, 0.0), 3.0), [1.3], "less than a byte counts as one");
     }
 
+    fn different(number: u64) -> Rank {
+        let part = |i: u64| (100 * number + i) as f64;
+        let room = Room {
+            resident: part(0),
+            address_space: part(1),
+            control_group: f64::INFINITY,
+            machine: part(2),
+            node: u64::MAX - number,
+        };
+        let amounts = Amounts::from_array(std::array::from_fn(|i| part(10 + i as u64)));
+        Rank { amounts, facets: part(3), room, peak: part(4) }
+    }
+
     #[test]
     fn ranks_gather_what_each_one_has() {
         crate::comm::sim::run(3, 1, |comm| {
-            let mine = comm.rank() as f64;
-            let amounts = Amounts::from_array(std::array::from_fn(|i| mine * 10.0 + i as f64));
-            let ranks = Ranks::gather(comm, amounts, 100 + comm.rank());
+            let ranks = Ranks::gather_each(comm, &different(comm.rank() as u64));
             assert_eq!((ranks.count(), ranks.in_process), (3, 3.0));
-            assert_eq!(ranks.total().to_array(), std::array::from_fn(|i| 30.0 + 3.0 * i as f64));
-            let here = Room::read();
-            for (number, rank) in (0..).zip(&ranks.all) {
-                let number = f64::from(number);
-                assert_eq!((rank.amounts.cells, rank.facets), (10.0 * number, 100.0 + number));
-                assert_eq!(rank.room.node, here.node);
-                let room = |room: Room| {
-                    [room.resident, room.address_space, room.control_group, room.machine]
-                };
-                // Other programs take memory meanwhile.
-                let near = |(a, b): (f64, f64)| a == b || (a - b).abs() < 0.2 * b;
-                let mut pairs = room(rank.room).into_iter().zip(room(here));
-                assert!(pairs.all(near), "{:?} for {here:?}", rank.room);
-                assert!((rank.room.resident..1e11).contains(&rank.peak), "{}", rank.peak);
-            }
+            assert_eq!(ranks.all, [different(0), different(1), different(2)]);
+            let total = std::array::from_fn(|i| 300.0 + 3.0 * (10 + i) as f64);
+            assert_eq!(ranks.total().to_array(), total);
         });
+    }
+
+    #[test]
+    fn a_rank_reads_its_own_memory() {
+        let ranks = Ranks::gather(&crate::comm::Solo, Amounts::default(), 7);
+        let [rank] = &ranks.all[..] else { panic!("one rank has {} records", ranks.count()) };
+        assert_eq!((rank.facets, rank.room.node), (7.0, Room::read().node));
+        for bytes in [rank.room.resident, rank.peak] {
+            assert!((1e5..1e11).contains(&bytes), "{rank:?}");
+        }
     }
 
     #[test]
