@@ -199,7 +199,6 @@ def main():
     parser.add_argument("--known", type=Path, required=True)
     parser.add_argument("--sample", type=int)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--file")
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--minutes", type=float, default=math.inf)
     parser.add_argument("--tests", default="")
@@ -209,15 +208,12 @@ def main():
     rename(tree)
     known = {line for line in given.known.read_text().splitlines() if line and line[0] not in "#[ "}
 
-    files = ["--file", given.file] if given.file else []
-    listed = subprocess.run(
-        ["cargo", "mutants", "--list", "--json", "--package", given.crate, *files], cwd=tree, capture_output=True, text=True
-    )
+    listed = subprocess.run(["cargo", "mutants", "--list", "--json", "--package", given.crate], cwd=tree, capture_output=True, text=True)
     if listed.returncode != 0:
         fail(2, f"the changes of {given.crate} cannot be listed: {listed.stderr.strip()}")
     every = json.loads(listed.stdout)
     if not every:
-        fail(2, f"{given.crate} is not a package of this workspace, or has no code in such files")
+        fail(2, f"{given.crate} is not a package of this workspace, or has no code")
     mutants = random.Random(given.seed).sample(every, min(given.sample or len(every), len(every)))
     sources = {}
     apart = [mutant for mutant in mutants if needs_own_build(tree, mutant, sources)]
