@@ -199,6 +199,7 @@ def main():
     parser.add_argument("--known", type=Path, required=True)
     parser.add_argument("--sample", type=int)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--file", action="append", default=[])
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--minutes", type=float, default=math.inf)
     parser.add_argument("--tests", default="")
@@ -214,6 +215,10 @@ def main():
     every = json.loads(listed.stdout)
     if not every:
         fail(2, f"{given.crate} is not a package of this workspace, or has no code")
+    names = {mutant["name"] for mutant in every}
+    every = [mutant for mutant in every if not given.file or any(pattern in mutant["file"] for pattern in given.file)]
+    if not every:
+        fail(2, f"no file of {given.crate} with a change has a path that contains {' or '.join(given.file)}")
     mutants = random.Random(given.seed).sample(every, min(given.sample or len(every), len(every)))
     sources = {}
     apart = [mutant for mutant in mutants if needs_own_build(tree, mutant, sources)]
@@ -261,12 +266,14 @@ def main():
 
     results = given.out / "changes.jsonl"
     kept = [json.loads(line) for line in results.read_text().splitlines()] if given.resume and results.exists() else []
-    kept = {record["name"]: record for record in kept if record["outcome"] in ("noticed", "timed out")}
+    kept = {record["name"]: record for record in kept if record["name"] in names and record["outcome"] in ("noticed", "timed out")}
     outcomes, killers = [], defaultdict(list)
     random.Random(given.seed).shuffle(viable)
     viable.sort(key=lambda mutant: mutant["name"] not in kept)
     end = time.monotonic() + 60 * given.minutes
+    selected = {mutant["name"] for mutant in viable}
     with open(results, "w") as log:
+        log.writelines(json.dumps(record) + "\n" for name, record in kept.items() if name not in selected)
         for mutant in viable:
             if record := kept.get(mutant["name"]):
                 outcomes.append((mutant, record["outcome"]))
