@@ -232,6 +232,32 @@ mod tests {
         }
     }
 
+    /// A box around some leaves. A face that is given twice stops no ray, so the rays of all leaves within disagree.
+    #[test]
+    fn the_majority_of_all_rays_decides_where_the_rays_of_every_candidate_disagree() {
+        const CELL: i64 = UNITS_PER_EDGE / 16;
+        let ends = [[33, 97], [35, 111], [31, 96]].map(|axis| axis.map(|c| c * CELL / 10));
+        let corner = |i: usize| [0, 1, 2].map(|a: usize| ends[a][i >> a & 1]);
+        let faces =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]].map(|f| f.map(corner));
+        let terms = Terms::of_manifest(&contract::testing::leaf_set(vec![]).manifest);
+        for twice in 0..=6 {
+            let body: Vec<FacetLattice> = faces.into_iter().flat_map(halves).collect();
+            let body = [&body[..], &body[..2 * twice]].concat();
+            let words = contract::testing::base_tree(&body, 4);
+            let found = find(&words, &terms, &body);
+            let within = leaf_at(&words, [6 * CELL; 3]).unwrap() as u32;
+            let component = found.iter().find(|c| c.leaves.contains(&within)).unwrap();
+            assert!(found.len() == 2 && component.leaves.len() > CANDIDATES_MAX);
+            let side = if twice < 3 { Side::Inside } else { Side::Outside };
+            let ambiguous = (1..6).contains(&twice);
+            assert_eq!((component.side, component.ambiguous), (side, ambiguous), "{twice}");
+            let other = found.iter().find(|c| c.first != component.first).unwrap();
+            assert_eq!((other.side, other.ambiguous), (Side::Outside, false), "{twice}");
+        }
+    }
+
     #[test]
     fn the_root_is_half_open() {
         assert!(in_root([0; 3]) && in_root([UNITS_PER_EDGE - 1; 3]));

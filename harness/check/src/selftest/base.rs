@@ -32,7 +32,7 @@ fn crossing_siblings(words: &[u64]) -> Option<usize> {
 fn coarse_at_surface(s: &SelftestCase) -> Option<Mutation> {
     let i = siblings_at_surface(s)?;
     let words = &s.base.words;
-    let crossing = edit::parent(words[i]) & !3 | Side::Crossing as u64;
+    let crossing = edit::with_side(edit::parent(words[i]), Side::Crossing);
     let mut all = words.clone();
     all.splice(i..i + 8, [crossing]);
     with_base(s, all)

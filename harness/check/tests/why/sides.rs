@@ -118,15 +118,50 @@ fn a_point_in_an_enclosed_part_names_the_rule() {
     assert!(rule(wall).contains("keep is outside"));
 }
 
-/// A thin wall divides the root but for an opening, and the component around it has too many leaves for a search.
-#[test]
-fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
-    let ends = [[0.1f32, 0.3], [-8.0, 7.0], [-8.0, 8.0]];
+/// The faces of a box with these ends along each axis, two facets each.
+fn cuboid(ends: [[f32; 2]; 3]) -> Vec<Facet> {
     let at = |i: usize| [0, 1, 2].map(|a| ends[a][i >> a & 1]);
     let faces =
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
-    let wall: Vec<Facet> = faces.into_iter().flat_map(halves).map(|facet| facet.map(at)).collect();
+    faces.into_iter().flat_map(halves).map(|facet| facet.map(at)).collect()
+}
+
+/// A face that is given twice stops no ray, so the rays of all leaves within the box disagree.
+#[test]
+fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
+    let faces = cuboid([[-2.7, 3.6], [-2.3, 4.1], [-3.3, 3.7]]);
+    for twice in 0..=6 {
+        let body = [&faces[..], &faces[..2 * twice]].concat();
+        let text = format!("spacing_min = 1.0\nlayer_cells_min = 1\nkeep = 'all'\n{ROOT}");
+        let correct = made(&text, &body);
+        let answer =
+            with_mesh(&correct.mesh, Some(&correct.case), |m| m.at([0.5, 0.6, 0.7]).unwrap());
+        let SideReason::Component { side, decision, leaves_visited, .. } = answer.side_decided_by
+        else {
+            panic!("no facet crosses the leaf")
+        };
+        let expected = if twice < 3 { Side::Inside } else { Side::Outside };
+        assert_eq!((side, answer.side), (expected, Some(expected)), "{twice}: {decision}");
+        if (1..6).contains(&twice) {
+            let candidates = leaves_visited.min(32) as usize;
+            let text = format!(
+                "the component is ambiguous: the rays of no candidate agree, and {} of the {} rays of {candidates} \
+                 candidates are odd",
+                (6 - twice) * candidates,
+                6 * candidates
+            );
+            assert_eq!(decision, text);
+        } else {
+            assert!(decision.starts_with("each of the six rays"), "{twice}: {decision}");
+        }
+    }
+}
+
+/// A thin wall divides the root but for an opening, and the component around it has too many leaves for a search.
+#[test]
+fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
+    let wall = cuboid([[0.1, 0.3], [-8.0, 7.0], [-8.0, 8.0]]);
     let whole = "[[box]]\nmin = [-8.0, -8.0, -8.0]\nmax = [8.0, 8.0, 8.0]\nspacing = 0.25\n";
     let explain = |seeds: &str, point: [f64; 3]| {
         let text = format!(
