@@ -214,3 +214,28 @@ fn extra_layer_missing(s: &SelftestCase) -> Option<Mutation> {
     let i = graded_siblings(s).into_iter().find(touches)?;
     Some(Mutation::with_words(s, merge(words, &[i])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+    use contract::testing::leaf_set;
+
+    #[test]
+    fn layers_exist_at_levels_coarser_than_the_surface_and_at_all_levels_if_all_is_kept() {
+        let has = |n: u32, keep: &str| {
+            let text = format!(
+                "spacing_min = 2.0\nlayer_cells_min = {n}\nkeep = '{keep}'\n\
+                 root = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
+            );
+            let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+            let case = Case::from_parts(&text, vec![facet]).unwrap();
+            let (mesh, base) = (leaf_set(vec![]), leaf_set(vec![]));
+            let correct = SelftestCase { case, mesh, base };
+            [1, 2, 3].map(|level| has_layer(&correct, level))
+        };
+        assert_eq!(has(2, "outside"), [true, false, false]);
+        assert_eq!(has(2, "all"), [true; 3]);
+        assert_eq!([has(1, "outside"), has(1, "all")], [[false; 3]; 2]);
+    }
+}

@@ -119,7 +119,7 @@ fn a_point_in_an_enclosed_part_names_the_rule() {
 }
 
 /// The faces of a box with these ends along each axis, two facets each.
-fn cuboid(ends: [[f32; 2]; 3]) -> Vec<Facet> {
+pub fn cuboid(ends: [[f32; 2]; 3]) -> Vec<Facet> {
     let at = |i: usize| [0, 1, 2].map(|a| ends[a][i >> a & 1]);
     let faces =
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -163,11 +163,11 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
 fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
     let wall = cuboid([[0.1, 0.3], [-8.0, 7.0], [-8.0, 8.0]]);
     let whole = "[[box]]\nmin = [-8.0, -8.0, -8.0]\nmax = [8.0, 8.0, 8.0]\nspacing = 0.25\n";
-    let explain = |seeds: &str, point: [f64; 3]| {
+    let explain_with = |wall: &[Facet], seeds: &str, point: [f64; 3]| {
         let text = format!(
             "spacing_min = 0.25\nlayer_cells_min = 1\nkeep = 'all'\nseeds = {seeds}\n{ROOT}{whole}"
         );
-        let case = Case::from_parts(&text, wall.clone()).unwrap();
+        let case = Case::from_parts(&text, wall.to_vec()).unwrap();
         let manifest = case.manifest(Tree::Base, "test".to_owned());
         let set = LeafSet::new(manifest, vec![]).with_parts(vec![words_of(|o| o.level < 6)]);
         let answer = with_mesh(&set, Some(&case), |mesh| mesh.at(point).unwrap());
@@ -179,10 +179,15 @@ fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it
             _ => panic!("{answer}"),
         }
     };
+    let explain = |seeds: &str, point| explain_with(&wall, seeds, point);
     let (candidate, is_proven, _) = explain("[]", [-4.0; 3]);
     assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.0"), true));
     let (candidate, is_proven, _) = explain("[]", [4.0, -4.0, -4.0]);
     assert_eq!((candidate.as_deref(), is_proven), (Some("1.0.0.0.1.0"), false));
+    // Crossing leaves are no candidates.
+    let first = cuboid([[-7.95, -7.85], [-7.95, -7.85], [-7.95, -7.85]]);
+    let (candidate, is_proven, _) = explain_with(&first, "[]", [-4.0; 3]);
+    assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.1"), true));
     let (_, is_proven, decision) = explain("[[7.9, 7.9, 7.9]]", [-4.0; 3]);
     assert_eq!((decision.as_str(), is_proven), ("no seed was found in its component", false));
     let (_, is_proven, decision) = explain("[[-7.9, -7.9, -7.9]]", [-4.0; 3]);

@@ -2,6 +2,7 @@
 
 use super::*;
 use contract::octant::LEVEL_MAX;
+use contract::testing::octants_of;
 use contract::word::{self, Leaf};
 
 /// The words with the leaf at an index split.
@@ -37,6 +38,8 @@ proptest! {
             let mutated = correct.mesh.with_parts(vec![words.clone()]);
             let found = with_mesh(&mutated, case, |mesh| mesh.unneeded(100).unwrap());
             prop_assert_eq!(found.unneeded, planted as u64, "{}{}", text, found);
+            let splits = octants_of(&words).len() - words.len();
+            prop_assert_eq!((found.splits, found.leaves), (splits as u64, words.len() as u64));
             prop_assert_eq!(found.subtrees, found.first.len() as u64);
             let leaves: u64 = found.first.iter().map(|subtree| subtree.leaves).sum();
             prop_assert_eq!(leaves, 7 * found.unneeded + found.subtrees, "{}", found);
@@ -78,6 +81,29 @@ fn a_needless_split_is_found_wherever_it_is() {
             split(&mut mutated, at);
             let found = count(&correct.base.with_parts(vec![mutated]));
             assert_eq!((found.unneeded, found.unneeded_leaves), (1, 8), "{name}: {found}");
+        }
+    }
+}
+
+/// Faces of a box in every part of an octant, so that octants are deleted with all their leaves, or with some.
+#[test]
+fn deleted_crossing_leaves_require_the_layers_around_them() {
+    for (at, n) in [0.2f32, 1.2, 2.2, 3.2].into_iter().zip([3, 4, 3, 4]) {
+        let facets = sides::cuboid([[at - 3.0, at + 1.0], [at - 2.0, 3.3], [-2.4, at]]);
+        for keep in ["outside", "inside", "all"] {
+            let text = format!(
+                "spacing_min = 1.0\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = false\n{ROOT}"
+            );
+            let correct = made(&text, &facets);
+            let words = &correct.mesh.words;
+            let count = |words: Vec<u64>| {
+                let set = correct.mesh.with_parts(vec![words]);
+                with_mesh(&set, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap().unneeded)
+            };
+            assert_eq!(count(words.clone()), 0, "{at}, {n} cells, {keep}");
+            let mut needless = words.clone();
+            split(&mut needless, words.len() / 2);
+            assert_eq!(count(needless), 1, "{at}, {n} cells, {keep}");
         }
     }
 }
