@@ -219,7 +219,7 @@ fn extra_layer_missing(s: &SelftestCase) -> Option<Mutation> {
 mod tests {
     use super::*;
     use contract::case::Case;
-    use contract::testing::leaf_set;
+    use contract::testing::{leaf_set, words_with_sides};
 
     #[test]
     fn layers_exist_at_levels_coarser_than_the_surface_and_at_all_levels_if_all_is_kept() {
@@ -237,5 +237,24 @@ mod tests {
         assert_eq!(has(2, "outside"), [true, false, false]);
         assert_eq!(has(2, "all"), [true; 3]);
         assert_eq!([has(1, "outside"), has(1, "all")], [[false; 3]; 2]);
+    }
+
+    /// The octants 0 and 5 are split in the mesh only, and a crossing leaf of T0 touches octant 5.
+    #[test]
+    fn the_extra_layer_is_removed_beside_a_crossing_leaf() {
+        let text = "spacing_min = 2.0\nlayer_cells_min = 1\nkeep_crossing = false\n\
+                    root = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[6.5, 4.5, 4.5], [7.5, 4.5, 4.5], [6.5, 5.5, 4.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let words = |split: &'static [&'static str]| {
+            let crossing = |o: &Octant| o.path() == "7.1";
+            words_with_sides(
+                |o| o.level == 0 || split.contains(&&*o.path()),
+                |o| Some(if crossing(o) { Side::Crossing } else { Side::Outside }),
+            )
+        };
+        let (mesh, base) = (leaf_set(vec![words(&["0", "5", "7"])]), leaf_set(vec![words(&["7"])]));
+        let mutation = extra_layer_missing(&SelftestCase { case, mesh, base }).unwrap();
+        assert_eq!(mutation.mesh.words, words(&["0", "7"]));
     }
 }

@@ -85,11 +85,12 @@ fn a_needless_split_is_found_wherever_it_is() {
     }
 }
 
-/// Faces of a box in every part of an octant, so that octants are deleted with all their leaves, or with some.
+/// Faces of a box in every part of an octant, so that octants are deleted with all their leaves, or with some. The deleted space
+/// within the box has coarse leaves in T0, which require nothing.
 #[test]
-fn deleted_crossing_leaves_require_the_layers_around_them() {
+fn deleted_crossing_leaves_require_the_layers_around_them_and_other_deleted_leaves_do_not() {
     for (at, n) in [0.2f32, 1.2, 2.2, 3.2].into_iter().zip([3, 4, 3, 4]) {
-        let facets = sides::cuboid([[at - 3.0, at + 1.0], [at - 2.0, 3.3], [-2.4, at]]);
+        let facets = sides::cuboid([[at - 4.0, at + 3.0], [at - 5.0, 3.3], [-4.4, at]]);
         for keep in ["outside", "inside", "all"] {
             let text = format!(
                 "spacing_min = 1.0\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = false\n{ROOT}"
@@ -101,10 +102,33 @@ fn deleted_crossing_leaves_require_the_layers_around_them() {
                 with_mesh(&set, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap().unneeded)
             };
             assert_eq!(count(words.clone()), 0, "{at}, {n} cells, {keep}");
-            let mut needless = words.clone();
-            split(&mut needless, words.len() / 2);
-            assert_eq!(count(needless), 1, "{at}, {n} cells, {keep}");
+            let coarsest = words.iter().map(|&w| word::level(w)).min().unwrap();
+            let coarse = (0..words.len()).filter(|&i| word::level(words[i]) <= coarsest + 1);
+            for i in coarse.step_by(7) {
+                let mut needless = words.clone();
+                split(&mut needless, i);
+                let leaf = word::octant(words[i]);
+                assert_eq!(count(needless), 1, "{at}, {n} cells, {keep}: {leaf}");
+            }
         }
+    }
+}
+
+#[test]
+fn a_needless_split_below_the_deepest_level_has_no_cause_and_those_above_it_have_one() {
+    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
+    let correct = support::selftest_case(name, text);
+    let mut words = correct.mesh.words.clone();
+    let deepest = words.iter().map(|&w| word::level(w)).max().unwrap();
+    let at = words.iter().position(|&w| word::level(w) == deepest).unwrap();
+    let point = correct.case.root.to_user(word::octant(words[at]).child(0).centre());
+    split(&mut words, at);
+    for case in [None, Some(&correct.case)] {
+        let mutated = correct.mesh.with_parts(vec![words.clone()]);
+        let answer = with_mesh(&mutated, case, |mesh| mesh.at(point).unwrap());
+        let causes: Vec<bool> = answer.splits.iter().map(|split| split.cause.is_some()).collect();
+        let expected: Vec<bool> = (0..=deepest).map(|level| level < deepest).collect();
+        assert_eq!(causes, expected, "{answer}");
     }
 }
 
