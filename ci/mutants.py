@@ -256,13 +256,17 @@ def main():
     scratch = tempfile.mkdtemp(prefix="mutants-")
     tests = tests_of(reported)
     slow, failing = [], []
-    for test in tests:
-        trace = Path(scratch) / "trace"
-        trace.unlink(missing_ok=True)
-        outcome, test["cpu_s"] = run(test, scratch, SLOW_S, 600, MUTANT_TRACE=str(trace))
+
+    def trace(test):
+        """Adds to a test its CPU time and the functions that it reaches."""
+        reached = Path(tempfile.mkdtemp(dir=scratch)) / "functions"
+        outcome, test["cpu_s"] = run(test, scratch, SLOW_S, 600, MUTANT_TRACE=str(reached))
         if outcome != "passed":
             (failing if outcome == "failed" else slow).append(test)
-        test["reaches"] = {int(line) for line in trace.read_text().split()} if trace.exists() else set()
+        test["reaches"] = {int(line) for line in reached.read_text().split()} if reached.exists() else set()
+
+    with ThreadPoolExecutor(given.jobs) as pool:
+        list(pool.map(trace, tests))
     tests = sorted((test for test in tests if test not in slow + failing), key=lambda test: test["cpu_s"])
     print(f"{given.crate}: {len(tests)} tests take {sum(test['cpu_s'] for test in tests):.1f} s of CPU time", flush=True)
     for left_out, why in [(slow, f"take more than {SLOW_S} s"), (failing, "fail without a change")]:

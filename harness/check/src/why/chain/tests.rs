@@ -8,7 +8,7 @@ mod support;
 const ROOT: &str = "[root]\norigin = [-8.0, -8.0, -8.0]\nedge = 16.0\n";
 const FACET: Facet = [[0.3, 0.2, 0.1], [0.31, 0.2, 0.1], [0.3, 0.21, 0.12]];
 
-const BOX: &str = "[[box]]\nmin = [4.1, -3.0, 2.0]\nmax = [4.3, -2.8, 2.4]\nspacing = 0.25\n";
+const BOX: &str = "[[box]]\nmin = [4.1, -3.0, 2.0]\nmax = [4.3, -2.8, 2.4]\nspacing = 0.5\n";
 
 /// All octants that a mesh has split.
 fn splits(mesh: &Mesh) -> Vec<Octant> {
@@ -52,20 +52,20 @@ fn chains_are_found_after_as_many_searches_as_expected() {
         format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\nkeep = 'all'\n{more}")
     };
     let found = [
-        effort(&settings(7, 1, "")),
-        effort(&settings(6, 2, "")),
-        effort(&settings(6, 3, "")),
-        effort(&settings(5, 4, "")),
-        effort(&settings(6, 2, "keep_crossing = false\n")),
+        effort(&settings(6, 1, "")),
+        effort(&settings(5, 2, "")),
+        effort(&settings(5, 3, "")),
+        effort(&settings(4, 4, "")),
+        effort(&settings(5, 2, "keep_crossing = false\n")),
         effort(&settings(4, 3, BOX)),
     ];
     let expected = [
-        [71, 207, 71, 12],
-        [1349, 9935, 1349, 381],
-        [1349, 4011, 1349, 325],
-        [1441, 4435, 1441, 195],
-        [1682, 13930, 1682, 436],
-        [1047, 3517, 1049, 321],
+        [28, 28, 28, 0],
+        [510, 1578, 510, 173],
+        [510, 1218, 510, 117],
+        [231, 268, 231, 0],
+        [1022, 7407, 1022, 264],
+        [380, 683, 383, 137],
     ];
     assert_eq!(found, expected);
 }
