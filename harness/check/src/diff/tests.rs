@@ -51,6 +51,8 @@ fn the_octants_that_differ_are_listed_up_to_eight() {
         "a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\n{contradiction}"
     );
     assert_eq!(report.to_string(), expected);
+    let manifest = leaf_set(vec![]).manifest;
+    assert_eq!(manifests(&manifest, &manifest).compared, Trust::Manifests);
     let same = DiffReport { compared: Trust::Manifests, leaves: 5, ..DiffReport::default() };
     assert_eq!(same.to_string(), "the leaves are the same (5, by the digests in the manifests)");
 }

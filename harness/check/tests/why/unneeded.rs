@@ -115,6 +115,23 @@ fn deleted_crossing_leaves_require_the_layers_around_them_and_other_deleted_leav
     }
 }
 
+/// Then no leaf of the least mesh is a leaf, and yet each justifies what it did.
+#[test]
+fn needless_splits_of_all_leaves_are_counted_and_no_other() {
+    let facets = sides::cuboid([[-2.8, 1.2], [-1.8, 3.3], [-2.4, 0.2]]);
+    for (keep, crossing, n) in [("outside", true, 3), ("outside", false, 3), ("all", true, 1)] {
+        let text = format!(
+            "spacing_min = 1.0\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = {crossing}\n{ROOT}"
+        );
+        let correct = made(&text, &facets);
+        let mut words = correct.mesh.words.clone();
+        (0..words.len()).rev().for_each(|i| split(&mut words, i));
+        let mutated = correct.mesh.with_parts(vec![words]);
+        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap());
+        assert_eq!(found.unneeded, correct.mesh.words.len() as u64, "{keep}, {crossing}: {found}");
+    }
+}
+
 #[test]
 fn a_needless_split_below_the_deepest_level_has_no_cause_and_those_above_it_have_one() {
     let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
