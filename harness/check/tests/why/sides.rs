@@ -174,6 +174,8 @@ fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it
         match answer.side_decided_by {
             SideReason::Component { decision, candidate, is_complete, is_proven, .. } => {
                 assert!(!is_complete, "{decision}");
+                let is_rest = |what: &String| what.starts_with("the rest of the component: ");
+                assert_eq!(answer.left_out.iter().any(is_rest), !is_proven, "{decision}");
                 (candidate.map(|place| place.octant.path()), is_proven, decision)
             }
             _ => panic!("{answer}"),
