@@ -17,8 +17,10 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from mutant_sources import Source, needs_own_build, write_changes
@@ -26,6 +28,7 @@ from mutant_sources import Source, needs_own_build, write_changes
 ROUNDS = 12  # Attempts to compile, each without the changes that the one before refused.
 MEMORY = 8 << 30
 FILE_SIZE = 2 << 30
+REFUSED = "does not compile"
 SLOW_S = 6  # A test with more CPU time than this tries no change.
 # Random cases of the tests that read these variables: fewer than usual, and the same for every change.
 DRAWS = {"PROPTEST_CASES": "128", "PROPTEST_MAX_SHRINK_ITERS": "0", "PROPTEST_RNG_SEED": "1"}
@@ -102,20 +105,17 @@ def refused(reported, tree):
     return numbers
 
 
-def limits(seconds):
-    def apply():
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_SIZE, FILE_SIZE))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-    return apply
+def limit(process, cpu_s):
+    """Limits a process that was just started: `preexec_fn` would not be safe beside other threads."""
+    resource.prlimit(process, resource.RLIMIT_CPU, (cpu_s, cpu_s + 5))
+    resource.prlimit(process, resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.prlimit(process, resource.RLIMIT_FSIZE, (FILE_SIZE, FILE_SIZE))
+    resource.prlimit(process, resource.RLIMIT_CORE, (0, 0))
 
 
 def run(test, scratch, limit_cpu_s, limit_wall_s, **environment):
     """Runs one test: "passed", "failed" or "timed out", and its CPU time in seconds."""
     temporary = tempfile.mkdtemp(dir=scratch)
-    before = cpu_s()
     child = subprocess.Popen(
         [test["program"], "--exact", test["name"], "--test-threads", "1"],
         cwd=test["package"],
@@ -124,20 +124,20 @@ def run(test, scratch, limit_cpu_s, limit_wall_s, **environment):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
-        preexec_fn=limits(limit_cpu_s),
     )
-    try:
-        code = child.wait(timeout=limit_wall_s)
-        outcome = "passed" if code == 0 else "timed out" if code in (-signal.SIGXCPU, -signal.SIGKILL) else "failed"
-    except subprocess.TimeoutExpired:
-        outcome = "timed out"
+    limit(child.pid, limit_cpu_s)
+    late = threading.Timer(limit_wall_s, os.killpg, [child.pid, signal.SIGKILL])
+    late.start()
+    _, status, usage = os.wait4(child.pid, 0)
+    late.cancel()
+    child.returncode = code = os.waitstatus_to_exitcode(status)
     try:
         os.killpg(child.pid, signal.SIGKILL)
     except ProcessLookupError:
         pass
-    child.wait()
     shutil.rmtree(temporary, ignore_errors=True)
-    return outcome, cpu_s() - before
+    outcome = "passed" if code == 0 else "timed out" if code in (-signal.SIGXCPU, -signal.SIGKILL) else "failed"
+    return outcome, usage.ru_utime + usage.ru_stime
 
 
 def tests_of(reported):
@@ -199,6 +199,8 @@ def main():
     parser.add_argument("--known", type=Path, required=True)
     parser.add_argument("--sample", type=int)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--file", action="append", default=[])
+    parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--minutes", type=float, default=math.inf)
     parser.add_argument("--tests", default="")
@@ -214,6 +216,10 @@ def main():
     every = json.loads(listed.stdout)
     if not every:
         fail(2, f"{given.crate} is not a package of this workspace, or has no code")
+    names = {mutant["name"] for mutant in every}
+    every = [mutant for mutant in every if not given.file or any(pattern in mutant["file"] for pattern in given.file)]
+    if not every:
+        fail(2, f"no file of {given.crate} with a change has a path that contains {' or '.join(given.file)}")
     mutants = random.Random(given.seed).sample(every, min(given.sample or len(every), len(every)))
     sources = {}
     apart = [mutant for mutant in mutants if needs_own_build(tree, mutant, sources)]
@@ -229,7 +235,11 @@ def main():
     for root in roots:
         sources.setdefault(str(root.relative_to(tree)), Source(root))
 
-    viable = list(mutants)
+    given.out.mkdir(parents=True, exist_ok=True)
+    results = given.out / "changes.jsonl"
+    kept = [json.loads(line) for line in results.read_text().splitlines()] if given.resume and results.exists() else []
+    kept = {record["name"]: record for record in kept if record["name"] in names and record["outcome"] in ("noticed", "timed out", REFUSED)}
+    viable = [mutant for mutant in mutants if kept.get(mutant["name"], {}).get("outcome") != REFUSED]
     for _ in range(ROUNDS):
         write_changes(tree, viable, sources, roots)
         build = ["cargo", "test", "--quiet", "--no-run", "--message-format", "json", "--package", given.crate, *given.tests.split()]
@@ -243,52 +253,58 @@ def main():
         fail(3, f"{given.crate} still does not compile after {ROUNDS} attempts")
     print(f"{given.crate}: compiled after {cpu_s():.0f} s of CPU time", flush=True)
 
-    given.out.mkdir(parents=True, exist_ok=True)
     scratch = tempfile.mkdtemp(prefix="mutants-")
     tests = tests_of(reported)
     slow, failing = [], []
-    for test in tests:
-        trace = Path(scratch) / "trace"
-        trace.unlink(missing_ok=True)
-        outcome, test["cpu_s"] = run(test, scratch, SLOW_S, 600, MUTANT_TRACE=str(trace))
+
+    def trace(test):
+        """Adds to a test its CPU time and the functions that it reaches."""
+        reached = Path(tempfile.mkdtemp(dir=scratch)) / "functions"
+        outcome, test["cpu_s"] = run(test, scratch, SLOW_S, 600, MUTANT_TRACE=str(reached))
         if outcome != "passed":
             (failing if outcome == "failed" else slow).append(test)
-        test["reaches"] = {int(line) for line in trace.read_text().split()} if trace.exists() else set()
+        test["reaches"] = {int(line) for line in reached.read_text().split()} if reached.exists() else set()
+
+    with ThreadPoolExecutor(given.jobs) as pool:
+        list(pool.map(trace, tests))
     tests = sorted((test for test in tests if test not in slow + failing), key=lambda test: test["cpu_s"])
     print(f"{given.crate}: {len(tests)} tests take {sum(test['cpu_s'] for test in tests):.1f} s of CPU time", flush=True)
     for left_out, why in [(slow, f"take more than {SLOW_S} s"), (failing, "fail without a change")]:
         print(f"{given.crate}: left out because they {why}:", *[test["name"] for test in left_out] or ["none"], flush=True)
 
-    results = given.out / "changes.jsonl"
-    kept = [json.loads(line) for line in results.read_text().splitlines()] if given.resume and results.exists() else []
-    kept = {record["name"]: record for record in kept if record["outcome"] in ("noticed", "timed out")}
-    outcomes, killers = [], defaultdict(list)
-    random.Random(given.seed).shuffle(viable)
-    viable.sort(key=lambda mutant: mutant["name"] not in kept)
+    outcomes = [(mutant, kept[mutant["name"]]["outcome"]) for mutant in viable if mutant["name"] in kept]
+    untried = [mutant for mutant in viable if mutant["name"] not in kept]
+    random.Random(given.seed).shuffle(untried)
+    killers = defaultdict(list)
     end = time.monotonic() + 60 * given.minutes
-    with open(results, "w") as log:
-        for mutant in viable:
-            if record := kept.get(mutant["name"]):
+
+    def tried(mutant):
+        """The record of a change; `None` after the end."""
+        if time.monotonic() > end:
+            return None
+        function, spent_s, killer = mutant["reached by"], 0.0, None
+        reaching = [test for test in tests if function in test["reaches"]]
+        # A test that noticed another change of the function comes first.
+        reaching.sort(key=lambda test: (test["name"] not in killers[function], test["cpu_s"]))
+        outcome = "survived" if reaching else "not reached"
+        for test in reaching:
+            result, seconds = run(test, scratch, int(2 + 5 * test["cpu_s"]), 120 + 20 * test["cpu_s"], MUTANT=str(mutant["id"]))
+            spent_s += seconds
+            if result != "passed":
+                outcome, killer = ("noticed" if result == "failed" else result), test["name"]
+                killers[function].append(killer)
+                break
+        return {"name": mutant["name"], "outcome": outcome, "test": killer, "cpu_s": round(spent_s, 3)}
+
+    with open(results, "w") as log, ThreadPoolExecutor(given.jobs) as pool:
+        compiled = {mutant["name"] for mutant in viable}
+        kept |= {name: {"name": name, "outcome": REFUSED} for name in (mutant["name"] for mutant in mutants) if name not in compiled}
+        log.writelines(json.dumps(record) + "\n" for record in kept.values())
+        for mutant, record in zip(untried, pool.map(tried, untried)):
+            if record:
                 outcomes.append((mutant, record["outcome"]))
                 log.write(json.dumps(record) + "\n")
-                continue
-            if time.monotonic() > end:
-                break
-            function, spent_s, killer = mutant["reached by"], 0.0, None
-            reaching = [test for test in tests if function in test["reaches"]]
-            # A test that noticed another change of the function comes first.
-            reaching.sort(key=lambda test: (test["name"] not in killers[function], test["cpu_s"]))
-            outcome = "survived" if reaching else "not reached"
-            for test in reaching:
-                result, seconds = run(test, scratch, int(2 + 5 * test["cpu_s"]), 120 + 20 * test["cpu_s"], MUTANT=str(mutant["id"]))
-                spent_s += seconds
-                if result != "passed":
-                    outcome, killer = ("noticed" if result == "failed" else result), test["name"]
-                    killers[function].append(killer)
-                    break
-            outcomes.append((mutant, outcome))
-            log.write(json.dumps({"name": mutant["name"], "outcome": outcome, "test": killer, "cpu_s": round(spent_s, 3)}) + "\n")
-            log.flush()
+                log.flush()
     shutil.rmtree(scratch, ignore_errors=True)
     print(f"{given.crate}: {cpu_s():.0f} s of CPU time in all")
     complete = summary(given.crate, len(every), len(apart), outcomes, len(mutants) - len(viable), known)

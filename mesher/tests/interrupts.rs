@@ -13,6 +13,10 @@ use std::time::{Duration, Instant};
 /// A mesh that takes many seconds on a slow machine, in all phases.
 const LONG: &str = "spacing_min = 0.0012\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"sphere\"\nfacets = 5120\n";
+/// One with four times as many cells, for several ranks, which must not have ended when they are interrupted.
+const LONG_ON_RANKS: &str =
+    "spacing_min = 0.0009\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
+[generator]\nshape = \"sphere\"\nfacets = 5120\n";
 /// One that takes a fraction of a second.
 const SHORT: &str = "spacing_min = 0.01\nroot_scale = 2.0\n
 [generator]\nshape = \"sphere\"\nfacets = 1280\n";
@@ -160,7 +164,7 @@ fn an_interrupted_job_leaves_no_files_and_no_ranks() {
     let mut random = Random(3);
     for round in 0..12 {
         let workspace = Workspace::new();
-        workspace.write("case.toml", LONG);
+        workspace.write("case.toml", LONG_ON_RANKS);
         let ranks = 2 + random.below(3) as usize;
         let mut job = start(workspace.mpirun(ranks, &[&OUTPUT[..], &["--quiet"]].concat()));
         wait_for_claim(&mut job, &workspace);
@@ -191,7 +195,7 @@ fn an_interrupted_job_leaves_no_files_and_no_ranks() {
 fn a_job_whose_launcher_or_rank_is_killed_leaves_no_mesh() {
     for victim in 0..3 {
         let workspace = Workspace::new();
-        workspace.write("case.toml", LONG);
+        workspace.write("case.toml", LONG_ON_RANKS);
         let mut job = start(workspace.mpirun(3, &["case.toml", "--out", "mesh", "--quiet"]));
         wait_for_claim(&mut job, &workspace);
         std::thread::sleep(Duration::from_millis(500));
@@ -214,12 +218,12 @@ fn a_rank_that_keeps_the_others_waiting_is_named() {
     let mut random = Random(4);
     for round in 0..6 {
         let workspace = Workspace::new();
-        workspace.write("case.toml", LONG);
+        workspace.write("case.toml", LONG_ON_RANKS);
         let ranks = 2 + round % 3;
         let limit = ["--stall-limit", "2", "--quiet"];
         let mut job = start(workspace.mpirun(ranks, &[&OUTPUT[..], &limit].concat()));
         wait_for_claim(&mut job, &workspace);
-        std::thread::sleep(Duration::from_micros(300_000 + random.below(1_500_000)));
+        std::thread::sleep(Duration::from_micros(200_000 + random.below(1_000_000)));
         let processes = children(job.id());
         let stopped = random.below(processes.len() as u64) as usize;
         signal("STOP", processes[stopped]);
@@ -256,7 +260,7 @@ fn a_time_limit_ends_a_run() {
     let workspace = Workspace::new();
     workspace.write("case.toml", LONG);
     let mut command = Command::new("timeout");
-    command.args(["--preserve-status", "0.3", process::MESHER]).args(OUTPUT);
+    command.args(["--preserve-status", "0.8", process::MESHER]).args(OUTPUT);
     let finished = run(workspace.enter(command));
     finished.refuses(130, &["interrupted"]);
     assert_all_or_nothing(&workspace, &["case.toml"], &finished);

@@ -305,7 +305,8 @@ fn an_interrupt_at_any_time_leaves_no_files() {
         let id = run.id().to_string();
         assert!(Command::new("kill").args(["-s", signal, &id]).status().unwrap().success());
         let output = run.wait_with_output().unwrap();
-        assert!(since.elapsed().as_secs() < 1, "{:?}", since.elapsed());
+        // Less than a second, and the time in which a busy machine gets to it. The mesh takes far longer.
+        assert!(since.elapsed().as_secs() < 5, "{:?}", since.elapsed());
         assert_eq!(output.status.code(), Some(130), "{output:?}");
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "error: interrupted\n");
         assert_eq!(fs::read_dir(path).unwrap().count(), 1, "only the case is left");

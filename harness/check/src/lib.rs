@@ -10,6 +10,10 @@
 //! - [`selftest`]: corrupted meshes that the checks must detect;
 //! - [`why`]: the cause of every split, and splits without one.
 
+// For the helpers of the integration tests, which unit tests share.
+#[cfg(test)]
+extern crate self as check;
+
 pub mod audit;
 pub mod checks;
 pub mod diff;

@@ -140,6 +140,25 @@ mod tests {
     }
 
     #[test]
+    fn the_limits_of_a_promise_are_valid_and_what_is_beyond_is_a_fault() {
+        let is_valid = |promises: Promises| promises.fault().is_none();
+        let ratio = |ratio| Promises {
+            balance: Some(Touching::Corner),
+            ratio: Some(ratio),
+            ..Promises::default()
+        };
+        assert_eq!([0, 1, 2, 4, 6].map(|r| is_valid(ratio(r))), [false, false, true, true, false]);
+        let surface = |tolerance_cells| Promises {
+            surface: Some(Surface { tolerance_cells }),
+            ..Promises::default()
+        };
+        assert_eq!([-0.1, 0.0, 0.9, 1.0].map(|t| is_valid(surface(t))), [false, true, true, false]);
+        let sides =
+            |band_cells| Promises { sides: Some(Sides { band_cells }), ..Promises::default() };
+        assert_eq!([-0.1, 0.0, 1e6, 2e6].map(|b| is_valid(sides(b))), [false, true, true, false]);
+    }
+
+    #[test]
     fn the_definition_includes_determinism_and_every_independence() {
         use Independence::{Partitioner, Ranks, Threads};
         let independent = |promises: &Promises| {

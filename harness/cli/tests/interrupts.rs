@@ -71,12 +71,27 @@ impl Fixture {
     }
 }
 
+/// Before that, a signal ends a process without exit code.
+fn wait_until_signals_are_handled(run: &Child) {
+    let [hangup, interrupt, terminate] = [1, 2, 15].map(|number| 1_u64 << (number - 1));
+    let all = hangup | interrupt | terminate;
+    let handled = || {
+        let status = fs::read_to_string(format!("/proc/{}/status", run.id())).unwrap();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+        u64::from_str_radix(mask.trim(), 16).unwrap()
+    };
+    while handled() & all != all {
+        sleep(Duration::from_millis(1));
+    }
+}
+
 #[test]
 fn a_command_that_computes_ends_at_once() {
     for signals in [&["INT"][..], &["TERM"], &["HUP"], &["INT", "INT"], &["TERM", "INT"]] {
         let fixture = Fixture::new();
         let run = fixture.start(&["geometry", "case.toml"]);
-        sleep(Duration::from_millis(400));
+        wait_until_signals_are_handled(&run);
+        sleep(Duration::from_millis(300));
         fixture.interrupt(run, signals);
     }
 }

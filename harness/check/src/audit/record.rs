@@ -60,6 +60,7 @@ impl AuditRecord {
             findings: c.findings_total,
             nothing_to_check: c.nothing_to_check.clone(),
         };
+        let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         Self {
             schema: SCHEMA.to_owned(),
             holds: report.holds(),
@@ -69,7 +70,7 @@ impl AuditRecord {
             time_read_s: report.time_read_s,
             time_wall_s: report.time_wall_s,
             time_cpu_s: ProcessTime::now().as_duration().as_secs_f64(),
-            peak_rss_bytes: peak_rss_bytes(),
+            peak_rss_bytes: peak_rss_bytes(&status),
         }
     }
 
@@ -96,8 +97,8 @@ impl AuditRecord {
     }
 }
 
-fn peak_rss_bytes() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+/// The peak resident memory in the text of `/proc/self/status`.
+fn peak_rss_bytes(status: &str) -> u64 {
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
     kib.unwrap_or(0) * 1024
@@ -108,6 +109,12 @@ mod tests {
     use super::*;
     use crate::audit::{AuditOptions, audit};
     use contract::testing::{leaf_set, words_of};
+
+    #[test]
+    fn the_peak_of_memory_is_read_in_kilobytes() {
+        let status = "Name:\tharness\nVmPeak:\t   99 kB\nVmHWM:\t     3 kB\nVmRSS:\t     2 kB\n";
+        assert_eq!([peak_rss_bytes(status), peak_rss_bytes("Name:\tharness\n")], [3072, 0]);
+    }
 
     #[test]
     fn a_record_is_read_back_unchanged() {
@@ -123,6 +130,10 @@ mod tests {
             assert_eq!((record.holds, record.leaves), (holds, 8));
             let manifest = record.checks.iter().find(|c| c.name == "manifest").unwrap();
             assert_eq!(manifest.findings > 0, !holds);
+            AuditRecord { schema: "octree-audit/9".to_owned(), ..record }.write(&path).unwrap();
+            let why = AuditRecord::read(&path).unwrap_err();
+            let file = path.display();
+            assert_eq!(why, format!("{file}: its schema is octree-audit/9, not octree-audit/1"));
             fs::write(&path, "{}").unwrap();
             assert!(AuditRecord::read(&path).is_err());
         }

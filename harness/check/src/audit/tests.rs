@@ -112,6 +112,31 @@ fn what_needs_unknown_sides_is_not_checked() {
 }
 
 #[test]
+fn a_promise_of_sides_is_not_checked_if_the_mesh_has_none() {
+    let text = "spacing_min = 2.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+    let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+    let case = Case::from_parts(text, vec![facet]).unwrap();
+    let sides = Some(crate::promises::Sides { band_cells: 0.0 });
+    let promises = Promises { sides, ..Promises::default() };
+    for known in [true, false] {
+        let mut set = leaf_set(vec![words_of(|o| o.level < 2)]);
+        set.manifest.sides = if known { Sides::Known } else { Sides::Unknown };
+        let dir = tempfile::tempdir().unwrap();
+        set.write(dir.path()).unwrap();
+        let requirements = Requirements::Promises(&promises, Some(&case));
+        let report = audit_against(dir.path(), &AuditOptions::default(), requirements);
+        let check = report.checks.iter().find(|check| check.name == "sides").unwrap();
+        assert_eq!(check.was_run(), known, "{report}");
+        let claims = report.checks.iter().find(|check| check.name == "manifest").unwrap();
+        let claims: Vec<&str> = claims.findings.iter().map(|f| f.detail.as_str()).collect();
+        let level = "level_surface: 0 in the manifest, but 2 in fact";
+        assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest, but 4 in fact"]);
+        // Leaves that the facet crosses are not judged, and are not counted.
+        assert!(!known || check.examined > 0 && check.examined < 64, "{report}");
+    }
+}
+
+#[test]
 fn the_report_states_each_check_and_whether_leaves_were_checked() {
     let mut report = AuditReport {
         checks: vec![CheckResult::new("manifest"), CheckResult::nothing("layer", "no layer")],

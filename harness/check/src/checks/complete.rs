@@ -160,4 +160,15 @@ mod tests {
             assert_eq!(result.note, format!("the mesh fills {percent} % of the root"));
         }
     }
+
+    #[test]
+    fn a_mesh_without_leaves_is_a_finding_if_nothing_is_ever_deleted() {
+        let manifest = leaf_set(vec![]).manifest;
+        for (keep, keep_crossing, findings) in
+            [(Keep::All, true, 1), (Keep::All, false, 0), (Keep::Outside, true, 0)]
+        {
+            let terms = Terms { keep, keep_crossing, ..Terms::of_manifest(&manifest) };
+            assert_eq!(check_holes(&Tree::default(), &terms).findings_total, findings);
+        }
+    }
 }

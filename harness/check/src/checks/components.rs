@@ -232,6 +232,62 @@ mod tests {
         }
     }
 
+    /// Edge of a cell of level 4.
+    const CELL: i64 = UNITS_PER_EDGE / 16;
+
+    /// The faces of a box with these ends along each axis, in tenths of a cell: two facets each.
+    fn cuboid(ends: [[i64; 2]; 3]) -> Vec<FacetLattice> {
+        let corner = |i: usize| [0, 1, 2].map(|a: usize| ends[a][i >> a & 1] * CELL / 10);
+        let faces =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]].map(|f| f.map(corner));
+        faces.into_iter().flat_map(halves).collect()
+    }
+
+    /// A box within a box that is within the root or around it.
+    #[test]
+    fn an_outside_component_is_enclosed_if_another_one_has_a_face_on_the_boundary() {
+        let inner = cuboid([[51, 102], [53, 101], [52, 111]]);
+        for (outer, enclosed) in [([14, 146], true), ([-14, 174], false)] {
+            let body = [&inner[..], &cuboid([outer; 3])].concat();
+            let words = contract::testing::base_tree(&body, 4);
+            let mut terms = Terms::of_manifest(&contract::testing::leaf_set(vec![]).manifest);
+            let of_cavity = |terms: &Terms| {
+                let cavity = leaf_at(&words, [8 * CELL; 3]).unwrap() as u32;
+                let found = find(&words, terms, &body);
+                assert_eq!(
+                    found.iter().filter(|c| c.enclosed).count(),
+                    usize::from(enclosed && terms.deletes_enclosed())
+                );
+                let component = found.into_iter().find(|c| c.leaves.contains(&cavity)).unwrap();
+                (component.side, component.enclosed)
+            };
+            assert_eq!(of_cavity(&terms), (Side::Outside, false));
+            terms.keep = contract::manifest::Keep::Outside;
+            assert_eq!(of_cavity(&terms), (Side::Outside, enclosed));
+        }
+    }
+
+    /// A box around some leaves. A face that is given twice stops no ray, so the rays of all leaves within disagree.
+    #[test]
+    fn the_majority_of_all_rays_decides_where_the_rays_of_every_candidate_disagree() {
+        let terms = Terms::of_manifest(&contract::testing::leaf_set(vec![]).manifest);
+        for twice in 0..=6 {
+            let faces = cuboid([[33, 97], [35, 111], [31, 96]]);
+            let body = [&faces[..], &faces[..2 * twice]].concat();
+            let words = contract::testing::base_tree(&body, 4);
+            let found = find(&words, &terms, &body);
+            let within = leaf_at(&words, [6 * CELL; 3]).unwrap() as u32;
+            let component = found.iter().find(|c| c.leaves.contains(&within)).unwrap();
+            assert!(found.len() == 2 && component.leaves.len() > CANDIDATES_MAX);
+            let side = if twice < 3 { Side::Inside } else { Side::Outside };
+            let ambiguous = (1..6).contains(&twice);
+            assert_eq!((component.side, component.ambiguous), (side, ambiguous), "{twice}");
+            let other = found.iter().find(|c| c.first != component.first).unwrap();
+            assert_eq!((other.side, other.ambiguous), (Side::Outside, false), "{twice}");
+        }
+    }
+
     #[test]
     fn the_root_is_half_open() {
         assert!(in_root([0; 3]) && in_root([UNITS_PER_EDGE - 1; 3]));

@@ -101,6 +101,7 @@ fn without_base(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
 mod tests {
     use super::*;
     use contract::case::Case;
+    use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
 
     /// The facet lies in octant 0 of level 1, the surface's level, and there in its child 0. Leaves have level 2.
@@ -130,5 +131,13 @@ mod tests {
             spurious.starts_with("no facet crosses the") && spurious.contains("3.1"),
             "{spurious}"
         );
+        // A leaf of the surface's level inherits nothing from the octant that precedes it.
+        let is_crossing = |path: String| path.starts_with(['0', '1']);
+        let side =
+            |o: &Octant| Some(if is_crossing(o.path()) { Side::Crossing } else { Side::Outside });
+        let mesh = leaf_set(vec![words_with_sides(|o| ["root", "0"].contains(&&*o.path()), side)]);
+        let result = check(&Subject::new(&case, &mesh));
+        let text = &result.findings[0].detail;
+        assert!(result.findings_total == 1 && text.contains("octant 1 "), "{result}");
     }
 }

@@ -189,6 +189,24 @@ mod tests {
         }
     }
 
+    /// A leaf of level 3, one finer than the surface, and three of its cells away from leaves of level 1.
+    #[test]
+    fn a_crossing_leaf_finer_than_the_surface_requires_only_its_neighbours_to_be_fine() {
+        let split = |o: &Octant| o.corner == [0; 3] && o.level < 3;
+        let findings = |side| {
+            let words = contract::testing::words_with_sides(split, |o| {
+                Some(if o.corner == [0; 3] { side } else { Side::Outside })
+            });
+            let result = check_tree(&Tree::of_words(&words), &terms(5, 2, Keep::Outside, true));
+            result.findings_total
+        };
+        assert_eq!(findings(Side::Crossing), findings(Side::Outside));
+        // The margin of a crossing leaf of the surface's level.
+        let of_surface =
+            |level| terms(5, level, Keep::Outside, true).surface_margin(Side::Crossing as Kind, 3);
+        assert_eq!([of_surface(2), of_surface(3)], [0, 4 * cell(3)]);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(256))]
 

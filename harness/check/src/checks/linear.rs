@@ -67,3 +67,32 @@ pub fn refused(
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+    use contract::testing::{leaf_set, words_of};
+
+    #[test]
+    fn the_leaves_of_the_mesh_and_of_the_base_tree_are_examined() {
+        let text =
+            "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let (fine, coarse) = (words_of(|o| o.level < 2), words_of(|o| o.level < 1));
+        let (mesh, mut base) = (leaf_set(vec![fine]), leaf_set(vec![coarse]));
+        let result = check(&Subject::new(&case, &mesh).with_base(&base));
+        assert_eq!((result.examined, result.findings_total), (64 + 8, 0));
+        base.parts[0].swap(2, 3);
+        let result = check(&Subject::new(&case, &mesh).with_base(&base));
+        let [finding] = &result.findings[..] else { panic!("{result}") };
+        let text = finding
+            .detail
+            .strip_prefix("T0: leaves-00000.npy is not sorted: outside leaf: octant 2 ");
+        assert!(
+            text.is_some_and(|rest| rest.contains("follows outside leaf: octant 3 ")),
+            "{result}"
+        );
+    }
+}

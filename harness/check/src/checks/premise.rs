@@ -135,6 +135,11 @@ mod tests {
         let deletes = Terms { keep_crossing: false, ..terms(1) };
         assert_eq!(of(&crossing, None, &deletes), ["", "", "", "", "", "", side, level, level]);
         assert_eq!(of(&uniform, None, &deletes)[8], thin);
+        let mut deleted = contract::tree::Builder::default();
+        deleted.push_leaf(0, 0, DELETED).unwrap();
+        let deleted = deleted.finish();
+        assert_eq!(of(&deleted, None, &deletes)[8], "all leaves have level 0");
+        assert_eq!(of(&deleted, None, &terms(1))[8], thin);
         let all = "all leaves of T0 are crossing";
         assert_eq!(
             of(&uniform, Some(&crossing), &terms(2)),

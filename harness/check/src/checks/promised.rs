@@ -61,3 +61,28 @@ pub fn promised(
     }
     results
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::{leaf_set, words_of};
+
+    #[test]
+    fn without_a_case_holes_are_judged_only_if_nothing_is_deleted() {
+        let words = words_of(|o| o.level < 2);
+        let manifest = leaf_set(vec![]).manifest;
+        let promises = Promises { complete: true, ..Promises::default() };
+        let result = |keep, keep_crossing, words: &[u64]| {
+            let terms = Terms { keep, keep_crossing, ..Terms::of_manifest(&manifest) };
+            let mut results = promised(&Tree::of_words(words), &terms, None, &promises);
+            assert_eq!(results.len(), 1);
+            let result = results.remove(0);
+            (result.was_run(), result.findings_total > 0)
+        };
+        assert_eq!(result(Keep::All, true, &words), (true, false));
+        assert_eq!(result(Keep::All, true, &words[1..]), (true, true));
+        for (keep, keep_crossing) in [(Keep::All, false), (Keep::Outside, true)] {
+            assert_eq!(result(keep, keep_crossing, &words[1..]), (false, false));
+        }
+    }
+}

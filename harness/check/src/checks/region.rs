@@ -5,6 +5,9 @@
 //! judged, because programs differ on the side of a cell that the geometry crosses; neither are places whose six rays
 //! contradict each other or their component, which exist around a body that is not watertight.
 
+#[cfg(test)]
+mod tests;
+
 use super::components::{self, Component};
 use super::facets::Facets;
 use super::{CheckResult, Terms, contact};
@@ -193,93 +196,5 @@ impl Survey<'_> {
             let child = self.tree.child(handle, digit, octant.level);
             self.uniform(child, octant.child(digit), position, visit);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use contract::case::Case;
-
-    /// A tetrahedron in a root of edge 8 with leaves of edge 1, without the facets from number `count`.
-    fn tetrahedron(count: usize, seeds: &str) -> Case {
-        let [a, b, c, d] = [[1.1f32; 3], [6.9, 1.1, 1.1], [1.1, 6.9, 1.1], [1.1, 1.1, 6.9]];
-        let body = [[a, b, d], [a, c, d], [a, b, c], [b, c, d]];
-        let text = format!(
-            "spacing_min = 1.0\nkeep = 'inside'\nseeds = {seeds}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
-        );
-        Case::from_parts(&text, body[..count].to_vec()).unwrap()
-    }
-
-    fn positions(count: usize, seeds: &str, paths: &[&[u8]]) -> Vec<Position> {
-        let case = tetrahedron(count, seeds);
-        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-        let space = Space::new(&terms, &facets, &case.facets_lattice);
-        let octant = |path: &&[u8]| path.iter().fold(Octant::ROOT, |o, &digit| o.child(digit));
-        paths.iter().map(|path| space.position(octant(path))).collect()
-    }
-
-    #[test]
-    fn a_place_is_near_the_surface_or_in_a_component_that_is_kept_or_not() {
-        let (outside, inside) =
-            (Position::On(Side::Outside, false), Position::On(Side::Inside, true));
-        // Within the body, far from it, in a leaf that a facet crosses, and in a child of it that none crosses.
-        let paths: [&[u8]; 4] = [&[0, 7, 0], &[7, 7], &[0, 0, 7], &[0, 0, 7, 7]];
-        let expected = [inside, outside, Position::Near, Position::Near];
-        assert_eq!(positions(4, "[]", &paths), expected);
-        // Seeds decide, so that rays are not asked, even if the body is open.
-        assert_eq!(positions(4, "[[2.5, 2.5, 2.5]]", &paths), expected);
-        let open = positions(3, "[[2.5, 2.5, 2.5]]", &paths[..2]);
-        assert_eq!(open, [inside, inside]);
-    }
-
-    #[test]
-    fn a_band_wider_than_the_root_leaves_nothing_to_check() {
-        let case = tetrahedron(4, "[]");
-        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-        let space = Space::new(&terms, &facets, &case.facets_lattice);
-        let tree = Tree::of_words(&contract::testing::words_of(|o| o.level < 2));
-        for (band_cells, was_run) in [(0.0, true), (8.0, false)] {
-            let survey = Survey { tree: &tree, space: &space, band_cells };
-            assert_eq!(
-                [survey.check_sides().was_run(), survey.check_complete().was_run()],
-                [was_run; 2]
-            );
-        }
-    }
-
-    #[test]
-    fn places_within_the_band_are_not_judged() {
-        let case = tetrahedron(4, "[]");
-        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-        let space = Space::new(&terms, &facets, &case.facets_lattice);
-        let words = contract::testing::words_of(|o| o.level < 3);
-        let tree = Tree::of_words(&words);
-        for band_cells in [0.0, 0.5, 1.0, 1.5] {
-            // A cell has edge 1.
-            let band = (band_cells * (UNITS_PER_EDGE / 8) as f64) as i64;
-            let is_beyond = |word: &&u64| {
-                let (low, high) = word::octant(**word).bounds();
-                let (low, high) = (low.map(|c| c - band), high.map(|c| c + band));
-                facets.meeting(&facets.all(), low, high).is_empty()
-            };
-            let expected = words.iter().filter(is_beyond).count() as u64;
-            let survey = Survey { tree: &tree, space: &space, band_cells };
-            assert_eq!(survey.check_complete().examined, expected, "{band_cells}");
-            assert!((1..512).contains(&expected), "{expected}");
-            let findings = survey.check_complete().findings;
-            assert!(!findings.is_empty(), "{band_cells}");
-            for detail in findings.iter().map(|finding| &finding.detail) {
-                let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
-                assert!(words.iter().any(names), "{detail}");
-            }
-        }
-    }
-
-    #[test]
-    fn without_a_facet_a_place_is_undecided_where_rays_disagree() {
-        // The component of the far field reaches into the body, where the rays towards three sides hit facets.
-        let far = Position::On(Side::Outside, false);
-        assert_eq!(positions(3, "[]", &[&[0, 7, 0], &[7, 7]]), [Position::Undecided, far]);
     }
 }

@@ -46,15 +46,10 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// The subject with its base tree.
+    /// The subject, which has none yet, with its base tree.
     pub fn with_base(self, base: &'a LeafSet) -> Self {
-        Self {
-            base: Some(base),
-            tree_base: OnceCell::new(),
-            tree_with_deleted: OnceCell::new(),
-            components: OnceCell::new(),
-            ..self
-        }
+        debug_assert!(self.base.is_none(), "what was found out with another base tree is kept");
+        Self { base: Some(base), ..self }
     }
 
     /// The subject with the mesh that it must equal.

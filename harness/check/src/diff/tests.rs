@@ -51,6 +51,8 @@ fn the_octants_that_differ_are_listed_up_to_eight() {
         "a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\n{contradiction}"
     );
     assert_eq!(report.to_string(), expected);
+    let manifest = leaf_set(vec![]).manifest;
+    assert_eq!(manifests(&manifest, &manifest).compared, Trust::Manifests);
     let same = DiffReport { compared: Trust::Manifests, leaves: 5, ..DiffReport::default() };
     assert_eq!(same.to_string(), "the leaves are the same (5, by the digests in the manifests)");
 }
@@ -158,4 +160,19 @@ fn a_tree_is_compared_with_parts_like_other_parts() {
             assert_eq!(text.matches(&leaf).count(), 2, "{text}");
         }
     }
+}
+
+/// The buffer has 65,536 words.
+#[test]
+fn a_part_larger_than_the_buffer_is_read_to_its_end() {
+    let words = words_of(|o| o.level < 5 || o.level < 6 && o.corner[2] < 1 << 17);
+    assert!(words.len() > 1 << 16, "{}", words.len());
+    let mut changed = words.clone();
+    *changed.last_mut().unwrap() |= 1;
+    let (a, b) = (written(words.clone()), written(changed));
+    let compared = |b: &Path| diff(a.path(), b, None, Trust::Leaves).unwrap();
+    let same = compared(a.path());
+    assert_eq!((same.same_leaves(), same.leaves), (true, words.len() as u64));
+    let found = compared(b.path());
+    assert_eq!((found.octants, found.contradictions.len()), (vec![level_3(511)], 0));
 }

@@ -115,6 +115,27 @@ mod tests {
         }
     }
 
+    /// 16 roundings of the largest coordinate, or 4 lattice units.
+    #[test]
+    fn the_band_is_the_larger_of_single_precision_and_the_lattice() {
+        let far = BODY.map(|vertex| vertex.map(|c| c + 4.0e6));
+        assert_eq!(band(&case(8.0, 4.0e6 - 4.0, far)), 4.000001e6 * 16.0 * 2f64.powi(-23));
+        let least = BODY.map(|vertex| vertex.map(|c| c / 1024.0));
+        assert_eq!(band(&case(8.0, -4.0, least)), 2f64.powi(-22));
+    }
+
+    #[test]
+    fn a_sample_has_the_leaves_whose_shuffled_words_are_least() {
+        let case = case(8.0, -4.0, BODY);
+        for seed in [1, 2, u64::MAX / 3] {
+            let mut expected = choose(&case, &leaves(), 1000, seed).words;
+            expected.sort_by_key(|&leaf| shuffle_key(leaf ^ seed));
+            expected.truncate(100);
+            expected.sort_unstable();
+            assert_eq!(choose(&case, &leaves(), 100, seed).words, expected, "{seed}");
+        }
+    }
+
     /// The first numbers of the published generator with seed 0.
     #[test]
     fn leaves_are_shuffled_by_splitmix64() {

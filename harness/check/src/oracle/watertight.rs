@@ -11,7 +11,7 @@ pub fn is_watertight(facets: &[FacetLattice]) -> bool {
         let [a, b, c] = *facet;
         [[a, b], [b, c], [c, a]]
     };
-    let sorted = |[a, b]: [[i64; 3]; 2]| if a <= b { [a, b] } else { [b, a] };
+    let sorted = |[a, b]: [[i64; 3]; 2]| [a.min(b), a.max(b)];
     let mut edges: Vec<_> = facets.iter().flat_map(sides).map(sorted).collect();
     edges.retain(|[a, b]| a != b);
     edges.sort_unstable();

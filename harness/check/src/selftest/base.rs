@@ -32,7 +32,7 @@ fn crossing_siblings(words: &[u64]) -> Option<usize> {
 fn coarse_at_surface(s: &SelftestCase) -> Option<Mutation> {
     let i = siblings_at_surface(s)?;
     let words = &s.base.words;
-    let crossing = edit::parent(words[i]) & !3 | Side::Crossing as u64;
+    let crossing = edit::with_side(edit::parent(words[i]), Side::Crossing);
     let mut all = words.clone();
     all.splice(i..i + 8, [crossing]);
     with_base(s, all)
@@ -118,4 +118,28 @@ fn crossing_merged(s: &SelftestCase) -> Option<Mutation> {
     let words = &s.mesh.words;
     let i = crossing_siblings(words).filter(|&i| word::level(words[i]) == s.case.level_surface)?;
     Some(Mutation::with_words(s, merge(words, &[i])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+    use contract::octant::LEVEL_MAX;
+    use contract::testing::{leaf_set, words_with_sides};
+
+    #[test]
+    fn no_leaf_of_the_deepest_level_is_split() {
+        let text = "spacing_min = 1.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 524288.0 }\n";
+        let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let split = |side| {
+            let path = |o: &Octant| o.corner == [0; 3] && o.level < LEVEL_MAX;
+            let deepest = |o: &Octant| (o.level == LEVEL_MAX).then_some(side);
+            let base = leaf_set(vec![words_with_sides(path, deepest)]);
+            let mesh = leaf_set(vec![]);
+            let correct = SelftestCase { case: case.clone(), mesh, base };
+            fine_away(&correct).is_some() || fine_at_surface(&correct).is_some()
+        };
+        assert_eq!(Side::ALL.map(split), [false; 3]);
+    }
 }

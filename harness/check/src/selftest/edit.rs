@@ -117,3 +117,26 @@ pub(super) fn neighbourhood(tree: &Tree, word: u64) -> Neighbourhood {
 pub(super) fn base_level(base: &Tree, octant: &Octant) -> u8 {
     base.locate(octant.corner).map_or(0, |(o, _)| o.level)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::words_of;
+
+    #[test]
+    fn eight_leaves_of_one_side_are_a_sibling_group_if_they_fill_an_octant() {
+        let words = words_of(|o| o.level < 1 || o.digit() == 7 && o.level < 2);
+        assert_eq!((words.len(), sibling_groups(&words)), (15, vec![7]));
+        let merged = merge(&words, &[7]);
+        assert_eq!(
+            (merged, sibling_groups(&merge(&words, &[7]))),
+            (words_of(|o| o.level < 1), vec![0])
+        );
+        let mut sides = words.clone();
+        sides[9] |= 1;
+        assert_eq!(sibling_groups(&sides), [0usize; 0]);
+        assert_eq!(sibling_groups(&words[1..9]), [0usize; 0]);
+        // The root has no siblings.
+        assert_eq!(sibling_groups(&[0; 8]), [0usize; 0]);
+    }
+}

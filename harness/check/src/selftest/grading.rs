@@ -214,3 +214,69 @@ fn extra_layer_missing(s: &SelftestCase) -> Option<Mutation> {
     let i = graded_siblings(s).into_iter().find(touches)?;
     Some(Mutation::with_words(s, merge(words, &[i])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::case::Case;
+    use contract::testing::{leaf_set, words_with_sides};
+
+    #[test]
+    fn layers_exist_at_levels_coarser_than_the_surface_and_at_all_levels_if_all_is_kept() {
+        let has = |n: u32, keep: &str| {
+            let text = format!(
+                "spacing_min = 2.0\nlayer_cells_min = {n}\nkeep = '{keep}'\n\
+                 root = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
+            );
+            let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
+            let case = Case::from_parts(&text, vec![facet]).unwrap();
+            let (mesh, base) = (leaf_set(vec![]), leaf_set(vec![]));
+            let correct = SelftestCase { case, mesh, base };
+            [1, 2, 3].map(|level| has_layer(&correct, level))
+        };
+        assert_eq!(has(2, "outside"), [true, false, false]);
+        assert_eq!(has(2, "all"), [true; 3]);
+        assert_eq!([has(1, "outside"), has(1, "all")], [[false; 3]; 2]);
+    }
+
+    /// The octants 0 and 5 are split in the mesh only, and a crossing leaf of T0 touches octant 5.
+    #[test]
+    fn the_extra_layer_is_removed_beside_a_crossing_leaf() {
+        let text = "spacing_min = 2.0\nlayer_cells_min = 1\nkeep_crossing = false\n\
+                    root = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[6.5, 4.5, 4.5], [7.5, 4.5, 4.5], [6.5, 5.5, 4.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let words = |split: &'static [&'static str]| {
+            let crossing = |o: &Octant| o.path() == "7.1";
+            words_with_sides(
+                |o| o.level == 0 || split.contains(&&*o.path()),
+                |o| Some(if crossing(o) { Side::Crossing } else { Side::Outside }),
+            )
+        };
+        let (mesh, base) = (leaf_set(vec![words(&["0", "5", "7"])]), leaf_set(vec![words(&["7"])]));
+        let mutation = extra_layer_missing(&SelftestCase { case, mesh, base }).unwrap();
+        assert_eq!(mutation.mesh.words, words(&["0", "7"]));
+    }
+
+    /// Octant 0.0 is two cells of level 3 away from a crossing leaf of that level, the surface's, and touches leaves of level 2.
+    #[test]
+    fn the_surroundings_of_an_octant_end_at_the_thickness_of_its_layers() {
+        let around = |n: u32| {
+            let text = format!(
+                "spacing_min = 1.0\nlayer_cells_min = {n}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
+            );
+            let facet = [[4.5, 0.5, 0.5], [4.6, 0.5, 0.5], [4.5, 0.6, 0.5]];
+            let case = Case::from_parts(&text, vec![facet]).unwrap();
+            let words = words_with_sides(
+                |o| ["root", "0", "0.0", "1", "1.0"].contains(&&*o.path()),
+                |o| Some(if o.path() == "1.0.0" { Side::Crossing } else { Side::Outside }),
+            );
+            let correct =
+                SelftestCase { case, mesh: leaf_set(vec![words]), base: leaf_set(vec![]) };
+            let Surroundings { touching, within_layer, in_surface_layer } =
+                surroundings(&correct, 0);
+            (touching, within_layer, in_surface_layer)
+        };
+        assert_eq!([around(2), around(3), around(4)], [(2, 2, false), (2, 3, false), (2, 3, true)]);
+    }
+}

@@ -66,11 +66,9 @@ fn kept_beside_children(s: &SelftestCase) -> Option<Mutation> {
 fn enlarged(s: &SelftestCase) -> Option<Mutation> {
     let first = |w| word::octant(w).digit() == 0;
     let sibling = |w| word::octant(edit::parent(w));
-    let words = &s.mesh.words;
-    let i = (1..words.len()).find(|&i| {
-        first(words[i - 1]) && sibling(words[i - 1]).contains(&word::octant(words[i]))
-    })?;
-    changed(s, |words| words[i - 1] = edit::parent(words[i - 1]))
+    let within = |pair: &[u64]| first(pair[0]) && sibling(pair[0]).contains(&word::octant(pair[1]));
+    let i = s.mesh.words.windows(2).position(within)?;
+    changed(s, |words| words[i] = edit::parent(words[i]))
 }
 
 fn too_deep(s: &SelftestCase) -> Option<Mutation> {

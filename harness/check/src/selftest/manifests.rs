@@ -123,3 +123,26 @@ fn leaf_changed(s: &SelftestCase) -> Option<Mutation> {
     *last = other_side(*last);
     Some(mutation)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::{leaf_set, words_of};
+
+    #[test]
+    fn every_change_of_a_digest_changes_it_whatever_it_is() {
+        let words = words_of(|o| o.level < 3);
+        let correct = leaf_set(words.chunks(256).map(<[u64]>::to_vec).collect()).manifest;
+        for digest in [Digest(0), Digest(!0)] {
+            let mut before = correct.clone();
+            before.digest = digest;
+            before.octant_digests.fill(digest);
+            before.parts.iter_mut().for_each(|part| part.digest = digest);
+            for change in [octant_digest, part_digest] {
+                let mut after = before.clone();
+                change(&mut after);
+                assert_ne!(after, before);
+            }
+        }
+    }
+}

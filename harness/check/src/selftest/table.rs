@@ -97,6 +97,7 @@ mod tests {
             side          a case  sides       killed    sides\n";
         let counts = "2 corruptions in 3 trials: 1 survived, 0 false alarms";
         assert_eq!(report.to_string(), format!("{rows}{counts}"));
+        assert_eq!(report.found_by_audit(), 1);
         report.alarms.push("an alarm".to_owned());
         report.unused.push("unused");
         report.left_out.push(("left", "why".to_owned()));

@@ -6,6 +6,9 @@
 //! levels, of which there are most, are rarely looked at. The chain that is found is the shortest. After
 //! [`SEARCHES_MAX`] searches the links that are still needed count twice in this order, so that a chain is found soon.
 
+#[cfg(test)]
+mod tests;
+
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::RangeInclusive;

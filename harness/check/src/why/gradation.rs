@@ -35,9 +35,9 @@ impl Mesh<'_> {
         i64::from(self.terms.layer_cells_min - 1) * edge(level)
     }
 
-    /// Whether the layer of a leaf reaches a coarser octant.
+    /// Whether the layer of a finer leaf reaches an octant.
     pub(super) fn forces_by_layer(&self, leaf: &Octant, octant: &Octant) -> bool {
-        leaf.level > octant.level && octant.distance(leaf) < self.layer_reach(leaf.level)
+        octant.distance(leaf) < self.layer_reach(leaf.level)
     }
 
     /// Whether balance with a leaf requires an octant to be split.

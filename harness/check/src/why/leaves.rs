@@ -197,8 +197,60 @@ impl Leaves {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::testing::{octants_of, words_of};
+    use contract::testing::{leaf_set, octants_of, words_of, words_with_sides};
     use std::collections::HashSet;
+
+    /// With so many words, the ranges of octants are stored.
+    #[test]
+    fn the_leaves_of_an_octant_are_those_among_all_words_of_all_parts() {
+        let side = |o: &Octant| match o.path().len() % 3 {
+            _ if o.corner == [5 << 15; 3] => Some(Side::Crossing),
+            0 => Some(Side::Outside),
+            _ => (o.corner[1] % 3 > 0).then_some(Side::Inside),
+        };
+        let words = words_with_sides(
+            |o| {
+                o.level < 4
+                    || o.level < 5 && o.corner[0] < 1 << 18
+                    || o.corner == [0; 3] && o.level < 9
+            },
+            side,
+        );
+        assert!(words.len() > 3 * WORDS_FEW, "{}", words.len());
+        let mut parts = vec![Vec::new(); 3];
+        words.iter().for_each(|&w| parts[(w >> 50) as usize % 3].push(w));
+        let dir = tempfile::tempdir().unwrap();
+        leaf_set(parts).write(dir.path()).unwrap();
+        let leaves = Leaves::open(dir.path()).unwrap();
+        let octants: HashSet<Octant> = words.iter().map(|&w| word::octant(w)).collect();
+        let within = |octant: &Octant| {
+            let (first, key) = (word::key_of(octant.corner), |w: &u64| word::key(*w));
+            let from = words.partition_point(|w| key(w) < first);
+            let until = words.partition_point(|w| key(w) < first + word::span(octant.level));
+            &words[from..until]
+        };
+        for octant in octants_of(&words) {
+            if octants.contains(&octant) {
+                assert_eq!(leaves.node(&octant), Node::default(), "{octant}");
+                let cell = octant.corner.map(|c| c + octant.edge() - 1);
+                assert_eq!(leaves.leaf_at(cell).map(|leaf| leaf.octant), Some(octant));
+                continue;
+            }
+            let children: Vec<Octant> = (0..8).map(|digit| octant.child(digit)).collect();
+            let set = |fit: &dyn Fn(&Octant) -> bool| {
+                (0..8).filter(|&d| fit(&children[d])).map(|d| 1u8 << d).sum()
+            };
+            let expected = Node {
+                leaves: set(&|child| octants.contains(child)),
+                split: set(&|child| !octants.contains(child) && !within(child).is_empty()),
+            };
+            assert_eq!(leaves.node(&octant), expected, "{octant}");
+            assert_eq!(leaves.count(&octant), within(&octant).len() as u64, "{octant}");
+            let crossing = within(&octant).iter().any(|&w| word::side(w) == Side::Crossing);
+            assert_eq!(leaves.has_crossing(&octant), crossing, "{octant}");
+        }
+        assert_eq!(leaves.invalid(), None);
+    }
 
     #[test]
     fn octants_have_ids_of_their_own() {

@@ -59,4 +59,19 @@ fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
     assert_eq!(check(|m| m.components.as_mut().unwrap().inside += 1), 1);
     assert_eq!(check(|m| m.components.as_mut().unwrap().enclosed.example = None), 1);
     assert_eq!(check(|m| m.components_ambiguous.count += 1), 1);
+    let note = |change: fn(&mut Manifest)| {
+        let mut mesh = correct.mesh.clone();
+        change(&mut mesh.manifest);
+        kept::check(&Subject::new(&correct.case, &mesh).with_base(&correct.base)).note
+    };
+    let expected = format!(
+        "components of T0: 9 outside, 1 inside; the far field does not reach 1 of those outside, which are deleted \
+         with their 904 leaves, for example at {:?}",
+        correct.mesh.manifest.components.as_ref().unwrap().enclosed.example.unwrap()
+    );
+    assert_eq!(note(|_| ()), expected);
+    assert_eq!(
+        note(|m| m.components = None),
+        format!("{expected}; the manifest does not count them")
+    );
 }

@@ -171,12 +171,24 @@ fn a_directory_alone_explains_the_same_sizes() {
 #[test]
 fn a_point_outside_the_root_and_another_case_are_refused() {
     let text = include_str!("../../../selftest-cases/all.toml");
-    let correct = support::selftest_case("all", text);
+    let mut correct = support::selftest_case("all", text);
     let why = with_mesh(&correct.mesh, None, |mesh| mesh.at([99.0, 0.0, 0.0]).unwrap_err());
     assert!(why.contains("outside the root"), "{why}");
     let dir = tempfile::tempdir().unwrap();
     correct.mesh.write(dir.path()).unwrap();
     let mut other = correct.case.clone();
     other.layer_cells_min += 1;
-    assert!(Mesh::open(dir.path(), Some(&other)).unwrap_err().contains("other inputs"));
+    let why = Mesh::open(dir.path(), Some(&other)).unwrap_err();
+    let n = other.layer_cells_min;
+    let expected = format!(
+        "{} was made from other inputs than the case (layer_cells_min: {} in the mesh; {n} in the case); give the case \
+         file from which the mesh was made",
+        dir.path().display(),
+        n - 1
+    );
+    assert_eq!(why, expected);
+    correct.mesh.manifest.sides = contract::manifest::Sides::Unknown;
+    correct.mesh.write(dir.path()).unwrap();
+    let why = Mesh::open(dir.path(), Some(&correct.case)).unwrap_err();
+    assert!(why.contains("than the case (the sides of the mesh are unknown); give"), "{why}");
 }

@@ -118,36 +118,78 @@ fn a_point_in_an_enclosed_part_names_the_rule() {
     assert!(rule(wall).contains("keep is outside"));
 }
 
-/// A thin wall divides the root but for an opening, and the component around it has too many leaves for a search.
-#[test]
-fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
-    let ends = [[0.1f32, 0.3], [-8.0, 7.0], [-8.0, 8.0]];
+/// The faces of a box with these ends along each axis, two facets each.
+pub fn cuboid(ends: [[f32; 2]; 3]) -> Vec<Facet> {
     let at = |i: usize| [0, 1, 2].map(|a| ends[a][i >> a & 1]);
     let faces =
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
-    let wall: Vec<Facet> = faces.into_iter().flat_map(halves).map(|facet| facet.map(at)).collect();
+    faces.into_iter().flat_map(halves).map(|facet| facet.map(at)).collect()
+}
+
+/// A face that is given twice stops no ray, so the rays of all leaves within the box disagree.
+#[test]
+fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
+    let faces = cuboid([[-2.7, 3.6], [-2.3, 4.1], [-3.3, 3.7]]);
+    for twice in 0..=6 {
+        let body = [&faces[..], &faces[..2 * twice]].concat();
+        let text = format!("spacing_min = 1.0\nlayer_cells_min = 1\nkeep = 'all'\n{ROOT}");
+        let correct = made(&text, &body);
+        let answer =
+            with_mesh(&correct.mesh, Some(&correct.case), |m| m.at([0.5, 0.6, 0.7]).unwrap());
+        let SideReason::Component { side, decision, leaves_visited, .. } = answer.side_decided_by
+        else {
+            panic!("no facet crosses the leaf")
+        };
+        let expected = if twice < 3 { Side::Inside } else { Side::Outside };
+        assert_eq!((side, answer.side), (expected, Some(expected)), "{twice}: {decision}");
+        if (1..6).contains(&twice) {
+            let candidates = leaves_visited.min(32) as usize;
+            let text = format!(
+                "the component is ambiguous: the rays of no candidate agree, and {} of the {} rays of {candidates} \
+                 candidates are odd",
+                (6 - twice) * candidates,
+                6 * candidates
+            );
+            assert_eq!(decision, text);
+        } else {
+            assert!(decision.starts_with("each of the six rays"), "{twice}: {decision}");
+        }
+    }
+}
+
+/// A thin wall divides the root but for an opening, and the component around it has too many leaves for a search.
+#[test]
+fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
+    let wall = cuboid([[0.1, 0.3], [-8.0, 7.0], [-8.0, 8.0]]);
     let whole = "[[box]]\nmin = [-8.0, -8.0, -8.0]\nmax = [8.0, 8.0, 8.0]\nspacing = 0.25\n";
-    let explain = |seeds: &str, point: [f64; 3]| {
+    let explain_with = |wall: &[Facet], seeds: &str, point: [f64; 3]| {
         let text = format!(
             "spacing_min = 0.25\nlayer_cells_min = 1\nkeep = 'all'\nseeds = {seeds}\n{ROOT}{whole}"
         );
-        let case = Case::from_parts(&text, wall.clone()).unwrap();
+        let case = Case::from_parts(&text, wall.to_vec()).unwrap();
         let manifest = case.manifest(Tree::Base, "test".to_owned());
         let set = LeafSet::new(manifest, vec![]).with_parts(vec![words_of(|o| o.level < 6)]);
         let answer = with_mesh(&set, Some(&case), |mesh| mesh.at(point).unwrap());
         match answer.side_decided_by {
             SideReason::Component { decision, candidate, is_complete, is_proven, .. } => {
                 assert!(!is_complete, "{decision}");
+                let is_rest = |what: &String| what.starts_with("the rest of the component: ");
+                assert_eq!(answer.left_out.iter().any(is_rest), !is_proven, "{decision}");
                 (candidate.map(|place| place.octant.path()), is_proven, decision)
             }
             _ => panic!("{answer}"),
         }
     };
+    let explain = |seeds: &str, point| explain_with(&wall, seeds, point);
     let (candidate, is_proven, _) = explain("[]", [-4.0; 3]);
     assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.0"), true));
     let (candidate, is_proven, _) = explain("[]", [4.0, -4.0, -4.0]);
     assert_eq!((candidate.as_deref(), is_proven), (Some("1.0.0.0.1.0"), false));
+    // Crossing leaves are no candidates.
+    let first = cuboid([[-7.95, -7.85], [-7.95, -7.85], [-7.95, -7.85]]);
+    let (candidate, is_proven, _) = explain_with(&first, "[]", [-4.0; 3]);
+    assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.1"), true));
     let (_, is_proven, decision) = explain("[[7.9, 7.9, 7.9]]", [-4.0; 3]);
     assert_eq!((decision.as_str(), is_proven), ("no seed was found in its component", false));
     let (_, is_proven, decision) = explain("[[-7.9, -7.9, -7.9]]", [-4.0; 3]);

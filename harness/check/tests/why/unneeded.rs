@@ -2,6 +2,7 @@
 
 use super::*;
 use contract::octant::LEVEL_MAX;
+use contract::testing::octants_of;
 use contract::word::{self, Leaf};
 
 /// The words with the leaf at an index split.
@@ -37,6 +38,8 @@ proptest! {
             let mutated = correct.mesh.with_parts(vec![words.clone()]);
             let found = with_mesh(&mutated, case, |mesh| mesh.unneeded(100).unwrap());
             prop_assert_eq!(found.unneeded, planted as u64, "{}{}", text, found);
+            let splits = octants_of(&words).len() - words.len();
+            prop_assert_eq!((found.splits, found.leaves), (splits as u64, words.len() as u64));
             prop_assert_eq!(found.subtrees, found.first.len() as u64);
             let leaves: u64 = found.first.iter().map(|subtree| subtree.leaves).sum();
             prop_assert_eq!(leaves, 7 * found.unneeded + found.subtrees, "{}", found);
@@ -79,6 +82,71 @@ fn a_needless_split_is_found_wherever_it_is() {
             let found = count(&correct.base.with_parts(vec![mutated]));
             assert_eq!((found.unneeded, found.unneeded_leaves), (1, 8), "{name}: {found}");
         }
+    }
+}
+
+/// Faces of a box in every part of an octant, so that octants are deleted with all their leaves, or with some. The deleted space
+/// within the box has coarse leaves in T0, which require nothing.
+#[test]
+fn deleted_crossing_leaves_require_the_layers_around_them_and_other_deleted_leaves_do_not() {
+    for (at, n) in [(0.2, 3), (1.2, 4)] {
+        let facets = sides::cuboid([[at - 4.0, at + 3.0], [at - 5.0, 3.3], [-4.4, at]]);
+        for keep in ["outside", "inside", "all"] {
+            let text = format!(
+                "spacing_min = 1.0\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = false\n{ROOT}"
+            );
+            let correct = made(&text, &facets);
+            let words = &correct.mesh.words;
+            let count = |words: Vec<u64>| {
+                let set = correct.mesh.with_parts(vec![words]);
+                with_mesh(&set, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap().unneeded)
+            };
+            assert_eq!(count(words.clone()), 0, "{at}, {n} cells, {keep}");
+            let coarsest = words.iter().map(|&w| word::level(w)).min().unwrap();
+            let is_coarse = |&i: &usize| word::level(words[i]) <= coarsest + 1;
+            let coarse: Vec<usize> = (0..words.len()).filter(is_coarse).collect();
+            for &i in coarse.iter().step_by(1 + coarse.len() / 8) {
+                let mut needless = words.clone();
+                split(&mut needless, i);
+                let leaf = word::octant(words[i]);
+                assert_eq!(count(needless), 1, "{at}, {n} cells, {keep}: {leaf}");
+            }
+        }
+    }
+}
+
+/// Then no leaf of the least mesh is a leaf, and yet each justifies what it did.
+#[test]
+fn needless_splits_of_all_leaves_are_counted_and_no_other() {
+    let facets = sides::cuboid([[-2.8, 1.2], [-1.8, 3.3], [-2.4, 0.2]]);
+    for (keep, crossing, n) in [("outside", true, 3), ("outside", false, 3), ("all", true, 1)] {
+        let text = format!(
+            "spacing_min = 1.0\nlayer_cells_min = {n}\nkeep = {keep:?}\nkeep_crossing = {crossing}\n{ROOT}"
+        );
+        let correct = made(&text, &facets);
+        let mut words = correct.mesh.words.clone();
+        (0..words.len()).rev().for_each(|i| split(&mut words, i));
+        let mutated = correct.mesh.with_parts(vec![words]);
+        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap());
+        assert_eq!(found.unneeded, correct.mesh.words.len() as u64, "{keep}, {crossing}: {found}");
+    }
+}
+
+#[test]
+fn a_needless_split_below_the_deepest_level_has_no_cause_and_those_above_it_have_one() {
+    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
+    let correct = support::selftest_case(name, text);
+    let mut words = correct.mesh.words.clone();
+    let deepest = words.iter().map(|&w| word::level(w)).max().unwrap();
+    let at = words.iter().position(|&w| word::level(w) == deepest).unwrap();
+    let point = correct.case.root.to_user(word::octant(words[at]).child(0).centre());
+    split(&mut words, at);
+    for case in [None, Some(&correct.case)] {
+        let mutated = correct.mesh.with_parts(vec![words.clone()]);
+        let answer = with_mesh(&mutated, case, |mesh| mesh.at(point).unwrap());
+        let causes: Vec<bool> = answer.splits.iter().map(|split| split.cause.is_some()).collect();
+        let expected: Vec<bool> = (0..=deepest).map(|level| level < deepest).collect();
+        assert_eq!(causes, expected, "{answer}");
     }
 }
 

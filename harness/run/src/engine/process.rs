@@ -237,7 +237,15 @@ mod tests {
     }
 
     fn end_of(script: &str, limit_ms: u64) -> End {
+        end_with_activity(script, limit_ms, &[])
+    }
+
+    /// `activity` are the texts of the ranks' status files.
+    fn end_with_activity(script: &str, limit_ms: u64, activity: &[&str]) -> End {
         let logs = tempfile::tempdir().unwrap();
+        for (rank, text) in activity.iter().enumerate() {
+            fs::write(logs.path().join(format!("rank-{rank:05}.txt")), text).unwrap();
+        }
         let limit = Duration::from_millis(limit_ms);
         let watch = Watch { status: Some(logs.path()), ..Watch::new("child", limit, logs.path()) };
         shell(script, &watch).unwrap_err().end
@@ -293,11 +301,11 @@ mod tests {
 
     #[test]
     fn a_hang_is_killed_and_reported_with_the_activity_of_the_ranks() {
-        let script = "echo layer > rank-00001.txt; echo balance > rank-00000.txt; sleep 600";
         let start = Instant::now();
         let activity = Some("rank 0 was in: balance; rank 1 was in: layer".to_owned());
         let limit = Duration::from_millis(300);
-        assert_eq!(end_of(script, 300), End::TimedOut { limit, activity });
+        let end = end_with_activity("sleep 600", 300, &["balance\n", "layer\n"]);
+        assert_eq!(end, End::TimedOut { limit, activity });
         assert!(start.elapsed() < Duration::from_secs(60));
     }
 

@@ -218,6 +218,10 @@ fn with_a_case_facets_and_rays_decide() {
     let (coarse, fine) = (mesh(&[&[0]]), mesh(&[&[0, 0]]));
     assert!(rule(&coarse, &fine).contains("section 3: facet 0 crosses it"));
     assert!(rule(&[coarse[0] | 2], &coarse).contains("crossing: A is right"));
+    // A crossed leaf of the surface's level need not be split.
+    let (coarse, fine) = (mesh(&[&[0, 7, 0]]), mesh(&[&[0, 7, 0, 0]]));
+    assert!(rule(&coarse, &fine).contains("nothing in either mesh requires the split"));
+    let coarse = mesh(&[&[0]]);
     let far = mesh(&[&[7]]);
     assert!(rule(&[far[0] | 1], &far).contains("0 of its 6 rays are inside: B is right"));
     assert!(

@@ -122,3 +122,35 @@ impl Trial<'_> {
         differs.fields.into_iter().next().or(digests)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selftest::catalogue;
+    use crate::selftest::scale::Source;
+    use contract::manifest::Manifest;
+    use contract::testing::{leaf_set, words_of};
+
+    #[test]
+    fn a_manifest_differs_in_a_field_or_in_the_digests_of_octants() {
+        let place = tempfile::tempdir().unwrap();
+        let mesh = place.path().join("given");
+        fs::create_dir(&mesh).unwrap();
+        leaf_set(vec![words_of(|o| o.level < 3)]).write(&mesh).unwrap();
+        let source = Source { name: "given".into(), mesh, base: None };
+        let original = DistributedMesh::new(&source, place.path()).unwrap();
+        let dir = place.path().join("changed");
+        fs::create_dir(&dir).unwrap();
+        let difference = |change: fn(&mut Manifest)| {
+            let mut manifest = original.manifest().clone();
+            change(&mut manifest);
+            manifest.write(&dir).unwrap();
+            Trial { original: &original, mutant: &catalogue()[0], seed: 0, dir: &dir }.difference()
+        };
+        assert_eq!(difference(|_| ()), None);
+        let digests = difference(|m| m.octant_digests[5..7].iter_mut().for_each(|d| d.0 ^= 1));
+        assert_eq!(digests.as_deref(), Some("the digests of 2 of 512 level-3 octants differ"));
+        let field = difference(|m| (m.leaves, m.octant_digests[5].0) = (7, 1));
+        assert_eq!(field.as_deref(), Some("leaves: 512 in A; 7 in B"));
+    }
+}

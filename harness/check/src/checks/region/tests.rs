@@ -1,0 +1,163 @@
+use super::*;
+use contract::case::Case;
+
+/// A tetrahedron in a root of edge 8 with leaves of edge 1, without the facets from number `count`.
+fn tetrahedron(count: usize, seeds: &str) -> Case {
+    let [a, b, c, d] = [[1.1f32; 3], [6.9, 1.1, 1.1], [1.1, 6.9, 1.1], [1.1, 1.1, 6.9]];
+    let body = [[a, b, d], [a, c, d], [a, b, c], [b, c, d]];
+    let text = format!(
+        "spacing_min = 1.0\nkeep = 'inside'\nseeds = {seeds}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
+    );
+    Case::from_parts(&text, body[..count].to_vec()).unwrap()
+}
+
+fn positions(count: usize, seeds: &str, paths: &[&[u8]]) -> Vec<Position> {
+    let case = tetrahedron(count, seeds);
+    let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+    let space = Space::new(&terms, &facets, &case.facets_lattice);
+    let octant = |path: &&[u8]| path.iter().fold(Octant::ROOT, |o, &digit| o.child(digit));
+    paths.iter().map(|path| space.position(octant(path))).collect()
+}
+
+#[test]
+fn a_place_is_near_the_surface_or_in_a_component_that_is_kept_or_not() {
+    let (outside, inside) = (Position::On(Side::Outside, false), Position::On(Side::Inside, true));
+    // Within the body, far from it, in a leaf that a facet crosses, and in a child of it that none crosses.
+    let paths: [&[u8]; 4] = [&[0, 7, 0], &[7, 7], &[0, 0, 7], &[0, 0, 7, 7]];
+    let expected = [inside, outside, Position::Near, Position::Near];
+    assert_eq!(positions(4, "[]", &paths), expected);
+    // Seeds decide, so that rays are not asked, even if the body is open.
+    assert_eq!(positions(4, "[[2.5, 2.5, 2.5]]", &paths), expected);
+    let open = positions(3, "[[2.5, 2.5, 2.5]]", &paths[..2]);
+    assert_eq!(open, [inside, inside]);
+}
+
+#[test]
+fn a_band_wider_than_the_root_leaves_nothing_to_check() {
+    let case = tetrahedron(4, "[]");
+    let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+    let space = Space::new(&terms, &facets, &case.facets_lattice);
+    let tree = Tree::of_words(&contract::testing::words_of(|o| o.level < 2));
+    for (band_cells, was_run) in [(0.0, true), (8.0, false)] {
+        let survey = Survey { tree: &tree, space: &space, band_cells };
+        assert_eq!(
+            [survey.check_sides().was_run(), survey.check_complete().was_run()],
+            [was_run; 2]
+        );
+    }
+}
+
+#[test]
+fn places_within_the_band_are_not_judged() {
+    let case = tetrahedron(4, "[]");
+    let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+    let space = Space::new(&terms, &facets, &case.facets_lattice);
+    let words = contract::testing::words_of(|o| o.level < 3);
+    let tree = Tree::of_words(&words);
+    for band_cells in [0.0, 0.5, 1.0, 1.5] {
+        // A cell has edge 1.
+        let band = (band_cells * (UNITS_PER_EDGE / 8) as f64) as i64;
+        let is_beyond = |word: &&u64| {
+            let (low, high) = word::octant(**word).bounds();
+            let (low, high) = (low.map(|c| c - band), high.map(|c| c + band));
+            facets.meeting(&facets.all(), low, high).is_empty()
+        };
+        let expected = words.iter().filter(is_beyond).count() as u64;
+        let survey = Survey { tree: &tree, space: &space, band_cells };
+        assert_eq!(survey.check_complete().examined, expected, "{band_cells}");
+        assert!((1..512).contains(&expected), "{expected}");
+        let findings = survey.check_complete().findings;
+        assert!(!findings.is_empty(), "{band_cells}");
+        for detail in findings.iter().map(|finding| &finding.detail) {
+            let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
+            assert!(words.iter().any(names), "{detail}");
+        }
+    }
+}
+
+/// Leaves of edge 1 with the sides of the components, and of which kind they are.
+fn labelled(space: &Space) -> Vec<u64> {
+    let side = |octant: &Octant| match space.position(*octant) {
+        Position::On(side, _) => Some(side),
+        Position::Near => Some(Side::Crossing),
+        Position::Undecided => Some(Side::Outside),
+    };
+    contract::testing::words_with_sides(|o| o.level < 3, side)
+}
+
+#[test]
+fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_are_counted() {
+    for (count, undecided) in [(4, false), (3, true)] {
+        let case = tetrahedron(count, "[]");
+        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let mut words = labelled(&space);
+        // Of the largest octant around the leaf that no facet meets.
+        let position = |w: &u64| {
+            let around = (0..=3).map(|level| word::octant(*w).ancestor(level));
+            let is_free = |octant: &Octant| {
+                let (low, high) = octant.bounds();
+                facets.meeting(&facets.all(), low, high).is_empty()
+            };
+            around.into_iter().find(is_free).map_or(Position::Near, |o| space.position(o))
+        };
+        let count =
+            |of: &dyn Fn(Position) -> bool| words.iter().filter(|w| of(position(w))).count() as u64;
+        let judged = count(&|position| matches!(position, Position::On(..)));
+        let not_judged = count(&|position| position == Position::Undecided);
+        assert_eq!(not_judged > 0, undecided);
+        let check = |words: &[u64]| {
+            let tree = Tree::of_words(words);
+            Survey { tree: &tree, space: &space, band_cells: 0.0 }.check_sides()
+        };
+        let note = format!(
+            "leaves beyond 0 cells from the geometry; {not_judged} are not judged, because their rays disagree"
+        );
+        let result = check(&words);
+        assert_eq!((result.findings_total, result.examined, &result.note), (0, judged, &note));
+        let far = words.iter().position(|w| matches!(position(w), Position::On(..))).unwrap();
+        words[far] ^= 1;
+        let (result, leaf) = (check(&words), terms.root.describe(&word::octant(words[far])));
+        let expected = format!("the inside leaf {leaf} is in a component that is outside");
+        assert_eq!((result.findings_total, &result.findings[0].detail), (1, &expected));
+    }
+}
+
+#[test]
+fn a_hole_that_the_geometry_crosses_is_a_finding_if_the_band_has_no_width() {
+    for keep_crossing in [true, false] {
+        let case = Case { keep_crossing, ..tetrahedron(4, "[]") };
+        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
+        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let mut words = labelled(&space);
+        words.retain(|w| w & 3 != Side::Outside as u64);
+        let inside = words.iter().filter(|&w| w & 3 == Side::Inside as u64).count() as u64;
+        let crossing = |w: &u64| w & 3 == Side::Crossing as u64;
+        let lost = words.remove(words.iter().position(crossing).unwrap());
+        let check = |words: &[u64], band_cells| {
+            let tree = Tree::of_words(words);
+            let result = Survey { tree: &tree, space: &space, band_cells }.check_complete();
+            let first = result.findings.first().map(|finding| finding.detail.clone());
+            (first, result.findings_total, result.examined)
+        };
+        let hole = |w| format!("the mesh has a hole: {}", terms.root.describe(&word::octant(w)));
+        let (first, findings, examined) = check(&words, 0.0);
+        assert_eq!((first.is_some(), findings), (keep_crossing, u64::from(keep_crossing)));
+        assert!(!keep_crossing || first == Some(hole(lost)));
+        // The leaves within, the octants without leaves around the body, and the hole.
+        assert!(examined > inside + findings, "{examined}");
+        assert_eq!((check(&words, 0.1).0, check(&words, 0.1).1), (None, 0));
+        let at = words.iter().position(|w| w & 3 == Side::Inside as u64).unwrap();
+        let lost = words.remove(at);
+        let (first, findings, same) = check(&words, 0.0);
+        assert_eq!((findings, same), (1 + u64::from(keep_crossing), examined));
+        assert!(keep_crossing || first == Some(hole(lost)));
+    }
+}
+
+#[test]
+fn without_a_facet_a_place_is_undecided_where_rays_disagree() {
+    // The component of the far field reaches into the body, where the rays towards three sides hit facets.
+    let far = Position::On(Side::Outside, false);
+    assert_eq!(positions(3, "[]", &[&[0, 7, 0], &[7, 7]]), [Position::Undecided, far]);
+}
