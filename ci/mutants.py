@@ -87,7 +87,10 @@ def refused(reported, tree):
         if not isinstance(message, dict) or message.get("level") != "error" or not message.get("spans"):
             continue
         found = set()
-        for span in sorted(message["spans"], key=lambda span: not span["is_primary"]):
+        spans = sorted(message["spans"], key=lambda span: not span["is_primary"])
+        for span in spans:
+            if span.get("expansion"):  # An error in a macro of another crate is where the macro is used.
+                spans.append(span["expansion"]["span"])
             file = span["file_name"]
             if file not in lines:
                 current, lines[file] = 0, [0]

@@ -1,7 +1,7 @@
 //! A binary tree of bounding boxes over facets.
 //!
 //! Facets are sorted along the Morton curve of their centres, after a class if there are classes. A node with more
-//! than `GROUP` facets is split where the highest bit changes in which their codes differ, so that the centres of a node are within
+//! than `GROUP` facets, or with facets that are far apart, is split where the highest bit changes in which their codes differ, so that the centres of a node are within
 //! one cell of the curve; nodes of equal numbers of facets would contain jumps of the curve, and be many times larger.
 
 #[cfg(test)]
@@ -18,6 +18,10 @@ use super::facets::{is_degenerate, normal};
 
 /// Maximum number of facets per leaf of the tree.
 pub const GROUP: usize = 8;
+
+/// A leaf of several facets is larger than the largest of them by at most this factor: few facets that are far apart, such as those
+/// of a class that is rare, would be near all others.
+const SPREAD_MAX: i64 = 6;
 
 /// The extent of some facets.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +48,11 @@ impl Bounds {
             low: std::array::from_fn(|a| self.low[a].min(other.low[a])),
             high: std::array::from_fn(|a| self.high[a].max(other.high[a])),
         }
+    }
+
+    /// The sum of the lengths of the edges.
+    fn size(&self) -> i64 {
+        (0..3).map(|a| i64::from(self.high[a]) - i64::from(self.low[a])).sum()
     }
 
     /// Whether the closed boxes share a point.
@@ -130,8 +139,9 @@ impl Boxes {
         let i = self.nodes.len();
         let members = range.start as u32..range.end as u32;
         self.nodes.push(Node { bounds: Bounds::EMPTY, members, second: None });
-        let bounds = if range.len() <= GROUP {
-            self.bounds[range].iter().fold(Bounds::EMPTY, |all, b| all.union(b))
+        let leaf = (range.len() <= GROUP).then(|| &self.bounds[range.clone()]);
+        let bounds = if let Some(bounds) = leaf.and_then(bounds_of_leaf) {
+            bounds
         } else {
             let bit = (keys[range.start] ^ keys[range.end - 1]).ilog2();
             let split =
@@ -195,6 +205,13 @@ impl Boxes {
             }
         }
     }
+}
+
+/// The bounds of some facets; none if they are too far apart for a leaf.
+fn bounds_of_leaf(facets: &[Bounds]) -> Option<Bounds> {
+    let bounds = facets.iter().fold(Bounds::EMPTY, |all, b| all.union(b));
+    let largest = facets.iter().map(Bounds::size).max().unwrap_or(0);
+    (facets.len() < 2 || bounds.size() <= SPREAD_MAX * largest).then_some(bounds)
 }
 
 fn members(node: &Node) -> Range<usize> {

@@ -38,7 +38,7 @@ pub fn size(points: &[Point]) -> Size {
     }
     let v = far.map(|x| x / height);
     let flat = points.iter().map(|p| [dot(sub(*p, from), u), dot(sub(*p, from), v)]).collect();
-    Size { diameter, width: width_of_hull(&hull(flat)) }
+    Size { diameter, width: width_of_hull(&hull(flat), diameter) }
 }
 
 /// The two points farthest apart.
@@ -94,21 +94,20 @@ fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     hull
 }
 
-/// The least distance of two parallel lines that enclose a convex polygon; one of them contains an edge.
-fn width_of_hull(hull: &[[f64; 2]]) -> f64 {
-    let n = hull.len();
-    if n < 3 {
-        return 0.0;
-    }
+/// The least distance of two parallel lines that enclose a convex polygon; one of them contains an edge. Of more than 1024 vertices,
+/// only some are used, evenly spread.
+fn width_of_hull(hull: &[[f64; 2]], diameter: f64) -> f64 {
+    let vertices: Vec<_> = hull.iter().step_by(hull.len().div_ceil(POINTS_EXACT)).collect();
     let mut least = f64::INFINITY;
-    let mut far = 1;
-    for i in 0..n {
-        let (p, q) = (hull[i], hull[(i + 1) % n]);
-        // The farthest vertex advances with the edge.
-        while turn(p, q, hull[(far + 1) % n]) > turn(p, q, hull[far]) {
-            far = (far + 1) % n;
+    for (i, &p) in vertices.iter().enumerate() {
+        let q = vertices[(i + 1) % vertices.len()];
+        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        // The direction of a shorter edge is a rounding error.
+        if length > 1e-9 * diameter {
+            let heights = vertices.iter().map(|r| turn(*p, *q, **r) / length);
+            let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
+            least = least.min(high - low);
         }
-        least = least.min(turn(p, q, hull[far]) / (q[0] - p[0]).hypot(q[1] - p[1]));
     }
     least
 }
@@ -211,6 +210,14 @@ mod tests {
 
     fn turn_of(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
         (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    }
+
+    #[test]
+    fn a_rim_with_three_points_on_a_line_is_as_wide_as_the_others_are_far_from_it() {
+        let flat = [[-3, -6], [-8, 4], [-2, -8], [4, 4], [6, -8], [-7, 2]];
+        let rim = size(&flat.map(|[x, y]| [f64::from(x), f64::from(y), 3.0]));
+        // Of (-8, 4), (-7, 2) and (-2, -8), from (4, 4).
+        assert!((rim.width - 24.0 / 5.0f64.sqrt()).abs() < 1e-9, "{rim:?}");
     }
 
     #[test]

@@ -4,11 +4,23 @@ use proptest::prelude::*;
 fn facet() -> impl Strategy<Value = FacetLattice> {
     let corner = || prop::array::uniform3(-50i64..50);
     let any = prop::array::uniform3(corner());
-    prop_oneof![9 => any, 1 => (corner(), corner()).prop_map(|(a, b)| [a, b, a])]
+    let small = (corner(), prop::array::uniform3(prop::array::uniform3(-2i64..2)))
+        .prop_map(|(at, corners)| corners.map(|v| [0, 1, 2].map(|a| at[a] + v[a])));
+    prop_oneof![5 => any, 4 => small, 1 => (corner(), corner()).prop_map(|(a, b)| [a, b, a])]
 }
 
 fn facets() -> impl Strategy<Value = Vec<FacetLattice>> {
     prop::collection::vec(facet(), 1..80)
+}
+
+/// Whether facets are within six times the largest of them, by the sums of the edges of bounding boxes.
+fn is_compact(facets: &[Bounds]) -> bool {
+    let end =
+        |f: fn(&Bounds, usize) -> i32| (0..3).map(move |a| facets.iter().map(move |b| f(b, a)));
+    let low = end(|b, a| b.low[a]).map(|ends| ends.min().unwrap());
+    let high = end(|b, a| b.high[a]).map(|ends| ends.max().unwrap());
+    let size = |b: &Bounds| (0..3).map(|a| b.high[a] - b.low[a]).sum::<i32>();
+    high.sum::<i32>() - low.sum::<i32>() <= 6 * facets.iter().map(size).max().unwrap()
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -30,6 +42,7 @@ proptest! {
             let mut at = 0;
             for (_, members) in boxes.groups() {
                 prop_assert!(members.start == at && members.len() <= GROUP);
+                prop_assert!(members.len() < 2 || is_compact(&boxes.bounds[members.clone()]));
                 at = members.end;
             }
             prop_assert_eq!(at, boxes.facets.len());
@@ -46,7 +59,8 @@ proptest! {
                 if let Some([a, b]) = boxes.children(node) {
                     let [a, b] = [a, b].map(|child| boxes.members(child));
                     prop_assert!(a.start == members.start && a.end == b.start && b.end == members.end);
-                    prop_assert!(!a.is_empty() && !b.is_empty() && members.len() > GROUP);
+                    prop_assert!(!a.is_empty() && !b.is_empty());
+                    prop_assert!(members.len() > GROUP || !is_compact(&boxes.bounds[members]));
                 }
             }
         }
