@@ -47,26 +47,26 @@ fn on_edge(tree: &Tree, neighbourhood: &Neighbourhood, axis: usize, sides: [u8; 
         let facing = |a: usize, side: u8| u8::from((offset[a] == 0) == (side == 1)) << a;
         *neighbour = (neighbourhood.at_offset(offset), facing(u, sides[0]) | facing(v, sides[1]));
     }
-    along(tree, neighbours, axis, neighbourhood.octant.level)
+    along(tree, neighbours, axis)
 }
 
 /// Number of nodes in the interior of part of an edge. Each of the three octants around it is given with the
 /// digit of its first child along the edge.
-fn along(tree: &Tree, octants: [(Handle, u8); 3], axis: usize, level: u8) -> u64 {
+fn along(tree: &Tree, octants: [(Handle, u8); 3], axis: usize) -> u64 {
     if !octants.iter().any(|(handle, _)| handle.is_node()) {
         return 0;
     }
+    // Which children are leaves does not depend on the level, so any level serves.
     let half = |which: u8| {
-        let child = |(handle, digit): (Handle, u8)| {
-            (tree.child(handle, digit | which << axis, level), digit)
-        };
-        along(tree, octants.map(child), axis, level + 1)
+        let child =
+            |(handle, digit): (Handle, u8)| (tree.child(handle, digit | which << axis, 0), digit);
+        along(tree, octants.map(child), axis)
     };
     // The midpoint is a node if it is a corner of a leaf. It is none if all leaves around it were deleted.
     let is_node = octants.iter().filter(|(handle, _)| handle.is_node()).any(|&(handle, digit)| {
         let (low, high) = (digit, digit | 1 << axis);
-        has_leaf_in_corner(tree, tree.child(handle, low, level), high)
-            || has_leaf_in_corner(tree, tree.child(handle, high, level), low)
+        has_leaf_in_corner(tree, tree.child(handle, low, 0), high)
+            || has_leaf_in_corner(tree, tree.child(handle, high, 0), low)
     });
     u64::from(is_node) + half(0) + half(1)
 }

@@ -84,6 +84,8 @@ mod tests {
         let (mesh, mut base) = (leaf_set(vec![fine]), leaf_set(vec![coarse]));
         let result = check(&Subject::new(&case, &mesh).with_base(&base));
         assert_eq!((result.examined, result.findings_total), (64 + 8, 0));
+        let spacing = crate::checks::spacing::check(&Subject::new(&case, &mesh).with_base(&base));
+        assert_eq!(spacing.examined, 64 + 8);
         base.parts[0].swap(2, 3);
         let result = check(&Subject::new(&case, &mesh).with_base(&base));
         let [finding] = &result.findings[..] else { panic!("{result}") };

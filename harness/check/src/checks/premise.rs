@@ -130,6 +130,8 @@ mod tests {
             of(&uniform, None, &terms(2)),
             ["", "", "", surface, "", "", side, level, level]
         );
+        let sides: Vec<u64> = words_of(|o| o.level < 1).iter().map(|w| w | w >> 61 & 1).collect();
+        assert_eq!(of(&Tree::of_words(&sides), None, &terms(2))[6], "");
         let thin = "with n = 1 the layers are the 2:1 balance, which `balance` checks";
         assert_eq!(of(&crossing, None, &terms(1)), ["", "", "", "", "", "", side, level, thin]);
         let deletes = Terms { keep_crossing: false, ..terms(1) };

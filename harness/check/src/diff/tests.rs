@@ -175,4 +175,5 @@ fn a_part_larger_than_the_buffer_is_read_to_its_end() {
     assert_eq!((same.same_leaves(), same.leaves), (true, words.len() as u64));
     let found = compared(b.path());
     assert_eq!((found.octants, found.contradictions.len()), (vec![level_3(511)], 0));
+    assert_eq!(found.rules, ["section 4 (side): give the case file (--case) to decide it"]);
 }

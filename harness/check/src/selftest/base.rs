@@ -142,4 +142,22 @@ mod tests {
         };
         assert_eq!(Side::ALL.map(split), [false; 3]);
     }
+
+    /// Octant 0 has no crossing leaf, and the one in octant 1 is finer than the surface.
+    #[test]
+    fn eight_leaves_of_the_surface_level_with_a_crossing_one_are_merged() {
+        let text =
+            "spacing_min = 2.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
+        let facet = [[0.5, 4.5, 0.5], [1.5, 4.5, 0.5], [0.5, 5.5, 0.5]];
+        let case = Case::from_parts(text, vec![facet]).unwrap();
+        let is_crossing = |o: &Octant| ["1.0.3", "2.4", "2"].contains(&&*o.path());
+        let side = |o: &Octant| Some(if is_crossing(o) { Side::Crossing } else { Side::Outside });
+        let words = |split: &'static [&'static str]| {
+            words_with_sides(|o| o.level == 0 || split.contains(&&*o.path()), side)
+        };
+        let base = leaf_set(vec![words(&["0", "1", "1.0", "2"])]);
+        let correct = SelftestCase { case, mesh: leaf_set(vec![]), base };
+        let merged = coarse_at_surface(&correct).unwrap();
+        assert_eq!(merged.base.words, words(&["0", "1", "1.0"]));
+    }
 }

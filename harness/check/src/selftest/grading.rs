@@ -261,15 +261,15 @@ mod tests {
     /// Octant 0.0 is two cells of level 3 away from a crossing leaf of that level, the surface's, and touches leaves of level 2.
     #[test]
     fn the_surroundings_of_an_octant_end_at_the_thickness_of_its_layers() {
-        let around = |n: u32| {
+        let around_with = |spacing: f64, crossing: &str, n: u32| {
             let text = format!(
-                "spacing_min = 1.0\nlayer_cells_min = {n}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
+                "spacing_min = {spacing:?}\nlayer_cells_min = {n}\nroot = {{ origin = [0.0, 0.0, 0.0], edge = 8.0 }}\n"
             );
             let facet = [[4.5, 0.5, 0.5], [4.6, 0.5, 0.5], [4.5, 0.6, 0.5]];
             let case = Case::from_parts(&text, vec![facet]).unwrap();
             let words = words_with_sides(
                 |o| ["root", "0", "0.0", "1", "1.0"].contains(&&*o.path()),
-                |o| Some(if o.path() == "1.0.0" { Side::Crossing } else { Side::Outside }),
+                |o| Some(if o.path() == crossing { Side::Crossing } else { Side::Outside }),
             );
             let correct =
                 SelftestCase { case, mesh: leaf_set(vec![words]), base: leaf_set(vec![]) };
@@ -277,6 +277,9 @@ mod tests {
                 surroundings(&correct, 0);
             (touching, within_layer, in_surface_layer)
         };
+        // An octant of the surface's level is not too coarse.
+        assert!(!around_with(2.0, "1.2", 4).2);
+        let around = |n| around_with(1.0, "1.0.0", n);
         assert_eq!([around(2), around(3), around(4)], [(2, 2, false), (2, 3, false), (2, 3, true)]);
     }
 }

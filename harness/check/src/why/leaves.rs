@@ -206,7 +206,7 @@ mod tests {
         let side = |o: &Octant| match o.path().len() % 3 {
             _ if o.corner == [5 << 15; 3] => Some(Side::Crossing),
             0 => Some(Side::Outside),
-            _ => (o.corner[1] % 3 > 0).then_some(Side::Inside),
+            _ => (!o.corner[1].is_multiple_of(3)).then_some(Side::Inside),
         };
         let words = words_with_sides(
             |o| {

@@ -19,6 +19,8 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
     for split in &answer.splits {
         let cause = split.cause.as_ref();
         prop_assert!(cause.is_some(), "{answer}");
+        let (is_crossed, facets) = cause.map_or((false, 0), |c| (c.is_crossed, c.facets_count));
+        prop_assert_eq!(is_crossed, facets > 0, "{}", answer);
         let mut octant = split.octant.octant;
         let mut is_source = false;
         for link in &split.links {
@@ -164,6 +166,10 @@ fn a_directory_alone_explains_the_same_sizes() {
             links.map(|links| links.map(|link| link.leaf.octant).collect()).collect()
         };
         assert_eq!(links(with), links(without));
+        let crossed = |answer: &Answer| -> Vec<bool> {
+            answer.splits.iter().map(|split| split.cause.as_ref().unwrap().is_crossed).collect()
+        };
+        assert_eq!(crossed(with), crossed(without));
         assert!(with.left_out.is_empty() && without.left_out[0].contains("--case"), "{without}");
     }
 }

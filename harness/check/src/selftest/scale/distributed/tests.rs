@@ -71,3 +71,15 @@ fn thirds_are_as_long_as_each_other_up_to_one_word() {
     assert_eq!([lengths(8), lengths(3), lengths(0)], [[2, 3, 3], [1, 1, 1], [0; 3]]);
     assert_eq!(thirds(&words).concat(), words);
 }
+
+#[test]
+fn the_window_of_a_mesh_of_one_leaf_is_the_root() {
+    let place = tempfile::tempdir().unwrap();
+    let mesh = place.path().join("given");
+    std::fs::create_dir(&mesh).unwrap();
+    leaf_set(vec![words_of(|_| false)]).write(&mesh).unwrap();
+    let source = Source { name: "given".into(), mesh, base: None };
+    let original = DistributedMesh::new(&source, place.path()).unwrap();
+    let window = original.window(0).unwrap().unwrap();
+    assert_eq!(window.correct.mesh.words, [0]);
+}
