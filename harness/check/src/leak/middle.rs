@@ -57,7 +57,8 @@ impl Near<'_> {
 /// around the point before it.
 fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
     let start = clearance.at(from, f64::INFINITY);
-    let triangles = clearance.near(from, REACH * start, FACETS_FEW);
+    let triangles = clearance.near(from, REACH * start, f64::INFINITY, FACETS_FEW);
+    let triangles = triangles.unwrap_or_default();
     let mut near = Near { clearance, centre: from, triangles, obstacle: 0 };
     let [u, v] = plane(normal);
     let step_min = PRECISION / 2.0 * start;
@@ -149,7 +150,7 @@ impl Passage<'_> {
             return;
         }
         let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
-        let clearance = self.clearance.at(at, from.bound(at));
+        let clearance = self.clearance.at(at, from.bound(at).min(to.bound(at)));
         let middle = self.moved(Spot { at, clearance, step: f64::INFINITY, apart: 0.0 }, gap);
         self.fill(from, middle, halvings - 1, path);
         path.push(middle);

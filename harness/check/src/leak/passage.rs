@@ -18,6 +18,9 @@ use contract::lattice::UNITS_PER_EDGE;
 
 /// Openings that are measured at most.
 const OPENINGS_MAX: usize = 4;
+/// Open space has at least this clearance, in radii of the balls that may pass. It is not measured, because a search is slow
+/// where many facets are almost equally near.
+const WIDE: f64 = 1.5;
 /// Another opening is of interest if it is wider by this factor.
 const WIDER: f64 = 1.005;
 
@@ -43,6 +46,8 @@ pub fn widest(
     let inner_goal = departure.last().map_or(Goal::Far, |&end| Goal::Place(end));
     let mut best: Option<Path> = None;
     let (mut memory, mut scratch) = (Memory::default(), Scratch::default());
+    // No path is wider than the first.
+    let mut open = f64::INFINITY;
     for _ in 0..OPENINGS_MAX {
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let wanted = WIDER * measured;
@@ -58,11 +63,12 @@ pub fn widest(
         if radius <= wanted {
             break;
         }
+        open = open.min(WIDE * radius);
         let inner = field.shortened(&route, narrowest, inner_goal, &mut memory, stop)?;
         let on = departure.iter().rev().skip(1);
         let whole: Vec<u32> = approach.iter().chain(&inner[1..]).chain(on).copied().collect();
         let approaches = [approach.len() - 1, departure.len().saturating_sub(1)];
-        let route = Route { leaves: &whole, approaches, radius, wanted };
+        let route = Route { leaves: &whole, approaches, radius, wanted, open };
         let path = Path::through(leaves, &route, goal, &clearance, &mut scratch, stop)?;
         let is_end = path.is_narrowest_at_end();
         field.close(&path, narrowest);

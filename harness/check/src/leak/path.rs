@@ -41,6 +41,8 @@ pub struct Route<'a> {
     pub approaches: [usize; 2],
     /// No ball of a greater radius passes.
     pub radius: f64,
+    /// Open space: greater clearances are not measured in grids.
+    pub open: f64,
     /// The narrowest place is found to full precision only if its ball's radius may be at least this.
     pub wanted: f64,
 }
@@ -85,7 +87,7 @@ impl Path {
             if path.is_narrowest_at_end() || is_precise || is_fine || bound < route.wanted {
                 break;
             }
-            let Some(found) = path.widen(step, clearance, scratch, stop)? else { break };
+            let Some(found) = path.widen(step, route.open, clearance, scratch, stop)? else { break };
             if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
                 path.centre(bound.min(route.radius), clearance);
                 is_centred = true;
@@ -96,6 +98,7 @@ impl Path {
             bound = bound.min(found.least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
+        path.measure_open(route.open, clearance);
         Ok(path)
     }
 
@@ -142,6 +145,17 @@ impl Path {
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
     }
 
+    /// Measures the clearances of points in open space.
+    fn measure_open(&mut self, open: f64, clearance: &Clearance) {
+        for i in 0..self.spots.len() {
+            if self.spots[i].clearance >= open {
+                let at = self.spots[i].at;
+                let before = i.checked_sub(1).map(|before| self.spots[before].bound(at));
+                self.spots[i].clearance = clearance.at(at, before.unwrap_or(f64::INFINITY));
+            }
+        }
+    }
+
     /// Whether an end is among the points in a cube around the narrowest one.
     fn reaches_end(&self, half: f64) -> bool {
         let (first, last) = self.surroundings(half);
@@ -171,6 +185,7 @@ impl Path {
     fn widen(
         &mut self,
         step: f64,
+        open: f64,
         clearance: &Clearance,
         Scratch { known, memory }: &mut Scratch,
         stop: &dyn Fn() -> bool,
@@ -179,7 +194,7 @@ impl Path {
         let (first, last) = self.surroundings(f64::from(STEPS) * step);
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
         known.clear(grid.count());
-        let mut distances = Distances::new(&grid, clearance);
+        let mut distances = Distances::new(&grid, clearance, open);
         let mut width = |place: u32, near: u32| {
             known.get_or_insert_with(place, |known| {
                 let bound = match known[near as usize] {

@@ -99,7 +99,7 @@ fn assert_widened(facets: &[FacetLattice]) {
     assert_eq!(path.throat().clearance, 150.0);
     let ends = [path.spots[0], path.spots[16]];
     let (step, mut scratch) = (80.0, Scratch::default());
-    let widest = path.widen(step, &clearance, &mut scratch, &|| false).unwrap().unwrap();
+    let widest = path.widen(step, f64::INFINITY, &clearance, &mut scratch, &|| false).unwrap().unwrap();
     assert!(!widest.is_at_end);
     path.narrowest = path.find_narrowest();
     let throat = path.throat();
@@ -119,7 +119,7 @@ fn assert_widened(facets: &[FacetLattice]) {
     let blocked =
         [spot(&[-400.0, 2000.0, 0.0]), spot(&[0.0, 2000.0, 0.0]), spot(&[400.0, 2000.0, 0.0])];
     let mut blocked = Path { spots: blocked.to_vec(), narrowest: 1, approaches: [0, 0] };
-    assert!(blocked.widen(step, &clearance, &mut scratch, &|| false).unwrap().is_none());
+    assert!(blocked.widen(step, f64::INFINITY, &clearance, &mut scratch, &|| false).unwrap().is_none());
 }
 
 /// The sides of a duct along x, 1000 wide.
