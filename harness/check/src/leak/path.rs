@@ -89,7 +89,7 @@ impl Path {
             }
             let Some(found) = path.widen(step, route.open, clearance, scratch, stop)? else { break };
             if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
-                path.centre(bound.min(route.radius), clearance);
+                path.centre(bound.min(route.radius), route.open, clearance);
                 is_centred = true;
                 continue;
             }
@@ -172,10 +172,10 @@ impl Path {
     }
 
     /// Moves points less than `below` from the facets to the middle of a passage, unless that makes the path narrower.
-    fn centre(&mut self, below: f64, clearance: &Clearance) {
+    fn centre(&mut self, below: f64, open: f64, clearance: &Clearance) {
         let (first, last) = self.inner();
         let least = |spots: &[Spot]| spots.iter().map(Spot::passing).fold(f64::INFINITY, f64::min);
-        let centred = middle::centred(&self.spots[first..=last], below, clearance);
+        let centred = middle::centred(&self.spots[first..=last], below, open, clearance);
         if least(&centred) > least(&self.spots[first..=last]) {
             self.spots.splice(first..=last, centred);
         }

@@ -150,17 +150,17 @@ fn a_path_through_a_long_passage_is_moved_to_its_middle_unless_it_is_there() {
         approaches: [0, 0],
     };
     let mut path = through(300.0, 600.0);
-    path.centre(501.0, &clearance);
+    path.centre(501.0, f64::INFINITY, &clearance);
     assert!(
         path.spots.len() > 3 && path.spots.iter().all(|spot| spot.clearance > 498.0),
         "{path:?}"
     );
     let mut path = through(500.0, 500.0);
-    path.centre(501.0, &clearance);
+    path.centre(501.0, f64::INFINITY, &clearance);
     assert_eq!(path.spots, through(500.0, 500.0).spots);
     // An approach stays where it is.
     let mut path = Path { approaches: [1, 0], ..through(300.0, 600.0) };
-    path.centre(501.0, &clearance);
+    path.centre(501.0, f64::INFINITY, &clearance);
     let (approach, rest) = path.spots.split_first().expect("points");
     assert_eq!(*approach, through(300.0, 600.0).spots[0]);
     assert!(rest.len() > 2 && rest.iter().all(|spot| spot.clearance > 498.0), "{rest:?}");
