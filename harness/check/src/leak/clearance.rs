@@ -3,7 +3,7 @@
 use contract::lattice::FacetLattice;
 
 use crate::geometry::boxes::{Bounds, Boxes};
-use crate::geometry::distance::{self, Prepared, length, sub};
+use crate::geometry::distance::{self, Prepared};
 
 /// Exceeds the rounding of a distance, in lattice units.
 pub const ROUNDING: f64 = 1.0;
@@ -25,11 +25,6 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// Upper bound of the clearance at another point.
-    pub fn bound(&self, at: Point) -> f64 {
-        self.clearance + length(sub(at, self.at))
-    }
-
     /// Radius of a ball that passes from this point to the next ones: a facet that leaves this clearance at two points of a grid can
     /// be nearer between them.
     pub fn passing(&self) -> f64 {

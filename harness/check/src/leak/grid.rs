@@ -63,8 +63,8 @@ impl<'a> Distances<'a> {
         Self { grid, clearance, open, triangles: triangles.unwrap_or_default(), is_shared, blocks }
     }
 
-    /// Distance from a point to the nearest facet, or `open` if it is greater; `bound` is an upper bound that the caller knows.
-    pub fn at(&mut self, place: u32, bound: f64) -> f64 {
+    /// Distance from a point to the nearest facet, or `open` if it is greater.
+    pub fn at(&mut self, place: u32) -> f64 {
         let indices = Grid::indices(place).map(|i| i / BLOCK);
         let [x, y, z] = indices;
         let block = ((z * BLOCKS + y) * BLOCKS + x) as usize;
@@ -77,7 +77,7 @@ impl<'a> Distances<'a> {
                 let triangles = near.iter().map(|&(i, from)| (&self.triangles[i as usize].0, from));
                 nearest(triangles, point, length(sub(point, *centre)), 0.0).unwrap_or(0.0).min(self.open)
             }
-            _ => self.clearance.at(point, bound.min(self.open)).min(self.open),
+            _ => self.clearance.at(point, self.open).min(self.open),
         }
     }
 
@@ -188,7 +188,7 @@ mod tests {
             let mut distances = Distances::new(&grid, &clearance, open);
             for place in (0..grid.count() as u32).step_by(97) {
                 let expected = clearance.at(grid.position(place), f64::INFINITY).min(open);
-                prop_assert_eq!(distances.at(place, f64::INFINITY), expected);
+                prop_assert_eq!(distances.at(place), expected);
             }
         }
     }

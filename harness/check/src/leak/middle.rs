@@ -39,10 +39,10 @@ struct Near<'a> {
 }
 
 impl Near<'_> {
-    /// The clearance at a place if it is greater than `least`; `bound` is an upper bound that the caller knows.
-    fn beyond(&mut self, at: Point, least: f64, bound: f64) -> Option<f64> {
+    /// The clearance at a place if it is greater than `least`.
+    fn beyond(&mut self, at: Point, least: f64) -> Option<f64> {
         let Some((obstacle, _)) = self.triangles.get(self.obstacle) else {
-            return Some(self.clearance.at(at, bound)).filter(|&clearance| clearance > least);
+            return Some(self.clearance.at(at, f64::INFINITY)).filter(|&clearance| clearance > least);
         };
         if obstacle.squared(at) <= least * least {
             return None;
@@ -74,7 +74,7 @@ fn across(from: Point, normal: Point, open: f64, clearance: &Clearance) -> Spot 
             let (sin, cos) = angle.sin_cos();
             let at = std::array::from_fn(|a| before.at[a] + step * (cos * u[a] + sin * v[a]));
             if length(sub(at, from)) <= REACH * start
-                && let Some(clearance) = near.beyond(at, best.clearance, before.bound(at))
+                && let Some(clearance) = near.beyond(at, best.clearance)
             {
                 best = Spot { at, clearance, step: step_min, apart: 0.0 };
             }
@@ -152,7 +152,7 @@ impl Passage<'_> {
             return;
         }
         let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
-        let clearance = self.clearance.at(at, from.bound(at).min(to.bound(at)));
+        let clearance = self.clearance.at(at, f64::INFINITY);
         let middle = self.moved(Spot { at, clearance, step: f64::INFINITY, apart: 0.0 }, gap);
         self.fill(from, middle, halvings - 1, path);
         path.push(middle);

@@ -147,12 +147,8 @@ impl Path {
 
     /// Measures the clearances of points in open space.
     fn measure_open(&mut self, open: f64, clearance: &Clearance) {
-        for i in 0..self.spots.len() {
-            if self.spots[i].clearance >= open {
-                let at = self.spots[i].at;
-                let before = i.checked_sub(1).map(|before| self.spots[before].bound(at));
-                self.spots[i].clearance = clearance.at(at, before.unwrap_or(f64::INFINITY));
-            }
+        for spot in self.spots.iter_mut().filter(|spot| spot.clearance >= open) {
+            spot.clearance = clearance.at(spot.at, f64::INFINITY);
         }
     }
 
@@ -195,13 +191,9 @@ impl Path {
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
         known.clear(grid.count());
         let mut distances = Distances::new(&grid, clearance, open);
-        let mut width = |place: u32, near: u32| {
-            known.get_or_insert_with(place, |known| {
-                let bound = match known[near as usize] {
-                    near if near >= 0.0 => f64::from(near) + 2.0 * step,
-                    _ => f64::INFINITY,
-                };
-                let free = distances.at(place, bound);
+        let mut width = |place: u32, _: u32| {
+            known.get_or_insert_with(place, || {
+                let free = distances.at(place);
                 // Balls at neighbours must overlap, so that no facet is between them.
                 if free > step { free as f32 } else { -1.0 }
             })
@@ -267,9 +259,9 @@ impl Known {
         }
     }
 
-    fn get_or_insert_with(&mut self, place: u32, compute: impl FnOnce(&[f32]) -> f32) -> f32 {
+    fn get_or_insert_with(&mut self, place: u32, compute: impl FnOnce() -> f32) -> f32 {
         if self.values[place as usize].is_nan() {
-            self.values[place as usize] = compute(&self.values);
+            self.values[place as usize] = compute();
             self.entered.push(place);
         }
         self.values[place as usize]
@@ -287,15 +279,11 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
     if goal == Goal::Far {
         points.push(nearest_boundary(points[points.len() - 1]));
     }
-    let mut spots: Vec<Spot> = Vec::with_capacity(points.len());
-    for at in points {
-        let bound = spots.last().map_or(f64::INFINITY, |last| last.bound(at));
-        spots.push(Spot {
-            at,
-            clearance: clearance.at(at, bound),
-            step: f64::INFINITY,
-            apart: 0.0,
-        });
-    }
-    spots
+    let spot = |at| Spot {
+        at,
+        clearance: clearance.at(at, f64::INFINITY),
+        step: f64::INFINITY,
+        apart: 0.0,
+    };
+    points.into_iter().map(spot).collect()
 }

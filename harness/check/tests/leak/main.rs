@@ -9,7 +9,7 @@ use check::leak::{LeakError, Question, Watch, answer};
 use contract::case::{Case, Facet};
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
-use openings::{Body, ROTATIONS, bodies, pipe, two_holes};
+use openings::{Body, ROTATIONS, bodies, pipe, torn_sphere, two_holes};
 use std::cell::Cell;
 use std::convert::Infallible;
 
@@ -113,6 +113,23 @@ fn the_answer_about_a_slit_and_a_crack_is_the_expected_text() {
             let text = from_centre(&body.facets, level).to_string();
             assert_text(&text, &format!("tests/leak/expected/{}-{what}.txt", body.name));
         }
+    }
+}
+
+#[test]
+fn the_answer_about_other_openings_is_the_expected_text() {
+    let [hole, _, _, missing] = <[Body; 4]>::try_from(bodies()).unwrap();
+    let turned = |body: Body| body.rotated(ROTATIONS[2]).facets;
+    let all = [
+        ("hole", turned(hole), 6),
+        ("missing-facet", turned(missing), 7),
+        ("pipe", turned(pipe(1.0, 0.13)), 6),
+        ("two-holes", turned(two_holes(0.2, 0.199)), 5),
+        ("torn-sphere", torn_sphere(), 5),
+    ];
+    for (name, facets, level) in all {
+        let text = from_centre(&facets, level).to_string();
+        assert_text(&text, &format!("tests/leak/expected/{name}.txt"));
     }
 }
 
