@@ -48,8 +48,7 @@ impl<'a> Clearance<'a> {
         Self { facets, boxes: (!facets.is_empty()).then(|| Boxes::of_all(facets)) }
     }
 
-    /// Distance from a point to the nearest facet; infinite without facets. `bound` is an upper bound that the caller
-    /// knows, and limits the search.
+    /// Distance from a point to the nearest facet, but no more than `bound` and a lattice unit; infinite if there is neither.
     pub fn at(&self, point: Point, bound: f64) -> f64 {
         // Rounding must not exclude the facet that the bound comes from.
         let mut best = (bound + ROUNDING) * (bound + ROUNDING);
@@ -208,6 +207,13 @@ mod tests {
         prop::collection::vec(facet, 1..60)
     }
 
+    #[test]
+    fn a_facet_between_two_points_of_a_grid_can_be_nearer_than_to_both() {
+        let passing =
+            |clearance, apart| Spot { at: [0.0; 3], clearance, step: 1.0, apart }.passing();
+        assert_eq!([passing(5.0, 0.0), passing(5.0, 8.0), passing(5.0, 11.0)], [5.0, 3.0, 0.0]);
+    }
+
     proptest! {
         #[test]
         fn the_nearest_facet_is_found_among_all(facets in facets(), point in prop::array::uniform3(-99.0f64..4099.0)) {
@@ -217,6 +223,8 @@ mod tests {
             let expected = distances.iter().copied().fold(f64::INFINITY, f64::min);
             prop_assert_eq!(clearance.at(point, f64::INFINITY), expected);
             prop_assert_eq!(clearance.at(point, expected), expected);
+            let below = expected / 2.0;
+            prop_assert!((below..=expected).contains(&clearance.at(point, below)));
             let nearest = clearance.nearest(point).map(|at| distance::length(distance::sub(at, point)));
             prop_assert!(nearest.is_some_and(|found| (found - expected).abs() <= 1e-9 * (1.0 + expected)));
             let within = clearance.facets_within(point, expected * 1.5 + 1.0);

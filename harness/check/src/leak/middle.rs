@@ -42,7 +42,8 @@ impl Near<'_> {
     /// The clearance at a place if it is greater than `least`.
     fn beyond(&mut self, at: Point, least: f64) -> Option<f64> {
         let Some((obstacle, _)) = self.triangles.get(self.obstacle) else {
-            return Some(self.clearance.at(at, f64::INFINITY)).filter(|&clearance| clearance > least);
+            return Some(self.clearance.at(at, f64::INFINITY))
+                .filter(|&clearance| clearance > least);
         };
         if obstacle.squared(at) <= least * least {
             return None;

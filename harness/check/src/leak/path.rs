@@ -87,7 +87,9 @@ impl Path {
             if path.is_narrowest_at_end() || is_precise || is_fine || bound < route.wanted {
                 break;
             }
-            let Some(found) = path.widen(step, route.open, clearance, scratch, stop)? else { break };
+            let Some(found) = path.widen(step, route.open, clearance, scratch, stop)? else {
+                break;
+            };
             if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
                 path.centre(bound.min(route.radius), route.open, clearance);
                 is_centred = true;
