@@ -180,27 +180,31 @@ impl Boxes {
         self.nodes[node].second.map(|second| [node + 1, second.get() as usize])
     }
 
-    /// Depth-first search from the root. `enter` is called with the bounds of a node, and with the positions of its
-    /// facets if the node is a leaf; it returns whether to search the children. Of two children the one with the
-    /// smaller `order` is searched first.
+    /// Depth-first search from the root. `enter` is called with the bounds of a node and their `order`, and with the positions of
+    /// its facets if the node is a leaf; it returns whether to search the children. Of two children the one with the smaller
+    /// `order` is searched first.
     pub fn search(
         &self,
-        mut enter: impl FnMut(&Bounds, Option<Range<usize>>) -> bool,
+        mut enter: impl FnMut(&Bounds, f64, Option<Range<usize>>) -> bool,
         order: impl Fn(&Bounds) -> f64,
     ) {
+        if self.facets.is_empty() {
+            return;
+        }
         // A node has fewer than 128 above it, each of which splits its keys at a lower bit.
-        let mut stack = [0; 128];
-        let mut size = usize::from(!self.facets.is_empty());
+        let mut stack = [(0.0, 0); 128];
+        stack[0].0 = order(self.bounds(0));
+        let mut size = 1;
         while size > 0 {
             size -= 1;
-            let i = stack[size];
+            let (at, i) = stack[size];
             let children = self.children(i);
             let members = children.is_none().then(|| self.members(i));
-            if enter(self.bounds(i), members)
-                && let Some([a, b]) = children
+            if enter(self.bounds(i), at, members)
+                && let Some(children) = children
             {
-                let is_a_first = order(self.bounds(a)) <= order(self.bounds(b));
-                stack[size..size + 2].copy_from_slice(&if is_a_first { [b, a] } else { [a, b] });
+                let [a, b] = children.map(|child| (order(self.bounds(child)), child));
+                stack[size..size + 2].copy_from_slice(&if a.0 <= b.0 { [b, a] } else { [a, b] });
                 size += 2;
             }
         }

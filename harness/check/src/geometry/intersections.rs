@@ -36,7 +36,7 @@ const PAIRS_MAX: usize = 1 << 22;
 pub fn intersections(input: &Input, boxes: &Boxes, first: usize) -> [Finding; 2] {
     let mut pairs: [Vec<(u32, u32)>; 2] = Default::default();
     for (bounds, group) in boxes.groups() {
-        let visit = |node: &Bounds, members: Option<Range<usize>>| {
+        let visit = |node: &Bounds, _, members: Option<Range<usize>>| {
             if !bounds.overlaps(node) {
                 return false;
             }

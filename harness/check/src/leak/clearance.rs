@@ -3,7 +3,7 @@
 use contract::lattice::FacetLattice;
 
 use crate::geometry::boxes::{Bounds, Boxes};
-use crate::geometry::distance::{self, Prepared, length, sub};
+use crate::geometry::distance::{self, Prepared};
 
 /// Exceeds the rounding of a distance, in lattice units.
 pub const ROUNDING: f64 = 1.0;
@@ -25,11 +25,6 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// Upper bound of the clearance at another point.
-    pub fn bound(&self, at: Point) -> f64 {
-        self.clearance + length(sub(at, self.at))
-    }
-
     /// Radius of a ball that passes from this point to the next ones: a facet that leaves this clearance at two points of a grid can
     /// be nearer between them.
     pub fn passing(&self) -> f64 {
@@ -53,8 +48,7 @@ impl<'a> Clearance<'a> {
         Self { facets, boxes: (!facets.is_empty()).then(|| Boxes::of_all(facets)) }
     }
 
-    /// Distance from a point to the nearest facet; infinite without facets. `bound` is an upper bound that the caller
-    /// knows, and limits the search.
+    /// Distance from a point to the nearest facet, but no more than `bound` and a lattice unit; infinite if there is neither.
     pub fn at(&self, point: Point, bound: f64) -> f64 {
         // Rounding must not exclude the facet that the bound comes from.
         let mut best = (bound + ROUNDING) * (bound + ROUNDING);
@@ -90,11 +84,17 @@ impl<'a> Clearance<'a> {
         found
     }
 
-    /// The facets that can be the nearest one of a point at most `radius` from `centre`, with their distances from the centre,
-    /// nearest first; none if they are more than `most`.
-    pub fn near(&self, centre: Point, radius: f64, most: usize) -> Vec<(Prepared, f64)> {
+    /// The facets that can be the nearest one, and nearer than `open`, of a point at most `radius` from `centre`, with their distances
+    /// from the centre, nearest first; `None` if they are more than `most`.
+    pub fn near(
+        &self,
+        centre: Point,
+        radius: f64,
+        open: f64,
+        most: usize,
+    ) -> Option<Vec<(Prepared, f64)>> {
         // The nearest facet of such a point is farther from the centre than the nearest of all by at most twice the radius.
-        let reach = self.at(centre, f64::INFINITY) + 2.0 * radius + ROUNDING;
+        let reach = (self.at(centre, open + radius) + radius).min(open) + radius + ROUNDING;
         let (mut found, mut limit) = (Vec::new(), reach * reach);
         self.within(centre, &mut limit, &mut |squared, facet, limit| {
             found.push((facet, squared.sqrt()));
@@ -104,11 +104,11 @@ impl<'a> Clearance<'a> {
             }
         });
         if found.len() > most {
-            return Vec::new();
+            return None;
         }
         found.sort_by(|a, b| a.1.total_cmp(&b.1));
         let prepared = |(facet, from)| (Prepared::new(&self.triangle(facet)), from);
-        found.into_iter().map(prepared).collect()
+        Some(found.into_iter().map(prepared).collect())
     }
 
     /// A nearest point of the nearest facet.
@@ -147,8 +147,8 @@ impl<'a> Clearance<'a> {
     ) {
         let Some(boxes) = &self.boxes else { return };
         boxes.search(
-            |bounds, members| {
-                if from_box(bounds) >= *limit {
+            |_, from, members| {
+                if from >= *limit {
                     return false;
                 }
                 for i in members.into_iter().flatten() {
@@ -207,6 +207,13 @@ mod tests {
         prop::collection::vec(facet, 1..60)
     }
 
+    #[test]
+    fn a_facet_between_two_points_of_a_grid_can_be_nearer_than_to_both() {
+        let passing =
+            |clearance, apart| Spot { at: [0.0; 3], clearance, step: 1.0, apart }.passing();
+        assert_eq!([passing(5.0, 0.0), passing(5.0, 8.0), passing(5.0, 11.0)], [5.0, 3.0, 0.0]);
+    }
+
     proptest! {
         #[test]
         fn the_nearest_facet_is_found_among_all(facets in facets(), point in prop::array::uniform3(-99.0f64..4099.0)) {
@@ -216,6 +223,8 @@ mod tests {
             let expected = distances.iter().copied().fold(f64::INFINITY, f64::min);
             prop_assert_eq!(clearance.at(point, f64::INFINITY), expected);
             prop_assert_eq!(clearance.at(point, expected), expected);
+            let below = expected / 2.0;
+            prop_assert!((below..=expected).contains(&clearance.at(point, below)));
             let nearest = clearance.nearest(point).map(|at| distance::length(distance::sub(at, point)));
             prop_assert!(nearest.is_some_and(|found| (found - expected).abs() <= 1e-9 * (1.0 + expected)));
             let within = clearance.facets_within(point, expected * 1.5 + 1.0);
@@ -226,18 +235,24 @@ mod tests {
         #[test]
         fn the_nearest_facet_of_every_point_of_a_ball_is_near_it(
             facets in facets(), centre in prop::array::uniform3(0.0f64..4000.0), radius in 0.0f64..900.0,
+            open in 0.0f64..2000.0,
             points in prop::collection::vec((prop::array::uniform3(-1.0f64..1.0), 0.0f64..1.0), 20),
         ) {
             let clearance = Clearance::new(&facets);
-            let near = clearance.near(centre, radius, usize::MAX);
+            let near = clearance.near(centre, radius, f64::INFINITY, usize::MAX).unwrap();
+            let below = clearance.near(centre, radius, open, usize::MAX).unwrap();
+            prop_assert!(below.len() <= near.len());
             for (direction, part) in points {
                 let length = direction.map(|c| c * c).iter().sum::<f64>().sqrt().max(1e-9);
                 let at = [0, 1, 2].map(|a| centre[a] + direction[a] * part * radius / length);
                 let found = near.iter().map(|t| t.0.squared(at)).fold(f64::INFINITY, f64::min).sqrt();
-                prop_assert_eq!(found, clearance.at(at, f64::INFINITY));
+                let expected = clearance.at(at, f64::INFINITY);
+                prop_assert_eq!(found, expected);
+                let found = below.iter().map(|t| t.0.squared(at)).fold(f64::INFINITY, f64::min).sqrt();
+                prop_assert!(found == expected || found.min(expected) >= open, "{} for {}", found, expected);
             }
-            prop_assert_eq!(clearance.near(centre, radius, near.len()).len(), near.len());
-            prop_assert!(clearance.near(centre, radius, near.len() - 1).is_empty());
+            let is_found = |most| clearance.near(centre, radius, f64::INFINITY, most).is_some();
+            prop_assert!(is_found(near.len()) && !is_found(near.len() - 1));
         }
 
         #[test]

@@ -22,11 +22,13 @@ pub struct Grid {
 pub struct Distances<'a> {
     grid: &'a Grid,
     clearance: &'a Clearance<'a>,
-    /// The facets that can be the nearest of any point, with their distances from the grid's centre, nearest first; none if they are
-    /// many. Then those of the blocks, with their distances from these.
+    /// Greater distances are not measured.
+    open: f64,
+    /// The facets that can be the nearest of any point, with their distances from the grid's centre, nearest first. If they are many, those
+    /// of the blocks, with their distances from these.
     triangles: Vec<(Prepared, f64)>,
-    /// Number of [`Self::triangles`] that are of the whole grid.
-    shared: usize,
+    /// Whether [`Self::triangles`] are of the whole grid.
+    is_shared: bool,
     blocks: Vec<Option<Block>>,
 }
 
@@ -34,9 +36,9 @@ pub struct Distances<'a> {
 #[derive(Clone, Debug)]
 struct Block {
     centre: Point,
-    /// The triangles that can be the nearest of its points, with their distances from the centre, nearest first; none if they
+    /// The triangles that can be the nearest of its points, with their distances from the centre, nearest first; `None` if they
     /// are many.
-    near: Vec<(u32, f64)>,
+    near: Option<Vec<(u32, f64)>>,
 }
 
 /// Points of a block along an edge.
@@ -53,15 +55,16 @@ const FACETS_FEW: usize = 128;
 
 impl<'a> Distances<'a> {
     /// No distance is known yet.
-    pub fn new(grid: &'a Grid, clearance: &'a Clearance<'a>) -> Self {
+    pub fn new(grid: &'a Grid, clearance: &'a Clearance<'a>, open: f64) -> Self {
         let blocks = vec![None; (BLOCKS * BLOCKS * BLOCKS) as usize];
         let radius = 3f64.sqrt() * f64::from(STEPS) * grid.step;
-        let triangles = clearance.near(grid.centre, radius, FACETS_FEW);
-        Self { grid, clearance, shared: triangles.len(), triangles, blocks }
+        let triangles = clearance.near(grid.centre, radius, open, FACETS_FEW);
+        let is_shared = triangles.is_some();
+        Self { grid, clearance, open, triangles: triangles.unwrap_or_default(), is_shared, blocks }
     }
 
-    /// Distance from a point to the nearest facet; `bound` is an upper bound that the caller knows.
-    pub fn at(&mut self, place: u32, bound: f64) -> f64 {
+    /// Distance from a point to the nearest facet, or `open` if it is greater.
+    pub fn at(&mut self, place: u32) -> f64 {
         let indices = Grid::indices(place).map(|i| i / BLOCK);
         let [x, y, z] = indices;
         let block = ((z * BLOCKS + y) * BLOCKS + x) as usize;
@@ -70,11 +73,13 @@ impl<'a> Distances<'a> {
         }
         let point = self.grid.position(place);
         match &self.blocks[block] {
-            Some(Block { centre, near }) if !near.is_empty() => {
+            Some(Block { centre, near: Some(near) }) => {
                 let triangles = near.iter().map(|&(i, from)| (&self.triangles[i as usize].0, from));
-                nearest(triangles, point, length(sub(point, *centre)), 0.0).unwrap_or(0.0)
+                nearest(triangles, point, length(sub(point, *centre)), 0.0)
+                    .unwrap_or(0.0)
+                    .min(self.open)
             }
-            _ => self.clearance.at(point, bound),
+            _ => self.clearance.at(point, self.open).min(self.open),
         }
     }
 
@@ -84,29 +89,29 @@ impl<'a> Distances<'a> {
             centre[a] + (f64::from(indices[a] * BLOCK - STEPS) + BLOCK_HALF) * step
         });
         let radius = 3f64.sqrt() * BLOCK_HALF * step;
-        let candidates = if self.shared > 0 {
-            0..self.shared
-        } else {
-            let near = self.clearance.near(centre, radius, FACETS_FEW);
-            let first = self.triangles.len();
-            self.triangles.extend(near);
-            first..self.triangles.len()
-        };
-        let (mut near, mut reach) = (Vec::new(), f64::INFINITY);
-        let offset = if self.shared > 0 { length(sub(centre, self.grid.centre)) } else { 0.0 };
-        for i in candidates {
-            let (triangle, from) = &self.triangles[i];
+        if !self.is_shared {
+            let near = self.clearance.near(centre, radius, self.open, FACETS_FEW);
+            let first = self.triangles.len() as u32;
+            let near = near.map(|near| {
+                self.triangles.extend(&near);
+                (first..).zip(near).map(|(i, (_, from))| (i, from)).collect()
+            });
+            return Block { centre, near };
+        }
+        // As in `Clearance::near`, which searches for the same among all facets.
+        let (mut near, mut reach) = (Vec::new(), self.open + radius + ROUNDING);
+        let offset = length(sub(centre, self.grid.centre));
+        for (i, (triangle, from)) in (0u32..).zip(&self.triangles) {
             if from - offset > reach {
                 break;
             }
             let from = triangle.squared(centre).sqrt();
-            // As in `Clearance::near`, which searches for the same among all facets.
             reach = reach.min(from + 2.0 * radius + ROUNDING);
-            near.push((i as u32, from));
+            near.push((i, from));
         }
         near.retain(|&(_, from)| from <= reach);
         near.sort_by(|a, b| a.1.total_cmp(&b.1));
-        Block { centre, near }
+        Block { centre, near: Some(near) }
     }
 }
 
@@ -174,6 +179,7 @@ mod tests {
         fn distances_of_grid_points_are_those_of_a_search_among_all_facets(
             facets in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(0i64..4000)), 1..300),
             centre in prop::array::uniform3(0.0f64..4000.0), step in 0.01f64..100.0, is_repeated in any::<bool>(),
+            open in prop_oneof![Just(f64::INFINITY), 0.0f64..2000.0],
         ) {
             // More facets may be near a point than are searched one by one.
             let copies = if is_repeated { 2 * FACETS_FEW } else { 0 };
@@ -181,10 +187,12 @@ mod tests {
                 facets.iter().copied().chain(std::iter::repeat_n(facets[0], copies)).collect();
             let clearance = Clearance::new(&facets);
             let grid = Grid { centre, step };
-            let mut distances = Distances::new(&grid, &clearance);
+            let mut distances = Distances::new(&grid, &clearance, open);
             for place in (0..grid.count() as u32).step_by(97) {
-                let expected = clearance.at(grid.position(place), f64::INFINITY);
-                prop_assert_eq!(distances.at(place, f64::INFINITY), expected);
+                let expected = clearance.at(grid.position(place), f64::INFINITY).min(open);
+                let found = distances.at(place);
+                prop_assert!((found - expected).abs() <= 1e-9 * expected, "{} for {}", found, expected);
+                prop_assert!(!grid.is_far(place));
             }
         }
     }

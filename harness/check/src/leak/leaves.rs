@@ -229,6 +229,17 @@ mod tests {
         }
     }
 
+    #[test]
+    fn leaves_at_the_boundary_are_in_the_far_field() {
+        let words = words_of(|o| o.level < 2 || (o.level < 3 && o.corner == [0; 3]));
+        let leaves = Leaves::new(&words).unwrap();
+        for leaf in 0..leaves.len() as u32 {
+            let (low, high) = leaves.octant(leaf).bounds();
+            let is_at_face = |a: usize| low[a] == 0 || high[a] == contract::lattice::UNITS_PER_EDGE;
+            assert_eq!(leaves.is_far(leaf), (0..3).any(is_at_face), "leaf {leaf}");
+        }
+    }
+
     /// Closed boxes that share an area: they touch along one axis and overlap along the others.
     fn shares_a_face(a: &Octant, b: &Octant) -> bool {
         let ((a_low, a_high), (b_low, b_high)) = (a.bounds(), b.bounds());
@@ -248,6 +259,8 @@ mod tests {
         let hole =
             words_with_sides(|o| o.level < 2, |o| (o.corner != [0; 3]).then_some(Side::Outside));
         assert!(Leaves::new(&hole).is_err());
-        assert_eq!(Leaves::new(&words_of(|_| false)).unwrap().locate([5; 3]), 0);
+        let root = words_of(|_| false);
+        let root = Leaves::new(&root).unwrap();
+        assert!(root.locate([5; 3]) == 0 && !root.is_empty());
     }
 }

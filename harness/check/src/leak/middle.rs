@@ -39,10 +39,11 @@ struct Near<'a> {
 }
 
 impl Near<'_> {
-    /// The clearance at a place if it is greater than `least`; `bound` is an upper bound that the caller knows.
-    fn beyond(&mut self, at: Point, least: f64, bound: f64) -> Option<f64> {
+    /// The clearance at a place if it is greater than `least`.
+    fn beyond(&mut self, at: Point, least: f64) -> Option<f64> {
         let Some((obstacle, _)) = self.triangles.get(self.obstacle) else {
-            return Some(self.clearance.at(at, bound)).filter(|&clearance| clearance > least);
+            return Some(self.clearance.at(at, f64::INFINITY))
+                .filter(|&clearance| clearance > least);
         };
         if obstacle.squared(at) <= least * least {
             return None;
@@ -53,18 +54,19 @@ impl Near<'_> {
     }
 }
 
-/// The point of greatest clearance near a point, in the plane through it that has this normal. Every move ends in the ball
-/// around the point before it.
-fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
+/// The point of greatest clearance near a point, in the plane through it that has this normal, or a point of at least the
+/// clearance `open`, which is not exact. Every move ends in the ball around the point before it.
+fn across(from: Point, normal: Point, open: f64, clearance: &Clearance) -> Spot {
     let start = clearance.at(from, f64::INFINITY);
-    let triangles = clearance.near(from, REACH * start, FACETS_FEW);
+    let triangles = clearance.near(from, REACH * start, open, FACETS_FEW);
+    let triangles = triangles.unwrap_or_default();
     let mut near = Near { clearance, centre: from, triangles, obstacle: 0 };
     let [u, v] = plane(normal);
     let step_min = PRECISION / 2.0 * start;
     let mut best = Spot { at: from, clearance: start, step: step_min, apart: 0.0 };
     let (mut step, mut turn) = (start / 2.0, 0.0);
     for _ in 0..MOVES_MAX {
-        if step < step_min {
+        if step < step_min || best.clearance >= open {
             break;
         }
         let before = best;
@@ -73,7 +75,7 @@ fn across(from: Point, normal: Point, clearance: &Clearance) -> Spot {
             let (sin, cos) = angle.sin_cos();
             let at = std::array::from_fn(|a| before.at[a] + step * (cos * u[a] + sin * v[a]));
             if length(sub(at, from)) <= REACH * start
-                && let Some(clearance) = near.beyond(at, best.clearance, before.bound(at))
+                && let Some(clearance) = near.beyond(at, best.clearance)
             {
                 best = Spot { at, clearance, step: step_min, apart: 0.0 };
             }
@@ -106,18 +108,19 @@ fn unit(a: Point) -> Point {
 
 /// The widest place near a point, by moves in planes across the axes.
 pub fn widest_near(at: Point, clearance: &Clearance) -> Spot {
-    let mut best = across(at, [1.0, 0.0, 0.0], clearance);
+    let mut best = across(at, [1.0, 0.0, 0.0], f64::INFINITY, clearance);
     for axis in [1, 2, 0, 1, 2] {
         let mut normal = [0.0; 3];
         normal[axis] = 1.0;
-        best = across(best.at, normal, clearance);
+        best = across(best.at, normal, f64::INFINITY, clearance);
     }
     best
 }
 
 /// The path with points less than `below` from the facets moved to the middle, and with points between those that are far apart.
-pub fn centred(spots: &[Spot], below: f64, clearance: &Clearance) -> Vec<Spot> {
-    let passage = Passage { below, clearance };
+/// Clearances from `open` on are not exact.
+pub fn centred(spots: &[Spot], below: f64, open: f64, clearance: &Clearance) -> Vec<Spot> {
+    let passage = Passage { below, open, clearance };
     let mut path: Vec<Spot> = Vec::new();
     for (i, &spot) in spots.iter().enumerate() {
         let moved = passage.moved(spot, direction(spots, i));
@@ -131,13 +134,14 @@ pub fn centred(spots: &[Spot], below: f64, clearance: &Clearance) -> Vec<Spot> {
 
 struct Passage<'a> {
     below: f64,
+    open: f64,
     clearance: &'a Clearance<'a>,
 }
 
 impl Passage<'_> {
     fn moved(&self, spot: Spot, direction: Point) -> Spot {
         match spot.clearance < self.below {
-            true => across(spot.at, direction, self.clearance),
+            true => across(spot.at, direction, self.open, self.clearance),
             false => spot,
         }
     }
@@ -149,7 +153,7 @@ impl Passage<'_> {
             return;
         }
         let at = std::array::from_fn(|a| (from.at[a] + to.at[a]) / 2.0);
-        let clearance = self.clearance.at(at, from.bound(at));
+        let clearance = self.clearance.at(at, f64::INFINITY);
         let middle = self.moved(Spot { at, clearance, step: f64::INFINITY, apart: 0.0 }, gap);
         self.fill(from, middle, halvings - 1, path);
         path.push(middle);
@@ -216,7 +220,7 @@ mod tests {
             let spot = |x: f64, [y, z]: [f64; 2]| {
                 Spot { at: [x, y, z], clearance: clearance.at([x, y, z], f64::INFINITY), step: f64::INFINITY, apart: 0.0 }
             };
-            let path = centred(&[spot(2_000.0, from), spot(8_000.0, to)], 600.0, &clearance);
+            let path = centred(&[spot(2_000.0, from), spot(8_000.0, to)], 600.0, f64::INFINITY, &clearance);
             prop_assert!(path.iter().all(|spot| spot.clearance > 498.0), "{path:?}");
             prop_assert!(path.windows(2).all(|pair| pair[0].at[0] < pair[1].at[0]), "{path:?}");
             let gaps = path.windows(2).map(|pair| length(sub(pair[1].at, pair[0].at)));
@@ -224,7 +228,7 @@ mod tests {
             prop_assert!(path.len() < 60, "{} points", path.len());
             // What is wide enough stays.
             let ends = [spot(2_000.0, from), spot(8_000.0, to)];
-            prop_assert_eq!(centred(&ends, 100.0, &clearance), ends);
+            prop_assert_eq!(centred(&ends, 100.0, f64::INFINITY, &clearance), ends);
         }
     }
 }

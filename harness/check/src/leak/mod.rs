@@ -231,6 +231,8 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
     fn refine(&mut self, mut tree: Tree, limit: &mut Option<String>) -> Result<Tree, LeakError<E>> {
         // Halving the spacing of a surface multiplies its leaves by four.
         const GROWTH: u64 = 4;
+        // Finer trees, the finest first.
+        let mut ahead: Vec<Tree> = Vec::new();
         while tree.level < LEVEL_MAX {
             let (level, expected) = (tree.level + 1, tree.words.len() as u64 * GROWTH);
             if expected > self.question.leaves_max {
@@ -240,7 +242,10 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
                 ));
                 return Ok(tree);
             }
-            tree = match self.tree(level) {
+            if ahead.is_empty() {
+                ahead = self.ahead(level, expected);
+            }
+            tree = match ahead.pop().map_or_else(|| self.tree(level), Ok) {
                 Ok(finer) => finer,
                 Err(LeakError::Source(error)) if !self.watch.is_interrupted() => {
                     *limit = Some(format!("level {level} could not be meshed: {error}"));
@@ -254,6 +259,25 @@ impl<E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Investigation<'_, F> {
         }
         *limit = Some(format!("level {LEVEL_MAX} is the finest"));
         Ok(tree)
+    }
+
+    /// The base trees of a level, with this number of leaves expected, and of finer ones, the finest first; none if that was not made. A
+    /// small tree is made faster than the mesher starts, so several are derived from one.
+    fn ahead(&mut self, level: u8, expected: u64) -> Vec<Tree> {
+        /// Leaves of a tree that is small.
+        const SMALL: u64 = 1 << 16;
+        let small = SMALL.min(self.question.leaves_max);
+        let more = (1..=LEVEL_MAX - level).take_while(|&l| expected << (2 * l) <= small).last();
+        let Some(finest) = more.and_then(|more| self.tree(level + more).ok()) else {
+            return Vec::new();
+        };
+        let mut trees = vec![finest];
+        for level in (level..trees[0].level).rev() {
+            let finer = &trees[trees.len() - 1].words;
+            let words = coarser::coarser(finer, &self.question.case.boxes, level);
+            trees.push(Tree { level, words });
+        }
+        trees
     }
 
     /// Whether a closed surface separates the centres of the leaves at the ends.

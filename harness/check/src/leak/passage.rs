@@ -7,7 +7,7 @@
 //!
 //! An end near a facet is not an opening, so both ends are first moved from leaf to leaf to where the radius is greatest.
 
-use super::clearance::Clearance;
+use super::clearance::{Clearance, Spot};
 use super::leaves::Leaves;
 use super::path::{Path, Route, Scratch};
 use super::report::{Narrowest, Passage, Point, Spacing};
@@ -18,6 +18,9 @@ use contract::lattice::UNITS_PER_EDGE;
 
 /// Openings that are measured at most.
 const OPENINGS_MAX: usize = 4;
+/// Open space has at least this clearance, in radii of the balls that may pass. It is not measured, because a search is slow
+/// where many facets are almost equally near.
+const WIDE: f64 = 1.5;
 /// Another opening is of interest if it is wider by this factor.
 const WIDER: f64 = 1.005;
 
@@ -43,6 +46,8 @@ pub fn widest(
     let inner_goal = departure.last().map_or(Goal::Far, |&end| Goal::Place(end));
     let mut best: Option<Path> = None;
     let (mut memory, mut scratch) = (Memory::default(), Scratch::default());
+    // No path is wider than the first.
+    let mut open = f64::INFINITY;
     for _ in 0..OPENINGS_MAX {
         let measured = best.as_ref().map_or(0.0, |path| path.throat().clearance);
         let wanted = WIDER * measured;
@@ -58,14 +63,15 @@ pub fn widest(
         if radius <= wanted {
             break;
         }
+        open = open.min(WIDE * radius);
         let inner = field.shortened(&route, narrowest, inner_goal, &mut memory, stop)?;
         let on = departure.iter().rev().skip(1);
         let whole: Vec<u32> = approach.iter().chain(&inner[1..]).chain(on).copied().collect();
         let approaches = [approach.len() - 1, departure.len().saturating_sub(1)];
-        let route = Route { leaves: &whole, approaches, radius, wanted };
+        let route = Route { leaves: &whole, approaches, radius, wanted, open };
         let path = Path::through(leaves, &route, goal, &clearance, &mut scratch, stop)?;
         let is_end = path.is_narrowest_at_end();
-        field.close(&path, narrowest);
+        field.close(path.throat(), narrowest);
         if path.throat().clearance > measured {
             best = Some(path);
         }
@@ -158,9 +164,8 @@ impl Field<'_> {
         Ok(whole)
     }
 
-    /// Closes the leaves in the ball at the narrowest place of a path, and one more leaf in any case.
-    fn close(&mut self, path: &Path, other: u32) {
-        let throat = path.throat();
+    /// Closes the leaves whose centres are in the ball at the narrowest place of a path, and one more leaf in any case.
+    fn close(&mut self, throat: Spot, other: u32) {
         self.radii[other as usize] = -1.0;
         for leaf in 0..self.leaves.len() as u32 {
             let from = sub(self.leaves.position(leaf), throat.at);
@@ -204,5 +209,46 @@ fn described(case: &Case, level: u8, path: &Path, clearance: &Clearance) -> Pass
         },
         length: points.windows(2).map(length).sum(),
         points,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::testing::words_of;
+
+    #[test]
+    fn the_leaves_in_the_ball_of_an_opening_are_closed_and_one_more() {
+        let words = words_of(|o| o.level < 3);
+        let leaves = Leaves::new(&words).unwrap();
+        let clearance = Clearance::new(&[]);
+        let mut field = Field { leaves: &leaves, clearance: &clearance, radii: vec![7.0; 512] };
+        let edge = UNITS_PER_EDGE as f64 / 8.0;
+        let centre = leaves.position(77);
+        let at = [centre[0] + 0.25 * edge, centre[1], centre[2]];
+        let clearance = 1.25 * edge;
+        field.close(Spot { at, clearance, step: 1.0, apart: 0.0 }, 500);
+        let offset = |leaf: u32| {
+            let from = sub(leaves.position(leaf), centre);
+            from.map(|c| (c / edge).round() as i32)
+        };
+        // A leaf on the sphere is closed.
+        let closed = [
+            [0, 0, 0],
+            [1, 0, 0],
+            [-1, 0, 0],
+            [0, 1, 0],
+            [0, -1, 0],
+            [0, 0, 1],
+            [0, 0, -1],
+            [1, 1, 0],
+            [1, -1, 0],
+            [1, 0, 1],
+            [1, 0, -1],
+        ];
+        for leaf in 0..512 {
+            let expected = leaf == 500 || closed.contains(&offset(leaf));
+            assert_eq!(field.radii[leaf as usize] == -1.0, expected, "{:?}", offset(leaf));
+        }
     }
 }

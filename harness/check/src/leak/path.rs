@@ -41,6 +41,8 @@ pub struct Route<'a> {
     pub approaches: [usize; 2],
     /// No ball of a greater radius passes.
     pub radius: f64,
+    /// Open space: greater clearances are not measured in grids.
+    pub open: f64,
     /// The narrowest place is found to full precision only if its ball's radius may be at least this.
     pub wanted: f64,
 }
@@ -85,9 +87,11 @@ impl Path {
             if path.is_narrowest_at_end() || is_precise || is_fine || bound < route.wanted {
                 break;
             }
-            let Some(found) = path.widen(step, clearance, scratch, stop)? else { break };
+            let Some(found) = path.widen(step, route.open, clearance, scratch, stop)? else {
+                break;
+            };
             if !is_centred && (found.is_at_end || grids > GRIDS_FEW) {
-                path.centre(bound.min(route.radius), clearance);
+                path.centre(bound.min(route.radius), route.open, clearance);
                 is_centred = true;
                 continue;
             }
@@ -96,6 +100,7 @@ impl Path {
             bound = bound.min(found.least + 3f64.sqrt() * step);
         }
         path.narrowest = path.find_narrowest();
+        path.measure_open(route.open, clearance);
         Ok(path)
     }
 
@@ -142,6 +147,13 @@ impl Path {
         (first.unwrap_or(self.narrowest), last.unwrap_or(self.narrowest))
     }
 
+    /// Measures the clearances of points in open space.
+    fn measure_open(&mut self, open: f64, clearance: &Clearance) {
+        for spot in self.spots.iter_mut().filter(|spot| spot.clearance >= open) {
+            spot.clearance = clearance.at(spot.at, f64::INFINITY);
+        }
+    }
+
     /// Whether an end is among the points in a cube around the narrowest one.
     fn reaches_end(&self, half: f64) -> bool {
         let (first, last) = self.surroundings(half);
@@ -158,10 +170,10 @@ impl Path {
     }
 
     /// Moves points less than `below` from the facets to the middle of a passage, unless that makes the path narrower.
-    fn centre(&mut self, below: f64, clearance: &Clearance) {
+    fn centre(&mut self, below: f64, open: f64, clearance: &Clearance) {
         let (first, last) = self.inner();
         let least = |spots: &[Spot]| spots.iter().map(Spot::passing).fold(f64::INFINITY, f64::min);
-        let centred = middle::centred(&self.spots[first..=last], below, clearance);
+        let centred = middle::centred(&self.spots[first..=last], below, open, clearance);
         if least(&centred) > least(&self.spots[first..=last]) {
             self.spots.splice(first..=last, centred);
         }
@@ -171,6 +183,7 @@ impl Path {
     fn widen(
         &mut self,
         step: f64,
+        open: f64,
         clearance: &Clearance,
         Scratch { known, memory }: &mut Scratch,
         stop: &dyn Fn() -> bool,
@@ -179,14 +192,10 @@ impl Path {
         let (first, last) = self.surroundings(f64::from(STEPS) * step);
         let (from, to) = (grid.nearest(self.spots[first].at), grid.nearest(self.spots[last].at));
         known.clear(grid.count());
-        let mut distances = Distances::new(&grid, clearance);
-        let mut width = |place: u32, near: u32| {
-            known.get_or_insert_with(place, |known| {
-                let bound = match known[near as usize] {
-                    near if near >= 0.0 => f64::from(near) + 2.0 * step,
-                    _ => f64::INFINITY,
-                };
-                let free = distances.at(place, bound);
+        let mut distances = Distances::new(&grid, clearance, open);
+        let mut width = |place: u32, _: u32| {
+            known.get_or_insert_with(place, || {
+                let free = distances.at(place);
                 // Balls at neighbours must overlap, so that no facet is between them.
                 if free > step { free as f32 } else { -1.0 }
             })
@@ -252,9 +261,9 @@ impl Known {
         }
     }
 
-    fn get_or_insert_with(&mut self, place: u32, compute: impl FnOnce(&[f32]) -> f32) -> f32 {
+    fn get_or_insert_with(&mut self, place: u32, compute: impl FnOnce() -> f32) -> f32 {
         if self.values[place as usize].is_nan() {
-            self.values[place as usize] = compute(&self.values);
+            self.values[place as usize] = compute();
             self.entered.push(place);
         }
         self.values[place as usize]
@@ -272,15 +281,11 @@ fn raw(leaves: &Leaves, route: &[u32], goal: Goal, clearance: &Clearance) -> Vec
     if goal == Goal::Far {
         points.push(nearest_boundary(points[points.len() - 1]));
     }
-    let mut spots: Vec<Spot> = Vec::with_capacity(points.len());
-    for at in points {
-        let bound = spots.last().map_or(f64::INFINITY, |last| last.bound(at));
-        spots.push(Spot {
-            at,
-            clearance: clearance.at(at, bound),
-            step: f64::INFINITY,
-            apart: 0.0,
-        });
-    }
-    spots
+    let spot = |at| Spot {
+        at,
+        clearance: clearance.at(at, f64::INFINITY),
+        step: f64::INFINITY,
+        apart: 0.0,
+    };
+    points.into_iter().map(spot).collect()
 }

@@ -47,9 +47,6 @@ impl Goal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interrupted;
 
-/// Interrupts are polled once in this many steps.
-const STEPS_PER_POLL: usize = 1 << 14;
-
 const NONE: u32 = u32::MAX;
 
 /// Memory of searches in one graph, or in graphs of one size. What a search has not reached costs the next one nothing.
@@ -115,13 +112,11 @@ pub fn widest(
     // The bit patterns of floats that are not negative are in the order of the floats.
     let first = width(start, start).to_bits();
     heap.push((first, first, start));
-    let mut steps = 0;
     while let Some((least, _, place)) = heap.pop() {
         if goal.is_reached(graph, place) {
             return Ok(Some(memory.path(place)));
         }
-        steps += 1;
-        if steps % STEPS_PER_POLL == 0 && stop() {
+        if stop() {
             return Err(Interrupted);
         }
         graph.joined(place, &mut |next| {
@@ -158,7 +153,6 @@ pub fn shortest(
     let mut heap = BinaryHeap::new();
     memory.reach(start, start, 0.0);
     heap.push((std::cmp::Reverse(remaining(start).to_bits()), 0, start));
-    let mut steps = 0;
     while let Some((_, cost, place)) = heap.pop() {
         let cost = f32::from_bits(cost);
         if goal.is_reached(graph, place) {
@@ -167,8 +161,7 @@ pub fn shortest(
         if cost > memory.costs[place as usize] {
             continue;
         }
-        steps += 1;
-        if steps % STEPS_PER_POLL == 0 && stop() {
+        if stop() {
             return Err(Interrupted);
         }
         let here = at(place);
@@ -259,6 +252,46 @@ mod tests {
 
     fn least_width(path: &[u32]) -> f32 {
         path.iter().map(|&l| width_of(l)).fold(f32::INFINITY, f32::min)
+    }
+
+    #[test]
+    fn a_search_ends_when_it_is_interrupted_unless_it_is_there() {
+        let words = contract::testing::words_of(|o| o.level < 2);
+        let leaves = Leaves::new(&words).unwrap();
+        let (stop, memory): (&dyn Fn() -> bool, _) = (&|| true, &mut Memory::default());
+        let width = |_, _| 1.0;
+        for (goal, expected) in [(63, Err(Interrupted)), (0, Ok(Some(vec![0])))] {
+            let goal = Goal::Place(goal);
+            assert_eq!(widest(&leaves, 0, goal, width, memory, stop), expected);
+            assert_eq!(shortest(&leaves, 0, goal, 1.0, width, memory, stop), expected);
+        }
+    }
+
+    #[test]
+    fn a_step_costs_twice_its_length_where_it_is_as_narrow_as_possible() {
+        // Two ways around the middle of 4 x 4 x 4 leaves: the one of wide leaves is as long, and cheaper.
+        let words = contract::testing::words_of(|o| o.level < 2);
+        let leaves = Leaves::new(&words).unwrap();
+        let at = |x: u32, y: u32| {
+            let half = 0.5 * UNITS_PER_EDGE as f64 / 4.0;
+            leaves.locate([x, y, 0].map(|i| ((2 * i + 1) as f64 * half) as i64))
+        };
+        let (start, goal) = (at(0, 0), Goal::Place(at(3, 3)));
+        for wide in [[at(1, 0), at(2, 0), at(3, 0)], [at(0, 1), at(0, 2), at(0, 3)]] {
+            let width = |place, _| if wide.contains(&place) { 8.0 } else { 1.0 };
+            let memory = &mut Memory::default();
+            let path = shortest(&leaves, start, goal, 1.0, width, memory, NEVER).unwrap().unwrap();
+            assert!(path.len() == 7 && wide.iter().all(|leaf| path.contains(leaf)), "{path:?}");
+        }
+    }
+
+    #[test]
+    fn the_nearest_point_of_the_boundary_is_on_the_nearest_face() {
+        let edge = UNITS_PER_EDGE as f64;
+        assert_eq!(nearest_boundary([5.0, 7.0, 9.0]), [0.0, 7.0, 9.0]);
+        assert_eq!(nearest_boundary([edge - 5.0, 7.0, 9.0]), [edge, 7.0, 9.0]);
+        assert_eq!(nearest_boundary([10.0, 7.0, edge - 6.0]), [10.0, 7.0, edge]);
+        assert_eq!(nearest_boundary([10.0, 1.0, edge - 6.0]), [10.0, 0.0, edge - 6.0]);
     }
 
     proptest! {

@@ -1,14 +1,17 @@
 //! Whether the facets form a closed surface between two places, which then no path joins at any spacing.
 
 use crate::geometry::shells::{find, unite};
-use crate::oracle::watertight::is_watertight;
 use contract::case::Case;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::parity::Parity;
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
 
 /// Vertices that are nearer than this along each axis, in lattice units, may be taken for one: an eighth of the finest cell.
 const WELD: i64 = 32;
+
+/// Edge of the blocks in which vertices are searched for, in lattice units: a multiple of [`WELD`].
+const BLOCK: i64 = 32 * WELD;
 
 /// Whether a closed surface separates the centres of two free leaves at every spacing; `to` is `None` for the root's boundary.
 ///
@@ -16,27 +19,37 @@ const WELD: i64 = 32;
 /// centres of leaves and of shared faces, so it stays half an edge of the finest cell, 128 units, away from all facets. Welding
 /// moves no point of a facet by more than sqrt(3) times `WELD`, 56 units, so the path does not meet the welded surface either.
 pub fn separates(case: &Case, from: [i64; 3], to: Option<[i64; 3]>) -> bool {
-    is_separated(&case.facets_lattice, from, to)
-        || is_separated(&welded(&case.facets_lattice), from, to)
+    let facets = &case.facets_lattice;
+    is_separated(facets, from, to) || {
+        let welded = welded(facets);
+        welded != *facets && is_separated(&welded, from, to)
+    }
 }
 
 /// The facets with each vertex replaced by an earlier one that is near, without those that lose their area by that.
 fn welded(facets: &[FacetLattice]) -> Vec<FacetLattice> {
-    let mut kept: HashMap<[i64; 3], Vec<[i64; 3]>> = HashMap::new();
-    let mut weld = |vertex: [i64; 3]| {
-        let block = vertex.map(|c| c.div_euclid(WELD));
+    let mut kept: FxHashMap<[i64; 3], Vec<[i64; 3]>> = FxHashMap::default();
+    let mut search = |vertex: [i64; 3]| {
         let is_near = |other: &[i64; 3]| (0..3).all(|a| (other[a] - vertex[a]).abs() <= WELD);
-        let around = (0..27).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
-        let near = around.filter_map(|offset| {
-            let of_block = kept.get(&std::array::from_fn(|a| block[a] + offset[a]))?;
-            of_block.iter().copied().find(is_near)
-        });
-        let found = near.min();
+        // Of the blocks that a vertex near this one can be in, there is mostly one.
+        let block = |offset: i64| vertex.map(|c| (c + offset).div_euclid(BLOCK));
+        let (low, high) = (block(-WELD), block(WELD));
+        let mut found = None;
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let of_block = kept.get(&[x, y, z]).into_iter().flatten();
+                    found = of_block.copied().filter(is_near).chain(found).min();
+                }
+            }
+        }
         found.unwrap_or_else(|| {
-            kept.entry(block).or_default().push(vertex);
+            kept.entry(block(0)).or_default().push(vertex);
             vertex
         })
     };
+    let mut known: FxHashMap<[i64; 3], [i64; 3]> = FxHashMap::default();
+    let mut weld = |vertex: [i64; 3]| *known.entry(vertex).or_insert_with(|| search(vertex));
     let welded = facets.iter().map(|facet| facet.map(&mut weld));
     welded.filter(|[a, b, c]| a != b && b != c && c != a).collect()
 }
@@ -49,10 +62,9 @@ fn welded(facets: &[FacetLattice]) -> Vec<FacetLattice> {
 /// exact, but false does not mean that a path exists: an open sheet or several surfaces together can separate places too.
 fn is_separated(facets: &[FacetLattice], from: [i64; 3], to: Option<[i64; 3]>) -> bool {
     let interior = 1..UNITS_PER_EDGE;
-    shells(facets).into_iter().any(|facets| {
-        let is_interior = || facets.iter().flatten().flatten().all(|c| interior.contains(c));
+    closed_shells(facets).into_iter().any(|facets| {
         // Without facets at the root's boundary, all of it is outside.
-        if (to.is_none() && !is_interior()) || !is_watertight(&facets) {
+        if to.is_none() && !facets.iter().flatten().flatten().all(|c| interior.contains(c)) {
             return false;
         }
         let parity = Parity::new(&facets);
@@ -61,19 +73,33 @@ fn is_separated(facets: &[FacetLattice], from: [i64; 3], to: Option<[i64; 3]>) -
     })
 }
 
-/// The facets by the shells that shared edges make of them.
-fn shells(facets: &[FacetLattice]) -> Vec<Vec<FacetLattice>> {
+/// The facets of the shells, which shared edges make of them, all of whose edges belong to an even number of facets.
+fn closed_shells(facets: &[FacetLattice]) -> Vec<Vec<FacetLattice>> {
+    let mut numbers: FxHashMap<[i64; 3], u32> = FxHashMap::default();
     let mut parents: Vec<u32> = (0..facets.len() as u32).collect();
-    let mut first_at: HashMap<[[i64; 3]; 2], u32> = HashMap::new();
-    for (facet, &[a, b, c]) in (0u32..).zip(facets) {
+    // The first facet at each edge, and whether their number is odd.
+    let mut edges: FxHashMap<[u32; 2], (u32, bool)> = FxHashMap::default();
+    for (facet, corners) in (0u32..).zip(facets) {
+        let [a, b, c] = corners.map(|corner| {
+            let next = numbers.len() as u32;
+            *numbers.entry(corner).or_insert(next)
+        });
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            let first = *first_at.entry([from.min(to), from.max(to)]).or_insert(facet);
-            unite(&mut parents, first, facet);
+            if from != to {
+                let edge = edges.entry([from.min(to), from.max(to)]).or_insert((facet, false));
+                edge.1 = !edge.1;
+                unite(&mut parents, edge.0, facet);
+            }
         }
     }
+    let odd = edges.values().filter(|(_, is_odd)| *is_odd);
+    let open: FxHashSet<u32> = odd.map(|&(facet, _)| find(&mut parents, facet)).collect();
     let mut shells: BTreeMap<u32, Vec<FacetLattice>> = BTreeMap::new();
     for (facet, corners) in (0u32..).zip(facets) {
-        shells.entry(find(&mut parents, facet)).or_default().push(*corners);
+        let shell = find(&mut parents, facet);
+        if !open.contains(&shell) {
+            shells.entry(shell).or_default().push(*corners);
+        }
     }
     shells.into_values().collect()
 }

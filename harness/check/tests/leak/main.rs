@@ -9,8 +9,8 @@ use check::leak::{LeakError, Question, Watch, answer};
 use contract::case::{Case, Facet};
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
-use openings::{Body, ROTATIONS, bodies, pipe, two_holes};
-use std::cell::Cell;
+use openings::{Body, ROTATIONS, bodies, pipe, torn_sphere, two_holes};
+use std::cell::{Cell, RefCell};
 use std::convert::Infallible;
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
@@ -113,6 +113,23 @@ fn the_answer_about_a_slit_and_a_crack_is_the_expected_text() {
             let text = from_centre(&body.facets, level).to_string();
             assert_text(&text, &format!("tests/leak/expected/{}-{what}.txt", body.name));
         }
+    }
+}
+
+#[test]
+fn the_answer_about_other_openings_is_the_expected_text() {
+    let [hole, _, _, missing] = <[Body; 4]>::try_from(bodies()).unwrap();
+    let turned = |body: Body| body.rotated(ROTATIONS[2]).facets;
+    let all = [
+        ("hole", turned(hole), 6),
+        ("missing-facet", turned(missing), 7),
+        ("pipe", turned(pipe(1.0, 0.13)), 6),
+        ("two-holes", turned(two_holes(0.2, 0.199)), 5),
+        ("torn-sphere", torn_sphere(), 5),
+    ];
+    for (name, facets, level) in all {
+        let text = from_centre(&facets, level).to_string();
+        assert_text(&text, &format!("tests/leak/expected/{name}.txt"));
     }
 }
 
@@ -233,6 +250,47 @@ fn a_base_tree_is_meshed_if_it_is_expected_to_have_just_as_many_leaves_as_allowe
         let report = answer(&question, tree, &Silent).unwrap().report;
         assert_eq!(report.levels.len(), levels, "at most {leaves_max}");
     }
+}
+
+#[test]
+fn the_widest_path_is_searched_two_levels_below_the_coarsest_tree_that_joins_the_ends() {
+    let report = from_centre(&bodies()[0].facets, 8);
+    let closes = report.closes.unwrap().level;
+    assert_eq!(report.passage.unwrap().spacing.level, closes + 3);
+}
+
+#[test]
+fn small_finer_trees_are_derived_from_one_that_is_meshed() {
+    let case = case(&bodies()[0].facets, 3);
+    let tree = |level| base_tree(&case.facets_lattice, level);
+    let asked = |finest: u8, leaves_max: u64| {
+        let requested = RefCell::new(Vec::new());
+        let source = |level| {
+            requested.borrow_mut().push(level);
+            if level <= finest { Ok(tree(level)) } else { Err("no memory") }
+        };
+        let question = Question { case: &case, from: [0.0; 3], to: Target::Far, leaves_max };
+        let report = answer(&question, source, &Silent).unwrap().report;
+        for meshed in &report.levels {
+            assert_eq!(meshed.leaves, tree(meshed.spacing.level).len() as u64);
+        }
+        (requested.into_inner(), report)
+    };
+    // Level 7 is expected to have at most 65,536 leaves, level 8 more.
+    let leaves = tree(3).len() as u64;
+    assert!((65..=256).contains(&leaves), "{leaves}");
+    let (requested, report) = asked(19, 1_000_000);
+    assert_eq!(requested, [3, 7]);
+    let opens = report.opens.unwrap().level;
+    let levels: Vec<u8> = report.levels.iter().map(|meshed| meshed.spacing.level).collect();
+    assert_eq!(levels, (3..=opens).collect::<Vec<u8>>());
+    assert!((5..7).contains(&opens), "{opens}");
+    // Not more than allowed, and without a tree that cannot be made.
+    assert_eq!(asked(19, 16 * leaves).0, [3, 5]);
+    assert_eq!(asked(19, 16 * leaves - 1).0[..2], [3, 4]);
+    let (requested, failed) = asked(4, 1_000_000);
+    assert_eq!(requested[..3], [3, 7, 4]);
+    assert!(failed.limit.unwrap().contains("level 5 could not be meshed"));
 }
 
 #[test]

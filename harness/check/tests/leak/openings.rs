@@ -98,6 +98,18 @@ fn missing_facet() -> Body {
     Body { name: "missing facet", width: inscribed(&rim), facets, rim, is_round: true }
 }
 
+/// A sphere of many facets without those around a place, of which more are near the opening than are searched one by one.
+pub fn torn_sphere() -> Vec<Facet> {
+    const CENTRE: Point = [0.3, 0.5, 0.8];
+    let generator = Generator { radius: Some(1.0), ..Generator::new(Shape::Sphere, 5120) };
+    let mut facets = generator.facets().unwrap();
+    facets.retain(|facet| {
+        let from = |v: &[f32; 3]| sub(v.map(f64::from), CENTRE);
+        facet.iter().map(from).any(|d| dot(d, d) > 0.2 * 0.2)
+    });
+    facets
+}
+
 /// Diameter of a triangle's inscribed circle.
 fn inscribed(t: &[Point]) -> f64 {
     let length =

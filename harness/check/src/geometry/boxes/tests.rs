@@ -87,10 +87,11 @@ proptest! {
         let (mut entered, mut members) = (0, Vec::new());
         let mut first_leaf = None;
         boxes.search(
-            |bounds, of_leaf| {
+            |bounds, at, of_leaf| {
                 entered += 1;
+                assert_eq!(at, order(bounds));
                 if of_leaf.is_some() {
-                    first_leaf.get_or_insert(order(bounds));
+                    first_leaf.get_or_insert(at);
                 }
                 members.extend(of_leaf.into_iter().flatten());
                 true
@@ -105,7 +106,7 @@ proptest! {
         }
         prop_assert_eq!(first_leaf, Some(order(boxes.bounds(node))));
         let mut visits = 0;
-        boxes.search(|_, _| { visits += 1; false }, order);
+        boxes.search(|_, _, _| { visits += 1; false }, order);
         prop_assert_eq!(visits, 1);
     }
 }

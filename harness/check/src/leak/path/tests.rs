@@ -99,7 +99,8 @@ fn assert_widened(facets: &[FacetLattice]) {
     assert_eq!(path.throat().clearance, 150.0);
     let ends = [path.spots[0], path.spots[16]];
     let (step, mut scratch) = (80.0, Scratch::default());
-    let widest = path.widen(step, &clearance, &mut scratch, &|| false).unwrap().unwrap();
+    let widest =
+        path.widen(step, f64::INFINITY, &clearance, &mut scratch, &|| false).unwrap().unwrap();
     assert!(!widest.is_at_end);
     path.narrowest = path.find_narrowest();
     let throat = path.throat();
@@ -119,7 +120,9 @@ fn assert_widened(facets: &[FacetLattice]) {
     let blocked =
         [spot(&[-400.0, 2000.0, 0.0]), spot(&[0.0, 2000.0, 0.0]), spot(&[400.0, 2000.0, 0.0])];
     let mut blocked = Path { spots: blocked.to_vec(), narrowest: 1, approaches: [0, 0] };
-    assert!(blocked.widen(step, &clearance, &mut scratch, &|| false).unwrap().is_none());
+    assert!(
+        blocked.widen(step, f64::INFINITY, &clearance, &mut scratch, &|| false).unwrap().is_none()
+    );
 }
 
 /// The sides of a duct along x, 1000 wide.
@@ -150,18 +153,52 @@ fn a_path_through_a_long_passage_is_moved_to_its_middle_unless_it_is_there() {
         approaches: [0, 0],
     };
     let mut path = through(300.0, 600.0);
-    path.centre(501.0, &clearance);
+    path.centre(501.0, f64::INFINITY, &clearance);
     assert!(
         path.spots.len() > 3 && path.spots.iter().all(|spot| spot.clearance > 498.0),
         "{path:?}"
     );
     let mut path = through(500.0, 500.0);
-    path.centre(501.0, &clearance);
+    path.centre(501.0, f64::INFINITY, &clearance);
     assert_eq!(path.spots, through(500.0, 500.0).spots);
     // An approach stays where it is.
     let mut path = Path { approaches: [1, 0], ..through(300.0, 600.0) };
-    path.centre(501.0, &clearance);
+    path.centre(501.0, f64::INFINITY, &clearance);
     let (approach, rest) = path.spots.split_first().expect("points");
     assert_eq!(*approach, through(300.0, 600.0).spots[0]);
     assert!(rest.len() > 2 && rest.iter().all(|spot| spot.clearance > 498.0), "{rest:?}");
+}
+
+#[test]
+fn an_end_is_reached_if_the_points_up_to_it_are_in_the_cube() {
+    let reaches =
+        |narrowest, half, approaches| path(&BEND, narrowest, 1.0, approaches).reaches_end(half);
+    assert_eq!([1.5, 2.0, 2.5].map(|half| reaches(2, half, [0, 0])), [false, true, true]);
+    assert_eq!([0.5, 1.0].map(|half| reaches(5, half, [0, 0])), [false, true]);
+    assert_eq!([0.5, 1.0].map(|half| reaches(2, half, [1, 0])), [false, true]);
+    assert_eq!([0.5, 1.0].map(|half| reaches(3, half, [0, 2])), [false, true]);
+}
+
+#[test]
+fn a_path_leads_through_centres_of_leaves_and_faces_and_to_the_boundary() {
+    let words = contract::testing::words_of(|o| o.level < 2);
+    let leaves = Leaves::new(&words).unwrap();
+    let edge = contract::lattice::UNITS_PER_EDGE as f64 / 4.0;
+    let corner = (9.0 * edge) as i64;
+    let facets: Vec<FacetLattice> = vec![[[0, 0, corner]; 3]];
+    let clearance = Clearance::new(&facets);
+    let (from, to) = ([0.5, 0.5, 0.5], [1.5, 0.5, 0.5]);
+    let leaf = |at: Point| leaves.locate(at.map(|c| (c * edge) as i64));
+    let spots = |goal| -> Vec<Point> {
+        let spots = raw(&leaves, &[leaf(from), leaf(to)], goal, &clearance);
+        for spot in &spots {
+            let expected = length(sub(spot.at, [0.0, 0.0, 9.0 * edge]));
+            assert!((spot.clearance - expected).abs() < 1e-6 * expected);
+            assert!(spot.step.is_infinite() && spot.apart == 0.0);
+        }
+        spots.iter().map(|spot| spot.at.map(|c| c / edge)).collect()
+    };
+    let inner = vec![from, [1.0, 0.5, 0.5], to];
+    assert_eq!(spots(Goal::Place(leaf(to))), inner);
+    assert_eq!(spots(Goal::Far), [inner, vec![[1.5, 0.0, 0.5]]].concat());
 }
