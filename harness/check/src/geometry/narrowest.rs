@@ -40,6 +40,8 @@ pub struct Narrowest<'a> {
     /// The squared distance and number of the nearest opposite facet seen, as wall and as gap, by position in the tree.
     found: [FxHashMap<u32, (f64, u32)>; 2],
     queue: BinaryHeap<Visit>,
+    /// Pairs of nodes and pairs of facets examined: the work of the search, which a test pins.
+    pub examined: [u64; 2],
 }
 
 impl<'a> Narrowest<'a> {
@@ -62,6 +64,7 @@ impl<'a> Narrowest<'a> {
             least: [0, 1].map(|side| Least::new(first, settled.bound(side))),
             found: Default::default(),
             queue: BinaryHeap::new(),
+            examined: [0; 2],
         };
         // Children follow their parents.
         for node in (0..patches.nodes()).rev() {
@@ -92,6 +95,7 @@ impl<'a> Narrowest<'a> {
 
     /// Adds the pairs of a facet of node `a` and a facet of node `b`, which may be walls, gaps or both.
     fn push(&mut self, a: usize, b: usize, may: [bool; 2]) {
+        self.examined[0] += 1;
         let limits = self.limits(may, self.limits_of_nodes[a], self.limits_of_nodes[b]);
         if limits == [0.0; 2] {
             return;
@@ -168,6 +172,7 @@ impl<'a> Narrowest<'a> {
 
     /// Updates what is known of the facets at two positions. Returns whether a limit fell.
     fn compare(&mut self, [i, j]: [usize; 2], squared_min: f64, may: [bool; 2]) -> bool {
+        self.examined[1] += 1;
         let may = [may[0] && self.pairs.may_be_wall(i, j), may[1]];
         let limits = self.limits(may, self.limits[i], self.limits[j]);
         if limits == [0.0; 2] {

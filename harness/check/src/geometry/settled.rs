@@ -16,6 +16,8 @@ pub struct Settled<'a> {
     open_nodes: Vec<[bool; 2]>,
     /// Upper bounds on the least distances.
     least: [Least; 2],
+    /// Pairs of nodes and pairs of facets examined: the work of the search, which a test pins.
+    pub examined: [u64; 2],
 }
 
 impl<'a> Settled<'a> {
@@ -26,6 +28,7 @@ impl<'a> Settled<'a> {
             open: vec![[true; 2]; pairs.patches.facets()],
             open_nodes: vec![[true; 2]; pairs.patches.nodes()],
             least: [0, 1].map(|_| Least::new(first, f64::INFINITY)),
+            examined: [0; 2],
         };
         if pairs.patches.nodes() > 0 {
             settled.visit(0, 0, [true; 2]);
@@ -53,6 +56,7 @@ impl<'a> Settled<'a> {
     /// facet was settled.
     fn visit(&mut self, a: usize, b: usize, may: [bool; 2]) -> bool {
         let patches = self.pairs.patches;
+        self.examined[0] += 1;
         let may = both(may, either(self.open_nodes[a], self.open_nodes[b]));
         if may == [false; 2] {
             return false;
@@ -160,6 +164,7 @@ impl<'a> Settled<'a> {
         verdicts: &Verdicts<GROUP>,
         at: usize,
     ) -> bool {
+        self.examined[1] += 1;
         let mut may = both(may, either(self.open[i], self.open[j]));
         may[0] = may[0] && self.pairs.may_be_wall(i, j);
         if may == [false; 2] {

@@ -2,12 +2,19 @@
 
 use check::geometry::boxes::unit_normal;
 use check::geometry::distance::{cross, dot, length, nearest, sub};
+use check::geometry::edges::Edges;
 use check::geometry::finding::Kind;
 use check::geometry::input::{Input, Requested};
 use check::geometry::intersections::{Relation, relation};
+use check::geometry::narrowest::Narrowest;
+use check::geometry::pairs::Pairs;
+use check::geometry::patches::Patches;
+use check::geometry::settled::Settled;
+use check::geometry::shells::Shells;
 use check::geometry::{Options, diagnose};
 use contract::case::Facet;
 use contract::lattice::UNITS_PER_EDGE;
+use geometries::{Generator, Shape};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 
@@ -116,4 +123,38 @@ fn most_random_facets_have_sheets() {
         compare(facets, 1.0, &[1]).unwrap()
     };
     assert!((0..4).map(sheets).sum::<u64>() > 80);
+}
+
+/// The work of both searches: pairs of nodes and of facets examined by each.
+#[test]
+fn the_searches_examine_as_few_pairs_as_ever() {
+    let examined = |shape: Shape, facets: usize, spacing: f64| {
+        let centre = Some([0.01, 0.02, 0.03]);
+        let facets = Generator { centre, ..Generator::new(shape, facets) }.facets().unwrap();
+        let turned = facets.iter().map(|facet| {
+            facet.map(|[x, y, z]| {
+                // By an angle with the sine 0.6, about two axes.
+                let [x, y] = [0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y];
+                [x, 0.8 * y - 0.6 * z, 0.6 * y + 0.8 * z]
+            })
+        });
+        let requested =
+            Requested { spacing_min: Some(spacing), root: Some(ROOT), root_scale: None };
+        let input = Input::new(turned.collect(), &requested).unwrap();
+        let edges = Edges::new(&input.facets);
+        let shells = Shells::new(&edges, &input.lattice);
+        let patches = Patches::new(&input.lattice, &shells);
+        let unit = ROOT.edge / UNITS_PER_EDGE as f64;
+        let limit = (input.cell.unwrap() / unit).powi(2);
+        let pairs =
+            Pairs { input: &input, edges: &edges, shells: &shells, patches: &patches, limit };
+        let settled = Settled::new(&pairs, 5);
+        let narrowest = Narrowest::new(&pairs, &settled, 5);
+        [settled.examined, narrowest.examined]
+    };
+    assert_eq!(examined(Shape::Sphere, 5_120, 0.1), [[480, 0], [1, 0]]);
+    assert_eq!(examined(Shape::Sphere, 1_280, 4.0), [[3402, 1829], [24_394, 43_105]]);
+    assert_eq!(examined(Shape::NestedSpheres, 2_560, 0.5), [[21_810, 8662], [30_644, 20_565]]);
+    assert_eq!(examined(Shape::Torus, 4_000, 1.0), [[44_918, 16_450], [65_600, 49_807]]);
+    assert_eq!(examined(Shape::Pipe, 2_000, 0.5), [[5140, 2889], [14_912, 21_711]]);
 }

@@ -104,17 +104,29 @@ proptest! {
     }
 }
 
+/// Bounds that were looser would still be bounds, but the searches would take longer.
 #[test]
-fn many_pairs_of_patches_are_decided_either_way() {
-    // Otherwise the comparison above would compare nothing.
+fn as_many_pairs_of_patches_as_ever_are_decided() {
     let mut runner = TestRunner::deterministic();
-    let mut certain = [0; 2];
-    for _ in 0..300 {
+    let (mut certain, mut lengths) = ([[0; 2]; 3], [0.0; 3]);
+    for _ in 0..400 {
         let sets = sets().new_tree(&mut runner).unwrap().current();
-        let [none, all] = compare(&sets, 1.44e8).unwrap();
-        certain = [certain[0] + none, certain[1] + all];
+        for (certain, limit) in certain.iter_mut().zip([1_000.0f64, 4_000.0, 12_000.0]) {
+            let [none, all] = compare(&sets, limit.powi(2)).unwrap();
+            *certain = [certain[0] + none, certain[1] + all];
+        }
+        for (x, y) in both_patches(&sets[0]).into_iter().zip(both_patches(&sets[1])) {
+            let [p, q] = [x, y].map(|patch| patch.bundle([4_000.0; 3], 16_000.0));
+            let verdict = p.verdicts(&q, [1e8; 2]);
+            let [least, greatest] = [verdict.squared_min[0], verdict.squared_max[0]].map(f64::from);
+            for (sum, squared) in lengths.iter_mut().zip([x.squared_min(&y), least, greatest]) {
+                *sum += squared.sqrt();
+            }
+        }
     }
-    assert!(certain[0] > 400 && certain[1] > 30, "{certain:?}");
+    assert_eq!(certain, [[1496, 0], [1215, 12], [1084, 68]]);
+    let [least, least_rounded, greatest] = lengths.map(|sum| (sum / 1e3).round());
+    assert_eq!([least, least_rounded, greatest], [2439.0, 2438.0, 4245.0]);
 }
 
 #[test]
