@@ -118,7 +118,7 @@ fn record() -> Vec<Line> {
         }
     }
     // Records of earlier versions have weights that the mesher no longer offers.
-    for weights in ["unit", "area", "rehearsal"] {
+    for weights in ["unit", "area", "former"] {
         lines.extend(run("weights", Comm::Sim, 64, 4_000_000, 4, weights));
     }
     lines
@@ -183,7 +183,7 @@ fn every_figure_has_its_values_and_its_tikz_picture() {
     assert!(written.broken.is_empty(), "{:?}", written.broken);
     let balance =
         std::fs::read_to_string(place.path().join("figures/balance-uav-4M-64.csv")).unwrap();
-    assert!(balance.contains("\nmorton rehearsal,mesher: by cells,measured,"), "{balance}");
+    assert!(balance.contains("\nmorton former,mesher: by cells,measured,"), "{balance}");
     let exposed =
         std::fs::read_to_string(place.path().join("figures/balance-exposed-uav-4M-64.csv"));
     let exposed = exposed.unwrap();

@@ -177,7 +177,7 @@ pub struct Setup {
     pub comm: Comm,
     /// `metis` or `morton`; empty if the choice was left to the program.
     pub partitioner: String,
-    /// `unit`, `area` or `rebalance` (`rehearsal` in old records); empty if the choice was left to the program.
+    /// `unit`, `area` or `rebalance`; empty if the choice was left to the program.
     pub weights: String,
     /// How many cells each exposed face weighs in the partition; 0 counts these faces only. `None`: they were not counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -304,7 +304,6 @@ pub enum Verdict {
     /// The value is outside the bounds.
     Missed,
     /// The row has no bounds.
-    #[serde(rename = "told")]
     ForComparison,
     /// A run failed.
     Failed,
