@@ -140,7 +140,7 @@ pub fn plan(
     let quantised = quantised(case, options, comm, record)?;
     let volumes = Volumes::new(&quantised.rules.boxes);
     record.report_status("plan");
-    plan::of_case(&quantised.problem(case, &volumes, comm, record), &mut |shift| {
+    plan::of_case(&quantised.problem(case, &volumes, options, comm, record), &mut |shift| {
         pilot(&quantised, &volumes, shift, options, comm)
     })
 }
@@ -150,6 +150,7 @@ impl Quantised {
         &'a self,
         case: &Case,
         volumes: &'a Volumes,
+        options: &'a Options,
         comm: &'a dyn Comm,
         record: &Recorder,
     ) -> plan::Problem<'a> {
@@ -160,6 +161,7 @@ impl Quantised {
             facets_total: self.counts.total,
             spacing_min: case.spacing_min,
             volumes,
+            output: options.out.as_ref(),
             time_cpu_s: record.phases().iter().map(|p| p.time_cpu_s).sum(),
             comm,
         }
@@ -226,7 +228,7 @@ fn make(
     let quantised = quantised(case, options, comm, record)?;
     let volumes = Volumes::new(&quantised.rules.boxes);
     let planned = plan::before_run(
-        &quantised.problem(case, &volumes, comm, record),
+        &quantised.problem(case, &volumes, options, comm, record),
         options.force,
         record.shows_progress(),
         &mut |shift| pilot(&quantised, &volumes, shift, options, comm),

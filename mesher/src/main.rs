@@ -205,10 +205,13 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
-    match result {
-        Ok(outcome) if first && !args.quiet => print(&outcome),
-        Ok(_) => 0,
-        Err(e) => fail(&e, first),
+    let outcome = match result {
+        Ok(outcome) => outcome,
+        Err(e) => return fail(&e, first),
+    };
+    match (if first && !args.quiet { print(&outcome) } else { 0 }, outcome) {
+        (0, Outcome::Planned(plan)) if !plan.fits && !args.force => fail(&plan.refusal(), first),
+        (code, _) => code,
     }
 }
 

@@ -255,7 +255,10 @@ impl Report {
         }
         let heaviest = self.counters["base_leaf_cells_max"].iter().zip(&self.counters["leaves"]);
         for (rank, (heaviest, leaves)) in heaviest.enumerate() {
-            assert!(heaviest <= leaves, "rank {rank}: a base leaf of {heaviest} of {leaves} leaves");
+            assert!(
+                heaviest <= leaves,
+                "rank {rank}: a base leaf of {heaviest} of {leaves} leaves"
+            );
         }
         let [outside, inside] = [self.components_outside, self.components_inside];
         assert_eq!(self.components, outside + inside, "components must be outside or inside");
