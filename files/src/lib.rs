@@ -5,7 +5,7 @@
 //! - [`Draft`] is a file, [`write_atomically`] writes one in one call. Devices, FIFOs and sockets are written through.
 //! - [`Claim`] is a directory of files that become visible together, with the last of them.
 //! - [`Heap`] is the allocator of a program that ends when it gets no more memory.
-//! - [`interrupt::install`] makes SIGINT, SIGTERM and SIGHUP remove whatever is unfinished and end the process.
+//! - [`interrupt::install`] makes signals remove whatever is unfinished and end the process.
 
 #![deny(missing_docs)]
 

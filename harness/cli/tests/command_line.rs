@@ -90,7 +90,8 @@ fn a_fault_of_the_harness_has_an_exit_code_and_one_message() {
     ] {
         let place = tempfile::tempdir().unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        command.args(["planted", "case", "--fault", fault]).env("TMPDIR", place.path());
+        command.args(["planted", "case", "--fault", fault]);
+        command.env("TMPDIR", place.path()).env("RUST_BACKTRACE", "0");
         let output = command.output().unwrap();
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(code), "{fault}: {stderr}");

@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP: a flag that every loop that waits or runs programs checks, and an end for whatever does not.
+//! Signals: a flag that every loop that waits or runs programs checks, and an end for whatever does not.
 //!
 //! Invariants:
 //! - a first signal lets a command return in the ordinary way, with a partial report, but not for longer than [`GRACE`];
@@ -50,7 +50,7 @@ fn leftovers() -> MutexGuard<'static, Leftovers> {
     LEFTOVERS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop. Once per process, before anything makes a temporary file.
+/// Makes signals a request to stop. Once per process, before anything makes a temporary file.
 pub fn install() {
     // Without handlers, a signal ends the harness without cleaning up; that does not prevent a run.
     let _ = watch();
@@ -74,7 +74,7 @@ fn watch() -> io::Result<()> {
     };
     thread::Builder::new().name("signals".into()).spawn(wait)?;
     let _ = WAKE.set(sent.try_clone()?);
-    for signal in interrupt::signals() {
+    for signal in interrupt::signals()? {
         pipe::register(signal, sent.try_clone()?)?;
     }
     // A signal after this thread has made the directory removes it.
