@@ -2,7 +2,7 @@
 use clap::Parser;
 use files::{Heap, interrupt};
 use reference::write::{self, AmbiguousCount, Which};
-use reference::{Error, Mesh, base_tree, case_file, leaves, mesh};
+use reference::{Error, Geometry, Mesh, base_tree, case_file, leaves, mesh};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -45,6 +45,7 @@ struct Run {
     tree: Which,
     ranks: u32,
     facets: u64,
+    geometry: Geometry,
     cells: u64,
     cells_by_level: [u64; 20],
     components_ambiguous: AmbiguousCount,
@@ -103,6 +104,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         tree: which,
         ranks: 1,
         facets: case.facets.len() as u64,
+        geometry: mesh.geometry.clone(),
         cells: mesh.words.len() as u64,
         cells_by_level: tally.leaves_by_level,
         components_ambiguous: AmbiguousCount::of(&mesh),
