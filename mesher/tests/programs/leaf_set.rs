@@ -129,7 +129,7 @@ fn written_meshes_are_read_back() {
             assert_manifest(&folder, &words, ungraded, ranks);
             let report = workspace.json("run.json");
             assert_report(&report, &words, ranks);
-            for json in [process::read_json(&folder.join("mesh.json")), report] {
+            for json in [crate::process::read_json(&folder.join("mesh.json")), report] {
                 assert_eq!(json["geometry"], geometry, "{ranks} ranks");
             }
             std::fs::remove_dir_all(folder).expect("the mesh exists");
