@@ -59,7 +59,7 @@ mod tests {
         let words =
             [of(2, &[1, 3]), of(1, &[1]), of(3, &[128, 129, 130, 200]), of(2, &[32, 63])].concat();
         for (starts, level, want) in
-            [(&[0, 2, 5][..], 1, 4), (&[0, 4], 1, 6), (&[], 1, 3), (&[], 0, 9), (&[], 2, 3)]
+            [(&[0, 2, 5][..], 1, 5), (&[0, 4], 1, 7), (&[], 1, 3), (&[], 0, 9), (&[], 2, 3)]
         {
             let starts: Vec<u64> = starts.iter().map(|c| start57(1, *c)).collect();
             for piece in 1..=words.len() {
