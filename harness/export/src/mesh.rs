@@ -10,14 +10,13 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use contract::case::Case;
 use contract::lattice::Root;
-use contract::leafset::{self, LeafDir, Leaves};
 use contract::manifest::Manifest;
+use contract::mesh::{self, Part, Readers};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
 use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::part::{Part, Readers};
 use crate::selection::Selection;
 
 /// Number of words that are read at once: few enough that a slice reads little besides its own leaves.
@@ -104,13 +103,7 @@ impl Mesh {
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, ExportError> {
-        let (manifest, parts) = match leafset::open_any(path)? {
-            Leaves::Words(words) => {
-                let LeafDir { manifest, parts } = *words;
-                (manifest, parts.into_iter().map(Part::Words).collect())
-            }
-            Leaves::Tree(tree, manifest) => (*manifest, vec![Part::of_tree(*tree)?]),
-        };
+        let mesh::Mesh { manifest, parts, .. } = mesh::Mesh::open(path)?;
         Ok(Self { manifest, parts, leaves_by_rank: OnceLock::new() })
     }
 

@@ -65,11 +65,11 @@ impl Mesh<'_> {
                 .to_owned());
         }
         let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
-        refuse_too_large(self.leaves.manifest.leaves, &meminfo)?;
+        refuse_too_large(self.leaves.count(&Octant::ROOT), &meminfo)?;
         let mesh = self.distrusting();
         let mut found = Unneeded {
             schema: SCHEMA,
-            leaves: mesh.leaves.manifest.leaves,
+            leaves: mesh.leaves.count(&Octant::ROOT),
             splits: 0,
             unneeded: 0,
             subtrees: 0,
@@ -78,7 +78,7 @@ impl Mesh<'_> {
             largest: None,
         };
         mesh.search_unneeded(&Octant::ROOT, first, &mut found);
-        mesh.refuse_invalid()?;
+        found.check_invariants();
         Ok(found)
     }
 
@@ -117,6 +117,30 @@ impl Mesh<'_> {
 }
 
 /// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
+impl Unneeded {
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, first, largest, .. } = self;
+        assert!(
+            subtrees <= unneeded && unneeded <= splits && (*unneeded == 0) == (*subtrees == 0),
+            "{unneeded} of {splits} splits in {subtrees} octants are needless"
+        );
+        assert!(unneeded_leaves <= leaves, "{unneeded_leaves} of {leaves} leaves are needless");
+        let of_first: u64 = first.iter().map(|subtree| subtree.leaves).sum();
+        assert!(
+            first.len() as u64 <= *subtrees && of_first <= *unneeded_leaves,
+            "{} of {subtrees} octants are listed, with {of_first} of {unneeded_leaves} leaves",
+            first.len()
+        );
+        let most = first.iter().map(|subtree| subtree.leaves).max().unwrap_or(0);
+        let largest = largest.as_ref().map_or(0, |largest| largest.leaves);
+        assert!(
+            most <= largest && largest <= *unneeded_leaves,
+            "the largest of {unneeded_leaves} leaves has {largest}, and one listed has {most}"
+        );
+    }
+}
+
 fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
     let kilobytes = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
     let kilobytes =
