@@ -6,7 +6,6 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
 use npyz::{DType, NpyHeader};
 
 /// Longer than any header that the programs write, so that one read suffices.
@@ -130,72 +129,6 @@ impl PartFile {
             }
         }
         Ok(low)
-    }
-}
-
-/// A part file mapped into memory. Pages are read when they are first used.
-#[derive(Debug)]
-pub struct MappedPart {
-    bytes: Mmap,
-    /// Position of the first word in `bytes`. Nothing aligns it in files of other programs.
-    offset: usize,
-    len: usize,
-}
-
-impl PartFile {
-    /// Maps the file into memory. The process is killed (SIGBUS) if it reads a page that another process has cut
-    /// off the file in the meantime.
-    ///
-    /// # Errors
-    /// If the file cannot be mapped.
-    pub fn map(&self) -> std::io::Result<MappedPart> {
-        // SAFETY: the mapping is only read, byte by byte, and any bytes form valid words. A change of the file by
-        // another process can change their values, and no invariant in memory depends on these.
-        let bytes = unsafe { Mmap::map(&self.file) }?;
-        let fits = |n: u64| usize::try_from(n).map_err(std::io::Error::other);
-        let (offset, len) = (fits(self.offset)?, fits(self.len)?);
-        if bytes.len() < offset + 8 * len {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
-        }
-        Ok(MappedPart { bytes, offset, len })
-    }
-}
-
-impl MappedPart {
-    /// Number of words.
-    pub fn len(&self) -> usize {
-        self.len
-    }
-
-    /// Whether the part has no words.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// Announces that few words will be read, at random places. Has an effect on speed alone.
-    pub fn expect_few_reads(&self) {
-        // An error means that the system does not know this kind of advice.
-        let _ = self.bytes.advise(memmap2::Advice::Random);
-    }
-
-    /// The word with this index. Panics if there is none.
-    pub fn word(&self, index: usize) -> u64 {
-        assert!(index < self.len, "word {index} of {}", self.len);
-        let at = self.offset + 8 * index;
-        u64::from_le_bytes(self.bytes[at..at + 8].try_into().expect("eight bytes"))
-    }
-
-    /// Index of the first word in a sorted range that is not less than `word`; the range's end if there is none.
-    pub fn lower_bound(&self, range: Range<usize>, word: u64) -> usize {
-        let (mut low, mut high) = (range.start, range.end);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            match self.word(middle) < word {
-                true => low = middle + 1,
-                false => high = middle,
-            }
-        }
-        low
     }
 }
 

@@ -64,7 +64,8 @@ impl<'a> Visitor<'a> {
         self.with_readers(|readers| {
             let (mut intervals, mut before) = (Vec::new(), 0);
             for (part, file) in self.mesh.parts.iter().enumerate() {
-                let mut bound = |key| readers.lower_bound(part, 0..file.len(), key);
+                let mut bound =
+                    |key| readers.lower_bound(part, 0..file.len(), key).map_err(ExportError::from);
                 let interval = bound(keys.start)?..bound(keys.end)?;
                 before += interval.start;
                 intervals.extend((!interval.is_empty()).then_some((part, interval)));
@@ -288,7 +289,8 @@ impl Mesh {
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
         let file = &self.parts[part];
-        let (words, ranks) = readers.words(part, &octant, interval.clone())?;
+        let (words, ranks) =
+            readers.words(part, &octant, interval.clone()).map_err(ExportError::from)?;
         let mut ranks = ranks.into_iter();
         // Leaves that ascend and do not overlap begin where the one before ends, or later.
         let mut key_min = word::key_of(octant.corner);

@@ -67,6 +67,11 @@ impl AuditReport {
         self.checks.iter().filter(|check| !check.was_run())
     }
 
+    /// Whether needless splits were not sought, because memory does not suffice.
+    pub fn exceeds_memory(&self) -> bool {
+        self.not_run().any(|check| check.name == checks::NEEDLESS)
+    }
+
     /// Whether any property of the leaves was checked, beyond their files and counts.
     pub fn checked_anything(&self) -> bool {
         let formal = [checks::FILES, "manifest", "linear"];

@@ -7,7 +7,7 @@
 use std::fmt::Debug;
 
 use super::{Check, CheckResult, Pass, Subject, Terms, always, nothing};
-use contract::manifest::{BySide, Components, Manifest, Sides, Tree};
+use contract::manifest::{BySide, Components, Geometry, Manifest, Sides, Tree};
 
 pub(super) const CHECK: Check = Check { name: "manifest", wanted: always, needs: nothing, run };
 
@@ -21,6 +21,15 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         same("T0: ", "tree", &base.manifest.tree, &Tree::Base, result);
         of_leaves("T0: ", &base.manifest, pass, result);
         of_inputs("T0: ", &base.manifest, &subject.inputs, result);
+    }
+    for (prefix, manifest) in [
+        ("", Some(subject.manifest)),
+        ("T0: ", subject.base.as_ref().map(|(base, _)| &base.manifest)),
+    ] {
+        // A mesh of another geometry, or one that is older than its geometry.
+        if let (Some(case), Some(claimed)) = (subject.case, manifest.and_then(|m| m.geometry)) {
+            same(prefix, "geometry", &claimed, &Geometry::of(&case.facets_lattice), result);
+        }
     }
     // Of different leaves, `identical` reports the cause.
     if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)

@@ -35,6 +35,7 @@ pub(crate) use subject::valid_leaves;
 pub use subject::{CAPACITY, Subject};
 pub use terms::Terms;
 
+pub(crate) use needless::NAME as NEEDLESS;
 pub(crate) use pass::Pass;
 
 /// Why what needs sides is not checked.

@@ -7,8 +7,10 @@
 use super::{Check, CheckResult, FINDINGS_LISTED, NO_GEOMETRY, Subject, nothing};
 use crate::why::Mesh;
 
+pub(crate) const NAME: &str = "needless";
+
 pub(super) const CHECK: Check = Check {
-    name: "needless",
+    name: NAME,
     // `identical` finds the same, by comparison.
     wanted: |subject| {
         subject.promises.definition && subject.case.is_some() && subject.reference.is_none()

@@ -13,7 +13,7 @@
 use std::cell::RefCell;
 
 use contract::case::Case;
-use contract::manifest::{self, Manifest};
+use contract::manifest::{self, Geometry, Manifest};
 use contract::octant::Octant;
 use contract::tree::Tree;
 use rustc_hash::FxHashMap;
@@ -71,7 +71,11 @@ impl<'a> Mesh<'a> {
         case: Option<&'a Case>,
     ) -> Result<Self, String> {
         let terms = Terms::of_manifest(manifest);
-        match case.filter(|case| Terms::of_case(case) != terms) {
+        let is_other = |case: &&Case| {
+            let geometry = || Geometry::of(&case.facets_lattice);
+            Terms::of_case(case) != terms || manifest.geometry.is_some_and(|g| g != geometry())
+        };
+        match case.filter(is_other) {
             Some(case) => Err(other_inputs(manifest, case)),
             None => Ok(Self::new(manifest, tree, terms, case)),
         }
@@ -112,7 +116,8 @@ impl<'a> Mesh<'a> {
 
 /// The error of a case that is not that of a mesh, with the inputs that differ.
 fn other_inputs(of_mesh: &Manifest, case: &Case) -> String {
-    let of_case = case.manifest(of_mesh.tree, String::new());
+    let geometry = Some(Geometry::of(&case.facets_lattice));
+    let of_case = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
     let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &of_case));
     if of_mesh.sides == manifest::Sides::Unknown {
         differing.push("the sides of the mesh are unknown".to_owned());
