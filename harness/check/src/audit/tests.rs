@@ -159,6 +159,23 @@ fn the_report_states_each_check_and_whether_leaves_were_checked() {
     assert!(!report.holds() && report.checked_anything());
 }
 
+#[test]
+fn a_report_that_contradicts_itself_is_a_bug() {
+    let correct = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
+    let faults: [fn(&mut AuditReport); 5] = [
+        |r| r.checks.clear(),
+        |r| r.checks.push(r.checks[0].clone()),
+        |r| r.nodes = 20 * r.leaves,
+        |r| r.time_read_s = r.time_wall_s + 1.0,
+        |r| r.checks[0].findings_total += 1,
+    ];
+    for fault in faults {
+        let mut wrong = correct.clone();
+        fault(&mut wrong);
+        assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong}");
+    }
+}
+
 /// The audit must not pass if memory does not suffice, but it still checks counts and digests.
 #[test]
 fn an_exceeded_memory_limit_is_a_finding() {

@@ -224,3 +224,53 @@ fn kill(mutant: &Mutant, correct: &SelftestCase, mutation: &Mutation, examined: 
         finding: expected.and_then(|r| r.findings.first()).map(|f| f.detail.clone()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A report in which every corruption was tried once and reported.
+    fn correct() -> SelftestReport {
+        let kill = |mutant: &Mutant| Kill {
+            mutant: mutant.name,
+            case: "a case".to_owned(),
+            expected: mutant.expected,
+            caught_by: vec![mutant.expected],
+            audit_expected: mutant.audit,
+            audit_caught_by: vec![mutant.expected],
+            whole_audit_missed: false,
+            finding: Some("a finding".to_owned()),
+        };
+        let kills = catalogue().iter().map(kill).collect();
+        SelftestReport { kills, ..SelftestReport::default() }
+    }
+
+    #[test]
+    fn a_report_that_contradicts_itself_is_a_bug() {
+        correct().check_invariants();
+        assert!(correct().holds());
+        let faults: [fn(&mut SelftestReport); 6] = [
+            |r| drop(r.kills.pop()),
+            |r| r.unused.push(r.kills[0].mutant),
+            |r| r.kills[0].expected = "files",
+            |r| r.kills[0].caught_by.clear(),
+            |r| r.kills[0].finding = None,
+            |r| r.unused.push("another"),
+        ];
+        for (i, fault) in faults.iter().enumerate() {
+            let mut wrong = correct();
+            fault(&mut wrong);
+            let seen = std::panic::catch_unwind(|| wrong.check_invariants());
+            assert!(seen.is_err(), "fault {i}");
+        }
+    }
+
+    #[test]
+    fn a_corruption_that_the_audit_with_the_case_misses_survives() {
+        let mut report = correct();
+        report.kills[0].whole_audit_missed = true;
+        assert!(
+            !report.holds() && report.to_string().contains("missed by the audit with the case")
+        );
+    }
+}

@@ -190,6 +190,36 @@ mod tests {
     use super::*;
 
     #[test]
+    fn counts_of_needless_splits_that_contradict_each_other_are_a_bug() {
+        let root = contract::lattice::Root { origin: [0.0; 3], edge: 1.0 };
+        let subtree = Subtree { octant: Place::new(&Octant::ROOT.child(3), &root), leaves: 8 };
+        let correct = Unneeded {
+            schema: SCHEMA,
+            leaves: 64,
+            splits: 9,
+            unneeded: 2,
+            subtrees: 1,
+            unneeded_leaves: 8,
+            first: vec![subtree.clone()],
+            largest: Some(subtree),
+        };
+        correct.check_invariants();
+        let faults: [fn(&mut Unneeded); 6] = [
+            |u| u.unneeded = 10,
+            |u| u.subtrees = 0,
+            |u| u.unneeded_leaves = 65,
+            |u| u.first.push(u.first[0].clone()),
+            |u| u.largest = None,
+            |u| u.first[0].leaves = 9,
+        ];
+        for fault in faults {
+            let mut wrong = correct.clone();
+            fault(&mut wrong);
+            assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
     fn a_mesh_that_exceeds_the_available_memory_is_refused_before_the_audit() {
         let meminfo = "MemTotal:       24000000 kB\nMemAvailable:    1000000 kB\n";
         assert_eq!(refuse_too_large(17_000_000, meminfo), Ok(()));
