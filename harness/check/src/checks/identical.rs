@@ -8,7 +8,8 @@ use super::{CheckResult, Subject};
 use contract::lattice::Root;
 use contract::word::{self, Leaf};
 
-const NAME: &str = "identical";
+/// Name of the check.
+pub const NAME: &str = "identical";
 
 /// Compares the mesh with the reference; `None` without a reference.
 pub fn check(subject: &Subject) -> Option<CheckResult> {

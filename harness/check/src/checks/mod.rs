@@ -17,6 +17,7 @@ pub mod kept;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
+mod outcome;
 mod premise;
 mod promised;
 mod region;
@@ -28,6 +29,7 @@ mod surface;
 mod terms;
 pub mod trail;
 
+pub use outcome::Outcome;
 pub use premise::with_premise;
 pub use promised::promised;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};

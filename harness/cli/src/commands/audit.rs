@@ -52,8 +52,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
-        println!("left out: {why}");
-        return Ok(if *require_checks { EXIT_MISSING } else { EXIT_HOLDS });
+        return Err((EXIT_MISSING, format!("left out: {why}")));
     }
     // The temporary directory of an imported mesh lives as long as this value.
     let imported = match mesh.join(manifest::FILE).exists() {
@@ -81,6 +80,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(match report.holds() {
         false => EXIT_FAILED,
         true if *require_checks && report.not_run().next().is_some() => EXIT_MISSING,
+        true if !report.checked_anything() => EXIT_MISSING,
         true => EXIT_HOLDS,
     })
 }
