@@ -106,7 +106,10 @@ fn run_mpi(args: &Result<Args, Error>) {
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
     files::ends_with(mesher::comm::mpi::abort);
-    let code = run(args, &comm);
+    let code = match launch::check_size(comm.size(), &mesher::comm::mpi::library()) {
+        Ok(()) => run(args, &comm),
+        Err(e) => fail(&e, launch::is_first()),
+    };
     drop(comm);
     exit(code);
 }

@@ -57,9 +57,12 @@ impl Workspace {
     /// A command that runs in the directory, outside any MPI job that runs this test.
     pub fn enter(&self, mut command: Command) -> Command {
         command.current_dir(self.path());
-        for v in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "PMIX_RANK", "MPI_LOCALNRANKS"] {
+        for v in
+            ["OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "PMIX_RANK"]
+        {
             command.env_remove(v);
         }
+        command.env_remove("SLURM_STEP_NUM_TASKS").env_remove("MPI_LOCALNRANKS");
         command
     }
 

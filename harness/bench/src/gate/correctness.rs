@@ -79,7 +79,7 @@ fn verified(bench: &Bench, engine: &Engine, cases: Vec<String>) -> Result<Report
 fn finding(case: &CaseReport) -> Finding {
     let tally = case.tally();
     let failure = case.checks.iter().find_map(|check| match &check.outcome {
-        Outcome::Fail(why) => {
+        Outcome::Fail { why } => {
             let first = why.lines().next().unwrap_or_default();
             Some(format!("{}: {}: {first}", check.subject, check.name))
         }
@@ -87,7 +87,7 @@ fn finding(case: &CaseReport) -> Finding {
     });
     let failure = failure.or(case.input_error.clone());
     let left_out = case.checks.iter().find_map(|check| match &check.outcome {
-        Outcome::LeftOut(why) => Some(why.clone()),
+        Outcome::LeftOut { why } => Some(why.clone()),
         _ => None,
     });
     let (verdict, note) = match failure {

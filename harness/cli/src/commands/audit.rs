@@ -62,8 +62,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
-        println!("left out: {why}");
-        return Ok(EXIT_MISSING);
+        return Err((EXIT_MISSING, format!("left out: {why}")));
     }
     // The temporary directory of an imported mesh lives as long as this value.
     let imported = match mesh.join(manifest::FILE).exists() {

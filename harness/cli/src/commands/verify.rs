@@ -28,8 +28,10 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',', default_value = "small")]
     pub size: Vec<Size>,
     /// Rank counts of the runs on MPI
-    #[arg(long, value_delimiter = ',', default_value = "1,2,3,4,7,8,16,32,64", value_parser = rank_count)]
-    pub ranks: Vec<usize>,
+    ///
+    /// Given, they require MPI: exit code 3 without it [default: 1,2,3,4,7,8,16,32,64]
+    #[arg(long, value_delimiter = ',', value_parser = rank_count)]
+    pub ranks: Option<Vec<usize>>,
     /// Partitioners, each at every rank count
     #[arg(long, value_delimiter = ',', default_value = "metis,morton")]
     pub partitioners: Vec<String>,
@@ -83,6 +85,20 @@ pub struct Arguments {
     pub programs: ProgramArguments,
 }
 
+/// Rank counts without `--ranks`.
+const RANKS: [usize; 9] = [1, 2, 3, 4, 7, 8, 16, 32, 64];
+
+/// Each rank count once: a run has one directory.
+fn distinct(ranks: Vec<usize>) -> Vec<usize> {
+    let mut kept = Vec::new();
+    ranks.into_iter().for_each(|count| {
+        if !kept.contains(&count) {
+            kept.push(count)
+        }
+    });
+    kept
+}
+
 fn rank_count(text: &str) -> Result<usize, String> {
     match text.trim().parse() {
         Ok(0) => Err("a run has at least one rank".to_owned()),
@@ -127,7 +143,8 @@ fn options(arguments: Arguments) -> Options {
     Options {
         cases: arguments.cases,
         sizes: arguments.size,
-        ranks: arguments.ranks,
+        ranks_given: arguments.ranks.is_some(),
+        ranks: distinct(arguments.ranks.unwrap_or_else(|| RANKS.to_vec())),
         partitioners: arguments.partitioners,
         level_bases: arguments.level_bases,
         out: arguments.out,
