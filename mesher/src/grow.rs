@@ -38,7 +38,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         counters.add_voxelised(&work);
         tree.split
     };
-    let Partition { mut ownership, base_leaves, level_base } = match is_parallel {
+    let Partition { mut ownership, base_leaves, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
         true => record.phase("base tree", comm, || {
             initial::partition(facets.borrow(), &rules, division, mark, comm)
@@ -91,6 +91,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         rules,
         ownership,
         level_base,
+        partitioner,
         split,
         crossing,
         sides,

@@ -8,6 +8,7 @@
 
 pub mod experiments;
 pub mod gate;
+pub mod origin;
 pub mod selftest;
 pub mod shrink;
 pub mod statistics;

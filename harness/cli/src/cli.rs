@@ -54,9 +54,6 @@ pub enum Command {
     Why(commands::why::Arguments),
     /// Print a completion script for a shell
     Completions(commands::completions::Arguments),
-    /// The program that `gate --selftest` compares with itself
-    #[command(hide = true)]
-    Planted(commands::planted::Arguments),
     /// Print the manual page, or write one page per command into a directory
     Man(commands::man::Arguments),
 }

@@ -27,7 +27,6 @@ fn main() -> ExitCode {
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Leak(arguments) => commands::leak::run(&arguments),
-        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::NearBody(arguments) => commands::near_body::run(&arguments),
         Command::Picture(arguments) => commands::picture::run(&arguments),

@@ -15,7 +15,7 @@ use crate::octant::{LEVEL_MAX, Level, edge};
 use crate::partition::area::{self, FRACTIONS};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{BaseLeaf, Ownership};
-use crate::partition::{Division, base_leaves};
+use crate::partition::{Division, Partitioner, base_leaves};
 use crate::tree::PerLevel;
 
 /// Fine octants per rank, about: boundaries of the curve lie between them.
@@ -33,12 +33,19 @@ pub struct Partition {
     pub base_leaves: Vec<BaseLeaf>,
     /// Level of the deepest base leaves, or of the octants between which the boundaries of the curve lie.
     pub level_base: Level,
+    /// The partitioner that was used; none for a single rank.
+    pub partitioner: Option<Partitioner>,
 }
 
 impl Partition {
     /// The partition of a single rank.
     pub fn solo() -> Self {
-        Self { ownership: Ownership::solo(), base_leaves: vec![BaseLeaf::ROOT], level_base: 0 }
+        Self {
+            ownership: Ownership::solo(),
+            base_leaves: vec![BaseLeaf::ROOT],
+            level_base: 0,
+            partitioner: None,
+        }
     }
 }
 
@@ -54,7 +61,13 @@ pub fn partition(
     if division.is_of_curve() {
         let levels = levels(facets, rules, [COARSE_PER_RANK, FINE_PER_RANK as f64], comm);
         let ownership = by_area(facets, rules, levels, comm);
-        return Ok(Partition { ownership, base_leaves: Vec::new(), level_base: levels[1] });
+        let partitioner = Some(Partitioner::Morton);
+        return Ok(Partition {
+            ownership,
+            base_leaves: Vec::new(),
+            level_base: levels[1],
+            partitioner,
+        });
     }
     let level = match division.level_base {
         Some(level) => level.min(level_last(rules)),
@@ -63,11 +76,12 @@ pub fn partition(
             levels(facets, rules, [per_rank], comm)[0].min(LEVEL_BASE_AUTO_MAX)
         }
     };
-    let mut leaves = base_leaves::partition(facets, &mark(level), rules, division, level, comm)?;
+    let (mut leaves, partitioner) =
+        base_leaves::partition(facets, &mark(level), rules, division, level, comm)?;
     let ownership = Ownership::new(comm.rank(), comm.size(), &leaves);
     let level_base = leaves.iter().map(|b| b.level).max().unwrap_or(0);
     leaves.retain(|b| b.owner == comm.rank());
-    Ok(Partition { ownership, base_leaves: leaves, level_base })
+    Ok(Partition { ownership, base_leaves: leaves, level_base, partitioner: Some(partitioner) })
 }
 
 /// Deepest level that base leaves may have.

@@ -16,7 +16,6 @@ mod meshed;
 pub mod near_body;
 mod paper;
 pub mod picture;
-pub mod planted;
 mod programs;
 pub mod report;
 mod selection;
