@@ -220,7 +220,7 @@ fn measurements(setup: Setup, report: RunReport) -> Run {
         command: String::new(),
         program: String::new(),
         facets: report.facets,
-        geometry: report.geometry.map(|geometry| geometry.digest),
+        geometry: report.geometry.as_ref().map(|geometry| geometry.digest.clone()),
         cells: report.cells,
         time_wall_s,
         time_launch_s: 0.0,

@@ -16,6 +16,7 @@ mod meshed;
 pub mod near_body;
 mod paper;
 pub mod picture;
+pub mod planted;
 mod programs;
 pub mod report;
 mod selection;
