@@ -62,7 +62,6 @@ fn dispatch(arguments: Arguments) -> u8 {
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Leak(arguments) => commands::leak::run(&arguments),
-        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::NearBody(arguments) => commands::near_body::run(&arguments),
         Command::Picture(arguments) => commands::picture::run(&arguments),
@@ -72,6 +71,7 @@ fn dispatch(arguments: Arguments) -> u8 {
         Command::Completions(arguments) => {
             commands::completions::run(&arguments, &mut Arguments::command())
         }
+        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     }
 }

@@ -52,6 +52,7 @@ fn read(arguments: &Arguments) -> Result<Targets, String> {
 
 fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     let session = &arguments.session;
+    session.prepare()?;
     let programs = Programs::find(session.programs.given()).map_err(|why| {
         eprintln!("harness: {why}");
         EXIT_INPUT
@@ -131,8 +132,15 @@ fn machine(lines: &[Line]) -> String {
     format!("{cpu}, {cores} cores, {gib} GiB, {kernel}, {mpi}, {compiler}, commit {commit}")
 }
 
-/// Returns the exit code: 1 if a row was missed or failed.
+/// Returns the exit code: 1 if a row was missed or failed, 3 if none has a value.
 fn code(rows: &[Judged]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict, Verdict::Missed | Verdict::Failed);
-    if rows.iter().any(bad) { EXIT_FAILED } else { EXIT_HOLDS }
+    match rows {
+        _ if rows.iter().any(bad) => EXIT_FAILED,
+        _ if rows.iter().all(|row| row.measured.is_none()) => {
+            eprintln!("harness: no row was measured");
+            EXIT_MISSING
+        }
+        _ => EXIT_HOLDS,
+    }
 }

@@ -1,9 +1,9 @@
 //! `harness track`: appends metrics to the history and reports change points.
 
-use super::files::put;
+use super::files::{prepare, put};
 use super::values::{percentage, probability};
 use bench::statistics::change_points::Rules;
-use bench::track::history::{self, Record};
+use bench::track::history::{self, History, Record};
 use bench::track::{Series, analyse, link, summary};
 use clap::Args;
 use report::track::{export, page};
@@ -84,6 +84,7 @@ pub fn run(arguments: &Arguments) -> u8 {
 }
 
 fn try_run(arguments: &Arguments) -> Result<u8, String> {
+    arguments.outputs().try_for_each(|file| prepare(file).map_err(|error| error.to_string()))?;
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     } else if !arguments.history.exists() {
@@ -95,7 +96,10 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
     for commit in &arguments.accept {
         history::accept(&arguments.history, commit)?;
     }
-    let records = history::read(&arguments.history)?;
+    let History { records, warnings } = history::read(&arguments.history)?;
+    for warning in &warnings {
+        eprintln!("harness: {}: {warning}", arguments.history.display());
+    }
     let effect_min = arguments.effect_min / 100.0;
     let rules =
         Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
@@ -105,6 +109,14 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
     write(arguments, &records, &all).map_err(|error| error.to_string())?;
     let worse = all.iter().any(|series| series.worse_recently(arguments.fail_recent).is_some());
     Ok(if worse { EXIT_FAILED } else { EXIT_HOLDS })
+}
+
+impl Arguments {
+    /// The files to write.
+    fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
+        let Self { page, bencher, github_benchmark, csv, junit, json, .. } = self;
+        [page, bencher, github_benchmark, csv, junit, json].into_iter().flatten()
+    }
 }
 
 fn append(arguments: &Arguments) -> Result<(), String> {
