@@ -27,3 +27,4 @@ pub mod selection;
 #[cfg(test)]
 mod testing;
 pub mod vtu;
+mod written;

@@ -43,6 +43,22 @@ impl Points {
         }
     }
 
+    /// Asserts that every cell has eight points, of which the first and the seventh are its lowest and its highest corner, and that the
+    /// last point is that of a cell.
+    ///
+    /// # Panics
+    /// If that is not so.
+    pub fn check_invariants(&self, leaves: &[Leaf]) {
+        assert_eq!(self.connectivity.len(), 8 * leaves.len(), "eight points per cell");
+        for (Leaf { octant, .. }, corners) in leaves.iter().zip(self.connectivity.chunks_exact(8)) {
+            let [low, high] = [0, 6].map(|i| unpacked(self.packed[corners[i] as usize]));
+            let expected = octant.corner.map(|c| c + octant.edge());
+            assert!(low == octant.corner && high == expected, "{octant} from {low:?} to {high:?}");
+        }
+        let last = self.connectivity.iter().max().map_or(0, |last| *last as usize + 1);
+        assert_eq!(last, self.packed.len(), "points of cells and all points");
+    }
+
     /// Adds all leaves of an octant, `depth` levels below it. Most points are corners of several leaves of a block, and
     /// are then searched once.
     fn add(&mut self, block: &[Leaf], depth: u32) {
