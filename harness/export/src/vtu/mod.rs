@@ -87,7 +87,7 @@ fn encode(
                 Ok::<(), ExportError>(())
             })?;
             options.check()?;
-            Ok(encoder.encode(&content))
+            Ok::<Encoded, ExportError>(encoder.encode(&content))
         })
     };
     let total = leaves(pieces);

@@ -158,6 +158,28 @@ mod tests {
     }
 
     #[test]
+    fn planted_wrong_points_are_noticed() {
+        let noticed = |why: &str, change: &dyn Fn(&mut Points)| {
+            let words = words_of(|o| o.level < 2);
+            let leaf =
+                |&w: &u64| Leaf { octant: word::octant(w), side: word::side(w), rank: 0, index: 0 };
+            let leaves: Vec<Leaf> = words.iter().map(leaf).collect();
+            let mut points = Points::default();
+            points.set(&leaves);
+            points.check_invariants(&leaves);
+            change(&mut points);
+            let check = std::panic::AssertUnwindSafe(|| points.check_invariants(&leaves));
+            let caught = std::panic::catch_unwind(check).unwrap_err();
+            let message = caught.downcast_ref::<String>().unwrap();
+            assert!(message.contains(why), "{message}");
+        };
+        noticed("eight points", &|p| p.connectivity.truncate(500));
+        noticed("from [", &|p| p.connectivity.swap(0, 1));
+        noticed("from [", &|p| p.packed[40] += 1);
+        noticed("all points", &|p| p.packed.push(0));
+    }
+
+    #[test]
     fn leaves_of_one_level_have_a_lattice_of_points() {
         for level in 0..5 {
             let points = check(&words_of(|o| o.level < level));
