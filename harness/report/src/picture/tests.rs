@@ -280,7 +280,7 @@ fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
 fn planted_wrong_pictures_are_noticed() {
     assert_noticed("not within the root", |p| p.window[1][0] = 9.0);
     assert_noticed("outside of the window", |p| p.window = [[6.0; 2], [8.0; 2]]);
-    assert_noticed("has no colour", |p| drop(p.key.pop()));
+    assert_noticed("has no colour", |p| p.key.truncate(1));
     assert_noticed("leaves the window", |p| p.section.as_mut().unwrap()[0][0][1] = -5.0);
     assert_noticed("not the square of an octant", |p| p.squares.squares[0].corner[0] += 1);
     assert_noticed("leaves of all squares", |p| p.squares.leaves += 1);
