@@ -116,7 +116,7 @@ fn a_promise_of_sides_is_not_checked_if_the_mesh_has_none() {
     let text = "spacing_min = 2.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
     let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
     let case = Case::from_parts(text, vec![facet]).unwrap();
-    let sides = Some(crate::promises::Sides { band_cells: 0.0 });
+    let sides = Some(crate::promises::Sides { band_cells: 0.25 });
     let promises = Promises { sides, ..Promises::default() };
     for known in [true, false] {
         let mut set = leaf_set(vec![words_of(|o| o.level < 2)]);
@@ -130,7 +130,7 @@ fn a_promise_of_sides_is_not_checked_if_the_mesh_has_none() {
         let claims: Vec<&str> = claims.findings.iter().map(|f| f.detail.as_str()).collect();
         let level = "level_surface: 0 in the manifest, but 2 in fact";
         assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest, but 4 in fact"]);
-        // Leaves that the facet crosses are not judged, and are not counted.
+        // Leaves near the facet are not judged, and are not counted.
         assert!(!known || check.examined > 0 && check.examined < 64, "{report}");
     }
 }
