@@ -7,6 +7,7 @@ use crate::manifest::{self, Manifest};
 use crate::mesh::Mesh;
 use crate::stream::Counts;
 use crate::write::{OutDir, Written};
+use files::interrupt::stop_at;
 
 /// Sums over all ranks.
 pub struct Totals {
@@ -55,6 +56,7 @@ pub fn finish(
     let (digests, parts) = manifest::gather(written, comm);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
+            stop_at(format_args!("manifest:0"));
             out.manifest(&Manifest::new(&out.output, mesh, &counts, &digests, &parts))
         }
         _ => Ok(()),

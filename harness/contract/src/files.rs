@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use tempfile::TempDir;
 
-pub use ::files::{read, read_text, write_atomically};
+pub use ::files::{append_log, read, read_log, read_text, write_atomically};
 
 /// An error that names the file.
 pub fn named(path: &Path, error: &io::Error) -> io::Error {

@@ -38,7 +38,7 @@ impl Baseline {
         let path = Path::new(named);
         if path.is_file() {
             let start =
-                fs::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
+                files::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
             if start.first() == Some(&b'{') {
                 let measures = Measures::parse(&start)
                     .map_err(|why| GateError::Input(format!("{named}: {why}")))?;

@@ -12,7 +12,7 @@ use crate::gate::quantity::{CPU, WALL};
 use crate::gate::report::{LayerName, Report};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{self, Write};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
@@ -108,7 +108,7 @@ impl Record {
 /// One sentence with the number of the invalid line.
 pub fn read(path: &Path) -> Result<Vec<Record>, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let text = match contract::files::read_text(path) {
+    let text = match contract::files::read_log(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         other => other.map_err(|error| wrong(error.to_string()))?,
     };
@@ -173,7 +173,7 @@ pub fn append(path: &Path, record: &Record) -> io::Result<()> {
     // Strings and finite numbers only.
     let mut line = serde_json::to_string(record).expect("a record is representable in JSON");
     line.push('\n');
-    let mut file = OpenOptions::new().create(true).read(true).append(true).open(path)?;
+    let mut file = contract::files::append_log(path)?;
     file.lock()?;
     let length = file.metadata()?.len();
     if length > 0 {

@@ -1,6 +1,7 @@
 //! `harness audit`: checks a mesh by itself, or against promises on a case.
 
 use super::import::{Failure, Imported, Source};
+use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, Requirements, audit_against};
 use clap::Args;
@@ -16,7 +17,7 @@ use tempfile::TempDir;
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
-    mesh: PathBuf,
+    mesh: Input,
     /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines or path of a file
     /// with a table of promises
     #[arg(long, value_name = "ENGINE")]
@@ -29,7 +30,7 @@ pub struct Arguments {
     nodes_max: Option<usize>,
     /// Write verdict, times and memory as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// How to read a mesh without a manifest.
     #[command(flatten)]
     source: Source,

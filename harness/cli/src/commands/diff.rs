@@ -1,5 +1,6 @@
 //! `harness diff`: prints the first difference between two leaf-set directories.
 
+use super::values::Input;
 use check::diff::{self, Trust};
 use clap::Args;
 use contract::case::Case;
@@ -15,12 +16,12 @@ which mesh is right.
 Exit codes: 0 the leaves are the same; 1 they differ; 2 invalid input.")]
 pub struct Arguments {
     /// A leaf-set directory
-    a: PathBuf,
+    a: Input,
     /// The leaf-set directory to compare with
-    b: PathBuf,
+    b: Input,
     /// The case of both meshes: its facets help to find the deciding rule
     #[arg(long)]
-    case: Option<PathBuf>,
+    case: Option<Input>,
     /// Compare the counts and digests in the manifests instead of reading all leaves
     #[arg(long)]
     trust_manifests: bool,

@@ -1,6 +1,7 @@
 //! `harness near-body`: the surface that a mesh hands over to a near-body mesher, and its gap to the wall.
 
 use super::selection::SelectionArguments;
+use super::values::{Input, Output};
 use clap::Args;
 use contract::case::Case;
 use contract::files::{Content, write_together};
@@ -30,19 +31,19 @@ Examples:
 Exit codes: 0 success; 2 invalid input, or a mesh without such faces; 130 interrupted, after which no file remains.")]
 pub struct Arguments {
     /// The mesh: a leaf-set directory
-    mesh: PathBuf,
+    mesh: Input,
     /// The case that was meshed, for the gap to the wall: name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]
     case: Option<String>,
     /// Write the surface as triangles, in binary STL
     #[arg(long, value_name = "FILE.stl")]
-    stl: Option<PathBuf>,
+    stl: Option<Output>,
     /// Write the surface as polygons for VTK, with level, side, rank, spacing and gap of every face
     #[arg(long, value_name = "FILE.vtp")]
-    vtp: Option<PathBuf>,
+    vtp: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Which cells' faces are considered.
     #[command(flatten)]
     selection: SelectionArguments,

@@ -1,5 +1,6 @@
 //! `harness planted`: the program that `harness gate --selftest` compares with itself.
 
+use super::values::Output;
 use bench::gate::planted::{self, Kind, PHASES, SlowDown};
 use clap::{Args, ValueEnum};
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
@@ -23,7 +24,7 @@ pub struct Arguments {
     percent: f64,
     /// Write the run report
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// End with a fault of the harness itself instead
     #[arg(long)]
     fault: Option<Fault>,

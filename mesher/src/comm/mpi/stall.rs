@@ -3,6 +3,7 @@
 //! A rank that has waited for longer than the limit asks all others for a sign, on a communicator of its own. Ranks that wait themselves
 //! answer at once, as they look for questions while they wait. Those that do not answer compute, hang, or have been stopped.
 
+use crate::error::STALLED;
 use files::interrupt;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Destination, Source};
@@ -11,8 +12,6 @@ use std::collections::BTreeSet;
 use std::io::{Write, stderr};
 use std::time::{Duration, Instant};
 
-/// Exit code of a job with a rank that keeps the others waiting.
-const STALLED: i32 = 75;
 /// Time for an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 const QUESTION: i32 = 1;
