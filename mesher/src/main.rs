@@ -8,7 +8,7 @@ mod heap;
 mod launch;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
-use files::{BUG, Heap, check_writable, interrupt, write_atomically};
+use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
 use mesher::agreement;
 use mesher::case::Case;
 use mesher::comm::{Comm, Solo, sim};
@@ -142,7 +142,7 @@ fn fail(e: &Error, prints: bool) -> i32 {
 /// Prints a line on the standard error; returns whether that was possible.
 fn complain(line: &dyn Display) -> bool {
     // A launcher puts lines of its own between two writes.
-    stderr().write_all(format!("{line}\n").as_bytes()).is_ok()
+    stderr().write_all(format!("{}\n", message(line)).as_bytes()).is_ok()
 }
 
 /// The result of a run.

@@ -72,7 +72,7 @@ fn main() -> ExitCode {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             // The exit code remains if the standard error is full.
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = complain(&format_args!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
         // The panic handler has already printed the message.
@@ -147,7 +147,7 @@ fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
 
 /// Prints a line on the standard error.
 fn complain(line: &dyn Display) -> Result<(), Error> {
-    writeln!(std::io::stderr(), "{line}")
+    writeln!(std::io::stderr(), "{}", files::message(line))
         .map_err(|source| Error::Write { path: "standard error".into(), source })
 }
 

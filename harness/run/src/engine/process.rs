@@ -229,7 +229,6 @@ fn read_status(directory: &Path) -> Vec<(usize, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rustix::process::{getpid, set_child_subreaper};
 
     fn shell(script: &str, watch: &Watch) -> Result<Finished, Failure> {
         let mut command = Command::new("sh");
@@ -325,21 +324,6 @@ mod tests {
         let id = fs::read_to_string(logs.path().join("id")).unwrap();
         let stat = fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
         assert!(!session::session_and_liveness(&stat).is_some_and(|(_, alive)| alive), "{stat}");
-    }
-
-    #[test]
-    fn no_process_that_was_detached_survives_the_run() {
-        let _ = set_child_subreaper(Some(getpid()));
-        let logs = tempfile::tempdir().unwrap();
-        let watch = Watch::new("child", Duration::from_secs(600), logs.path());
-        // A session of its own, whose leader has lost its parent when the run ends, and another one in it.
-        let daemon = "setsid sleep 600 & echo $! > inner; echo $$ > outer; wait";
-        let script = format!("setsid sh -c '{daemon}' & until test -s outer; do sleep 0.01; done");
-        shell(&script, &watch).unwrap();
-        for name in ["outer", "inner"] {
-            let id = fs::read_to_string(logs.path().join(name)).unwrap();
-            assert!(!Path::new("/proc").join(id.trim()).exists(), "{name} runs on");
-        }
     }
 
     #[test]
