@@ -90,6 +90,7 @@ impl Staging {
         fs::metadata(directory)?;
         let dir = builder.tempdir_in(directory).map_err(|error| error.kind())?;
         staged.push(dir.path().to_owned());
+        ::files::interrupt::stop_at(format_args!("staged"));
         Ok(Self(dir))
     }
 

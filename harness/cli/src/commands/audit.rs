@@ -10,7 +10,7 @@ use contract::manifest;
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tempfile::TempDir;
 
 /// `harness audit`.
@@ -66,7 +66,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
         true => None,
         false => Some(imported(mesh, source, case.as_ref())?),
     };
-    let directory = imported.as_ref().map_or(mesh.as_path(), TempDir::path);
+    let directory = imported.as_ref().map_or(&**mesh, TempDir::path);
     let default = AuditOptions::default();
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let requirements = match &engine {

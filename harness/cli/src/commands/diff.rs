@@ -5,7 +5,6 @@ use check::diff::{self, Trust};
 use clap::Args;
 use contract::case::Case;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::path::PathBuf;
 
 /// `harness diff`.
 #[derive(Args, Debug)]

@@ -52,10 +52,10 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
     /// Write the path as a VTK polyline with the free width at each point
-    #[arg(long, value_name = "FILE.vtp", value_parser = with_extension("vtp"))]
+    #[arg(long, value_name = "FILE.vtp", value_parser = with_extension(&["vtp"]))]
     vtk: Option<Output>,
     /// Write a picture of a slice through the narrowest place
-    #[arg(long, value_name = "FILE.svg", value_parser = with_extension("svg"))]
+    #[arg(long, value_name = "FILE.svg", value_parser = with_extension(&["svg"]))]
     picture: Option<Output>,
     /// Refinement in search of an opening ends before a base tree of more leaves
     #[arg(long, value_name = "N", default_value = "2e7", value_parser = cell_count)]

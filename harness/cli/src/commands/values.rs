@@ -49,11 +49,14 @@ impl ValueParserFactory for Input {
     }
 }
 
-/// A parser of outputs with an extension: the format does not depend on the name, so another one would mislead.
-pub fn with_extension(extension: &'static str) -> impl TypedValueParser<Value = Output> {
+/// A parser of outputs with one of these extensions.
+pub fn with_extension(
+    extensions: &'static [&'static str],
+) -> impl TypedValueParser<Value = Output> {
     PathBufValueParser::new().try_map(move |path| {
-        if path.extension().is_none_or(|e| e != extension) {
-            return Err(io::Error::other(format!("the file name must end in .{extension}")));
+        if !path.extension().is_some_and(|e| extensions.iter().any(|wanted| e == *wanted)) {
+            let endings = extensions.join(" or .");
+            return Err(io::Error::other(format!("the file name must end in .{endings}")));
         }
         files::check_writable(&path).map(|()| Output(path))
     })

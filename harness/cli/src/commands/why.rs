@@ -3,7 +3,7 @@
 use super::values::Output;
 use std::fmt::Display;
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::meshed::{Failure, MeshArguments, input};
 use check::why::Mesh;
