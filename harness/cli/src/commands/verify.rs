@@ -1,6 +1,7 @@
 //! `harness verify`: verifies the selected cases and reports.
 
 use super::programs::ProgramArguments;
+use super::values::Output;
 use clap::Args;
 use contract::catalogue::Size;
 use contract::files::{named, write_atomically};
@@ -46,10 +47,10 @@ pub struct Arguments {
     pub keep: bool,
     /// Write the report as JUnit XML
     #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
+    pub junit: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    pub json: Option<Output>,
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
     pub timeout: u64,
@@ -165,8 +166,8 @@ fn options(arguments: Arguments) -> Options {
 fn write(
     report: &Report,
     options: &Options,
-    junit_file: Option<PathBuf>,
-    json_file: Option<PathBuf>,
+    junit_file: Option<Output>,
+    json_file: Option<Output>,
 ) -> io::Result<()> {
     let forms = [
         ("table.txt", table(report)),
