@@ -69,7 +69,8 @@ fn verified(bench: &Bench, engine: &Engine, cases: Vec<String>) -> Result<Report
     let programs = Programs { engine: engine.clone(), ..bench.programs.clone() };
     // The files of a case that fails end with the gate.
     let out = Some(bench.place.join("correctness"));
-    let options = Options { limit: bench.options.limit, out, ..Options::of_leaves_alone(cases) };
+    let options =
+        Options { timeout: bench.options.limit.as_secs(), out, ..Options::of_leaves_alone(cases) };
     verify(&options, &programs).map_err(|error| match error {
         VerifyError::Input(why) => GateError::Input(why),
         VerifyError::Missing(why) => GateError::Missing(why),
