@@ -139,7 +139,10 @@ impl Probe {
                 if truth.words == mesh.words && check.is_none_or(|c| OF_EQUAL.contains(&c)) =>
             {
                 let compared = identical::compare(&mesh.words, &truth.words, &case.root);
-                checks::only(&subject, &["manifest", "linear"]).into_iter().chain([compared]).collect()
+                checks::only(&subject, &["manifest", "linear"])
+                    .into_iter()
+                    .chain([compared])
+                    .collect()
             }
             Some(truth) => {
                 let base = self
