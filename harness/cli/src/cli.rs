@@ -54,7 +54,7 @@ pub enum Command {
     Why(commands::why::Arguments),
     /// Print a completion script for a shell
     Completions(commands::completions::Arguments),
-    /// The program that `gate --selftest` compares with itself
+    /// End with a fault, for the tests of the exit codes
     #[command(hide = true)]
     Planted(commands::planted::Arguments),
     /// Print the manual page, or write one page per command into a directory

@@ -139,10 +139,9 @@ impl Probe {
                 if truth.words == mesh.words && check.is_none_or(|c| OF_EQUAL.contains(&c)) =>
             {
                 let compared = identical::compare(&mesh.words, &truth.words, &case.root);
-                checks::only(&subject, &["manifest", "linear"])
-                    .into_iter()
-                    .chain([compared])
-                    .collect()
+                let mut results = checks::only(&subject, &["manifest", "linear"]);
+                results.push(compared);
+                results
             }
             Some(truth) => {
                 let base = self

@@ -1,7 +1,7 @@
 //! `harness report`: draws figures and a page from records.
 
 use bench::experiments::record;
-use bench::track::history::{self, Record};
+use bench::track::history::{self, History, Record};
 use clap::Args;
 use report::benchmark::report;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
@@ -77,7 +77,11 @@ fn history_of(path: &Path) -> Result<Vec<Record>, String> {
             path.display()
         ));
     }
-    history::read(path)
+    let History { records, warnings } = history::read(path)?;
+    for warning in warnings {
+        eprintln!("harness: {}: {warning}", path.display());
+    }
+    Ok(records)
 }
 
 fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {

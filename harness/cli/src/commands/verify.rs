@@ -1,8 +1,9 @@
 //! `harness verify`: verifies the selected cases and reports.
 
+use super::files::put;
 use super::programs::ProgramArguments;
+use super::values::Output;
 use clap::Args;
-use contract::files::{named, write_atomically};
 use report::verification::json::json;
 use report::verification::junit::junit;
 use report::verification::markdown::markdown;
@@ -14,7 +15,6 @@ use run::verify::{VerifyError, verify};
 use std::env;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
 
 /// `harness verify`.
 #[derive(Args, Debug)]
@@ -23,10 +23,10 @@ pub struct Arguments {
     pub options: Options,
     /// Write the report as JUnit XML
     #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
+    pub junit: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    pub json: Option<Output>,
     /// Verify another mesher: name in harness/engines or path of a description [default: the mesher itself]
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<String>,
@@ -70,8 +70,8 @@ pub fn run(arguments: Arguments) -> u8 {
 fn write(
     report: &Report,
     options: &Options,
-    junit_file: Option<PathBuf>,
-    json_file: Option<PathBuf>,
+    junit_file: Option<Output>,
+    json_file: Option<Output>,
 ) -> io::Result<()> {
     let forms = [
         ("table.txt", table(report)),
@@ -98,13 +98,4 @@ fn write(
             .write_all(markdown.as_bytes())?;
     }
     Ok(())
-}
-
-/// Writes a file.
-///
-/// # Errors
-/// The file's name and the reason.
-fn put(path: &Path, text: &str) -> io::Result<()> {
-    write_atomically(path, |out| out.write_all(text.as_bytes()))
-        .map_err(|error| named(path, &error))
 }

@@ -123,9 +123,9 @@ fn an_unknown_case_is_invalid_input() {
 fn a_hang_is_killed_reported_and_kept() {
     let fixture = Fixture::new();
     fixture.script("mesher", HANGS);
-    let outcome = fixture.verify(&["--no-mpi", "--timeout", "1", "--out", "out"]);
+    let outcome = fixture.verify(&["--no-mpi", "--timeout", "20", "--out", "out"]);
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
-    let why = "did not end within 1 s and was killed; ranks 0, 1 were in: layer 7";
+    let why = "did not end within 20 s and was killed; ranks 0, 1 were in: layer 7";
     assert!(outcome.printed.contains(why), "{}", outcome.printed);
     assert!(
         outcome.printed.contains("repeat with: ") && outcome.printed.contains("--no-mpi --keep"),

@@ -25,6 +25,12 @@ pub struct RunReport {
     /// Number of facets.
     #[serde(default)]
     pub facets: u64,
+    /// The facets as the program read them.
+    #[serde(default)]
+    pub geometry: Option<Geometry>,
+    /// The partitioner that was used; `None` if it is not reported, or for a single rank.
+    #[serde(default)]
+    pub partitioner: Option<String>,
     /// Wall time by the program's own clock, in seconds.
     #[serde(default)]
     pub time_wall_s: Option<f64>,
@@ -40,6 +46,15 @@ pub struct RunReport {
     /// Sender, receiver, messages and bytes of every pair of ranks that communicated.
     #[serde(default)]
     pub message_matrix: Vec<[u64; 4]>,
+}
+
+/// The facets of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Geometry {
+    /// Their number.
+    pub facets: u64,
+    /// Their digest.
+    pub digest: String,
 }
 
 /// A phase of a run.

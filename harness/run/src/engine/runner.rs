@@ -187,6 +187,11 @@ impl Engine {
             _ => RunReport::read(&options.report_path())
                 .map_err(|why| self.unusable(format!("ended, but {why}")))?,
         };
+        // Limits apply to this number, so it must be one of leaves that exist.
+        if let Some(mesh) = written.as_ref().filter(|mesh| mesh.len() != report.cells) {
+            let (stated, found) = (report.cells, mesh.len());
+            return Err(self.unusable(format!("states {stated} cells, and its mesh has {found}")));
+        }
         let (launched, reported) = (layout.ranks.count(), report.ranks);
         if let Some(ranks) = reported.filter(|&ranks| ranks != launched) {
             let why = match layout.ranks {
@@ -200,11 +205,6 @@ impl Engine {
                 _ => format!("was to run on {launched} ranks, but reports {ranks}"),
             };
             return Err(self.unusable(why));
-        }
-        // Limits apply to this number, so it must be one of leaves that exist.
-        if let Some(mesh) = written.as_ref().filter(|mesh| mesh.len() != report.cells) {
-            let (stated, found) = (report.cells, mesh.len());
-            return Err(self.unusable(format!("states {stated} cells, and its mesh has {found}")));
         }
         let report = completed(report, &finished);
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
