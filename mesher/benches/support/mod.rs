@@ -59,6 +59,8 @@ pub fn options() -> Options {
         check: false,
         weight_exposed: None,
         force: true,
+        strict: false,
+        case_name: String::new(),
     }
 }
 
@@ -236,5 +238,5 @@ fn leaves_of(tree: &Tree) -> u64 {
 }
 
 fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
-    decide(tree, ownership, facets, rules, false, &Solo).expect("a case without seeds")
+    decide(tree, ownership, facets, rules, false, true, &Solo).expect("a case without seeds").0
 }

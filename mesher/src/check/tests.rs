@@ -30,7 +30,16 @@ fn case() -> Case {
 fn options(ungraded: bool) -> Options {
     let (partitioner, weights) = (Partitioner::Morton, Weights::Rebalance);
     let division = Division { partitioner, weights, level_base: None };
-    Options { division, ungraded, out: None, check: true, weight_exposed: None, force: true }
+    Options {
+        division,
+        ungraded,
+        out: None,
+        check: true,
+        weight_exposed: None,
+        force: true,
+        strict: false,
+        case_name: String::new(),
+    }
 }
 
 fn mesh(ungraded: bool, comm: &dyn Comm) -> Mesh {

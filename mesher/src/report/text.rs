@@ -164,6 +164,7 @@ mod tests {
             enclosed_example: None,
             components_ambiguous: 0,
             ambiguous_example: None,
+            leaks: vec![],
             warnings: vec![],
             ranks: 2,
             time_wall_s: 0.5,
