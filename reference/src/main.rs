@@ -1,6 +1,6 @@
 //! The program `reference`: meshes a case by the paper's serial algorithm.
 use clap::Parser;
-use files::interrupt;
+use files::{Heap, interrupt};
 use reference::write::{self, AmbiguousCount, Which};
 use reference::{Error, Geometry, Leak, Mesh, base_tree, case_file, leaves, mesh};
 use serde::Serialize;
@@ -10,8 +10,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// The exit code of a bug. Every panic is one.
-const EXIT_BUG: u8 = 70;
+#[global_allocator]
+static HEAP: Heap =
+    Heap { program: "error", advice: "choose a larger spacing, or use a machine with more memory" };
+
 /// The exit code of output that cannot be written.
 const EXIT_OUTPUT: u8 = 4;
 
@@ -75,13 +77,17 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
         // The panic handler has already printed the message.
-        Err(_) => ExitCode::from(EXIT_BUG),
+        Err(_) => ExitCode::from(files::BUG as u8),
     }
 }
 
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let start = Instant::now();
     // Meshing may take an hour: refuse an unusable directory before it starts.
+    if let Some(path) = &arguments.json {
+        files::check_writable(path)
+            .map_err(|source| Error::Write { path: path.clone(), source })?;
+    }
     let claim = arguments.out.as_deref().map(write::claim).transpose()?;
     let case = case_file::read(&arguments.case)?;
     let (which, mesh) = if arguments.ungraded {
