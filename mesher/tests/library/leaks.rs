@@ -1,35 +1,9 @@
 //! Regions that are closed at a coarser spacing and open at that of the mesh.
-#![allow(missing_docs)]
 
-mod support;
-
-use mesher::lattice::{Enclosed, Keep, Root};
+use crate::support::{Facet, Run, Small, closed, config, division, run, slit, small};
+use mesher::lattice::Keep;
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
-use support::{Facet, Run, Small, closed, config, cuboid, division, run, small};
-
-/// A box with a slit of some width in its upper face, in the root of edge 64 with cells of edge 2.
-fn slit(width: f32, at: f32, keep: Keep, seeds: Vec<[f64; 3]>) -> Small {
-    let (lo, hi) = ([9.0, 11.0, 10.0], [49.0, 51.0, 47.0]);
-    let mut facets = cuboid(lo, hi);
-    facets.retain(|f| !f.iter().all(|v| v[2] == hi[2]));
-    for [x0, x1] in [[lo[0], at], [at + width, hi[0]]] {
-        let p = |x, y| [x, y, hi[2]];
-        facets.push([p(x0, lo[1]), p(x1, lo[1]), p(x1, hi[1])]);
-        facets.push([p(x0, lo[1]), p(x1, hi[1]), p(x0, hi[1])]);
-    }
-    Small {
-        facets,
-        root: Root { origin: [0.0; 3], edge: 64.0 },
-        spacing_min: 2.0,
-        layer_cells_min: 1,
-        keep,
-        keep_crossing: true,
-        boxes: vec![],
-        seeds,
-        enclosed: Enclosed::Delete,
-    }
-}
 
 /// Cells of edge 2 leak through slits wider than 4 for certain, those of edge 4 not through slits of 4 or less.
 #[test]
