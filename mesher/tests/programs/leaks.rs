@@ -49,7 +49,7 @@ fn leaks_are_warnings_or_errors() {
         let closed = slit(0.0, 20.0, Keep::Outside, vec![]);
         assert_eq!(meshed(&closed, comm), (vec![], json!([])));
         // Wider than the cells of any spacing that is compared.
-        let (warnings, leaks) = meshed(&slit(28.0, 15.0, Keep::Outside, vec![]), comm);
+        let (warnings, leaks) = meshed(&slit(20.0, 11.0, Keep::Outside, vec![]), comm);
         assert_eq!((warnings.len(), leaks), (1, json!([])));
         assert!(
             warnings[0].starts_with("the facets bound no inside at spacings of 2, 4 and 8"),

@@ -58,7 +58,7 @@ pub fn cuboid(lo: [f32; 3], hi: [f32; 3]) -> Vec<Facet> {
 
 /// A box with a slit of some width in its upper face, in the root of edge 64 with cells of edge 2.
 pub fn slit(width: f32, at: f32, keep: Keep, seeds: Vec<[f64; 3]>) -> Small {
-    let (lo, hi) = ([9.0, 11.0, 10.0], [49.0, 51.0, 47.0]);
+    let (lo, hi) = ([9.0, 11.0, 10.0], [33.0, 35.0, 31.0]);
     let mut facets = cuboid(lo, hi);
     facets.retain(|f| !f.iter().all(|v| v[2] == hi[2]));
     for f in &mut facets {
