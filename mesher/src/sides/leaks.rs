@@ -24,6 +24,7 @@ use crate::lattice::{Keep, Rules};
 use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, PerLevel, Tree, per_level};
+use std::collections::HashSet;
 
 /// Number of coarser spacings that are compared with that of the mesh.
 const COARSER: Level = 2;
@@ -151,10 +152,10 @@ fn of_tree(
     let components = Components::new(tree, ownership, comm);
     let label = |c| components.label(c);
     let found = seeds::find(rules, tree, &components.nodes, ownership, label, comm);
+    let seeded: HashSet<Label> = found.into_values().flatten().collect();
     let verdict = vote::decide(&components.all, &components.candidates, facets, comm);
-    let leaked = |label: &Label| {
-        verdict.inside.contains(label) != is_inside && found.iter().all(|f| f.1 != Some(*label))
-    };
+    let leaked =
+        |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);
     let leaked: Vec<_> = components.all.iter().filter(|(label, _)| leaked(label)).collect();
     if leaked.is_empty() {
         return Vec::new();
@@ -194,7 +195,7 @@ impl Leaks {
         }
         let volume = |l: Level| 1u64 << (3 * (LEVEL_MAX - l));
         for leak in &self.0 {
-            let (level, first) = (rules.level_surface, leak.first.level());
+            let (level, (first, code)) = (rules.level_surface, leak.first.leaf());
             assert!(
                 leak.level < level && leak.level + COARSER >= level && first <= leak.level,
                 "a leak of surface level {level} must have one of the {COARSER} levels above: {leak:?}"
@@ -203,7 +204,7 @@ impl Leaks {
                 leak.volume >= volume(first) && leak.volume.is_multiple_of(volume(leak.level)),
                 "a leak's volume must be that of leaves, its first among them: {leak:?}"
             );
-            assert!(leak.first.is_in_root(), "a leak's first leaf must lie in the root: {leak:?}");
+            assert!(code >> (3 * first) == 0, "a leak's first leaf must lie in the root: {leak:?}");
         }
         for level in 0..rules.level_surface {
             let of_level = self.0.iter().filter(|leak| leak.level == level);

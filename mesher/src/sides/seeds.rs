@@ -12,7 +12,7 @@ use crate::lattice::{Keep, Rules, Seed};
 use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, Tree};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
 const CROSSING: Label = Label::MAX;
@@ -26,7 +26,7 @@ pub fn find(
     ownership: &Ownership,
     label: impl Fn(Component) -> Label,
     comm: &dyn Comm,
-) -> Vec<(u64, Option<Label>)> {
+) -> HashMap<u64, Option<Label>> {
     let mut mine = Vec::new();
     for (number, seed) in (0..).zip(&rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
         let (l, code) = leaf_at(tree, seed);
@@ -48,25 +48,21 @@ pub fn find(
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf.
 pub fn flow(
-    found: &[(u64, Option<Label>)],
+    found: &HashMap<u64, Option<Label>>,
     rules: &Rules,
     tree: &Tree,
     ownership: &Ownership,
     comm: &dyn Comm,
 ) -> Result<HashSet<Label>, Error> {
-    let mut flow = HashSet::new();
     for (number, seed) in (0..).zip(&rules.seeds) {
-        let problem = match found.iter().find(|f| f.0 == number) {
+        let problem = match found.get(&number) {
             None => "lies outside the root",
-            Some((_, None)) => "lies in a leaf that the geometry crosses",
-            Some(&(_, Some(label))) => {
-                flow.insert(label);
-                continue;
-            }
+            Some(None) => "lies in a leaf that the geometry crosses",
+            Some(Some(_)) => continue,
         };
         return Err(unusable(number, seed, problem, rules, tree, ownership, comm));
     }
-    Ok(flow)
+    Ok(found.values().copied().flatten().collect())
 }
 
 /// The sides of all components: the flow is on the side that is kept, outside if everything is.

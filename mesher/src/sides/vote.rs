@@ -9,7 +9,7 @@ use crate::brick::Brick;
 use crate::brickset::ones;
 use crate::comm::{Comm, all_gather_reduced};
 use crate::facet::Facet;
-use crate::octant::{LEVEL_MAX, Level, corner, edge};
+use crate::octant::{Level, corner, edge};
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, Tree};
 use std::collections::BTreeMap;
@@ -27,23 +27,15 @@ impl Candidate {
         Self(u64::from(l) << 57 | code)
     }
 
-    /// The leaf's level.
-    pub fn level(self) -> Level {
-        (self.0 >> 57) as Level
-    }
-
-    /// Whether the leaf lies in the root.
-    pub fn is_in_root(self) -> bool {
-        self.level() <= LEVEL_MAX && self.code() >> (3 * self.level()) == 0
+    /// Its level and Morton code.
+    pub fn leaf(self) -> (Level, u64) {
+        ((self.0 >> 57) as Level, self.0 & ((1 << 57) - 1))
     }
 
     /// The leaf's centroid, a lattice point.
     pub fn centroid(self) -> [i64; 3] {
-        corner(self.level(), self.code()).map(|c| c + edge(self.level()) / 2)
-    }
-
-    fn code(self) -> u64 {
-        self.0 & ((1 << 57) - 1)
+        let (l, code) = self.leaf();
+        corner(l, code).map(|c| c + edge(l) / 2)
     }
 }
 
