@@ -21,7 +21,6 @@ pub mod near_body;
 pub mod options;
 pub mod ordered;
 pub mod p8est;
-mod part;
 pub mod pieces;
 pub mod selection;
 #[cfg(test)]

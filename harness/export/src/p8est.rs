@@ -168,14 +168,18 @@ impl Counts {
     }
 }
 
-/// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices.
+/// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices. If their
+/// difference has lost digits of the edge, the edge is the attribute of the tree.
 fn connectivity(root: &Root) -> Vec<u8> {
     let mut bytes = b"p8est\0\0\0".to_vec();
     bytes.extend(VERSION);
     bytes.resize(ALIGNMENT, 0);
     // Format, bytes of an index, and numbers of vertices, trees, edges, trees at edges, corners, trees at corners, bytes of
     // attributes; the last number is reserved.
-    numbers(&mut bytes, &[FORMAT, 4, 8, 1, 0, 0, 0, 0, 0, 0]);
+    let opposite = root.to_user([UNITS_PER_EDGE; 3]);
+    let is_lost = opposite[0] - root.origin[0] != root.edge;
+    let attribute = if is_lost { &root.edge.to_le_bytes()[..] } else { &[] };
+    numbers(&mut bytes, &[FORMAT, 4, 8, 1, 0, 0, 0, 0, attribute.len() as u64, 0]);
     for vertex in 0..8 {
         let corner = std::array::from_fn(|a| (vertex >> a & 1) * UNITS_PER_EDGE);
         for coordinate in root.to_user(corner) {
@@ -186,6 +190,7 @@ fn connectivity(root: &Root) -> Vec<u8> {
     (0..8u32).for_each(|vertex| bytes.extend(vertex.to_le_bytes()));
     bytes.extend([0; 6 * 4]);
     bytes.extend(0..6u8);
+    bytes.extend(attribute);
     bytes.extend([0; 2 * 4]);
     pad(&mut bytes);
     bytes
@@ -311,6 +316,18 @@ mod tests {
             let read = read(&path, Format::P4est, &request)
                 .and_then(|cells| leaf_set(&cells, None, None, "test".to_owned()));
             prop_assert!(read.map_or(true, |set| set.manifest.digest != mesh.manifest.digest));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_root_is_kept_to_the_last_bit(origin in prop::array::uniform3(-1e3f64..1e3), edge in 1e-3f64..1e3) {
+            let root = Root { origin, edge };
+            let (_dir, mesh) = stored(vec![words_of(|o| o.level < 2)], root);
+            let (dir, _) = exported(&mesh, &Selection::default());
+            let found = import(&dir.path().join("forest.p8est"), true).manifest.root;
+            prop_assert_eq!(found.edge.to_bits(), edge.to_bits());
+            prop_assert_eq!(found.origin.map(f64::to_bits), origin.map(f64::to_bits));
         }
     }
 

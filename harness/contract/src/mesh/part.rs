@@ -3,17 +3,15 @@
 use std::ops::Range;
 use std::path::Path;
 
-use contract::htg::{Cursor, Index, TreeError, TreeFile};
-use contract::leafset::ReadError;
-use contract::npy::PartFile;
-use contract::octant::Octant;
-use contract::word::{self, KEY_END};
-
-use crate::error::ExportError;
+use crate::htg::{Cursor, Index, TreeError, TreeFile};
+use crate::leafset::ReadError;
+use crate::npy::PartFile;
+use crate::octant::Octant;
+use crate::word::{self, KEY_END};
 
 /// A part.
 #[derive(Debug)]
-pub(crate) enum Part {
+pub enum Part {
     /// A file of leaf words.
     Words(PartFile),
     /// The whole tree.
@@ -22,12 +20,13 @@ pub(crate) enum Part {
 
 impl Part {
     /// The tree as a part.
-    pub(crate) fn of_tree(tree: TreeFile) -> Result<Self, ExportError> {
+    pub fn of_tree(tree: TreeFile) -> Result<Self, ReadError> {
         let index = tree.index().map_err(|error| ReadError::tree(&tree, error))?;
         Ok(Self::Tree(Box::new((tree, index))))
     }
 
-    pub(crate) fn path(&self) -> &Path {
+    /// Its file.
+    pub fn path(&self) -> &Path {
         match self {
             Self::Words(file) => file.path(),
             Self::Tree(tree) => tree.0.path(),
@@ -35,7 +34,7 @@ impl Part {
     }
 
     /// Whether it states the rank of each leaf: a file of words is that of one rank, but a tree may have none.
-    pub(crate) fn has_ranks(&self) -> bool {
+    pub fn has_ranks(&self) -> bool {
         match self {
             Self::Words(_) => true,
             Self::Tree(tree) => tree.0.has_ranks(),
@@ -43,7 +42,7 @@ impl Part {
     }
 
     /// Number of leaves.
-    pub(crate) fn len(&self) -> u64 {
+    pub fn len(&self) -> u64 {
         match self {
             Self::Words(file) => file.len(),
             Self::Tree(tree) => tree.1.leaves,
@@ -52,7 +51,7 @@ impl Part {
 }
 
 /// One reader for each part. Each thread has readers of its own, because those of trees have buffers.
-pub(crate) struct Readers<'a>(Vec<Reader<'a>>);
+pub struct Readers<'a>(Vec<Reader<'a>>);
 
 enum Reader<'a> {
     Words(&'a PartFile),
@@ -60,7 +59,8 @@ enum Reader<'a> {
 }
 
 impl<'a> Readers<'a> {
-    pub(crate) fn new(parts: &'a [Part]) -> Self {
+    /// Readers of all parts.
+    pub fn new(parts: &'a [Part]) -> Self {
         let reader = |part: &'a Part| match part {
             Part::Words(file) => Reader::Words(file),
             Part::Tree(tree) => Reader::Tree(&tree.0, Cursor::new(&tree.0, &tree.1)),
@@ -69,19 +69,19 @@ impl<'a> Readers<'a> {
     }
 
     /// Index of the first leaf in a range of a part whose Morton code is at least `key`.
-    pub(crate) fn lower_bound(
+    pub fn lower_bound(
         &mut self,
         part: usize,
         range: Range<u64>,
         key: u64,
-    ) -> Result<u64, ExportError> {
+    ) -> Result<u64, ReadError> {
         // The code one past the last one does not fit in a word.
         if key >= KEY_END {
             return Ok(range.end);
         }
         match &mut self.0[part] {
             Reader::Words(file) => {
-                Ok(file.lower_bound(range, key << 7).map_err(|e| ReadError::part(file, e))?)
+                file.lower_bound(range, key << 7).map_err(|error| ReadError::part(file, error))
             }
             Reader::Tree(tree, cursor) => {
                 let before = cursor.leaves_before(key).map_err(|e| ReadError::tree(tree, e))?;
@@ -91,12 +91,12 @@ impl<'a> Readers<'a> {
     }
 
     /// The words at these indices, which are leaves of the octant, and their ranks if the part is a tree with ranks.
-    pub(crate) fn words(
+    pub fn words(
         &mut self,
         part: usize,
         octant: &Octant,
         interval: Range<u64>,
-    ) -> Result<(Vec<u64>, Vec<u32>), ExportError> {
+    ) -> Result<(Vec<u64>, Vec<u32>), ReadError> {
         let (mut words, mut ranks) = (Vec::new(), Vec::new());
         match &mut self.0[part] {
             Reader::Words(file) => {

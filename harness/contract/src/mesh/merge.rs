@@ -3,7 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use contract::npy::PartFile;
+use super::Part;
+use crate::leafset::ReadError;
+use crate::npy::PartFile;
 
 /// Words per read: large enough for streaming, small enough for thousands of parts.
 const CHUNK: usize = 1 << 15;
@@ -20,11 +22,12 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Refills an exhausted buffer; false at the end of the part.
-    fn fill(&mut self) -> std::io::Result<bool> {
+    fn fill(&mut self) -> Result<bool, ReadError> {
         if self.position == self.words.len() {
             let left = self.file.len() - self.next;
             self.words.resize(usize::try_from(left).unwrap_or(usize::MAX).min(CHUNK), 0);
-            self.file.read_at(self.next, &mut self.words)?;
+            let read = self.file.read_at(self.next, &mut self.words);
+            read.map_err(|error| ReadError::part(self.file, error))?;
             (self.next, self.position) = (self.next + self.words.len() as u64, 0);
         }
         Ok(!self.words.is_empty())
@@ -36,16 +39,19 @@ impl Reader<'_> {
 /// the stream.
 ///
 /// # Errors
-/// The index of a part that cannot be read.
-pub(crate) fn merge(
-    parts: &[PartFile],
+/// If a part cannot be read.
+pub(super) fn merge(
+    parts: &[Part],
     run: &mut dyn FnMut(usize, &[u64]) -> bool,
-) -> Result<(), (usize, std::io::Error)> {
-    let reader = |file| Reader { file, next: 0, words: Vec::new(), position: 0 };
-    let mut readers: Vec<_> = parts.iter().map(reader).collect();
+) -> Result<(), ReadError> {
+    let mut readers = Vec::new();
+    for part in parts {
+        let Part::Words(file) = part else { unreachable!("a tree is the only part of its mesh") };
+        readers.push(Reader { file, next: 0, words: Vec::new(), position: 0 });
+    }
     let mut heads = BinaryHeap::new();
     for (part, reader) in readers.iter_mut().enumerate() {
-        if reader.fill().map_err(|e| (part, e))? {
+        if reader.fill()? {
             heads.push(Reverse((reader.words[0], part)));
         }
     }
@@ -59,7 +65,7 @@ pub(crate) fn merge(
             return Ok(());
         }
         reader.position += len;
-        if reader.fill().map_err(|e| (part, e))? {
+        if reader.fill()? {
             heads.push(Reverse((reader.words[reader.position], part)));
         }
     }
@@ -69,15 +75,15 @@ pub(crate) fn merge(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::digest::mix;
-    use contract::npy;
+    use crate::digest::mix;
+    use crate::npy;
 
-    fn parts(words: &[Vec<u64>]) -> (tempfile::TempDir, Vec<PartFile>) {
+    fn parts(words: &[Vec<u64>]) -> (tempfile::TempDir, Vec<Part>) {
         let dir = tempfile::tempdir().unwrap();
         let open = |(i, words): (usize, &Vec<u64>)| {
             let path = dir.path().join(format!("{i}.npy"));
             npy::write(&path, words).unwrap();
-            PartFile::open(&path).unwrap()
+            Part::Words(PartFile::open(&path).unwrap())
         };
         let files = words.iter().enumerate().map(open).collect();
         (dir, files)
