@@ -29,7 +29,9 @@ pub fn run(arguments: &Arguments) -> u8 {
     let _place = tempfile::tempdir();
     match arguments.fault {
         Fault::Panic => panic!("a fault that was asked for"),
-        Fault::Thread => thread::scope(|scope| _ = scope.spawn(|| panic!("a fault that was asked for"))),
+        Fault::Thread => {
+            thread::scope(|scope| _ = scope.spawn(|| panic!("a fault that was asked for")))
+        }
         Fault::Memory => drop(black_box(vec![0_u8; 1 << 62])),
     }
     EXIT_HOLDS
