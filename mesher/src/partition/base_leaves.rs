@@ -5,7 +5,7 @@
 
 mod heaviest;
 
-pub use heaviest::cells_heaviest;
+pub use heaviest::Heaviest;
 
 use crate::brick::{self, Brick};
 use crate::comm::{Comm, agree, all_gather_reduced};

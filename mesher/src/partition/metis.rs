@@ -2,6 +2,10 @@
 
 use crate::error::Error;
 use crate::octant::{Level, neighbour, start57};
+use std::sync::{Mutex, PoisonError};
+
+/// METIS keeps its random state per process: threads that share it would change each other's parts.
+static TURN: Mutex<()> = Mutex::new(());
 
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
 const LEAVES_PER_RANK_MIN: usize = 8;
@@ -27,6 +31,7 @@ pub fn assign(leaves: &[(Level, u64)], weights: &[u64], ranks: usize) -> Result<
     let failed = |e: &dyn std::fmt::Display| {
         Error::input(format!("METIS failed ({e}): use --partitioner morton"))
     };
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     metis::Graph::new(1, ranks as metis::Idx, &xadj, &adjncy)
         .map_err(|e| failed(&e))?
         .set_vwgt(&scaled)

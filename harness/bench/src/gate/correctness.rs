@@ -103,14 +103,14 @@ fn findings(bench: &Bench, case: &Selected, report: &CaseReport) -> Vec<Finding>
 fn finding(case: &str, metric: &str, checks: &[&Check]) -> Finding {
     let tally: Tally = checks.iter().copied().collect();
     let failure = checks.iter().find_map(|check| match &check.outcome {
-        Outcome::Fail(why) => {
+        Outcome::Fail { why } => {
             let first = why.lines().next().unwrap_or_default();
             Some(format!("{}: {}: {first}", check.subject, check.name))
         }
         _ => None,
     });
     let left_out = checks.iter().find_map(|check| match &check.outcome {
-        Outcome::LeftOut(why) => Some(why.clone()),
+        Outcome::LeftOut { why } => Some(why.clone()),
         _ => None,
     });
     let compared = (tally.pass + tally.fail) as u64;

@@ -26,7 +26,7 @@ pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> Finding {
         check.failed() && baseline.get(&key(check)).is_none_or(|old| candidate[&key(check)] > *old)
     };
     let first = |check: &Check| match &check.outcome {
-        Outcome::Fail(why) => why.lines().next().unwrap_or_default().to_owned(),
+        Outcome::Fail { why } => why.lines().next().unwrap_or_default().to_owned(),
         _ => String::new(),
     };
     let total = |known: &Known| known.values().sum::<u64>();
@@ -60,10 +60,10 @@ mod tests {
     fn case(failed: &[(&str, u64)]) -> CaseReport {
         let check = |(name, findings): &(&str, u64)| {
             let counts = [("findings".to_owned(), *findings)].into();
-            Check { counts, ..Check::new("serial", *name, Outcome::Fail("here\nthere".into())) }
+            Check { counts, ..Check::new("serial", *name, Outcome::fail("here\nthere")) }
         };
         let mut checks: Vec<Check> = failed.iter().map(check).collect();
-        checks.push(Check::new("serial", "balance", Outcome::Pass));
+        checks.push(Check::new("serial", "balance", Outcome::held(1)));
         CaseReport { name: "c".into(), checks, ..CaseReport::default() }
     }
 

@@ -38,8 +38,8 @@ impl Baseline {
         let Some(named) = &options.baseline else { return Ok(Self::None) };
         let path = Path::new(named);
         if path.is_file() {
-            let start =
-                fs::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
+            let start = contract::files::read(path)
+                .map_err(|error| GateError::Input(format!("{named}: {error}")))?;
             if start.first() == Some(&b'{') {
                 let measures = Measures::parse(&start)
                     .map_err(|why| GateError::Input(format!("{named}: {why}")))?;

@@ -19,7 +19,7 @@ use crate::gate::report::{LayerName, Report};
 use crate::origin::Origins;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::Command;
@@ -137,7 +137,7 @@ pub struct History {
 /// One sentence with the number of the invalid line.
 pub fn read(path: &Path) -> Result<History, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let bytes = match contract::files::read(path) {
+    let bytes = match contract::files::read_log(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         other => other.map_err(|error| wrong(error.to_string()))?,
     };
@@ -227,7 +227,7 @@ pub fn append(path: &Path, record: &Record) -> io::Result<()> {
     // Strings and finite numbers only.
     let mut line = serde_json::to_string(record).expect("a record is representable in JSON");
     line.push('\n');
-    let mut file = OpenOptions::new().create(true).read(true).append(true).open(path)?;
+    let mut file = contract::files::append_log(path)?;
     file.lock()?;
     let bytes = fs::read(path)?;
     let mut length = bytes.len() as u64;

@@ -2,7 +2,7 @@
 
 use super::files::{prepare, put};
 use super::programs::ProgramArguments;
-use super::values::seconds;
+use super::values::{Input, Output, seconds};
 use bench::gate::build::top_level;
 use bench::gate::report::{End, LayerName, Report};
 use bench::gate::{GateError, Options, gate};
@@ -30,7 +30,7 @@ pub struct Arguments {
     engine: String,
     /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
     #[arg(long, value_name = "FILE")]
-    rules: Option<PathBuf>,
+    rules: Option<Input>,
     /// Only these cases of the rules
     #[arg(long, value_delimiter = ',')]
     case: Vec<String>,
@@ -48,16 +48,16 @@ pub struct Arguments {
     timeout: u64,
     /// Write the exact measures of the candidate: a baseline for later and input of `harness track`
     #[arg(long, value_name = "FILE")]
-    record: Option<PathBuf>,
+    record: Option<Output>,
     /// Write the report as JUnit XML
     #[arg(long, value_name = "FILE")]
-    junit: Option<PathBuf>,
+    junit: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Write the report as Markdown
     #[arg(long, value_name = "FILE")]
-    markdown: Option<PathBuf>,
+    markdown: Option<Output>,
     /// Exit code 3 if a layer or a case of it was left out
     #[arg(long)]
     require_layers: bool,
@@ -92,7 +92,7 @@ pub fn run(arguments: Arguments) -> u8 {
     let options = Options {
         baseline: arguments.baseline.clone(),
         candidate: arguments.candidate.clone(),
-        rules: arguments.rules.clone(),
+        rules: arguments.rules.as_deref().map(Path::to_owned),
         cases: arguments.case.clone(),
         layers: arguments.layers.clone(),
         require_layers: arguments.require_layers,
@@ -132,7 +132,7 @@ fn exit_code(report: &Report) -> u8 {
 }
 
 fn write(report: &Report, arguments: &Arguments) -> io::Result<()> {
-    let forms: [(&Option<PathBuf>, &dyn Fn() -> String); 4] = [
+    let forms: [(&Option<Output>, &dyn Fn() -> String); 4] = [
         (&arguments.record, &|| report.candidate_measures.json()),
         (&arguments.junit, &|| junit(report)),
         (&arguments.json, &|| json(report)),

@@ -55,6 +55,10 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
         ));
     }
     let written = report(directory, &lines, &history).map_err(|error| error.to_string())?;
+    if written.figures == 0 {
+        let page = written.page.display();
+        return Err(format!("no figure could be drawn from these results; {page} lists them"));
+    }
     for finding in &written.broken {
         println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
     }

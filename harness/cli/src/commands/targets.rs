@@ -1,6 +1,7 @@
 //! `harness targets`: measures the rows of a table of targets and prints which are met.
 
 use super::session::{SessionArguments, progress, refuse, require};
+use super::values::Input;
 use bench::experiments::entry::{Entry, Judged, Line, Machine, Verdict};
 use bench::experiments::session::BenchError;
 use bench::targets::{self, Overrides, Targets};
@@ -17,7 +18,7 @@ const PAGE: &str = "targets.md";
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// The table of targets, TOML
-    pub file: PathBuf,
+    pub file: Input,
     /// Only these rows
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
