@@ -44,7 +44,7 @@ pub struct Directory<'a> {
     /// All cells.
     pub model: &'a Model<'a>,
     /// The patches of the whole mesh.
-    pub patches: &'a Patches<'a>,
+    pub patches: &'a Patches,
     /// The faces of the whole mesh.
     pub survey: &'a Survey,
     /// The cells of the directory.
@@ -64,7 +64,7 @@ impl<'a> Directory<'a> {
     /// If labels are too narrow, or if the user interrupts.
     pub fn new(
         model: &'a Model<'a>,
-        patches: &'a Patches<'a>,
+        patches: &'a Patches,
         survey: &'a Survey,
         domain: Domain<'a>,
         path: &'a Path,

@@ -76,10 +76,10 @@ pub fn write(
     model.points = corners::points(&model.tree, options)?;
     let distribution = distribute(&model, mesh, options.foam.processors)?;
     let targets = targets(path, distribution.as_ref().map(Distribution::processors))?;
-    let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
+    let patches = Patches::new(options.foam.case, *selection != Selection::default())
         .map_err(ExportError::Request)?;
 
-    let survey = survey(&model, &mut patches, distribution.as_ref())?;
+    let survey = survey(&model, &patches, distribution.as_ref())?;
 
     let named = |error| ExportError::write(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;

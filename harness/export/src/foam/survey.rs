@@ -209,7 +209,7 @@ pub fn owned(squares: &[Square], owned: &mut Vec<(u32, usize)>) {
 /// If the user interrupts.
 pub fn survey(
     model: &Model,
-    patches: &mut Patches,
+    patches: &Patches,
     distribution: Option<&Distribution>,
 ) -> Result<Survey, ExportError> {
     let directories = distribution.map_or(1, Distribution::processors);
