@@ -2,6 +2,7 @@
 
 use crate::interrupt::uninterrupted;
 use crate::unfinished::{self, Output, Unfinished};
+use crate::uses::register_output;
 use rustix::fs::{RenameFlags, renameat, renameat_with};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
@@ -45,8 +46,9 @@ impl Draft {
     /// if they are regular files.
     ///
     /// # Errors
-    /// If the file is a directory, or cannot be created or opened.
+    /// If the file is a directory or an input of this run, or cannot be created or opened.
     pub fn create(path: &Path) -> io::Result<Self> {
+        register_output(path)?;
         match destination(path)? {
             Destination::Special(file) => Ok(Self { place: Place::Through, file: file.into() }),
             Destination::Regular(path) => uninterrupted(|| Self::beside(path)),

@@ -1,9 +1,12 @@
-//! The end of a program on SIGINT, SIGTERM and SIGHUP: at once, in whatever it does, and without unfinished files.
+//! The end of a program on a signal: at once, in whatever it does, and without unfinished files.
 
 use crate::unfinished::{abandon_all, abandon_others, complete};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::stdio::stderr;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+    SIGXFSZ,
+};
 use signal_hook::low_level::{self, exit};
 use std::io;
 use std::mem::MaybeUninit;
@@ -16,7 +19,9 @@ use std::time::Duration;
 /// Exit code of an interrupted program.
 pub const INTERRUPTED: i32 = 130;
 
-const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
+/// All that another process, a timer or a limit sends to end this one. SIGPIPE is ignored by the standard library.
+const SIGNALS: [i32; 10] =
+    [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU];
 
 /// Makes each of the signals remove all unfinished files, print `message` on the standard error and end the process with exit code 130.
 /// If output is complete or the outcome [decided], the first signal is ignored, as the process is about to end. Signals that the process was started to
@@ -27,7 +32,7 @@ const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 pub fn install(message: &str, linger: Duration) -> io::Result<()> {
     let message: Arc<[u8]> = message.as_bytes().into();
     let is_second = Arc::new(AtomicBool::new(false));
-    for signal in signals() {
+    for signal in signals()? {
         let (message, is_second) = (message.clone(), is_second.clone());
         let end = move || {
             let is_second = is_second.swap(true, Ordering::AcqRel);
@@ -46,9 +51,15 @@ pub fn install(message: &str, linger: Duration) -> io::Result<()> {
     Ok(())
 }
 
-/// The signals that end a program: those of the three that it was not started to ignore.
-pub fn signals() -> impl Iterator<Item = i32> {
-    SIGNALS.into_iter().filter(|&signal| !is_ignored(signal))
+/// The signals that end a program: all that it was not started to ignore. At the limit on file sizes, from now on, writing fails instead.
+///
+/// # Errors
+/// If a handler cannot be installed.
+pub fn signals() -> io::Result<impl Iterator<Item = i32>> {
+    // A handler, unlike an ignored signal, is not inherited by the programs that this one starts.
+    // SAFETY: the action does nothing.
+    unsafe { low_level::register(SIGXFSZ, || ())? };
+    Ok(SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)))
 }
 
 /// Runs `body` without a signal in between on this thread: for steps that create a file and note that it exists.

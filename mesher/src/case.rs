@@ -91,11 +91,7 @@ impl Case {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let fail = |e: &dyn std::fmt::Display| Error::input(format!("{}: {e}", path.display()));
         let unreadable = |e| fail(&format!("{e}: give a readable case file"));
-        // Checked before opening, because opening a pipe would wait for a writer, and a device may never end.
-        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-            return Err(fail(&"is a directory, a pipe or a device: give a case file"));
-        }
-        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        let text = files::read_text(path).map_err(unreadable)?;
         let file: File = toml::from_str(&text).map_err(|e| fail(&explain(&text, &e)))?;
         let folder = path.parent().unwrap_or(Path::new("."));
         file.into_case(folder).map_err(|e| fail(&e))

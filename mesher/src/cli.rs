@@ -21,8 +21,7 @@ pub const UNPRINTED: i32 = 4;
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
-/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by SIGINT, SIGTERM or
-/// SIGHUP. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
+/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {

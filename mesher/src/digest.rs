@@ -3,6 +3,7 @@
 //! `mix(w) = f(w + c) * 2^64 + f(f(w + c) ^ rotl(w, 32))` with the finaliser `f` of splitmix64, summed
 //! modulo 2^128. So the digest of a mesh is the sum of the digests of its parts.
 
+use crate::facet::Facet;
 use crate::octant::Level;
 use crate::wide::widest;
 
@@ -10,6 +11,9 @@ use crate::wide::widest;
 pub const OCTANT_LEVEL: Level = 3;
 /// Number of such octants.
 pub const OCTANTS: usize = 512;
+
+/// The increment of splitmix64.
+const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 
 #[inline]
 const fn finalise(x: u64) -> u64 {
@@ -27,7 +31,7 @@ pub const fn mix(w: u64) -> u128 {
 
 #[inline]
 const fn halves(w: u64) -> (u64, u64) {
-    let a = finalise(w.wrapping_add(0x9e37_79b9_7f4a_7c15));
+    let a = finalise(w.wrapping_add(INCREMENT));
     (a, finalise(a ^ w.rotate_left(32)))
 }
 
@@ -53,6 +57,28 @@ fn digest_lanes(words: &[u64]) -> u128 {
             .wrapping_add(u128::from(low))
             .wrapping_add(u128::from(low_top) << 32);
         total = total.wrapping_add(sum);
+    }
+    total
+}
+
+widest! {
+    /// The digest of a geometry: that of one word per facet.
+    pub fn of_facets(facets: &[Facet]) -> u128 = of_facets_lanes;
+}
+
+/// A facet's word is a chain of nine dependent steps, so many facets are taken at a time.
+#[inline(always)]
+fn of_facets_lanes(facets: &[Facet]) -> u128 {
+    let mut total = 0u128;
+    for chunk in facets.chunks(64) {
+        let mut words = [0; 64];
+        for i in 0..9 {
+            for (w, f) in words.iter_mut().zip(chunk) {
+                let c = i64::from(f.v[i / 3][i % 3]) as u64;
+                *w = finalise((*w ^ c).wrapping_add(INCREMENT));
+            }
+        }
+        total = total.wrapping_add(digest_lanes(&words[..chunk.len()]));
     }
     total
 }

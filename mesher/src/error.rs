@@ -2,10 +2,8 @@
 //!
 //! Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 130 interrupted.
 
+use files::OUT_OF_MEMORY;
 use thiserror::Error;
-
-/// Exit code of a run that does not fit into memory, or that ran out of it.
-pub const OUT_OF_MEMORY: i32 = 71;
 
 /// An error with a message of one sentence: what, where, what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

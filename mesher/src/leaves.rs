@@ -55,17 +55,7 @@ pub fn finish(
     let (digests, parts) = manifest::gather(written, comm);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
-            let (rules, summary) = (&mesh.rules, &mesh.sides.summary);
-            let is_base = mesh.is_base;
-            out.manifest(&Manifest::new(
-                &out.output,
-                rules,
-                is_base,
-                &counts,
-                summary,
-                &digests,
-                &parts,
-            ))
+            out.manifest(&Manifest::new(&out.output, mesh, &counts, &digests, &parts))
         }
         _ => Ok(()),
     };

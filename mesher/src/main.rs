@@ -6,13 +6,14 @@ mod cli;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod heap;
 mod launch;
-mod out_of_memory;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
-use files::{check_writable, interrupt, write_atomically};
+use files::{BUG, Heap, check_writable, interrupt, write_atomically};
 use mesher::agreement;
+use mesher::case::Case;
 use mesher::comm::{Comm, Solo, sim};
 use mesher::error::Error;
+use mesher::ingest::Source;
 use mesher::partition::Division;
 use mesher::plan::Plan;
 use mesher::record::Recorder;
@@ -27,8 +28,12 @@ use std::process::exit;
 use std::sync::Once;
 use std::time::Duration;
 
-/// Exit code of a bug.
-const BUG: i32 = 70;
+#[global_allocator]
+static HEAP: Heap = Heap {
+    program: "mesher",
+    advice: "choose a larger spacing (--plan estimates what fits) or use more machines",
+};
+
 /// Time that an interrupted rank of a job lives on. When one rank has ended, launchers kill the others at once, which must have removed
 /// their files by then.
 const LINGER: Duration = Duration::from_millis(300);
@@ -100,7 +105,7 @@ fn run_mpi(args: &Result<Args, Error>) {
     let comm = interrupt::uninterrupted(mesher::comm::mpi::Mpi::start);
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
-    out_of_memory::ends_with(mesher::comm::mpi::abort);
+    files::ends_with(mesher::comm::mpi::abort);
     let code = run(args, &comm);
     drop(comm);
     exit(code);
@@ -189,10 +194,8 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     if let Some(limit) = args.stall_limit {
         comm.limit_calls(limit);
     }
-    let status = args.status.as_ref().map(|dir| dir.join(format!("rank-{:05}.txt", comm.rank())));
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
-    let mut record = Recorder::new(status, progress);
-    record.report_status("start");
+    let mut record = Recorder::new(progress);
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
@@ -212,12 +215,16 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     }
 }
 
-fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
-    if let Some(dir) = &args.status {
-        comm.agree(std::fs::create_dir_all(dir).map_err(|e| {
-            Error::output(format!("{}: {e}: choose another --status", dir.display()))
-        }))?;
+/// A case whose geometry is known to be an input: no output of the run may be that file.
+fn registered(case: Case) -> Result<Case, Error> {
+    if let Source::Stl(path) = &case.source {
+        files::register_input(path)
+            .map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
     }
+    Ok(case)
+}
+
+fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
     let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
@@ -225,8 +232,17 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         comm.agree(json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
     on_json("choose another --json", &check_writable)?;
-    let case = mesher::comm::agree(comm, case(args))?;
+    let case = mesher::comm::agree(comm, case(args).and_then(registered))?;
     agreement::on_case(&case, comm)?;
+    if let Some(dir) = &args.status {
+        // Not before the inputs are known, which these files must not replace.
+        let path = dir.join(format!("rank-{:05}.txt", comm.rank()));
+        let begin = std::fs::create_dir_all(dir).and_then(|()| record.keep_status(path));
+        comm.agree(begin.map_err(|e| match e.kind() {
+            ErrorKind::InvalidInput => Error::input(format!("{}: {e}", dir.display())),
+            _ => Error::output(format!("{}: {e}: choose another --status", dir.display())),
+        }))?;
+    }
     let options = Options {
         division: Division {
             partitioner: args.partitioner,

@@ -2,8 +2,10 @@
 
 use crate::comm::Comm;
 use crate::digest::{Digests, hex};
-use crate::lattice::{Enclosed, Keep, Rules};
+use crate::lattice::{Enclosed, Keep};
+use crate::mesh::Mesh;
 use crate::octant::LEVEL_MAX;
+use crate::quantise::FacetCounts;
 use crate::sides::Summary;
 use crate::stream::Counts;
 use crate::write::{Output, TREE, Written, part_name};
@@ -21,6 +23,7 @@ pub struct Manifest {
     keep: Keep,
     keep_crossing: bool,
     boxes: Vec<BoxEntry>,
+    geometry: Geometry,
     leaves: u64,
     leaves_by_level: Vec<u64>,
     leaves_by_side: SideEntry,
@@ -33,6 +36,22 @@ pub struct Manifest {
     parts: Vec<PartEntry>,
     #[serde(skip_serializing_if = "Option::is_none")]
     hyper_tree_grid: Option<&'static str>,
+}
+
+/// The facets as read, in manifest and report.
+#[derive(Clone, Debug, Serialize)]
+pub struct Geometry {
+    /// Their number.
+    pub facets: u64,
+    /// Their digest on the lattice.
+    pub digest: String,
+}
+
+impl Geometry {
+    /// The facets of all ranks.
+    pub fn of(facets: &FacetCounts) -> Self {
+        Self { facets: facets.total, digest: hex(facets.digest) }
+    }
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -108,14 +127,13 @@ impl Manifest {
     /// The manifest of a mesh with these leaves, digests and parts; parts and tree are named as far as `output` has them.
     pub fn new(
         output: &Output,
-        rules: &Rules,
-        base: bool,
+        mesh: &Mesh,
         counts: &Counts,
-        summary: &Summary,
         digests: &Digests,
         parts: &[PartWords],
     ) -> Self {
-        let &Summary { outside, inside, enclosed, ambiguous, .. } = summary;
+        let rules = &mesh.rules;
+        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.sides.summary;
         let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
         let entry = |(i, p): (usize, &PartWords)| PartEntry {
             file: part_name(i),
@@ -125,7 +143,7 @@ impl Manifest {
         Self {
             schema: "octree-leaf-set/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
-            tree: if base { "base" } else { "final" },
+            tree: if mesh.is_base { "base" } else { "final" },
             root: RootEntry { origin: rules.root.origin, edge: rules.root.edge },
             level_surface: rules.level_surface,
             layer_cells_min: rules.layer_cells_min,
@@ -136,6 +154,7 @@ impl Manifest {
                 .iter()
                 .map(|b| BoxEntry { min: b.min, max: b.max, level: b.level })
                 .collect(),
+            geometry: Geometry::of(&mesh.facets),
             leaves: counts.total(),
             leaves_by_level: counts.by_level[..=LEVEL_MAX as usize]
                 .iter()

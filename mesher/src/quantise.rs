@@ -1,20 +1,23 @@
 //! Quantisation: the rules of a case and its facets on the lattice of the root.
 
 use crate::case::Case;
-use crate::comm::{Comm, agree};
+use crate::comm::{Comm, agree, uncounted};
+use crate::digest;
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::ingest::Slice;
 use crate::lattice::{Bounds, Rules};
 use crate::octant::ROOT_EDGE;
 
-/// Numbers of facets on all ranks.
+/// The facets of all ranks, in numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct FacetCounts {
     /// All facets.
     pub total: u64,
     /// Those with a point beyond the root.
     pub beyond_root: u64,
+    /// The digest of the geometry.
+    pub digest: u128,
 }
 
 /// The result of the phase on a rank.
@@ -43,8 +46,17 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised,
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
     let beyond_root = if bounds.exceed(&rules.root) { comm.sum(beyond_root(&facets)) } else { 0 };
-    let counts = FacetCounts { total: slice.total, beyond_root };
+    let digest = uncounted(comm, || digest_of_all(&facets, comm));
+    let counts = FacetCounts { total: slice.total, beyond_root, digest };
     Ok(Quantised { rules, bounds, facets, counts })
+}
+
+/// The digest of the facets of all ranks: each facet is in one slice. Collective.
+fn digest_of_all(mine: &[Facet], comm: &dyn Comm) -> u128 {
+    let mine = digest::of_facets(mine);
+    let all = comm.all_gather(&[(mine >> 64) as u64, mine as u64]);
+    let of_rank = |w: &[u64; 2]| u128::from(w[0]) << 64 | u128::from(w[1]);
+    all.words().as_chunks().0.iter().map(of_rank).fold(0, u128::wrapping_add)
 }
 
 fn beyond_root(facets: &[Facet]) -> u64 {

@@ -2,7 +2,7 @@
 
 use crate::comm::{Comm, Traffic};
 use cpu_time::ThreadTime;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -28,10 +28,20 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder that writes the name of the current phase to the file `status`, if given, and to standard error if `progress` is
-    /// true.
-    pub fn new(status: Option<PathBuf>, progress: bool) -> Self {
-        Self { phases: Vec::new(), status, progress }
+    /// A recorder that writes the name of the current phase to standard error if `progress` is true.
+    pub fn new(progress: bool) -> Self {
+        Self { progress, ..Self::default() }
+    }
+
+    /// Also writes the name of the current phase to a file from now on.
+    ///
+    /// # Errors
+    /// If the file is an input of this run.
+    pub fn keep_status(&mut self, path: PathBuf) -> io::Result<()> {
+        files::register_output(&path)?;
+        self.status = Some(path);
+        self.report_status("start");
+        Ok(())
     }
 
     /// Runs and times a phase. The times of phases with the same name add up.
@@ -109,7 +119,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary directory");
         sim::run(2, 1, |comm| {
             let status = folder.path().join(comm.rank().to_string());
-            let mut record = Recorder::new(Some(status.clone()), false);
+            let mut record = Recorder::new(false);
+            record.keep_status(status.clone()).expect("no input");
             comm.sum(1);
             let (before, since) = (comm.traffic(), ThreadTime::now());
             let work = |calls: usize| {
@@ -135,7 +146,7 @@ mod tests {
             assert!(a.time_cpu_s + b.time_cpu_s <= all_s + 1e-9, "{a:?} {b:?} {all_s}");
             assert!(a.time_wall_s >= a.time_cpu_s * 0.99 && b.time_wall_s >= b.time_cpu_s * 0.99);
             assert_eq!(std::fs::read_to_string(&status).expect("a status"), "a\n");
-            assert!(!record.shows_progress() && Recorder::new(None, true).shows_progress());
+            assert!(!record.shows_progress() && Recorder::new(true).shows_progress());
         });
         let peak = peak_rss_bytes();
         assert!(

@@ -8,6 +8,7 @@ pub(crate) use text::grouped;
 use crate::comm::{Comm, Traffic, matrix};
 use crate::digest::hex;
 use crate::leaves::Totals;
+use crate::manifest::Geometry;
 use crate::mesh::Mesh;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::record::{Phase, Recorder, peak_rss_bytes};
@@ -111,6 +112,8 @@ pub struct Report {
     program: &'static str,
     /// Facets in the geometry.
     pub facets: u64,
+    /// The same, with their digest.
+    pub geometry: Geometry,
     /// Leaves of the mesh.
     pub cells: u64,
     /// Leaves by level, 0 to 19.
@@ -201,6 +204,7 @@ impl Report {
             schema: "octree-mesher-run/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
             facets: mesh.facets.total,
+            geometry: Geometry::of(&mesh.facets),
             cells: counts.total(),
             cells_by_level: counts.by_level[..=LEVEL_MAX as usize]
                 .iter()

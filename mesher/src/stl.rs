@@ -31,14 +31,7 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     let fail = |e: std::io::Error| {
         Error::input(format!("{}: {e}: give a readable STL file", path.display()))
     };
-    // Checked before opening, because opening a pipe would wait for a writer.
-    if !std::fs::metadata(path).map_err(fail)?.is_file() {
-        return Err(Error::input(format!(
-            "{} is a directory, a pipe or a device: give an STL file",
-            path.display()
-        )));
-    }
-    let file = File::open(path).map_err(fail)?;
+    let file = files::open(path).map_err(fail)?;
     let length = file.metadata().map_err(fail)?.len();
     if length == 0 {
         return Err(Error::input(format!(

@@ -2,7 +2,8 @@
 #![allow(missing_docs)]
 
 use mesher::case::{BoxSpec, Case, RootSpec};
-use mesher::digest::{Digests, digest, hex, mix};
+use mesher::digest::{Digests, digest, hex, mix, of_facets};
+use mesher::facet::Facet;
 use mesher::ingest::Source;
 use mesher::lattice::{Bounds, Enclosed, Keep, Root};
 use mesher::octant::{LEVEL_MAX, Side, corner, morton, position, start57, word};
@@ -60,6 +61,22 @@ fn mixes_and_digests_equal_the_vectors() {
         let mut whole = Digests::default();
         whole.add(&words);
         assert_eq!(hex(whole.whole()), v["digest"], "the octants' digests must add up");
+    }
+}
+
+#[test]
+fn digests_of_geometries_equal_the_vectors() {
+    for v in vectors("geometries") {
+        let facet = |nine: &Value| Facet {
+            v: std::array::from_fn(|i| {
+                std::array::from_fn(|a| nine[3 * i + a].as_i64().expect("an integer") as i32)
+            }),
+        };
+        let mut facets: Vec<Facet> =
+            v["facets"].as_array().expect("a list").iter().map(facet).collect();
+        assert_eq!(hex(of_facets(&facets)), v["digest"]);
+        facets.reverse();
+        assert_eq!(hex(of_facets(&facets)), v["digest"], "the order must not matter");
     }
 }
 

@@ -89,7 +89,7 @@ fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
     assert_eq!(manifest["octant_digests"], json!(octants));
     assert_parts(folder, &manifest, words, ranks);
     let fields = manifest.as_object().expect("an object").len();
-    assert_eq!(fields, 19, "a field is untested, or missing");
+    assert_eq!(fields, 20, "a field is untested, or missing");
 }
 
 fn assert_parts(folder: &Path, manifest: &Value, words: &[u64], ranks: usize) {
@@ -111,6 +111,9 @@ fn assert_parts(folder: &Path, manifest: &Value, words: &[u64], ranks: usize) {
 fn written_meshes_are_read_back() {
     let workspace = Workspace::new();
     workspace.write("case.toml", CASE);
+    let case =
+        contract::case::Case::read(&workspace.path().join("case.toml")).expect("a good case");
+    let geometry = json!(contract::manifest::Geometry::of(&case.facets_lattice));
     for ungraded in [false, true] {
         let words = meshed(&workspace, ungraded);
         assert!(words.len() > 1000);
@@ -129,7 +132,11 @@ fn written_meshes_are_read_back() {
             run(workspace.mesher(&args)).succeeds();
             let folder = workspace.path().join("mesh");
             assert_manifest(&folder, &words, ungraded, ranks);
-            assert_report(&workspace.json("run.json"), &words, ranks);
+            let report = workspace.json("run.json");
+            assert_report(&report, &words, ranks);
+            for json in [process::read_json(&folder.join("mesh.json")), report] {
+                assert_eq!(json["geometry"], geometry, "{ranks} ranks");
+            }
             std::fs::remove_dir_all(folder).expect("the mesh exists");
         }
     }

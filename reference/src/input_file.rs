@@ -1,17 +1,12 @@
 //! Reading input files.
 
 use crate::error::Error;
-use std::io;
 use std::path::Path;
 
-/// The bytes of a regular file. A pipe could wait for a writer forever, and a device has no end.
+/// The bytes of a regular file.
 ///
 /// # Errors
-/// It is not a regular file, or cannot be read.
+/// It is not a regular file, is an output of this run, or cannot be read.
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    let bytes = || match std::fs::metadata(path)?.is_file() {
-        true => std::fs::read(path),
-        false => Err(io::Error::other("it is a directory, a pipe or a device")),
-    };
-    bytes().map_err(|source| Error::Read { path: path.to_owned(), source })
+    files::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })
 }

@@ -1,4 +1,6 @@
 //! Digests and counts of leaf words (`DEFINITION.md`, section 8).
+use crate::lattice::Facet;
+use serde::Serialize;
 
 /// The finaliser of the SplitMix64 generator: every input bit affects every output bit.
 fn scramble(mut x: u64) -> u64 {
@@ -22,6 +24,14 @@ pub fn mix(word: u64) -> u128 {
 #[must_use]
 pub fn digest(words: &[u64]) -> u128 {
     words.iter().fold(0, |sum, &word| sum.wrapping_add(mix(word)))
+}
+
+/// The digest of a geometry: that of one word per facet.
+#[must_use]
+pub fn digest_of_facets(facets: &[Facet]) -> u128 {
+    let step = |w: u64, &c: &i64| scramble((w ^ c as u64).wrapping_add(0x9e37_79b9_7f4a_7c15));
+    let word = |facet: &Facet| facet.as_flattened().iter().fold(0, step);
+    digest(&facets.iter().map(word).collect::<Vec<u64>>())
 }
 
 /// Counts and digests of a set of leaves.
@@ -58,6 +68,23 @@ impl Tally {
             *of_octant = of_octant.wrapping_add(mix(word));
         }
         tally
+    }
+}
+
+/// The facets as read, as manifest and record contain them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Geometry {
+    /// Their number.
+    pub facets: u64,
+    /// Their digest on the lattice.
+    pub digest: String,
+}
+
+impl Geometry {
+    /// The geometry of these facets.
+    #[must_use]
+    pub fn of(facets: &[Facet]) -> Self {
+        Self { facets: facets.len() as u64, digest: hex(digest_of_facets(facets)) }
     }
 }
 

@@ -30,7 +30,7 @@ pub mod write;
 pub use case::{BoxSpec, Case, Enclosed, Keep, Root};
 pub use error::Error;
 pub use kept::Components;
-pub use leaves::{digest, mix};
+pub use leaves::{Geometry, digest, mix};
 pub use octant::Side;
 pub use sides::Ambiguous;
 
@@ -49,6 +49,8 @@ pub struct Mesh {
     pub boxes: Vec<LatticeBox>,
     /// The seeds, on the lattice.
     pub seeds: Vec<Seed>,
+    /// The facets as read.
+    pub geometry: Geometry,
     /// The numbers of components of T0.
     pub components: Components,
     /// The components that no candidate decided; `None` if every component was decided.
@@ -108,6 +110,7 @@ impl Mesh {
             level_surface: input.level_surface,
             components: Components::of(tree, &input, components),
             ambiguous: Ambiguous::of(tree, &input, components),
+            geometry: Geometry::of(&input.facets),
             boxes: input.boxes,
             seeds: input.seeds,
         }

@@ -1,8 +1,8 @@
 //! The program `reference`: meshes a case by the paper's serial algorithm.
 use clap::Parser;
-use files::interrupt;
+use files::{Heap, interrupt};
 use reference::write::{self, AmbiguousCount, Which};
-use reference::{Error, Mesh, base_tree, case_file, leaves, mesh};
+use reference::{Error, Geometry, Mesh, base_tree, case_file, leaves, mesh};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -10,8 +10,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// The exit code of a bug. Every panic is one.
-const EXIT_BUG: u8 = 70;
+#[global_allocator]
+static HEAP: Heap =
+    Heap { program: "error", advice: "choose a larger spacing, or use a machine with more memory" };
+
 /// The exit code of output that cannot be written.
 const EXIT_OUTPUT: u8 = 4;
 
@@ -43,6 +45,7 @@ struct Run {
     tree: Which,
     ranks: u32,
     facets: u64,
+    geometry: Geometry,
     cells: u64,
     cells_by_level: [u64; 20],
     components_ambiguous: AmbiguousCount,
@@ -73,13 +76,17 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
         // The panic handler has already printed the message.
-        Err(_) => ExitCode::from(EXIT_BUG),
+        Err(_) => ExitCode::from(files::BUG as u8),
     }
 }
 
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let start = Instant::now();
     // Meshing may take an hour: refuse an unusable directory before it starts.
+    if let Some(path) = &arguments.json {
+        files::check_writable(path)
+            .map_err(|source| Error::Write { path: path.clone(), source })?;
+    }
     let claim = arguments.out.as_deref().map(write::claim).transpose()?;
     let case = case_file::read(&arguments.case)?;
     let (which, mesh) = if arguments.ungraded {
@@ -97,6 +104,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         tree: which,
         ranks: 1,
         facets: case.facets.len() as u64,
+        geometry: mesh.geometry.clone(),
         cells: mesh.words.len() as u64,
         cells_by_level: tally.leaves_by_level,
         components_ambiguous: AmbiguousCount::of(&mesh),

@@ -4,7 +4,7 @@ use crate::Mesh;
 use crate::case::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
 use crate::kept::Components;
-use crate::leaves::{Tally, hex};
+use crate::leaves::{Geometry, Tally, hex};
 use files::{Claim, ClaimError, write_atomically};
 use serde::Serialize;
 use std::fs;
@@ -40,6 +40,7 @@ struct Manifest {
     boxes: Vec<ManifestBox>,
     seeds: Vec<[i64; 3]>,
     enclosed: Enclosed,
+    geometry: Geometry,
     leaves: u64,
     leaves_by_level: [u64; 20],
     leaves_by_side: BySide,
@@ -108,6 +109,7 @@ impl Manifest {
                 .collect(),
             seeds: mesh.seeds.iter().map(|seed| seed.point).collect(),
             enclosed: case.enclosed,
+            geometry: mesh.geometry.clone(),
             leaves,
             leaves_by_level: tally.leaves_by_level,
             leaves_by_side: BySide { outside, inside, crossing },

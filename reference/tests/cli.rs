@@ -1,5 +1,6 @@
 //! The program as its users see it: exit codes, messages and files.
-use reference::leaves::{Tally, hex};
+use reference::lattice::Input;
+use reference::leaves::{Geometry, Tally, hex};
 use reference::{Keep, case_file, digest, mesh};
 use serde_json::Value;
 use std::fs::{self, File};
@@ -114,6 +115,9 @@ fn the_manifest_agrees_with_the_leaves() {
     equal("boxes", boxes);
     equal("seeds", serde_json::json!([]));
     equal("enclosed", "delete".into());
+    let case = case_file::read(&directory.path().join("case.toml")).unwrap();
+    let geometry = Geometry::of(&Input::new(&case).unwrap().facets);
+    equal("geometry", serde_json::to_value(geometry).unwrap());
     equal("leaves", words.len().into());
     equal("leaves_by_level", tally.leaves_by_level.to_vec().into());
     let [outside, inside, crossing] = tally.leaves_by_side;

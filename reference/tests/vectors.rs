@@ -1,6 +1,6 @@
 //! The test vectors that all programs share (`DEFINITION.md`, section 14).
-use reference::lattice::Input;
-use reference::leaves::{Tally, hex};
+use reference::lattice::{Facet, Input};
+use reference::leaves::{Tally, digest_of_facets, hex};
 use reference::octant::Octant;
 use reference::{BoxSpec, Case, Enclosed, Error, Keep, Root, Side, digest, mix};
 use serde_json::Value;
@@ -61,6 +61,16 @@ fn digests_agree_in_any_order() {
         assert_eq!(hex(tally.digest), case["digest"]);
         let merged = tally.octant_digests.iter().fold(0_u128, |sum, &d| sum.wrapping_add(d));
         assert_eq!(hex(merged), case["digest"], "the digests of octants add");
+    }
+}
+
+#[test]
+fn digests_of_geometries_agree_with_the_vectors() {
+    for case in cases("geometries") {
+        let facet =
+            |nine: &Value| [0, 3, 6].map(|v| [0, 1, 2].map(|a| nine[v + a].as_i64().unwrap()));
+        let facets: Vec<Facet> = case["facets"].as_array().unwrap().iter().map(facet).collect();
+        assert_eq!(hex(digest_of_facets(&facets)), case["digest"]);
     }
 }
 

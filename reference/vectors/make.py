@@ -30,6 +30,13 @@ def digest(words):
     return sum(map(mix, words)) % (1 << 128)
 
 
+def facet_word(facet):
+    w = 0
+    for c in facet:
+        w = f((w ^ (c & MASK)) + 0x9E3779B97F4A7C15 & MASK)
+    return w
+
+
 def word(level, cell, side):
     morton = 0
     for bit in range(19):
@@ -98,6 +105,20 @@ DIGESTS = [
     # Enough words for the sum to wrap around modulo 2^128.
     [word(3, [x << 16, y << 16, z << 16], "outside") for z in range(8) for y in range(8) for x in range(8)],
 ]
+LOW, HIGH = -ROOT_EDGE, 2 * ROOT_EDGE
+GEOMETRIES = [
+    [],
+    [[0] * 9],
+    [[1, 2, 3, 4, 5, 6, 7, 8, 9]],
+    # The same facet from another vertex, and with the other orientation.
+    [[4, 5, 6, 7, 8, 9, 1, 2, 3]],
+    [[4, 5, 6, 1, 2, 3, 7, 8, 9]],
+    [[LOW, HIGH, 0, HIGH, LOW, -1, ROOT_EDGE, ROOT_EDGE - 1, 1]],
+    # Twice the same, and one without area.
+    [[1, 2, 3, 4, 5, 6, 7, 8, 9], [-5] * 9, [1, 2, 3, 4, 5, 6, 7, 8, 9]],
+    # More facets than fit into the vector lanes of a program at once.
+    [[(i * i * 7919 + 104729 * k * (i - 40)) % (HIGH - LOW) + LOW for k in range(9)] for i in range(83)],
+]
 LEVELS = [
     (8.0, 8.0), (8.0, 9.0), (8.0, 7.999999), (8.0, 4.0), (8.0, 0.01), (1.0, 0.1), (1.0, 2.0**-19),
     (1.0, math.nextafter(2.0**-19, 0)), (0.3, 0.3 / 1024), (10.000000149011612, 0.01), (1e30, 1e25),
@@ -141,6 +162,7 @@ vectors = {
     "schema": "octree-test-vectors/1",
     "mix": [{"word": hex64(w), "mix": hex128(mix(w))} for w in MIX],
     "digests": [{"words": list(map(hex64, ws)), "digest": hex128(digest(ws))} for ws in DIGESTS],
+    "geometries": [{"facets": fs, "digest": hex128(digest(map(facet_word, fs)))} for fs in GEOMETRIES],
     "words": [
         {"level": l, "cell": c, "side": s, "word": hex64(word(l, c, s)), "octant": word(l, c, s) >> 55}
         for l, c, s in WORDS

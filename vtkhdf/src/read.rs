@@ -10,7 +10,6 @@ use crate::format::{
 };
 use flate2::{Decompress, FlushDecompress, Status};
 use std::fs;
-use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
@@ -42,11 +41,7 @@ impl File {
     /// # Errors
     /// If the file cannot be read, is damaged, or has another version of the format.
     pub fn open(path: &Path) -> Result<Self> {
-        // Checked before opening, because opening a pipe would wait for a writer.
-        if !fs::metadata(path)?.is_file() {
-            return Err(io::Error::other("it is a directory, a pipe or a device").into());
-        }
-        let file = fs::File::open(path)?;
+        let file = files::open(path)?;
         let bytes = file.metadata()?.len();
         let this = Self { file, bytes, root: 0 };
         let head = this.bytes_at(Extent { address: 0, bytes: bytes.min(8) })?;

@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand};
 /// Verifies and benchmarks oct-tree meshers.
 ///
 /// Exit codes: 0 success; 1 a check failed, two meshes differ or a target was missed; 2 invalid input; 3 a required program or
-/// file is missing; 4 standard output cannot be written; 130 interrupted by SIGINT, SIGTERM or SIGHUP.
+/// file is missing; 4 standard output cannot be written; 70 a bug; 71 memory ran out; 130 interrupted by a signal.
 #[derive(Debug, Parser)]
 #[command(version = env!("HARNESS_VERSION"), verbatim_doc_comment)]
 pub struct Arguments {

@@ -8,14 +8,49 @@ mod commands;
 
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
+use files::{BUG, Heap};
 use run::engine::interrupt;
 use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED};
-use std::process::ExitCode;
+use std::panic::{catch_unwind, set_hook, take_hook};
+use std::process::{ExitCode, exit};
+use std::sync::Once;
+
+#[global_allocator]
+static HEAP: Heap = Heap {
+    program: "harness",
+    advice: "use a smaller mesh, fewer --jobs or a machine with more memory",
+};
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     interrupt::install();
-    let code = match arguments.command {
+    files::ends_with(interrupt::out_of_memory);
+    report_a_panic_once();
+    let Ok(code) = catch_unwind(|| dispatch(arguments)) else {
+        interrupt::clean();
+        exit(BUG);
+    };
+    let code = output::finish(code);
+    interrupt::uninstall();
+    // A command that fails because its programs were ended has been interrupted.
+    let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
+    ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
+}
+
+/// Makes the first panic of any thread print one message. Threads that wait for that thread panic after it.
+fn report_a_panic_once() {
+    let report = take_hook();
+    set_hook(Box::new(move |info| {
+        static FIRST: Once = Once::new();
+        FIRST.call_once(|| {
+            report(info);
+            eprintln!("harness: this is a bug: please report it with the command and its input");
+        });
+    }));
+}
+
+fn dispatch(arguments: Arguments) -> u8 {
+    match arguments.command {
         Command::Verify(arguments) => commands::verify::run(*arguments),
         Command::Selftest(arguments) => commands::selftest::run(&arguments),
         Command::Gate(arguments) => commands::gate::run(*arguments),
@@ -38,10 +73,5 @@ fn main() -> ExitCode {
             commands::completions::run(&arguments, &mut Arguments::command())
         }
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
-    };
-    let code = output::finish(code);
-    interrupt::uninstall();
-    // A command that fails because its programs were ended has been interrupted.
-    let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
-    ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
+    }
 }

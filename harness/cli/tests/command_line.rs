@@ -80,6 +80,26 @@ fn output_to_a_file_has_no_colours() {
     }
 }
 
+/// A bug and exhausted memory end the harness with one message, and without temporary files.
+#[test]
+fn a_fault_of_the_harness_has_an_exit_code_and_one_message() {
+    for (fault, code, words) in [
+        ("panic", 70, &["panicked at", "planted", "harness: this is a bug"][..]),
+        ("thread", 70, &["panicked at", "planted", "harness: this is a bug"]),
+        ("memory", 71, &["harness: memory ran out at a request for 4611686018427387904 bytes"]),
+    ] {
+        let place = tempfile::tempdir().unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(["planted", "case", "--fault", fault]);
+        command.env("TMPDIR", place.path()).env("RUST_BACKTRACE", "0");
+        let output = command.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{fault}: {stderr}");
+        assert!(words.iter().all(|word| stderr.matches(word).count() == 1), "{stderr}");
+        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0, "{fault}");
+    }
+}
+
 /// Writes a mesh of these words in which nothing requires refinement.
 fn write_mesh(words: Vec<u64>, to: &Path) {
     let digests = vec!["0".repeat(32); 512];

@@ -6,6 +6,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::lattice::FacetLattice;
+
 /// Sum of [`mix`] over all leaf words, modulo 2^128.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Digest(pub u128);
@@ -21,12 +23,25 @@ fn finalise(mut x: u64) -> u64 {
 
 /// The contribution of one word to a digest.
 pub fn mix(word: u64) -> u128 {
-    let a = finalise(word.wrapping_add(0x9e37_79b9_7f4a_7c15));
+    let a = finalise(word.wrapping_add(INCREMENT));
     let b = finalise(a ^ word.rotate_left(32));
     u128::from(a) << 64 | u128::from(b)
 }
 
+/// The increment of SplitMix64.
+const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+
 impl Digest {
+    /// The digest of a geometry: that of one word per facet.
+    pub fn of_facets(facets: &[FacetLattice]) -> Self {
+        let mut digest = Self::default();
+        for facet in facets {
+            let step = |w: u64, &c: &i64| finalise((w ^ c as u64).wrapping_add(INCREMENT));
+            digest.add(facet.as_flattened().iter().fold(0, step));
+        }
+        digest
+    }
+
     /// The digest of these words.
     pub fn of(words: &[u64]) -> Self {
         let mut digest = Self::default();
@@ -110,6 +125,6 @@ mod tests {
     /// Published value: the first output of SplitMix64 with seed 0.
     #[test]
     fn the_finaliser_is_splitmix64() {
-        assert_eq!(finalise(0x9e37_79b9_7f4a_7c15), 0xe220_a839_7b1d_cdaf);
+        assert_eq!(finalise(INCREMENT), 0xe220_a839_7b1d_cdaf);
     }
 }

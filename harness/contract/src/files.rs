@@ -8,36 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use tempfile::TempDir;
 
-/// Reads a regular file. A pipe could wait for a writer forever, and a device has no end.
-///
-/// # Errors
-/// If it is no regular file, or cannot be read.
-pub fn read(path: &Path) -> io::Result<Vec<u8>> {
-    refuse_special(path)?;
-    fs::read(path)
-}
-
-/// Reads a regular file of text.
-///
-/// # Errors
-/// If it is no regular file, cannot be read, or is not UTF-8.
-pub fn read_text(path: &Path) -> io::Result<String> {
-    refuse_special(path)?;
-    fs::read_to_string(path)
-}
-
-/// Refuses what is there and is no regular file.
-///
-/// # Errors
-/// If it is a directory, a pipe or a device, or missing.
-pub fn refuse_special(path: &Path) -> io::Result<()> {
-    match fs::metadata(path)?.is_file() {
-        true => Ok(()),
-        false => Err(io::Error::other("it is a directory, a pipe or a device: give a file")),
-    }
-}
-
-pub use ::files::write_atomically;
+pub use ::files::{read, read_text, write_atomically};
 
 /// An error that names the file.
 pub fn named(path: &Path, error: &io::Error) -> io::Error {

@@ -10,7 +10,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
-use crate::lattice::{Root, UNITS_PER_EDGE};
+use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::octant::{LEVEL_MAX, Octant};
 
 /// The only supported schema.
@@ -89,6 +89,37 @@ impl ExtentBox {
         let (low, high) = octant.bounds();
         (0..3).all(|a| low[a].max(self.min[a]) < high[a].min(self.max[a]))
     }
+}
+
+/// The facets of a mesh, as read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Geometry {
+    /// Their number.
+    pub facets: u64,
+    /// Their digest on the lattice.
+    pub digest: Digest,
+}
+
+impl Geometry {
+    /// The geometry of these facets.
+    pub fn of(facets: &[FacetLattice]) -> Self {
+        Self { facets: facets.len() as u64, digest: Digest::of_facets(facets) }
+    }
+}
+
+/// A region that is inside, or deleted, at a coarser spacing and outside, or kept, at that of the mesh. In the user's units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Leak {
+    /// The spacing at which the region is closed.
+    pub spacing_coarse: f64,
+    /// The spacing of the mesh.
+    pub spacing_fine: f64,
+    /// The region's volume at the coarser spacing.
+    pub volume: f64,
+    /// A point in it.
+    pub point: [f64; 3],
 }
 
 /// Leaf counts by side.
@@ -181,6 +212,12 @@ pub struct Manifest {
     /// Whether the words hold sides. Written only if they do not.
     #[serde(default, skip_serializing_if = "Sides::are_known")]
     pub sides: Sides,
+    /// The facets as read; `None` if the program does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<Geometry>,
+    /// Leaks between coarser spacings and that of the mesh; `None` if the program does not look for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leaks: Option<Vec<Leak>>,
     /// Leaves in all parts.
     pub leaves: u64,
     /// Leaves by level.
@@ -220,6 +257,8 @@ impl Manifest {
             seeds: Vec::new(),
             enclosed: Enclosed::default(),
             sides: Sides::Known,
+            geometry: None,
+            leaks: None,
             leaves,
             leaves_by_level: by_level,
             leaves_by_side: by_side,

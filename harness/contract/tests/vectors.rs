@@ -1,7 +1,7 @@
 //! The test vectors that all programs share (reference/vectors).
 
 use contract::digest::{Digest, mix};
-use contract::lattice::Root;
+use contract::lattice::{FacetLattice, Root};
 use contract::manifest::octant_index;
 use contract::octant::Octant;
 use contract::word::{self, Leaf, Side};
@@ -36,6 +36,16 @@ fn mixed_words_and_digests_match_the_vectors() {
     for v in vectors("digests") {
         let words: Vec<u64> = v["words"].as_array().unwrap().iter().map(hex).collect();
         assert_eq!(Digest::of(&words).to_string(), v["digest"]);
+    }
+}
+
+#[test]
+fn digests_of_geometries_match_the_vectors() {
+    for v in vectors("geometries") {
+        let facet =
+            |nine: &Value| [0, 3, 6].map(|v| [0, 1, 2].map(|a| nine[v + a].as_i64().unwrap()));
+        let facets: Vec<FacetLattice> = v["facets"].as_array().unwrap().iter().map(facet).collect();
+        assert_eq!(Digest::of_facets(&facets).to_string(), v["digest"]);
     }
 }
 

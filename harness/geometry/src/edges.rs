@@ -5,6 +5,7 @@
 
 use contract::case::Facet;
 use contract::lattice::FacetLattice;
+use serde::Serialize;
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -16,6 +17,25 @@ pub struct Use {
     pub facet: u32,
     /// Whether the facet traverses the edge from its higher to its lower vertex.
     pub is_down: bool,
+}
+
+/// The edges by the number of their facets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct EdgeCounts {
+    /// All edges.
+    pub all: u64,
+    /// With one facet.
+    pub open: u64,
+    /// With two facets of consistent winding.
+    pub paired: u64,
+    /// With two facets of opposite winding.
+    pub flipped: u64,
+    /// With three, five, ... facets.
+    pub odd: u64,
+    /// With four, six, ... facets.
+    pub even: u64,
+    /// Facets at edges with more than two.
+    pub facets_non_manifold: u64,
 }
 
 /// Vertices by number, and the facets at every edge.
@@ -68,6 +88,25 @@ impl Edges {
             let facet = |&word: &u128| Use { facet: word as u32 >> 1, is_down: word & 1 == 1 };
             (ends, uses.iter().map(facet))
         })
+    }
+
+    /// The edges by the number of their facets.
+    pub fn counts(&self) -> EdgeCounts {
+        let mut counts = EdgeCounts::default();
+        for (_, uses) in self.iter() {
+            let facets = uses.len();
+            let down = uses.filter(|facet| facet.is_down).count();
+            counts.all += 1;
+            *match facets {
+                1 => &mut counts.open,
+                2 if down == 1 => &mut counts.paired,
+                2 => &mut counts.flipped,
+                _ if facets % 2 == 1 => &mut counts.odd,
+                _ => &mut counts.even,
+            } += 1;
+            counts.facets_non_manifold += if facets > 2 { facets as u64 } else { 0 };
+        }
+        counts
     }
 
     /// The coordinates of a vertex of a facet, in the user's units.

@@ -93,7 +93,7 @@ pub struct Finding {
     pub edges: Option<u64>,
     /// The effect on the mesh; empty where nothing was found.
     pub meaning: String,
-    /// The first places: widest openings, quantiles of sheets, deep before shallow intersections, largest shells, lowest facet numbers.
+    /// The first places: widest openings, quantiles of sheets, deep before shallow intersections, lowest facet numbers.
     pub places: Vec<Place>,
 }
 

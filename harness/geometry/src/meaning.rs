@@ -147,7 +147,10 @@ fn resolved(finding: &Finding, input: &Input) -> String {
     if narrowest / 2.0 < input.root.edge / f64::from(CELLS_PER_EDGE) {
         return "A twentieth is too narrow for the finest cell of the root.".into();
     }
-    format!("A spacing below {} would resolve all but the narrowest twentieth.", number(narrowest / 2.0))
+    format!(
+        "A spacing below {} would resolve all but the narrowest twentieth.",
+        number(narrowest / 2.0)
+    )
 }
 
 #[cfg(test)]
@@ -214,7 +217,9 @@ mod tests {
             assert!(narrow.ends_with("too narrow for the finest cell of the root."), "{narrow}");
             let wide = of_width(kind, 2.0, 3, true);
             assert!(
-                wide.ends_with(" A spacing below 1.00 would resolve all but the narrowest twentieth."),
+                wide.ends_with(
+                    " A spacing below 1.00 would resolve all but the narrowest twentieth."
+                ),
                 "{wide}"
             );
         }

@@ -64,7 +64,10 @@ pub fn sheets(
                 quantile: Some(quantile),
                 width: Some(width),
                 width_cells: input.in_cells(width),
-                ..Place::new(hit.facets.into(), input.root.to_user(hit.middle.round().to_array().map(|c| c as i64)))
+                ..Place::new(
+                    hit.facets.into(),
+                    input.root.to_user(hit.middle.round().to_array().map(|c| c as i64)),
+                )
             }
         };
         let places = QUANTILES.iter().filter_map(|&q| Some((q, quantile(&hits, q)?))).map(place);
@@ -99,7 +102,12 @@ fn hits(
             if faces && width > TOUCHING {
                 let area = triangle.area() / starts.len() as f64;
                 let middle = ray.point_at(width / 2.0);
-                hits.push(Hit { width, area, facets: [facet.min(other), facet.max(other)], middle });
+                hits.push(Hit {
+                    width,
+                    area,
+                    facets: [facet.min(other), facet.max(other)],
+                    middle,
+                });
             }
         }
     }

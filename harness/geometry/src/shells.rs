@@ -72,7 +72,7 @@ impl Shell {
 /// The shells of a geometry.
 #[derive(Debug)]
 pub struct Shells {
-    /// All shells, largest first.
+    /// All shells, in the order of their first facets.
     pub all: Vec<Shell>,
     /// The index of every facet's shell; [`u32::MAX`] for a facet with a repeated vertex, which belongs to none.
     of: Vec<u32>,
@@ -112,18 +112,7 @@ impl Shells {
             shell.is_closed &= count % 2 == 0;
             shell.is_oriented &= 2 * down == count;
         }
-        let mut order: Vec<u32> = (0..all.len() as u32).collect();
-        order.sort_by_key(|&i| {
-            let Shell { facets, facet_first, .. } = all[i as usize];
-            (std::cmp::Reverse(facets), facet_first)
-        });
-        let mut places = vec![0; order.len()];
-        (0..).zip(&order).for_each(|(place, &i)| places[i as usize] = place);
-        let place = |&i: &u32| places.get(i as usize).map_or(u32::MAX, |&place| place);
-        Self {
-            all: order.iter().map(|&i| all[i as usize].clone()).collect(),
-            of: of.iter().map(place).collect(),
-        }
+        Self { all, of }
     }
 
     /// The index of a facet's shell; [`u32::MAX`] for a facet that belongs to none.

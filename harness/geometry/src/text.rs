@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::finding::{Finding, Kind, Place};
-use contract::number::number;
 use super::report::Diagnosis;
+use contract::number::number;
 
 impl Kind {
     /// The heading of the kind's row.
@@ -122,11 +122,11 @@ fn more(f: &mut fmt::Formatter<'_>, listed: u64, count: u64) -> fmt::Result {
 
 fn line(place: &Place) -> String {
     let mut text = format!("at {}", point(&place.at));
-    if let Some(quantile) = place.quantile {
-        text = format!("{:>2.0} % of the area is narrower than {text}", 100.0 * quantile);
-    }
     if let Some(width) = place.width {
         text += &format!(": {} wide{}", number(width), in_cells(place.width_cells));
+    }
+    if let Some(quantile) = place.quantile {
+        text += &format!(", wider than {:.0} % of the area", 100.0 * quantile);
     }
     if let Some(diameter) = place.diameter {
         text += &format!(", {} across{}", number(diameter), in_cells(place.diameter_cells));
@@ -152,9 +152,10 @@ fn point(at: &[f64; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::extent::Extent;
-    use crate::geometry::report::Shells;
-    use crate::geometry::shells::Shell;
+    use crate::edges::EdgeCounts;
+    use crate::extent::Extent;
+    use crate::report::Shells;
+    use crate::shells::Shell;
     use contract::lattice::Root;
     use contract::stl::Solid;
 
@@ -174,7 +175,8 @@ mod tests {
             width_cells: Some(2.0),
             ..Place::new(vec![1, 2], at)
         };
-        let sheet = Place { width: Some(0.125), ..Place::new(vec![1, 2], at) };
+        let sheet =
+            Place { quantile: Some(0.05), width: Some(0.125), ..Place::new(vec![1, 2], at) };
         let one = |facets: std::ops::Range<u32>| vec![Place::new(facets.collect(), at)];
         let shell = |facet_first, facets, is_closed| {
             let mut shell = Shell::new(facet_first);
@@ -189,13 +191,15 @@ mod tests {
         let mut lower_bound = finding(Kind::Intersections, 2, 2, one(0..8));
         lower_bound.is_lower_bound = true;
         Diagnosis {
-            schema: crate::geometry::report::SCHEMA,
+            schema: crate::report::SCHEMA,
             facets: 30,
             vertices: 17,
+            edges: EdgeCounts::default(),
             solids: vec![solid(Some("wing"), 20), solid(None, 10)],
             shells: Shells {
                 count: 3,
                 closed: 2,
+                facets: 30,
                 largest: vec![shell(0, 16, true), shell(16, 8, false)],
             },
             root: Root { origin: [-8.0; 3], edge: 16.0 },
@@ -240,7 +244,7 @@ mod tests {
             edges at T-junctions: Meaning of Junctions.\n  at (0.1, 2.0, -3.5); facet 4\n          and 2 more (--first)\n\n\
             intersecting pairs of facets: Meaning of Intersections.\n  \
             at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--first)\n\n\
-            facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide; facets 1, 2\n\n\
+            facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide, wider than 5 % of the area; facets 1, 2\n\n\
             slivers: Meaning of Slivers.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
             findings that can change the mesh's region";
         assert_eq!(diagnosis().to_string(), expected);
@@ -251,8 +255,12 @@ mod tests {
         let mut plain = diagnosis();
         (plain.cell, plain.changes_region) = (None, false);
         (plain.solids, plain.findings) = (Vec::new(), Vec::new());
-        plain.shells =
-            Shells { count: 1, closed: 1, largest: vec![plain.shells.largest[0].clone()] };
+        plain.shells = Shells {
+            count: 1,
+            closed: 1,
+            facets: 16,
+            largest: vec![plain.shells.largest[0].clone()],
+        };
         let expected = "facets    30, with 17 distinct vertices\nshells    1, 1 closed\n\
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\
@@ -261,7 +269,7 @@ mod tests {
             no finding that changes the mesh's region";
         assert_eq!(plain.to_string(), expected);
         // Without places, nothing is left unlisted.
-        plain.shells = Shells { count: 2, closed: 0, largest: Vec::new() };
+        plain.shells = Shells { count: 2, closed: 0, facets: 2, largest: Vec::new() };
         plain.findings = vec![finding(Kind::Slivers, 3, 0, Vec::new())];
         assert!(!plain.to_string().contains("more"));
     }

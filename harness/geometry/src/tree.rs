@@ -2,8 +2,8 @@
 
 use contract::lattice::FacetLattice;
 use parry3d_f64::bounding_volume::Aabb;
-pub use parry3d_f64::math::Vector as Point;
 use parry3d_f64::math::Pose;
+pub use parry3d_f64::math::Vector as Point;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use parry3d_f64::query::details::distance_segment_segment;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
@@ -91,9 +91,8 @@ impl FacetTree {
         let from_box = |node: &BvhNode, _| {
             (node.mins() - high).max(low - node.maxs()).max(Point::ZERO).length()
         };
-        self.boxes.find_best(f64::INFINITY, from_box, |facet, _| {
-            Some(distance(self.triangle(facet)))
-        })
+        self.boxes
+            .find_best(f64::INFINITY, from_box, |facet, _| Some(distance(self.triangle(facet))))
     }
 }
 

@@ -3,15 +3,15 @@
 /// Diameter and width of a set of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// The largest distance of two points; at most 1 % less for more than 1024 points in general.
+    /// The largest distance of two points.
     pub diameter: f64,
     /// The least width of the convex hull of the points, projected on the plane that they span: a ball that is
     /// wider does not pass through a flat opening.
     pub width: f64,
 }
 
-/// Up to this number of points all pairs are compared.
-const POINTS_EXACT: usize = 1024;
+/// Of more vertices of a hull, only some are used, evenly spread.
+const VERTICES_MAX: usize = 1024;
 
 type Point = [f64; 3];
 
@@ -38,38 +38,26 @@ pub fn size(points: &[Point]) -> Size {
     }
     let v = far.map(|x| x / height);
     let flat = points.iter().map(|p| [dot(sub(*p, from), u), dot(sub(*p, from), v)]).collect();
-    Size { diameter, width: width_of_hull(&hull(flat), diameter) }
+    size_of_hull(&hull(flat), diameter)
 }
 
-/// The two points farthest apart.
+/// Two points neither of which has a farther one than the other.
 fn farthest(points: &[Point]) -> (Point, Point) {
-    let candidates = if points.len() <= POINTS_EXACT { points.to_vec() } else { extremes(points) };
-    let mut best = (0.0, points[0], points[0]);
-    for (i, p) in candidates.iter().enumerate() {
-        for q in &candidates[i + 1..] {
-            let distance = norm(sub(*q, *p));
-            if distance > best.0 {
-                best = (distance, *p, *q);
-            }
+    let from = |p: Point| {
+        let distance = |q: &Point| norm(sub(*q, p));
+        *points
+            .iter()
+            .max_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .expect("at least one point")
+    };
+    let (mut p, mut q) = (points[0], from(points[0]));
+    loop {
+        let next = from(q);
+        if norm(sub(next, q)) <= norm(sub(p, q)) {
+            return (p, q);
         }
+        (p, q) = (q, next);
     }
-    (best.1, best.2)
-}
-
-/// The extreme points in directions spread evenly over the sphere (a Fibonacci lattice).
-fn extremes(points: &[Point]) -> Vec<Point> {
-    const DIRECTIONS: usize = 256;
-    let direction = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / DIRECTIONS as f64;
-        let (sin, cos) = (i as f64 * 2.399_963_229_728_653).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        [r * cos, r * sin, z]
-    };
-    let extreme = |i: usize| {
-        let d = direction(i);
-        *points.iter().max_by(|p, q| dot(**p, d).total_cmp(&dot(**q, d))).expect("points exist")
-    };
-    (0..DIRECTIONS).map(extreme).collect()
 }
 
 /// The convex hull, counter-clockwise (Andrew's monotone chain).
@@ -94,22 +82,24 @@ fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     hull
 }
 
-/// The least distance of two parallel lines that enclose a convex polygon; one of them contains an edge. Of more than 1024 vertices,
-/// only some are used, evenly spread.
-fn width_of_hull(hull: &[[f64; 2]], diameter: f64) -> f64 {
-    let vertices: Vec<_> = hull.iter().step_by(hull.len().div_ceil(POINTS_EXACT)).collect();
-    let mut least = f64::INFINITY;
+/// The largest distance of two vertices of a convex polygon, which is at least `diameter`, and the least distance of two parallel lines
+/// that enclose it; one of them contains an edge.
+fn size_of_hull(hull: &[[f64; 2]], diameter: f64) -> Size {
+    let vertices: Vec<_> = hull.iter().step_by(hull.len().div_ceil(VERTICES_MAX)).collect();
+    let mut size = Size { diameter, width: f64::INFINITY };
     for (i, &p) in vertices.iter().enumerate() {
         let q = vertices[(i + 1) % vertices.len()];
         let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let across = vertices.iter().map(|r| (r[0] - p[0]).hypot(r[1] - p[1]));
+        size.diameter = across.fold(size.diameter, f64::max);
         // The direction of a shorter edge is a rounding error.
         if length > 1e-9 * diameter {
             let heights = vertices.iter().map(|r| turn(*p, *q, **r) / length);
             let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
-            least = least.min(high - low);
+            size.width = size.width.min(high - low);
         }
     }
-    least
+    size
 }
 
 /// Twice the signed area of a triangle.
@@ -157,23 +147,6 @@ mod tests {
             assert!((3.96..=4.0 + 1e-12).contains(&diameter), "{n}: {diameter}");
             assert!((3.96..=4.0 + 1e-12).contains(&width), "{n}: {width}");
         }
-    }
-
-    #[test]
-    fn extreme_points_lie_in_every_direction() {
-        let angles = |count: usize, to: f64| (0..count).map(move |i| i as f64 / count as f64 * to);
-        let sphere: Vec<Point> = angles(120, std::f64::consts::PI)
-            .flat_map(|polar| {
-                angles(240, std::f64::consts::TAU).map(move |around| {
-                    [polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()]
-                })
-            })
-            .collect();
-        let found = extremes(&sphere);
-        let nearest = |p: &Point| found.iter().map(|q| dot(*p, *q)).fold(-1.0, f64::max);
-        // Within 11.5 degrees.
-        let farthest = sphere.iter().step_by(7).map(nearest).fold(1.0, f64::min);
-        assert!(farthest > 0.98, "{farthest}");
     }
 
     proptest! {

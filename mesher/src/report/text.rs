@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_report_shows_its_numbers() {
-        use super::super::PhaseEntry;
+        use super::super::{Geometry, PhaseEntry};
         let phase = PhaseEntry {
             name: "sides".into(),
             time_wall_s: vec![0.25, 0.5],
@@ -148,6 +148,7 @@ mod tests {
             schema: "",
             program: "",
             facets: 1280,
+            geometry: Geometry { facets: 1280, digest: String::new() },
             cells: 3_000_000,
             cells_by_level: vec![0, 0, 1234],
             cells_by_side: [1000, 2000, 3],

@@ -1,9 +1,11 @@
 //! `harness planted`: the program that `harness gate --selftest` compares with itself.
 
 use bench::gate::planted::{self, Kind, PHASES, SlowDown};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use std::hint::black_box;
 use std::path::PathBuf;
+use std::thread;
 
 /// `harness planted`.
 #[derive(Args, Debug)]
@@ -22,10 +24,38 @@ pub struct Arguments {
     /// Write the run report
     #[arg(long)]
     json: Option<PathBuf>,
+    /// End with a fault of the harness itself instead
+    #[arg(long)]
+    fault: Option<Fault>,
+}
+
+/// A fault of the harness.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Fault {
+    /// A panic on the main thread.
+    Panic,
+    /// A panic on another thread, for which the main thread waits.
+    Thread,
+    /// A request for more memory than there is.
+    Memory,
+}
+
+impl Fault {
+    fn occur(self) {
+        match self {
+            Self::Panic => panic!("planted"),
+            Self::Thread => thread::scope(|scope| _ = scope.spawn(|| panic!("planted"))),
+            Self::Memory => drop(black_box(vec![0_u8; 1 << 62])),
+        }
+    }
 }
 
 /// Does the work; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
+    if let Some(fault) = arguments.fault {
+        let _place = tempfile::tempdir();
+        fault.occur();
+    }
     let slow = SlowDown {
         kind: arguments.kind,
         phase: usize::from(arguments.phase),

@@ -27,23 +27,48 @@ impl Report {
     pub fn check_invariants(&self, case: &Case, words: &[u64]) {
         let level = self.spacing.level;
         let joins = |l: u8| self.levels.iter().find(|m| m.spacing.level == l).map(|m| m.is_joined);
-        assert_eq!(joins(level), Some(self.is_leak), "the case's level was searched with another result");
+        assert_eq!(
+            joins(level),
+            Some(self.is_leak),
+            "the case's level was searched with another result"
+        );
         for (other, is_coarser) in [(self.closes, true), (self.opens, false)] {
             let Some(other) = other else { continue };
-            assert_eq!((other.level < level, self.is_leak), (is_coarser, is_coarser), "{other:?} for level {level}");
-            assert_eq!(joins(other.level), Some(!is_coarser), "{other:?} was searched with another result");
+            assert_eq!(
+                (other.level < level, self.is_leak),
+                (is_coarser, is_coarser),
+                "{other:?} for level {level}"
+            );
+            assert_eq!(
+                joins(other.level),
+                Some(!is_coarser),
+                "{other:?} was searched with another result"
+            );
             let between = self.levels.iter().filter(|m| {
                 let l = m.spacing.level;
-                (level.min(other.level) < l && l < level.max(other.level)) && m.is_joined != is_coarser
+                (level.min(other.level) < l && l < level.max(other.level))
+                    && m.is_joined != is_coarser
             });
             assert_eq!(between.count(), 0, "{other:?} is not the level nearest to {level}");
         }
         let known = [self.opens.is_some(), self.is_separated, self.limit.is_some()];
         let reasons = known.iter().filter(|&&is| is).count();
-        assert_eq!(reasons, usize::from(!self.is_leak), "one reason ends a search for an opening: {known:?}");
-        assert_eq!(self.passage.is_some(), self.is_leak || self.opens.is_some(), "a path exists iff a level joins the ends");
+        assert_eq!(
+            reasons,
+            usize::from(!self.is_leak),
+            "one reason ends a search for an opening: {known:?}"
+        );
+        assert_eq!(
+            self.passage.is_some(),
+            self.is_leak || self.opens.is_some(),
+            "a path exists iff a level joins the ends"
+        );
         if let Some(passage) = &self.passage {
-            assert_eq!(joins(passage.spacing.level), Some(true), "the path leads through a level that joins the ends");
+            assert_eq!(
+                joins(passage.spacing.level),
+                Some(true),
+                "the path leads through a level that joins the ends"
+            );
             passage.check_ends(&case.root, self.from, self.to);
             passage.check_legs(case, words);
             passage.check_narrowest(case);
@@ -71,7 +96,8 @@ impl Passage {
         let points = self.on_lattice(root);
         let origin = Point::from(root.origin);
         for (point, printed) in points.iter().zip(&self.points) {
-            let is_inside = point.min_element() >= -ROUNDING && point.max_element() <= edge + ROUNDING;
+            let is_inside =
+                point.min_element() >= -ROUNDING && point.max_element() <= edge + ROUNDING;
             assert!(is_inside, "{:?} of the path is outside the root", printed.at);
         }
         let ends_at = |index: usize, at: [f64; 3]| {
@@ -81,7 +107,9 @@ impl Passage {
         assert!(ends_at(0, from), "the path starts at {:?}, not at {from:?}", self.points[0].at);
         let at = self.points[last].at;
         match to {
-            Destination::Point(to) => assert!(ends_at(last, to), "the path ends at {at:?}, not at {to:?}"),
+            Destination::Point(to) => {
+                assert!(ends_at(last, to), "the path ends at {at:?}, not at {to:?}")
+            }
             Destination::Far(_) => {
                 let end = points[last];
                 let margin = end.min_element().min(edge - end.max_element());
@@ -90,20 +118,35 @@ impl Passage {
         }
         let sum: f64 = points.windows(2).map(|leg| leg[0].distance(leg[1])).sum();
         let length = self.length * units(root);
-        assert!((sum - length).abs() <= 1e-6 * sum + ROUNDING, "length {length} of legs of {sum} units");
+        assert!(
+            (sum - length).abs() <= 1e-6 * sum + ROUNDING,
+            "length {length} of legs of {sum} units"
+        );
     }
 
     fn check_legs(&self, case: &Case, words: &[u64]) {
         let points = self.on_lattice(&case.root);
         let (first, last) = self.inner;
-        assert!(first <= last && last < points.len(), "{:?} of {} points", self.inner, points.len());
+        assert!(
+            first <= last && last < points.len(),
+            "{:?} of {} points",
+            self.inner,
+            points.len()
+        );
         let least = self.narrowest.width_min / 2.0 * units(&case.root);
-        let legs: Vec<(Segment, f64)> = points.windows(2).enumerate().map(|(i, leg)| {
-            let is_inner = (first..last).contains(&i);
-            let is_free = is_free(leaf_at(words, leg[0].midpoint(leg[1])));
-            assert!(is_inner || is_free, "leg {i} of the path runs through a leaf that facets cross");
-            (Segment::new(leg[0], leg[1]), if is_inner { least } else { 0.0 })
-        }).collect();
+        let legs: Vec<(Segment, f64)> = points
+            .windows(2)
+            .enumerate()
+            .map(|(i, leg)| {
+                let is_inner = (first..last).contains(&i);
+                let is_free = is_free(leaf_at(words, leg[0].midpoint(leg[1])));
+                assert!(
+                    is_inner || is_free,
+                    "leg {i} of the path runs through a leaf that facets cross"
+                );
+                (Segment::new(leg[0], leg[1]), if is_inner { least } else { 0.0 })
+            })
+            .collect();
         // Legs in groups, most of which are far from a facet.
         const GROUP: usize = 32;
         let bounds = |legs: &[(Segment, f64)]| {
@@ -127,21 +170,43 @@ impl Passage {
         let narrowest = &self.narrowest;
         let (at, scale) = (narrowest.at, units(&case.root));
         let (first, last) = self.inner;
-        assert_eq!(Some(at), self.points.get(narrowest.index).map(|p| p.at), "the narrowest place is a point of the path");
-        let [min, width, max] = [narrowest.width_min, narrowest.width, narrowest.width_max].map(|w| w * scale);
-        assert!(0.0 < min && min <= width && width <= max + ROUNDING, "width {width} is not between {min} and {max} units");
+        assert_eq!(
+            Some(at),
+            self.points.get(narrowest.index).map(|p| p.at),
+            "the narrowest place is a point of the path"
+        );
+        let [min, width, max] =
+            [narrowest.width_min, narrowest.width, narrowest.width_max].map(|w| w * scale);
+        assert!(
+            0.0 < min && min <= width && width <= max + ROUNDING,
+            "width {width} is not between {min} and {max} units"
+        );
         let counted = self.points[first..=last].iter().map(|p| p.width * scale);
         let least = counted.fold(f64::INFINITY, f64::min);
-        assert!(is_near(least, width), "a point has the width {least}, the narrowest place {width} units");
-        let is_end = narrowest.index == first || (narrowest.index == last && self.inner.1 + 1 != self.points.len());
-        assert!((first..=last).contains(&narrowest.index), "point {} does not count", narrowest.index);
+        assert!(
+            is_near(least, width),
+            "a point has the width {least}, the narrowest place {width} units"
+        );
+        let is_end = narrowest.index == first
+            || (narrowest.index == last && self.inner.1 + 1 != self.points.len());
+        assert!(
+            (first..=last).contains(&narrowest.index),
+            "point {} does not count",
+            narrowest.index
+        );
         assert!(narrowest.is_end || !is_end, "point {} is an end of the path", narrowest.index);
         let centre = (Point::from(at) - Point::from(case.root.origin)) * scale;
         let from = |facet: &FacetLattice| 2.0 * from_point(centre, &triangle(facet));
         let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
-        assert!(is_near(nearest, width), "the nearest facet leaves a width of {nearest}, not {width} units");
+        assert!(
+            is_near(nearest, width),
+            "the nearest facet leaves a width of {nearest}, not {width} units"
+        );
         let rim = narrowest.facets.first().map(|&facet| from(&case.facets_lattice[facet as usize]));
-        assert!(rim.is_some_and(|rim| is_near(rim, nearest)), "the nearest facet is not at the rim");
+        assert!(
+            rim.is_some_and(|rim| is_near(rim, nearest)),
+            "the nearest facet is not at the rim"
+        );
         let direction = Point::from(narrowest.direction).length();
         assert!((direction - 1.0).abs() < 1e-9, "the direction has the length {direction}");
     }

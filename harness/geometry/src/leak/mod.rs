@@ -74,9 +74,16 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
     ///
     /// # Errors
     /// If the case has no facets.
-    pub fn new(case: &'a Case, make: F, leaves_max: u64, watch: &'a dyn Watch) -> Result<Self, LeakError<E>> {
+    pub fn new(
+        case: &'a Case,
+        make: F,
+        leaves_max: u64,
+        watch: &'a dyn Watch,
+    ) -> Result<Self, LeakError<E>> {
         if case.facets.is_empty() {
-            return Err(LeakError::Input("the case has no facets, so nothing separates places".into()));
+            return Err(LeakError::Input(
+                "the case has no facets, so nothing separates places".into(),
+            ));
         }
         let facets = FacetTree::new(&case.facets_lattice);
         Ok(Self { case, facets, make, trees: BTreeMap::new(), leaves_max, watch })
@@ -92,7 +99,8 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
     /// # Errors
     /// If an end is outside the root or in a crossing leaf, if a base tree cannot be made, or if `watch` is interrupted.
     pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers, LeakError<E>> {
-        let examined = ends.iter().map(|&(from, to)| self.answer(from, to)).collect::<Result<_, _>>()?;
+        let examined =
+            ends.iter().map(|&(from, to)| self.answer(from, to)).collect::<Result<_, _>>()?;
         let case = self.case;
         let facets = case.facets.len() as u64;
         Ok(Answers { schema: SCHEMA, case: case.name.clone(), facets, root: case.root, examined })
@@ -119,7 +127,16 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         let (is_leak, is_separated) = (levels[0].is_joined, false);
         let spacing_own = spacing(level);
         let mut report = Report {
-            from, to, spacing: spacing_own, is_leak, closes, opens, is_separated, limit: None, passage, levels: Vec::new(),
+            from,
+            to,
+            spacing: spacing_own,
+            is_leak,
+            closes,
+            opens,
+            is_separated,
+            limit: None,
+            passage,
+            levels: Vec::new(),
         };
         let mut measured = None;
         if is_leak {
@@ -159,7 +176,11 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
     }
 
     /// Whether free leaves of a base tree join the ends. The coarsest leaves are searched first: few of them lead far.
-    fn search(&self, level: u8, (from, to): (Point, Option<Point>)) -> Result<Meshed, LeakError<E>> {
+    fn search(
+        &self,
+        level: u8,
+        (from, to): (Point, Option<Point>),
+    ) -> Result<Meshed, LeakError<E>> {
         self.watch.step(&format!("searching the base tree of level {level}"));
         let words = &self.trees[&level];
         let mut space = Space::new(words, &self.facets).map_err(LeakError::Input)?;
@@ -172,7 +193,8 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         let stop = || self.watch.is_interrupted();
         let (start, goal) = (space.locate(from), to.map_or(Goal::Far, Goal::At));
         let edge = |space: &mut Space, cell| space.edge(cell);
-        let is_joined = why.is_none() && space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some();
+        let is_joined =
+            why.is_none() && space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some();
         let spacing = Spacing::of(level, &self.case.root);
         Ok(Meshed { spacing, leaves: words.len() as u64, is_joined, why })
     }
@@ -181,7 +203,9 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
     fn crossed_end(&self, level: u8, (from, to): (Point, Option<Point>)) -> String {
         let (words, root) = (&self.trees[&level], &self.case.root);
         let crossed = |what, at| ends::crossed(what, at, words, root);
-        crossed("--from", from).or_else(|| to.and_then(|to| crossed("--to", to))).expect("an end is crossed")
+        crossed("--from", from)
+            .or_else(|| to.and_then(|to| crossed("--to", to)))
+            .expect("an end is crossed")
     }
 
     /// Whether a closed surface separates the centres of the leaves at the ends.
@@ -191,7 +215,11 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
     }
 
     /// Coarsens the surface until the ends are not joined. Returns that level.
-    fn coarsen(&mut self, ends: (Point, Option<Point>), levels: &mut Vec<Meshed>) -> Result<Option<u8>, LeakError<E>> {
+    fn coarsen(
+        &mut self,
+        ends: (Point, Option<Point>),
+        levels: &mut Vec<Meshed>,
+    ) -> Result<Option<u8>, LeakError<E>> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             levels.push(self.search(level, ends)?);
@@ -203,7 +231,11 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
     }
 
     /// Meshes finer until the ends are joined. Returns that level, or the limit that was met before.
-    fn refine(&mut self, ends: (Point, Option<Point>), levels: &mut Vec<Meshed>) -> Result<Result<u8, String>, LeakError<E>> {
+    fn refine(
+        &mut self,
+        ends: (Point, Option<Point>),
+        levels: &mut Vec<Meshed>,
+    ) -> Result<Result<u8, String>, LeakError<E>> {
         // Halving the spacing of a surface multiplies its leaves by four.
         const GROWTH: u64 = 4;
         for level in self.case.level_surface + 1..=LEVEL_MAX {

@@ -8,8 +8,8 @@
 //! An opening of fewer than 3.5 cells can have the centre of its ball in a leaf that facets cross. Such leaves are opened near the
 //! narrow places of the path: their parts that no facet touches are passable.
 //!
-//! An end near a facet is not an opening. So the path first leads from leaf to leaf away from the facets, until no neighbour is farther
-//! from them, and the width counts from there.
+//! An end near a facet is not an opening. So the path first leads away from the facets, until no place near it is farther from them, and
+//! the width counts from there.
 
 use super::Interrupted;
 use super::report::{Narrowest, Passage, Point as Stop, Spacing};
@@ -84,11 +84,7 @@ pub fn widest(
             break;
         }
     }
-    Ok(described(case, facets, level, &way, bound, to_far(&search.to)))
-}
-
-fn to_far(to: &[Point]) -> bool {
-    to.is_empty()
+    Ok(described(case, facets, level, &way, bound, search.to.is_empty()))
 }
 
 /// The way from a point to where no neighbouring leaf is farther from the facets: the point, and centres with the faces between them.
@@ -106,9 +102,33 @@ fn approach(space: &mut Space, from: Point) -> Vec<Point> {
                 points.push(space.between(cell, next));
                 cell = next;
             }
-            _ => return points,
+            _ => break,
         }
     }
+    // On, from the centre of this leaf, in smaller and smaller steps.
+    let mut at = points[points.len() - 1];
+    let mut clearance = space.clearance(cell);
+    let mut step = space.edge(cell) / 4.0;
+    while step > SMALL * clearance {
+        let moves = [Point::X, Point::Y, Point::Z]
+            .into_iter()
+            .flat_map(|axis| [at - axis * step, at + axis * step]);
+        let open = moves.filter(|&to| is_in_root(to) && space.is_open(space.locate(to)));
+        let best =
+            open.map(|to| (space.facets.distance(to), to)).max_by(|a, b| a.0.total_cmp(&b.0));
+        match best.filter(|best| best.0 > clearance) {
+            Some(best) => {
+                (clearance, at) = best;
+                points.push(at);
+            }
+            None => step /= 2.0,
+        }
+    }
+    points
+}
+
+fn is_in_root(at: Point) -> bool {
+    at.min_element() >= 0.0 && at.max_element() <= UNITS_PER_EDGE as f64
 }
 
 impl Search<'_> {
@@ -153,12 +173,12 @@ impl Search<'_> {
             }
         }
         let end = cells[cells.len() - 1];
-        let inner_end = self.to.last().map_or_else(|| at_boundary(self.space.centre(end)), |&to| to);
-        add(inner_end, end);
+        add(self.to.last().copied().unwrap_or_else(|| at_boundary(self.space.centre(end))), end);
         let inner = (first, points.len() - 1);
         points.extend(self.to.iter().rev().skip(1));
         let legs = points[inner.0..=inner.1].windows(2);
-        let mut least: Vec<_> = legs.map(|leg| least_between(self.facets, leg[0], leg[1])).collect();
+        let mut least: Vec<_> =
+            legs.map(|leg| least_between(self.facets, leg[0], leg[1])).collect();
         if least.is_empty() {
             // Both ends lead to one place.
             of_legs.push(end);
@@ -173,11 +193,15 @@ impl Search<'_> {
         let wanted = radius / PRECISION / (1.0 - MARCH);
         let is_narrow = |leg: &usize| way.least[*leg].0 < wanted;
         let narrow: Vec<usize> = (0..way.least.len()).filter(is_narrow).collect();
-        let is_near = |at: Point| narrow.iter().any(|&leg| at.distance(way.least[leg].1) < 2.0 * radius);
-        let mut divided: Vec<u32> = narrow.iter().flat_map(|&leg| {
-            // The cells of the legs before and after it too: a leg begins and ends on their faces.
-            way.cells[leg.saturating_sub(1)..(leg + 2).min(way.cells.len())].iter().copied()
-        }).collect();
+        let is_near =
+            |at: Point| narrow.iter().any(|&leg| at.distance(way.least[leg].1) < 2.0 * radius);
+        let mut divided: Vec<u32> = narrow
+            .iter()
+            .flat_map(|&leg| {
+                // The cells of the legs before and after it too: a leg begins and ends on their faces.
+                way.cells[leg.saturating_sub(1)..(leg + 2).min(way.cells.len())].iter().copied()
+            })
+            .collect();
         if !narrow.is_empty() {
             divided.extend((0..self.space.count()).filter(|&cell| {
                 let promises = self.space.known_clearance(cell).is_some_and(|clearance| {
@@ -188,7 +212,9 @@ impl Search<'_> {
         }
         divided.sort_unstable();
         divided.dedup();
-        divided.retain(|&cell| self.space.half_diagonal(cell) > SMALL * radius && self.space.edge(cell) > 1.0);
+        divided.retain(|&cell| {
+            self.space.half_diagonal(cell) > SMALL * radius && self.space.edge(cell) > 1.0
+        });
         divided.iter().for_each(|&cell| self.space.split(cell));
         !divided.is_empty()
     }
@@ -238,7 +264,14 @@ fn at_boundary(at: Point) -> Point {
 }
 
 /// The path in the user's units.
-fn described(case: &Case, facets: &FacetTree, level: u8, way: &Way, bound: f64, is_far: bool) -> Passage {
+fn described(
+    case: &Case,
+    facets: &FacetTree,
+    level: u8,
+    way: &Way,
+    bound: f64,
+    is_far: bool,
+) -> Passage {
     /// Facets at the rim, in radii of the ball.
     const RIM: f64 = 1.05;
     let unit = case.root.edge / UNITS_PER_EDGE as f64;
@@ -273,7 +306,8 @@ fn described(case: &Case, facets: &FacetTree, level: u8, way: &Way, bound: f64, 
         .iter()
         .map(|&at| Stop { at: user(at), width: 2.0 * unit * facets.distance(at) })
         .collect();
-    let length = points.windows(2).map(|p| Point::from(p[0].at).distance(Point::from(p[1].at))).sum();
+    let length =
+        points.windows(2).map(|p| Point::from(p[0].at).distance(Point::from(p[1].at))).sum();
     let width = 2.0 * unit * clearance;
     Passage {
         spacing: Spacing::of(level, &case.root),
@@ -284,7 +318,9 @@ fn described(case: &Case, facets: &FacetTree, level: u8, way: &Way, bound: f64, 
             width_max: 2.0 * unit * bound,
             width_cells: width / Spacing::of(case.level_surface, &case.root).spacing,
             direction: direction.to_array(),
-            touches: user(parry3d_f64::query::PointQuery::project_local_point(nearest, at, true).point),
+            touches: user(
+                parry3d_f64::query::PointQuery::project_local_point(nearest, at, true).point,
+            ),
             facets: rim.into_iter().map(|(facet, _)| facet).collect(),
             index,
             is_end,

@@ -32,7 +32,8 @@ pub struct Space<'a> {
     cells: Vec<Cell>,
     nodes: Vec<[u32; 8]>,
     root: u32,
-    facets: &'a FacetTree,
+    /// The facets of the case.
+    pub facets: &'a FacetTree,
 }
 
 /// The end of a path.
@@ -187,8 +188,7 @@ impl<'a> Space<'a> {
     pub fn between(&self, a: u32, b: u32) -> Point {
         let [a, b] = [a, b].map(|cell| self.cells[cell as usize]);
         Point::from_array(std::array::from_fn(|i| {
-            let (low, high) =
-                (a.low[i].max(b.low[i]), (a.low[i] + a.edge).min(b.low[i] + b.edge));
+            let (low, high) = (a.low[i].max(b.low[i]), (a.low[i] + a.edge).min(b.low[i] + b.edge));
             (f64::from(low) + f64::from(high)) / 2.0
         }))
     }
@@ -244,7 +244,8 @@ impl<'a> Space<'a> {
         let mut queue = BinaryHeap::new();
         labels[start as usize] = ((width(self, start) as f32).min(cap), 0.0);
         // The bit patterns of floats that are not negative are in the order of the floats.
-        let key = |(least, cost): (f32, f32), cell| (least.to_bits(), Reverse(cost.to_bits()), cell);
+        let key =
+            |(least, cost): (f32, f32), cell| (least.to_bits(), Reverse(cost.to_bits()), cell);
         queue.push(key(labels[start as usize], start));
         let mut joined = Vec::new();
         while let Some((least, Reverse(cost), cell)) = queue.pop() {

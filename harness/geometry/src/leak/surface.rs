@@ -82,6 +82,7 @@ fn is_separated(facets: &[FacetLattice], from: [i64; 3], to: Option<[i64; 3]>) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::case::Case;
 
     /// A tetrahedron in a root of edge 8, without the facets from number `count`.
     fn tetrahedron(count: usize) -> Case {
@@ -95,13 +96,14 @@ mod tests {
     fn a_closed_surface_separates_inside_from_outside_and_nothing_else() {
         let closed = tetrahedron(4);
         let (inside, outside) = ([2 << 24; 3], [6 << 24; 3]);
-        assert!(separates(&closed, inside, None));
+        assert!(separates(&closed.facets_lattice, inside, None));
         assert!(
-            separates(&closed, inside, Some(outside)) && separates(&closed, outside, Some(inside))
+            separates(&closed.facets_lattice, inside, Some(outside))
+                && separates(&closed.facets_lattice, outside, Some(inside))
         );
-        assert!(!separates(&closed, outside, None));
-        assert!(!separates(&closed, inside, Some([3 << 23; 3])));
-        assert!(!separates(&tetrahedron(3), inside, None));
+        assert!(!separates(&closed.facets_lattice, outside, None));
+        assert!(!separates(&closed.facets_lattice, inside, Some([3 << 23; 3])));
+        assert!(!separates(&tetrahedron(3).facets_lattice, inside, None));
     }
 
     #[test]
@@ -111,7 +113,7 @@ mod tests {
             let mut cracked = tetrahedron(4);
             cracked.facets_lattice[3][0][2] += gap;
             assert!(!is_separated(&cracked.facets_lattice, inside, far));
-            assert_eq!(separates(&cracked, inside, far), is_closed, "{gap}");
+            assert_eq!(separates(&cracked.facets_lattice, inside, far), is_closed, "{gap}");
         }
     }
 
@@ -145,9 +147,13 @@ mod tests {
         hollow.facets_lattice.extend(cavity.iter().map(|facet| facet.map(shrunk)));
         let inner = cavity[0].map(shrunk);
         let in_cavity = std::array::from_fn(|a| inner[0][a] + (1 << 18));
-        assert!(separates(&hollow, in_cavity, None));
-        assert!(separates(&hollow, in_cavity, Some([2 << 24; 3])));
-        assert!(!separates(&hollow, [2 << 24, 3 << 23, 2 << 24], Some([2 << 24; 3])));
+        assert!(separates(&hollow.facets_lattice, in_cavity, None));
+        assert!(separates(&hollow.facets_lattice, in_cavity, Some([2 << 24; 3])));
+        assert!(!separates(
+            &hollow.facets_lattice,
+            [2 << 24, 3 << 23, 2 << 24],
+            Some([2 << 24; 3])
+        ));
     }
 
     #[test]
@@ -156,6 +162,6 @@ mod tests {
         for corner in case.facets_lattice.iter_mut().flatten() {
             corner[0] -= 1 << 24;
         }
-        assert!(!separates(&case, [1 << 23, 2 << 24, 2 << 24], None));
+        assert!(!separates(&case.facets_lattice, [1 << 23, 2 << 24, 2 << 24], None));
     }
 }

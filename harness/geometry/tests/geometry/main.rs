@@ -1,15 +1,13 @@
 //! Shapes with known defects, and shapes without any.
 
-mod sheets;
-
-use check::geometry::finding::{Kind, Place};
-use check::geometry::input::{Input, Requested};
-use check::geometry::report::Diagnosis;
-use check::geometry::{Options, diagnose};
 use contract::case::Facet;
 use contract::lattice::Root;
 use contract::testing::assert_text;
 use geometries::{Generator, Shape};
+use geometry::finding::{Kind, Place};
+use geometry::input::{Input, Requested};
+use geometry::report::Diagnosis;
+use geometry::{Options, diagnose};
 use proptest::prelude::*;
 
 /// Lattice units are powers of two, so that vertices with integer coordinates are exact.
@@ -277,7 +275,7 @@ fn facets_on_and_beyond_the_root_are_found() {
 fn json_has_the_schema_and_text_has_every_kind() {
     let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
-    assert_eq!(json["schema"], "octree-geometry/1");
+    assert_eq!(json["schema"], "octree-geometry/2");
     assert_eq!(json["findings"][0]["kind"], "openings");
     assert_eq!(json["findings"][0]["places"][0]["width_cells"], 4.0);
     let text = found.to_string();
@@ -393,5 +391,31 @@ proptest! {
         prop_assert_eq!(counts(&got), counts(&expected));
         prop_assert_eq!(got.changes_region, expected.changes_region);
         prop_assert_eq!((got.shells.count, got.shells.closed), (expected.shells.count, expected.shells.closed));
+    }
+
+    /// Both sides of a wall of known thickness, in any direction, beside a wall that is thicker than a cell.
+    #[test]
+    fn the_widths_of_a_plate_are_its_thickness(
+        thickness in 0.05f32..0.45, axis in prop::array::uniform3(-1.0f64..1.0), angle in 0.0f64..3.0,
+    ) {
+        let length = axis.iter().map(|c| c * c).sum::<f64>().sqrt();
+        prop_assume!(length > 0.1);
+        let [x, y, z] = axis.map(|c| c / length);
+        let (sin, cos) = angle.sin_cos();
+        // Rodrigues' formula.
+        let rotated = |v: [f32; 3]| {
+            let v = v.map(f64::from);
+            let along = x * v[0] + y * v[1] + z * v[2];
+            let cross = [y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]];
+            std::array::from_fn(|a| (v[a] * cos + cross[a] * sin + [x, y, z][a] * along * (1.0 - cos)) as f32)
+        };
+        let bodies = [cuboid([0.0; 3], [4.0, 4.0, thickness]), cuboid([0.0, 0.0, 2.0], [4.0, 4.0, 4.0])].concat();
+        let found = diagnosis(bodies.iter().map(|f| f.map(rotated)).collect(), Some(0.5));
+        let walls = found.finding(Kind::ThinWalls).unwrap();
+        // The four facets at the rim of the plate see each other too where it is thinner than a cell wide.
+        prop_assert!(walls.count >= 4 && count(&found, Kind::ThinGaps) == 0);
+        for place in &walls.places {
+            prop_assert!((place.width.unwrap() - f64::from(thickness)).abs() < 1e-5, "{:?}", place);
+        }
     }
 }

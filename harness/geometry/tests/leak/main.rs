@@ -8,7 +8,9 @@ use contract::testing::{assert_text, base_tree};
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Report};
 use geometry::leak::{LeakError, Leaks, Watch};
-use openings::{Body, ROTATIONS, bodies, crack, hole, missing_facet, pipe, slit, torn_sphere, two_holes};
+use openings::{
+    Body, ROTATIONS, bodies, crack, hole, missing_facet, pipe, slit, torn_sphere, two_holes,
+};
 use proptest::prelude::*;
 use std::cell::Cell;
 use std::convert::Infallible;
@@ -43,8 +45,13 @@ fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report, LeakError<Infa
     answers(case, &[(from, to)], LEAVES_MAX).map(|mut answers| answers.examined.remove(0))
 }
 
-fn answers(case: &Case, ends: &[([f64; 3], Target)], leaves_max: u64) -> Result<Answers, LeakError<Infallible>> {
-    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, level)), leaves_max, &Silent)?.answers(ends)
+fn answers(
+    case: &Case,
+    ends: &[([f64; 3], Target)],
+    leaves_max: u64,
+) -> Result<Answers, LeakError<Infallible>> {
+    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, level)), leaves_max, &Silent)?
+        .answers(ends)
 }
 
 fn from_centre(facets: &[Facet], level: u8) -> Report {
@@ -58,10 +65,19 @@ fn text(case: &Case, from: [f64; 3]) -> String {
 /// The narrowest place is the opening: its width to 5 %, which its bounds enclose, and its rim.
 fn assert_describes(report: &Report, body: &Body, what: &str) {
     let narrowest = &report.passage.as_ref().unwrap().narrowest;
-    let is_within = narrowest.width_min <= 1.001 * body.width && body.width <= 1.001 * narrowest.width_max;
-    assert!(is_within && narrowest.width_max <= 1.0501 * narrowest.width_min, "{what}: {narrowest:?} for {}", body.width);
+    let is_within =
+        narrowest.width_min <= 1.001 * body.width && body.width <= 1.001 * narrowest.width_max;
+    assert!(
+        is_within && narrowest.width_max <= 1.0501 * narrowest.width_min,
+        "{what}: {narrowest:?} for {}",
+        body.width
+    );
     let near = body.at_rim(1);
-    assert!(!narrowest.is_end && narrowest.facets.iter().all(|f| near.contains(f)), "{what}: {:?}", narrowest.facets);
+    assert!(
+        !narrowest.is_end && narrowest.facets.iter().all(|f| near.contains(f)),
+        "{what}: {:?}",
+        narrowest.facets
+    );
     let points = &report.passage.as_ref().unwrap().points;
     let passes = points.windows(2).filter(|pair| body.passes(pair[0].at, pair[1].at)).count();
     assert_eq!(passes % 2, 1, "{what}: the path crosses the opening {passes} times");
@@ -73,10 +89,16 @@ fn assert_levels(report: &Report, body: &Body, what: &str) {
     assert!(report.is_leak || cells < 3.47, "{what}: closed at {cells} cells");
     assert!(!report.is_leak || cells > 0.99, "{what}: open at {cells} cells");
     if let Some(closes) = report.closes {
-        assert!(closes.spacing > body.width / 12f64.sqrt() && closes.spacing / 2.0 <= body.width, "{what}");
+        assert!(
+            closes.spacing > body.width / 12f64.sqrt() && closes.spacing / 2.0 <= body.width,
+            "{what}"
+        );
     }
     if let Some(opens) = report.opens {
-        assert!(opens.spacing <= body.width && 2.0 * opens.spacing > body.width / 12f64.sqrt(), "{what}");
+        assert!(
+            opens.spacing <= body.width && 2.0 * opens.spacing > body.width / 12f64.sqrt(),
+            "{what}"
+        );
     }
 }
 
@@ -146,7 +168,8 @@ fn a_path_that_starts_in_a_pipe_is_as_wide_as_the_pipe() {
                 let mean = body.rim.iter().map(|v| v[i]).sum::<f64>() / body.rim.len() as f64;
                 mean + 0.3 * body.axis()[i]
             });
-            let in_pipe = ask(&case(&body.facets, 8), start, Target::Far).unwrap().passage.unwrap().narrowest;
+            let in_pipe =
+                ask(&case(&body.facets, 8), start, Target::Far).unwrap().passage.unwrap().narrowest;
             let error = in_pipe.width / body.width - 1.0;
             assert!(error.abs() < 0.05, "{radius}, {length}, from {start:?}: error {error}");
         }
@@ -166,7 +189,10 @@ fn the_answer_is_the_expected_text() {
         ("torn-sphere", torn_sphere(), 5),
     ];
     for (name, facets, level) in all {
-        assert_text(&text(&case(&facets, level), [0.0; 3]), &format!("tests/leak/expected/{name}.txt"));
+        assert_text(
+            &text(&case(&facets, level), [0.0; 3]),
+            &format!("tests/leak/expected/{name}.txt"),
+        );
     }
 }
 
@@ -200,7 +226,9 @@ fn a_finer_base_tree_that_cannot_be_meshed_ends_the_refinement_and_is_reported()
                 Err(format!("no memory for level {level}"))
             }
         };
-        let answers = Leaks::new(&case, tree, LEAVES_MAX, &watch).unwrap().answers(&[([0.0; 3], Target::Far)]);
+        let answers = Leaks::new(&case, tree, LEAVES_MAX, &watch)
+            .unwrap()
+            .answers(&[([0.0; 3], Target::Far)]);
         answers.map(|mut answers| answers.examined.remove(0))
     };
     let report = ask(false).unwrap();
@@ -216,7 +244,8 @@ fn refinement_ends_at_the_limit_of_leaves_and_that_is_reported() {
     // A tree is meshed if it is expected to have just as many leaves as allowed.
     let expected = 4 * base_tree(&case.facets_lattice, 3).len() as u64;
     for (leaves_max, levels) in [(expected - 1, 1), (expected, 2)] {
-        let report = answers(&case, &[([0.0; 3], Target::Far)], leaves_max).unwrap().examined.remove(0);
+        let report =
+            answers(&case, &[([0.0; 3], Target::Far)], leaves_max).unwrap().examined.remove(0);
         assert!(!report.is_leak && report.opens.is_none());
         assert!(report.limit.unwrap().contains(&format!("more than the limit of {leaves_max}")));
         assert_eq!(report.levels.len(), levels, "at most {leaves_max}");

@@ -155,8 +155,8 @@ fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
 #[cfg(test)]
 mod tests {
     use super::{Passage, *};
-    use geometry::leak::report::{Narrowest, Point, Spacing};
     use contract::testing::words_with_sides;
+    use geometry::leak::report::{Narrowest, Point, Spacing};
 
     #[test]
     fn the_slice_shows_leaves_facets_path_and_ball() {

@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP: a flag that every loop that waits or runs programs checks, and an end for whatever does not.
+//! Signals: a flag that every loop that waits or runs programs checks, and an end for whatever does not.
 //!
 //! Invariants:
 //! - a first signal lets a command return in the ordinary way, with a partial report, but not for longer than [`GRACE`];
@@ -8,6 +8,7 @@
 //! - output that is about to get its final names gets all of them first.
 
 use super::session;
+use files::OUT_OF_MEMORY;
 use files::interrupt::{self, INTERRUPTED};
 use rustix::process::Signal;
 use signal_hook::low_level::{exit, pipe};
@@ -16,7 +17,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{LazyLock, Mutex, MutexGuard};
+use std::sync::{LazyLock, Mutex, MutexGuard, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
@@ -27,6 +28,10 @@ pub const PATIENCE: Duration = Duration::from_millis(350);
 /// How often a directory is removed to which other threads may still write.
 const ATTEMPTS: usize = 20;
 
+/// Wakes the thread that waits for signals, whose bytes are different.
+const OUT_OF_MEMORY_BYTE: u8 = b'm';
+
+static WAKE: OnceLock<UnixStream> = OnceLock::new();
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
 
@@ -45,7 +50,7 @@ fn leftovers() -> MutexGuard<'static, Leftovers> {
     LEFTOVERS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// Makes Ctrl-C, SIGTERM and SIGHUP a request to stop. Once per process, before anything makes a temporary file.
+/// Makes signals a request to stop. Once per process, before anything makes a temporary file.
 pub fn install() {
     // Without handlers, a signal ends the harness without cleaning up; that does not prevent a run.
     let _ = watch();
@@ -56,6 +61,10 @@ fn watch() -> io::Result<()> {
     let wait = move || {
         let mut byte = [0];
         if received.read_exact(&mut byte).is_ok() {
+            if byte == [OUT_OF_MEMORY_BYTE] {
+                clean();
+                exit(OUT_OF_MEMORY);
+            }
             REQUESTED.store(true, Ordering::SeqCst);
             // A second signal, or the time limit.
             let _ = received.set_read_timeout(Some(GRACE));
@@ -64,7 +73,8 @@ fn watch() -> io::Result<()> {
         }
     };
     thread::Builder::new().name("signals".into()).spawn(wait)?;
-    for signal in interrupt::signals() {
+    let _ = WAKE.set(sent.try_clone()?);
+    for signal in interrupt::signals()? {
         pipe::register(signal, sent.try_clone()?)?;
     }
     // A signal after this thread has made the directory removes it.
@@ -73,6 +83,15 @@ fn watch() -> io::Result<()> {
     let _ = tempfile::env::override_temp_dir(&place);
     leftovers.temporary = Some(place);
     Ok(())
+}
+
+/// Ends the harness because memory ran out. Another thread cleans up, as this one may hold any lock.
+pub fn out_of_memory(code: i32) -> ! {
+    if let Some(mut wake) = WAKE.get() {
+        let _ = wake.write_all(&[OUT_OF_MEMORY_BYTE]);
+        sleep(GRACE + 2 * PATIENCE);
+    }
+    exit(code)
 }
 
 /// Removes the directory of temporary files, unless a command has kept some, when the harness ends in the ordinary way.
@@ -115,6 +134,13 @@ pub fn has_directory(path: &Path) -> bool {
 
 /// Ends the harness, whatever its other threads do.
 fn end() -> ! {
+    clean();
+    let _ = writeln!(io::stderr(), "harness: interrupted");
+    exit(INTERRUPTED)
+}
+
+/// Ends the child processes, and removes unfinished files and temporary directories. Then the process must end.
+pub fn clean() {
     let children = leftovers().children.clone();
     children.iter().for_each(|&child| session::signal(child, Signal::TERM));
     let mut waited = Duration::ZERO;
@@ -129,8 +155,6 @@ fn end() -> ! {
     interrupt::abandon_unfinished();
     let kept = leftovers();
     kept.directories.iter().chain(&kept.temporary).chain(&*staged).for_each(|path| remove(path));
-    let _ = writeln!(io::stderr(), "harness: interrupted");
-    exit(INTERRUPTED)
 }
 
 fn remove(directory: &Path) {

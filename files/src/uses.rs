@@ -1,0 +1,143 @@
+//! What this process reads and writes. No output replaces an input.
+//!
+//! Invariant: a regular file, known by its device and inode, is not registered both as an input and as an output, whichever comes first.
+//! Programs register their outputs before they begin to work, so the clash is found when the input is opened.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, Metadata};
+use std::io::{self, ErrorKind, Read};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Use {
+    Input,
+    Output,
+}
+
+/// The uses of files by device and inode, with the path that was given.
+static USES: Mutex<BTreeMap<(u64, u64), (Use, PathBuf)>> = Mutex::new(BTreeMap::new());
+
+/// Opens a regular file as an input of this run. A pipe could wait for a writer forever, and a device has no end.
+///
+/// # Errors
+/// If it is no regular file, cannot be opened, or is an output of this run.
+pub fn open(path: &Path) -> io::Result<File> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is a directory, a pipe or a device: give a file"));
+    }
+    let file = File::open(path)?;
+    register(path, &file.metadata()?, Use::Input)?;
+    Ok(file)
+}
+
+/// The bytes of an input of this run.
+///
+/// # Errors
+/// As [`open`].
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The text of an input of this run.
+///
+/// # Errors
+/// As [`open`], or if it is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    io::read_to_string(open(path)?)
+}
+
+/// Registers an input of this run that another process reads. One that is missing is found missing by that process.
+///
+/// # Errors
+/// If it is an output of this run.
+pub fn register_input(path: &Path) -> io::Result<()> {
+    fs::metadata(path).map_or(Ok(()), |found| register(path, &found, Use::Input))
+}
+
+/// Registers an output of this run, which may not exist yet.
+///
+/// # Errors
+/// If it is an input of this run.
+pub fn register_output(path: &Path) -> io::Result<()> {
+    fs::metadata(path).map_or(Ok(()), |found| register(path, &found, Use::Output))
+}
+
+fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
+    // A device is not replaced.
+    if !file.is_file() {
+        return Ok(());
+    }
+    let id = (file.dev(), file.ino());
+    let mut uses = USES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    if let Some((other, name)) = uses.get(&id)
+        && *other != role
+        // A temporary file may have been removed since then, and its inode used again.
+        && fs::metadata(name).is_ok_and(|now| (now.dev(), now.ino()) == id)
+    {
+        let verb = if role == Use::Output { "reads" } else { "writes" };
+        let why =
+            format!("this run also {verb} it as {}: give the output another name", name.display());
+        return Err(io::Error::new(ErrorKind::InvalidInput, why));
+    }
+    uses.insert(id, (role, path.to_owned()));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{check_writable, write_atomically};
+
+    #[test]
+    fn no_output_is_an_input_whichever_comes_first() {
+        let place = tempfile::tempdir().unwrap();
+        let path = |name: &str| place.path().join(name);
+        for (number, first_is_input) in [(0, true), (1, false)] {
+            let (file, link, other) = (path(&format!("{number}")), path("hard"), path("symbolic"));
+            fs::write(&file, "body").unwrap();
+            fs::hard_link(&file, &link).unwrap();
+            std::os::unix::fs::symlink(&file, &other).unwrap();
+            for alias in [&file, &link, &other] {
+                if first_is_input {
+                    open(&file).unwrap();
+                    assert!(check_writable(alias).is_err() && register_output(alias).is_err());
+                    let error = write_atomically(alias, |_| Ok(())).unwrap_err().to_string();
+                    assert!(
+                        error.contains("also reads it as") && error.contains("another name"),
+                        "{error}"
+                    );
+                } else {
+                    check_writable(&file).unwrap();
+                    assert!(register_input(alias).is_err());
+                    let error = read(alias).unwrap_err().to_string();
+                    assert!(error.contains("also writes it as"), "{error}");
+                }
+                assert_eq!(fs::read(&file).unwrap(), b"body");
+            }
+            [link, other].iter().for_each(|path| fs::remove_file(path).unwrap());
+        }
+    }
+
+    #[test]
+    fn an_input_that_was_removed_and_devices_clash_with_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let file = place.path().join("file");
+        fs::write(&file, "").unwrap();
+        open(&file).unwrap();
+        // The same inode under another name stands for an inode that is used again.
+        let moved = place.path().join("moved");
+        fs::rename(&file, &moved).unwrap();
+        check_writable(&moved).unwrap();
+        let null = Path::new("/dev/null");
+        register_input(null).unwrap();
+        check_writable(null).unwrap();
+        assert!(open(null).is_err() && open(place.path()).is_err());
+        // An output may be written twice, and an input read twice.
+        check_writable(&moved).unwrap();
+        write_atomically(&moved, |out| out.write_all(b"new")).unwrap();
+    }
+}
