@@ -161,6 +161,9 @@ mod tests {
             facets in facets(), at in prop::array::uniform3(0.0f64..4000.0), edge in 100.0f64..500.0, axis in 0usize..3,
         ) {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            // Beside the facets, so that none crosses the square.
+            let mut at = at;
+            at[axis] += 4000.0;
             let point = |s: f64, t: f64| {
                 let mut point = at;
                 (point[u], point[v]) = (at[u] + s * edge, at[v] + t * edge);
@@ -171,8 +174,8 @@ mod tests {
             let part = |i: i32| f64::from(i) / 16.0;
             let of = |(i, j)| tree.distance(point(part(i), part(j)));
             let sampled = (0..=16).flat_map(|i| (0..=16).map(move |j| (i, j))).map(of).fold(f64::INFINITY, f64::min);
-            // Facets that cross the square are none of its business; samples are at most edge / 16 apart.
-            prop_assert!(found <= sampled + 1e-6 && (sampled <= found + edge / 16.0 || sampled < edge / 16.0), "{found}, {sampled}");
+            // Samples are at most edge / 16 apart.
+            prop_assert!(facets.is_empty() || (found <= sampled + 1e-6 && sampled <= found + edge / 16.0), "{found}, {sampled}");
         }
 
         #[test]

@@ -187,14 +187,19 @@ impl Passage {
             is_near(least, width),
             "a point has the width {least}, the narrowest place {width} units"
         );
-        let is_end = narrowest.index == first
-            || (narrowest.index == last && self.inner.1 + 1 != self.points.len());
         assert!(
             (first..=last).contains(&narrowest.index),
             "point {} does not count",
             narrowest.index
         );
-        assert!(narrowest.is_end || !is_end, "point {} is an end of the path", narrowest.index);
+        // A path to the far field counts to its end.
+        let ends = if last + 1 == self.points.len() { vec![first] } else { vec![first, last] };
+        let is_end = ends.iter().any(|&end| self.points[end].width <= 1.05 * narrowest.width);
+        assert_eq!(
+            narrowest.is_end, is_end,
+            "ends {ends:?} of {:?} with {narrowest:?}",
+            self.points
+        );
         let centre = (Point::from(at) - Point::from(case.root.origin)) * scale;
         let from = |facet: &FacetLattice| 2.0 * from_point(centre, &triangle(facet));
         let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
@@ -223,4 +228,98 @@ fn check_leg((leg, clearance): &(Segment, f64), facet: &FacetLattice, number: us
         distance >= clearance - ROUNDING,
         "facet {number} is {distance} units from a leg of the path, which has a clearance of {clearance}"
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ends::Target;
+    use super::super::report::Spacing;
+    use super::super::{Leaks, Watch};
+    use super::*;
+    use contract::testing::base_tree;
+    use contract::word::Side;
+    use geometries::{Generator, Shape};
+    use std::convert::Infallible;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    struct Silent;
+
+    impl Watch for Silent {
+        fn step(&self, _: &str) {}
+
+        fn is_interrupted(&self) -> bool {
+            false
+        }
+    }
+
+    /// A sphere without one of its facets, and the answer for its centre.
+    fn torn() -> (Case, Report, Vec<u64>) {
+        let mut facets = Generator::new(Shape::Sphere, 320).facets().unwrap();
+        facets.remove(77);
+        let text = "spacing_min = 0.015625\n[root]\norigin = [-0.99, -1.03, -1.01]\nedge = 2.0";
+        let case = Case::from_parts(text, facets).unwrap();
+        let tree = |level| Ok::<_, Infallible>(base_tree(&case.facets_lattice, level));
+        let mut leaks = Leaks::new(&case, tree, 1_000_000, &Silent).unwrap();
+        let report = leaks.answers(&[([0.01; 3], Target::Far)]).unwrap().examined.remove(0);
+        let words = leaks.words(report.passage.as_ref().unwrap()).to_vec();
+        drop(leaks);
+        (case, report, words)
+    }
+
+    #[test]
+    fn wrong_answers_are_noticed() {
+        let (case, right, words) = torn();
+        right.check_invariants(&case, &words);
+        type Plant<'a> = (&'a str, &'a dyn Fn(&mut Report, &mut Passage));
+        let through_a_facet = |_: &mut Report, p: &mut Passage| {
+            // From the start straight to the boundary on the side without an opening.
+            let far = Point::from(p.points[p.points.len() - 1].at);
+            let across = if far.x.abs() > 0.9 { [0.01, -1.03, 0.01] } else { [-0.99, 0.01, 0.01] };
+            let end = super::super::report::Point { at: across, width: 2.0 };
+            p.points.truncate(p.inner.0 + 1);
+            p.points.push(end);
+            (p.inner.1, p.narrowest.index) = (p.points.len() - 1, p.inner.0);
+            p.length = p
+                .points
+                .windows(2)
+                .map(|l| Point::from(l[0].at).distance(Point::from(l[1].at)))
+                .sum();
+        };
+        let plants: [Plant; 16] = [
+            ("a point outside the root", &|_, p| p.points[1].at[0] = 1398.0),
+            ("another start", &|_, p| p.points[0].at[1] += 0.1),
+            ("an end off the boundary", &|_, p| p.points.truncate(p.points.len() - 1)),
+            ("a longer path", &|_, p| p.length *= 3.0),
+            ("a leg through a facet", &through_a_facet),
+            ("a wider opening than there is", &|_, p| {
+                let n = &mut p.narrowest;
+                (n.width_min, n.width, n.width_max) =
+                    (1.1 * n.width_min, 1.1 * n.width, 1.1 * n.width_max);
+            }),
+            ("a width above its bound", &|_, p| p.narrowest.width_max = 0.9 * p.narrowest.width),
+            ("a width below its bound", &|_, p| p.narrowest.width_min = 1.1 * p.narrowest.width),
+            ("another narrowest place", &|_, p| p.narrowest.index -= 1),
+            ("facets far from the rim", &|_, p| p.narrowest.facets = vec![300]),
+            ("an end that is wider", &|_, p| p.narrowest.is_end = true),
+            ("no direction", &|_, p| p.narrowest.direction = [0.0; 3]),
+            ("a path through another tree", &|_, p| p.spacing = Spacing { level: 1, ..p.spacing }),
+            ("no leak with a path", &|r, _| r.is_leak = false),
+            ("a level that closes and is open", &|r, _| {
+                r.closes = Some(r.levels[1].spacing);
+                r.levels[1].is_joined = true;
+            }),
+            ("a leak of separated places", &|r, _| r.is_separated = true),
+        ];
+        for (what, plant) in plants {
+            let mut wrong = right.clone();
+            let mut passage = wrong.passage.take().unwrap();
+            plant(&mut wrong, &mut passage);
+            wrong.passage = Some(passage);
+            let noticed = catch_unwind(AssertUnwindSafe(|| wrong.check_invariants(&case, &words)));
+            assert!(noticed.is_err(), "{what} is not noticed");
+        }
+        let crossing: Vec<u64> = words.iter().map(|w| w & !3 | Side::Crossing as u64).collect();
+        let noticed = catch_unwind(AssertUnwindSafe(|| right.check_invariants(&case, &crossing)));
+        assert!(noticed.is_err(), "an approach through leaves that facets cross is not noticed");
+    }
 }

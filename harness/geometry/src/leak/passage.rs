@@ -288,7 +288,8 @@ fn described(
             inner.1 += 1;
         }
     }
-    let is_end = index == inner.0 || (index == inner.1 && !is_far);
+    let ends = if is_far { vec![inner.0] } else { vec![inner.0, inner.1] };
+    let is_end = ends.iter().any(|&end| facets.distance(points[end]) <= PRECISION * clearance);
     let along = |from: usize, step: isize| {
         let mut i = from;
         while let Some(next) = i.checked_add_signed(step).filter(|&n| n < points.len()) {

@@ -69,7 +69,7 @@ pub struct Narrowest {
     pub facets: Vec<u32>,
     /// Index among the points of the path.
     pub index: usize,
-    /// Whether it is an end of the path instead of an opening: the widest place near the start or the end.
+    /// Whether an end of the path is no more than 5 % wider, so that it is no opening: the widest place near the start or the end.
     pub is_end: bool,
 }
 

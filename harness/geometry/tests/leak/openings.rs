@@ -15,8 +15,6 @@ pub struct Body {
     pub rim: Vec<Point>,
     /// Diameter of the largest ball that passes.
     pub width: f64,
-    /// The ball touches the whole rim.
-    pub is_round: bool,
 }
 
 /// One body for each kind of opening.
@@ -31,7 +29,7 @@ pub fn hole(radius: f64) -> Body {
     let mut facets = box_without_walls(|axis, side| axis == 2 && side > 0.0);
     let (wall, rim, width) = wall_with_hole(radius);
     facets.extend(wall);
-    Body { name: "hole", facets, rim, width, is_round: true }
+    Body { name: "hole", facets, rim, width }
 }
 
 /// A box with holes of these radii in the walls z = 1 and z = -1; the opening is the first hole.
@@ -41,7 +39,7 @@ pub fn two_holes(radius: f64, radius_opposite: f64) -> Body {
     facets.extend(wall);
     let opposite = wall_with_hole(radius_opposite).0;
     facets.extend(opposite.into_iter().map(|f| f.map(|[x, y, z]| [x, y, -z])));
-    Body { name: "two holes", facets, rim, width, is_round: true }
+    Body { name: "two holes", facets, rim, width }
 }
 
 /// A box with a pipe of this length and radius on its wall z = 1. The opening is the pipe's inner end.
@@ -54,7 +52,7 @@ pub fn pipe(length: f32, radius: f64) -> Body {
         let [c, d] = [a, b].map(|[x, y, z]| [x, y, z + length]);
         facets.extend([[a, b, c], [b, d, c]]);
     }
-    Body { name: "pipe", facets, rim, width, is_round: true }
+    Body { name: "pipe", facets, rim, width }
 }
 
 /// The wall z = 1 with a round hole, the hole's rim, and the diameter of the largest ball that passes.
@@ -76,7 +74,7 @@ pub fn slit(half: Plane) -> Body {
     let (wall, rim) = wall_with_opening(&corners);
     let mut facets = box_without_walls(|axis, side| axis == 2 && side > 0.0);
     facets.extend(wall);
-    Body { name: "slit", facets, rim, width: 2.0 * half[1], is_round: false }
+    Body { name: "slit", facets, rim, width: 2.0 * half[1] }
 }
 
 /// The wall's diagonal is an edge of one facet; on its other side it is two edges, whose common corner is off it.
@@ -87,14 +85,14 @@ pub fn crack(depth: f64) -> Body {
     let mut facets = box_without_walls(|axis, side| axis == 2 && side > 0.0);
     facets.extend([[a, b, c], [a, junction, d], [junction, c, d]].map(on_wall));
     let rim = [a, c, junction].map(|[x, y]| [x, y, 1.0]).to_vec();
-    Body { name: "crack", width: inscribed(&rim), facets, rim, is_round: false }
+    Body { name: "crack", width: inscribed(&rim), facets, rim }
 }
 
 pub fn missing_facet(index: usize) -> Body {
     let generator = Generator { radius: Some(1.0), ..Generator::new(Shape::Sphere, 320) };
     let mut facets = generator.facets().unwrap();
     let rim = facets.remove(index).map(|v| v.map(f64::from)).to_vec();
-    Body { name: "missing facet", width: inscribed(&rim), facets, rim, is_round: true }
+    Body { name: "missing facet", width: inscribed(&rim), facets, rim }
 }
 
 /// A sphere of many facets without those around a place, of which more are near the opening than are searched one by one.
