@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Every drawing is a section through the tree just beside the plane y = 0, made from the mesher's own leaf words on four
-//! simulated ranks. `tests/walkthrough.rs` fails when a committed drawing differs from what this program draws.
+//! simulated ranks. `tests/library/walkthrough.rs` fails when a committed drawing differs from what this program draws.
 
 use mesher::case::Case;
 use mesher::comm::sim;

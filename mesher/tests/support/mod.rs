@@ -243,6 +243,6 @@ pub fn first_difference(a: &[u64], b: &[u64]) -> String {
 macro_rules! assert_same {
     ($a:expr, $b:expr, $($what:tt)+) => {
         let (a, b) = (&$a, &$b);
-        prop_assert!(a == b, "{}: {}", format!($($what)+), support::first_difference(a, b));
+        prop_assert!(a == b, "{}: {}", format!($($what)+), $crate::support::first_difference(a, b));
     };
 }

@@ -1,10 +1,6 @@
 //! The options that print something and exit, rejected values, and output that is printed once per job.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{Finished, Workspace, run, tetrahedron};
+use crate::process::{Finished, Workspace, run, tetrahedron};
 
 /// Runs the mesher as rank `rank` of three under a launcher that sets `variables`, as `_SIZE` and `_RANK`.
 fn run_as_rank(workspace: &Workspace, args: &[&str], launcher: &str, rank: usize) -> Finished {

@@ -2,10 +2,10 @@
 //!
 //! The number of a schedule determines its case, rank count, division and adversary. `SCHEDULES` is the number of
 //! schedules, `SCHEDULES_FIRST` the number of the first one; `ci/schedules` runs many of them.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::fibres::Fibres;
+use crate::support::schedules::{Meshed, Serial, case, cases, drawn, run_words, write};
+use crate::support::{Run, first_difference, run};
 use cpu_time::ProcessTime;
 use mesher::error::Error;
 use mesher::partition::{Division, Partitioner};
@@ -13,9 +13,6 @@ use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use support::fibres::Fibres;
-use support::schedules::{Meshed, Serial, case, cases, drawn, run_words, write};
-use support::{Run, first_difference, run};
 
 /// Schedules of each case.
 const PER_CASE: u64 = 64;

@@ -1,10 +1,6 @@
 //! `--message-matrix`: included on request only, and equal for simulated and real ranks; and the time of a message.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{Workspace, run};
+use crate::process::{Workspace, run};
 use serde_json::Value;
 
 const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\n

@@ -1,28 +1,23 @@
 //! The tree as a file: the same bytes on any number of ranks, and the leaves of the mesh when the harness reads it.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-mod support;
-
+use crate::process::{INPUT, Workspace, refused, run};
+use crate::support::{Run, Small, closed, config, first_difference, small, soup, thin};
 use contract::htg::{SIDE, TreeFile};
 use mesher::comm::sim;
 use mesher::partition::Partitioner;
 use mesher::record::Recorder;
 use mesher::write::{Output, TREE};
 use mesher::{Options, mesh};
-use process::{INPUT, Workspace, refused, run};
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
-use support::{Run, Small, closed, config, first_difference, small, soup, thin};
 
 /// The file of a case that is meshed with a run configuration.
 fn tree_of(case: &Small, run: &Run, ungraded: bool, place: &Path) -> Vec<u8> {
     let directory = place.join("mesh");
     let output =
         Output { directory: directory.clone(), words: false, tree: true, cell_ranks: false };
-    let options = Options { out: Some(output), ..support::options(run.division, ungraded) };
+    let options = Options { out: Some(output), ..crate::support::options(run.division, ungraded) };
     let case = case.mesher_case();
     let reports = sim::run(run.ranks, run.seed, |comm| {
         mesh(&case, &options, comm, &mut Recorder::default()).map(|report| report.cells)
@@ -54,7 +49,7 @@ proptest! {
     #[test]
     fn the_tree_is_that_of_one_rank_and_has_the_leaves_of_the_mesh(
         case in prop_oneof![small(soup()).boxed(), small(closed()).boxed(), thin().boxed()],
-        run in support::run(),
+        run in crate::support::run(),
         ungraded in any::<bool>(),
     ) {
         let place = tempfile::tempdir().expect("a directory");
@@ -69,7 +64,7 @@ proptest! {
 /// Several windows of nodes, and several rounds of them.
 #[test]
 fn a_tree_of_many_windows_does_not_depend_on_ranks_and_partitioner() {
-    let facets = support::cuboid([20.0, 21.0, 22.0], [41.0, 42.5, 40.0]);
+    let facets = crate::support::cuboid([20.0, 21.0, 22.0], [41.0, 42.5, 40.0]);
     let case = Small {
         facets,
         root: mesher::lattice::Root { origin: [0.0; 3], edge: 64.0 },
@@ -87,7 +82,7 @@ fn a_tree_of_many_windows_does_not_depend_on_ranks_and_partitioner() {
     assert!(expected.len() as u64 > 2 * vtkhdf::tree::WINDOW, "{} leaves", expected.len());
     assert!(found == expected, "{}", first_difference(&found, &expected));
     for (ranks, partitioner) in [(2, Partitioner::Morton), (5, Partitioner::Metis)] {
-        let run = Run { ranks, seed: 3, division: support::division(partitioner, None) };
+        let run = Run { ranks, seed: 3, division: crate::support::division(partitioner, None) };
         assert!(serial == tree_of(&case, &run, false, place.path()), "{ranks} ranks");
     }
 }
@@ -95,7 +90,7 @@ fn a_tree_of_many_windows_does_not_depend_on_ranks_and_partitioner() {
 #[test]
 fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
     let workspace = Workspace::new();
-    workspace.write("body.stl", process::tetrahedron());
+    workspace.write("body.stl", crate::process::tetrahedron());
     let mesher = |args: &[&str]| {
         let base = ["body.stl", "--spacing-min=0.1", "--quiet"];
         let finished = run(workspace.mesher(&[&base[..], args].concat()));

@@ -1,11 +1,7 @@
 //! Load balance by counters, which repeat exactly: repartitioning balances the leaves on any number of ranks, no split is counted twice
 //! or missed, and no counter changes unnoticed.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{Workspace, run};
+use crate::process::{Workspace, run};
 use serde_json::Value;
 
 /// A torus, and an extent box next to it whose layers reach into other ranks' parts; `{n}` cells per layer.
@@ -152,7 +148,7 @@ fn numbers(report: &Value) -> String {
 /// the new numbers.
 #[test]
 fn the_counters_of_recorded_runs_are_the_same() {
-    let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/balance.counters");
+    let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/programs/balance.counters");
     let workspace = Workspace::new();
     let mut got = String::new();
     for (n, crossing, args) in RECORDED {

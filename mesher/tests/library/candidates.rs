@@ -1,9 +1,7 @@
 //! The candidates of a component's vote are its first leaves, by level and Morton code. This test finds the
 //! components independently, leaf by leaf.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
 use mesher::comm::Solo;
 use mesher::lattice::{Bounds, Enclosed, Keep, Root};
 use mesher::octant::{LEVEL_MAX, corner, edge, neighbour};
@@ -12,7 +10,6 @@ use mesher::sides::{components, global, nodes::Nodes, vote};
 use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
 
 /// Centroids of the first leaves of each component.
 type Firsts = BTreeSet<Vec<[i64; 3]>>;

@@ -1,10 +1,6 @@
 //! Bad input ends with one sentence, the documented exit code and no files, on one rank and on several.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{COMMS, INPUT, Workspace, binary_stl, refused, run, tetrahedron};
+use crate::process::{COMMS, INPUT, Workspace, binary_stl, refused, run, tetrahedron};
 use std::path::Path;
 use std::process::Command;
 

@@ -1,14 +1,11 @@
 //! The mesher's leaves equal the reference's, for any facets and any number of ranks.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::{Run, Small, config, cuboid, division, leaky_on_rays, run, small, soup, thin};
 use mesher::case::BoxSpec;
 use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::octant::position;
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
-use support::{Run, Small, config, cuboid, division, leaky_on_rays, run, small, soup, thin};
 
 proptest! {
     #![proptest_config(config(300))]

@@ -1,5 +1,4 @@
 //! The test vectors shared by all programs: digests, leaf words, levels, roots, lattice points, boxes.
-#![allow(missing_docs)]
 
 use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::digest::{Digests, digest, hex, mix, of_facets};
@@ -10,7 +9,7 @@ use mesher::octant::{LEVEL_MAX, Side, corner, morton, position, start57, word};
 use serde_json::Value;
 
 fn vectors(name: &str) -> Vec<Value> {
-    let all: Value = serde_json::from_str(include_str!("../../reference/vectors/digest.json"))
+    let all: Value = serde_json::from_str(include_str!("../../../reference/vectors/digest.json"))
         .expect("the vectors are JSON");
     assert_eq!(all["schema"], "octree-test-vectors/1");
     let found = all[name].as_array().expect("a list").clone();

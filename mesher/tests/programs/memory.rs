@@ -1,10 +1,6 @@
 //! Plans, runs that would not fit into memory, and runs that run out of it all the same.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{MESHER, Workspace, refused, run};
+use crate::process::{MESHER, Workspace, refused, run};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixDatagram;
 use std::process::Command;
@@ -41,7 +37,7 @@ fn a_box_of_level_19_over_the_whole_root_is_refused() {
 fn the_plan_of_a_case_with_few_cells_is_its_mesh() {
     let workspace = Workspace::new();
     workspace.write("case.toml", format!("spacing_min = 0.03\n{BODY}"));
-    for comm in process::COMMS {
+    for comm in crate::process::COMMS {
         let planned = run(workspace.mesher(&["case.toml", comm, "--plan", "--json", "plan.json"]));
         planned.succeeds();
         assert!(planned.stdout.contains("peak memory"), "{planned:?}");

@@ -1,16 +1,11 @@
 //! The kept region: seeds, enclosed components, what is reported about them, and warnings.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-mod support;
-
+use crate::process::{Workspace, run};
+use crate::support::{Facet, Run, Small, config, cuboid, small, soup};
 use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::octant::position;
-use process::{Workspace, run};
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use support::{Facet, Run, Small, config, cuboid, small, soup};
 
 fn case(facets: Vec<Facet>, keep: Keep) -> Small {
     Small {
@@ -98,7 +93,7 @@ proptest! {
     fn flow_from_seeds_equals_the_reference(
         case in small(soup()),
         picks in prop::collection::vec((any::<prop::sample::Index>(), [0i64..256, 0i64..256, 0i64..256]), 1..4),
-        run in support::run(),
+        run in crate::support::run(),
     ) {
         let mut free = case.solo(true);
         free.retain(|w| w & 3 != 2);
@@ -124,7 +119,7 @@ proptest! {
     fn unusable_seeds_are_refused_as_by_the_reference(
         case in small(soup()),
         seeds in prop::collection::vec([-9.0f64..73.0, -9.0f64..73.0, -9.0f64..73.0], 1..3),
-        run in support::run(),
+        run in crate::support::run(),
     ) {
         let case = Small { seeds, ..case };
         // The error's numbers: the seed's and the coordinates.
@@ -163,7 +158,7 @@ fn meshed(facets: &[Facet], options: &[&str]) -> (Value, String) {
     let args = ["body.stl", "--spacing-min", "2", "--root", "0,0,0,64", "--json", "report.json"];
     let finished = run(workspace.mesher(&[&args[..], options].concat()));
     assert_eq!(finished.code, Some(0), "{finished:?}");
-    (process::read_json(&workspace.path().join("report.json")), finished.stderr)
+    (crate::process::read_json(&workspace.path().join("report.json")), finished.stderr)
 }
 
 #[test]

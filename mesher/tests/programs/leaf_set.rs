@@ -1,13 +1,8 @@
 //! Output: parts, manifest and report, read back by other code, agree with the mesh.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-mod support;
-
+use crate::process::{Workspace, run};
 use mesher::comm::Solo;
 use mesher::digest::{Digests, hex, mix};
-use process::{Workspace, run};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -34,7 +29,7 @@ fn read_part(path: &Path) -> Vec<u64> {
 /// The mesh's words by the library, which the property tests compare with the reference.
 fn meshed(workspace: &Workspace, ungraded: bool) -> Vec<u64> {
     let case = mesher::case::Case::read(&workspace.path().join("case.toml")).expect("a good case");
-    let options = support::options(support::Run::SOLO.division, ungraded);
+    let options = crate::support::options(crate::support::Run::SOLO.division, ungraded);
     mesher::words(&case, &options, &Solo).expect("a good case").0
 }
 
@@ -56,7 +51,7 @@ fn assert_counts(report: &Value, words: &[u64], [total, by_level]: [&str; 2]) {
 }
 
 fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
-    let manifest = process::read_json(&folder.join("mesh.json"));
+    let manifest = crate::process::read_json(&folder.join("mesh.json"));
     assert_eq!(manifest["schema"], "octree-leaf-set/1");
     assert_eq!(manifest["program"], concat!("mesher ", env!("CARGO_PKG_VERSION")));
     assert_eq!(manifest["tree"], if ungraded { "base" } else { "final" });
@@ -102,7 +97,7 @@ fn assert_parts(folder: &Path, manifest: &Value, words: &[u64], ranks: usize) {
         all.extend(words);
     }
     all.sort_unstable();
-    assert!(all == words, "{}", support::first_difference(&all, words));
+    assert!(all == words, "{}", crate::support::first_difference(&all, words));
     let files = std::fs::read_dir(folder).expect("a directory").count();
     assert_eq!(files, ranks + 1, "the parts and the manifest must be the only files");
 }
@@ -134,7 +129,7 @@ fn written_meshes_are_read_back() {
             assert_manifest(&folder, &words, ungraded, ranks);
             let report = workspace.json("run.json");
             assert_report(&report, &words, ranks);
-            for json in [process::read_json(&folder.join("mesh.json")), report] {
+            for json in [crate::process::read_json(&folder.join("mesh.json")), report] {
                 assert_eq!(json["geometry"], geometry, "{ranks} ranks");
             }
             std::fs::remove_dir_all(folder).expect("the mesh exists");
@@ -224,7 +219,10 @@ fn standard_output_agrees_with_the_json_report() {
 #[test]
 fn options_and_a_case_file_with_the_same_parameters_give_the_same_mesh() {
     let workspace = Workspace::new();
-    workspace.write("body.stl", process::binary_stl(&support::cuboid([0.25; 3], [1.0, 1.5, 2.0])));
+    workspace.write(
+        "body.stl",
+        crate::process::binary_stl(&crate::support::cuboid([0.25; 3], [1.0, 1.5, 2.0])),
+    );
     let text = "geometry = \"body.stl\"\nspacing_min = 0.1\nlayer_cells_min = 3\nkeep = \"all\"\nkeep_crossing = false\n";
     let boxed = "[[box]]\nmin = [-1.0, 0.0, 0.0]\nmax = [0.5, 0.5, 0.5]\nspacing = 0.04\n";
     let exact = "[root]\norigin = [-2.0, -1.0, -1.5]\nedge = 5.0\n";

@@ -1,15 +1,12 @@
 //! The exposed faces that the mesher counts by bit operations, compared with a search for the neighbours of every leaf.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::{Run, Small, config, options, run, small, soup, thin};
 use mesher::comm::{Comm, sim};
 use mesher::octant::{LEVEL_MAX, Level, neighbour, start57};
 use mesher::record::Recorder;
 use mesher::{Options, mesh, words};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use support::{Run, Small, config, options, run, small, soup, thin};
 
 /// The leaves on a side: their level by the start of their interval of the curve.
 struct OnASide(BTreeMap<u64, Level>);
@@ -116,7 +113,7 @@ proptest! {
 
 #[test]
 fn weights_move_boundaries_towards_equal_numbers_of_faces() {
-    let facets = support::cuboid([20.0; 3], [44.0; 3]);
+    let facets = crate::support::cuboid([20.0; 3], [44.0; 3]);
     let case = Small {
         facets,
         root: mesher::lattice::Root { origin: [0.0; 3], edge: 64.0 },

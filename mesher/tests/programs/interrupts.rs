@@ -1,11 +1,7 @@
 //! Interrupted runs end at once with exit code 130 and leave no files, in whichever phase they are, on one rank and on several. A run
 //! that was about to end is complete.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{Finished, Running, Workspace, run, start};
+use crate::process::{Finished, Running, Workspace, run, start};
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -135,7 +131,8 @@ fn an_interrupt_near_the_end_leaves_no_files_or_a_complete_mesh() {
 fn a_run_that_is_started_to_survive_a_hangup_survives_it() {
     let workspace = Workspace::new();
     workspace.write("case.toml", SHORT);
-    let script = format!("trap '' HUP; exec '{}' {} --quiet", process::MESHER, OUTPUT.join(" "));
+    let script =
+        format!("trap '' HUP; exec '{}' {} --quiet", crate::process::MESHER, OUTPUT.join(" "));
     let mut command = Command::new("sh");
     command.args(["-c", &script]);
     let mut run = start(workspace.enter(command));
@@ -260,7 +257,7 @@ fn a_time_limit_ends_a_run() {
     let workspace = Workspace::new();
     workspace.write("case.toml", LONG);
     let mut command = Command::new("timeout");
-    command.args(["--preserve-status", "0.8", process::MESHER]).args(OUTPUT);
+    command.args(["--preserve-status", "0.8", crate::process::MESHER]).args(OUTPUT);
     let finished = run(workspace.enter(command));
     finished.refuses(130, &["interrupted"]);
     assert_all_or_nothing(&workspace, &["case.toml"], &finished);

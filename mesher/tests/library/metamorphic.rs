@@ -1,14 +1,13 @@
 //! Metamorphic tests: changes of the input whose effect on the mesh is known exactly, on any number of ranks.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::symmetry::Symmetry;
+use crate::support::{
+    Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup,
+};
 use clap::ValueEnum;
 use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
-use support::symmetry::Symmetry;
-use support::{Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup};
 
 /// Asserts equal leaves and equal components.
 macro_rules! assert_equal {

@@ -1,8 +1,6 @@
 //! Unusual STL files are read completely, malformed ones are refused, and none makes the mesher crash.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::{Facet, config, cuboid};
 use mesher::comm::{Solo, sim};
 use mesher::error::Error;
 use mesher::ingest::{self, Source};
@@ -10,7 +8,6 @@ use mesher::{case::Case, lattice::Bounds, stl};
 use proptest::prelude::*;
 use std::io::Write;
 use std::path::Path;
-use support::{Facet, config, cuboid};
 
 /// Reads a whole file on one rank.
 fn read(path: &Path) -> Result<Vec<Facet>, Error> {
@@ -197,7 +194,7 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
         seeds: Vec::new(),
         enclosed: mesher::lattice::Enclosed::Delete,
     };
-    let options = support::options(support::Run::SOLO.division, false);
+    let options = crate::support::options(crate::support::Run::SOLO.division, false);
     match mesher::words(&case, &options, &Solo) {
         Ok((words, _)) => prop_assert!(words.is_sorted() && !words.is_empty()),
         Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),

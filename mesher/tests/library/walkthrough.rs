@@ -1,10 +1,10 @@
 //! The drawings and the numbers of `mesher/walkthrough` are those of today's mesher.
 
-#[path = "../examples/walkthrough.rs"]
-mod walkthrough;
+#[path = "../../examples/walkthrough.rs"]
+mod example;
 
+use example::{directory, drawings, leaves_by_rank};
 use mesher::partition::Weights;
-use walkthrough::{directory, drawings, leaves_by_rank};
 
 #[test]
 fn committed_drawings_are_those_of_this_mesher() {

@@ -1,11 +1,7 @@
 //! Output that cannot be written ends with one sentence, the documented exit code and no files, on one rank and
 //! on several.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{
+use crate::process::{
     COMMS, Finished, INPUT, MESHER, OUTPUT, Workspace, refused, run, skip, start, tetrahedron,
 };
 use std::process::Command;
@@ -212,7 +208,7 @@ fn a_full_device_is_an_error_of_output() {
     let body = "body.stl --spacing-min 0.5";
     let warned = "sheet.stl --spacing-min 0.5 --root 0,0,0,8 --keep inside";
     let sheet = [[[1.0f32, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]];
-    workspace.write("sheet.stl", process::binary_stl(&sheet));
+    workspace.write("sheet.stl", crate::process::binary_stl(&sheet));
     for (args, code) in [
         (format!("{body} > full"), OUTPUT),
         (format!("{body} > null"), 0),

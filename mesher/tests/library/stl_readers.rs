@@ -2,18 +2,14 @@
 //! (reference/DEFINITION.md, section 10): on any file they read the same facets, or all refuse it.
 //!
 //! `STL_INPUTS=1e6` sets the number of inputs, and `STL_SEED=7` the first one.
-#![allow(missing_docs)]
 
-#[path = "support/stl_inputs.rs"]
-mod stl_inputs;
-
+use crate::stl_inputs::{Random, input};
 use geometries::Facet;
 use mesher::comm::Solo;
 use mesher::ingest::{self, Source};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
-use stl_inputs::{Random, input};
 
 type Bits = Vec<[[u32; 3]; 3]>;
 

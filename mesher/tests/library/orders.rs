@@ -13,10 +13,11 @@
 //!
 //! What remains is one permutation of the messages for each receiver of each sparse all-to-all. All combinations of these
 //! permutations are run, not only each by itself. `ORDERS` is the number of drawn cases; `ci/schedules` runs more of them.
-#![allow(missing_docs)]
 
-mod support;
-
+use crate::support::fibres::Fibres;
+use crate::support::orders::{Orders, Turns, permute};
+use crate::support::schedules::{Serial, cases, drawn};
+use crate::support::{Run, Small, cuboid, run};
 use cpu_time::ProcessTime;
 use mesher::case::BoxSpec;
 use mesher::comm::sim::Sim;
@@ -29,10 +30,6 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
-use support::fibres::Fibres;
-use support::orders::{Orders, Turns, permute};
-use support::schedules::{Serial, cases, drawn};
-use support::{Run, Small, cuboid, run};
 
 /// Deepest level of the trees.
 const LEVEL: u32 = 3;

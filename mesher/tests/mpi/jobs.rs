@@ -1,11 +1,7 @@
 //! Jobs on real MPI ranks: the mesh is the serial one, and an error ends all ranks and is printed once. Without
 //! the feature `mpi` these tests are ignored; with it, a missing `mpirun` fails them.
-#![allow(missing_docs)]
 
-#[path = "support/process.rs"]
-mod process;
-
-use process::{Finished, Workspace, run};
+use crate::process::{Finished, Workspace, run};
 use std::process::Command;
 
 const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\nkeep = \"all\"\n
@@ -47,8 +43,8 @@ fn an_error_on_one_rank_ends_all_ranks() {
     let nothing = [[[0.0f32; 3]; 3]; 40];
     let mut last_is_bad = nothing;
     last_is_bad[39][1][2] = f32::NAN;
-    workspace.write("nan.stl", process::binary_stl(&last_is_bad));
-    workspace.write("cut.stl", &process::binary_stl(&nothing)[..1000]);
+    workspace.write("nan.stl", crate::process::binary_stl(&last_is_bad));
+    workspace.write("cut.stl", &crate::process::binary_stl(&nothing)[..1000]);
     workspace.write("typo.toml", "spacing_mim = 0.5\n");
     workspace.write("case.toml", CASE);
     workspace.write("file", "kept");
@@ -83,7 +79,7 @@ fn a_full_disk_ends_all_ranks() {
     // ignore the signal, so that the write fails.
     let limited = format!(
         "trap '' XFSZ; ulimit -f 100; exec '{}' case.toml --out mesh --quiet",
-        process::MESHER
+        crate::process::MESHER
     );
     let command = workspace.mpirun_of(3, "sh", &["-c", &limited]);
     let before = workspace.contents();
@@ -93,7 +89,7 @@ fn a_full_disk_ends_all_ranks() {
 
 /// A job whose ranks are started with different words after the program's name.
 fn different(workspace: &Workspace, words: [&[&str]; 2]) -> Finished {
-    let first = [words[0], &[":", "-n", "2", process::MESHER], words[1]].concat();
+    let first = [words[0], &[":", "-n", "2", crate::process::MESHER], words[1]].concat();
     run(workspace.mpirun(1, &first))
 }
 
@@ -106,9 +102,9 @@ fn ranks_that_disagree_end_with_the_first_difference() {
     for folder in ["one", "two", "same"] {
         std::fs::create_dir(workspace.path().join(folder)).expect("a directory");
     }
-    workspace.write("one/body.stl", process::tetrahedron());
-    workspace.write("same/body.stl", process::tetrahedron());
-    let mut other = process::tetrahedron();
+    workspace.write("one/body.stl", crate::process::tetrahedron());
+    workspace.write("same/body.stl", crate::process::tetrahedron());
+    let mut other = crate::process::tetrahedron();
     // The same length, and another coordinate.
     *other.last_mut().expect("bytes") ^= 1;
     other[100] ^= 1;
@@ -134,9 +130,10 @@ fn ranks_that_disagree_end_with_the_first_difference() {
     // The same words in different directories.
     let elsewhere = |folders: [&str; 2], case: &str| {
         let [one, two] = folders.map(|f| workspace.path().join(f).display().to_string());
-        let words = ["-n", "1", "-wdir", &one, process::MESHER, case, "--quiet", ":", "-n", "2"];
+        let words =
+            ["-n", "1", "-wdir", &one, crate::process::MESHER, case, "--quiet", ":", "-n", "2"];
         let mut command = Command::new("mpirun");
-        command.args(words).args(["-wdir", &two, process::MESHER, case, "--quiet"]);
+        command.args(words).args(["-wdir", &two, crate::process::MESHER, case, "--quiet"]);
         run(workspace.as_mpi(command))
     };
     elsewhere(["one", "two"], "case.toml")
@@ -154,7 +151,7 @@ fn a_box_beyond_all_memory_is_refused_at_once() {
         [[box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nspacing = 1\n
         [[box]]\nmin = [-9, -9, -9]\nmax = [9, 9, 9]\nspacing = 1.6e-5\n";
     workspace.write("case.toml", case);
-    for comm in process::COMMS {
+    for comm in crate::process::COMMS {
         let args = ["case.toml", "--out", "mesh", comm];
         run(workspace.mesher(&args)).refuses(71, &["1.4e17 cells", "multiply all spacings"]);
         assert!(!workspace.path().join("mesh").exists());
