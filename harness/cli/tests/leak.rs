@@ -153,8 +153,10 @@ fn without_a_start_the_regions_that_leaked_are_examined() {
     let fixture = Fixture::new();
     let manifest = fixture.path("0.5/mesh.json");
     let own = fs::read_to_string(&manifest).unwrap();
-    let with = |key: &str| fs::write(&manifest, own.replacen('{', &format!("{{{key},"), 1)).unwrap();
-    let leak = r#"{"spacing_coarse": 2.0, "spacing_fine": 0.5, "volume": 8.0, "point": [0.5, 0.5, 0.5]}"#;
+    let with =
+        |key: &str| fs::write(&manifest, own.replacen('{', &format!("{{{key},"), 1)).unwrap();
+    let leak =
+        r#"{"spacing_coarse": 2.0, "spacing_fine": 0.5, "volume": 8.0, "point": [0.5, 0.5, 0.5]}"#;
     with(&format!(r#""leaks": [{leak}, {leak}]"#));
     let files = ["--json", "leak.json", "--vtk", "leak.vtp", "--picture", "leak.svg"];
     let (code, text) = fixture.leak(&files);

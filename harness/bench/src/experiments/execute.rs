@@ -3,7 +3,7 @@
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use check::audit::record::AuditRecord;
-use check::audit::{AuditOptions, Requirements, audit_against};
+use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
 use run::engine::failure::{End, Failure};
 use run::engine::launcher::Launcher;
@@ -169,8 +169,8 @@ impl Runner<'_> {
 /// Audits a mesh against the promises of the engine that made it.
 fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), String> {
     let case = Case::read(case).map_err(|error| error.to_string())?;
-    let requirements = Requirements::Promises(&engine.description().promises, Some(&case));
-    let report = audit_against(mesh, &AuditOptions::default(), requirements);
+    let promises = &engine.description().promises;
+    let report = audit_against(mesh, &AuditOptions::default(), Some(&case), promises);
     let broken = report.checks.iter().find_map(|check| check.findings.first());
     match broken {
         Some(finding) => {

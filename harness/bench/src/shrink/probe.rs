@@ -113,7 +113,7 @@ impl Probe {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
             Some(truth) if truth.words == mesh.words => {
-                vec![checks::manifest::check(&subject), checks::linear::check(&subject)]
+                checks::only(&subject, &["manifest", "linear"])
             }
             Some(truth) => {
                 let base = self
@@ -121,7 +121,7 @@ impl Probe {
                     .map_err(|why| Unknown::Error(why.to_string()))?;
                 checks::all(&subject.with_base(&base).with_reference(&truth))
             }
-            None => self.promised(&path, trial, &subject)?,
+            None => self.promised(&path, trial, subject)?,
         };
         if results.iter().all(|result| !result.was_run()) {
             return Err(Unknown::LeftOut("no check had anything to check".to_owned()));
@@ -135,16 +135,16 @@ impl Probe {
         &self,
         path: &Path,
         trial: &Trial,
-        subject: &Subject,
+        subject: Subject,
     ) -> Result<Vec<CheckResult>, Unknown> {
         let promises = &self.engine.description().promises;
-        let mut results = vec![checks::manifest::check(subject), checks::linear::check(subject)];
-        let terms = &subject.terms;
-        results.extend(checks::promised(subject.tree(), terms, Some(subject.case), promises));
+        let subject = subject.promising(promises);
+        let mut results = checks::all(&subject);
         if promises.deterministic && trial.ranks == Ranks::Serial {
             let again = self.run(&self.engine, path, trial.ranks, "again", false);
             let again = again.map_err(|why| Unknown::Error(why.to_string()))?;
-            let compared = identical::compare(&again.words, &subject.mesh.words, &terms.root);
+            let words = subject.mesh.map_or(&[][..], |mesh| &mesh.words);
+            let compared = identical::compare(&again.words, words, &subject.terms.root);
             results.push(CheckResult { name: "deterministic", ..compared });
         }
         Ok(results)

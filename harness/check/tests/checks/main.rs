@@ -5,5 +5,4 @@ mod kept;
 mod no_false_alarms;
 mod promises;
 mod selftest;
-mod selftest_at_scale;
 mod support;

@@ -66,14 +66,10 @@ pub struct Source {
 pub type Failure = (u8, String);
 
 impl Source {
-    /// Whether any option is given that has no effect on a leaf-set directory. A case has one if `with_promises`.
-    pub fn is_given(&self, with_promises: bool) -> bool {
-        let Self { format, root, case, sides, position, timeout: _ } = self;
-        format.is_some()
-            || root.is_some()
-            || case.is_some() && !with_promises
-            || sides.is_some()
-            || *position != Position::default()
+    /// Whether any option is given that has no effect on a leaf-set directory.
+    pub fn is_given(&self) -> bool {
+        let Self { format, root, case: _, sides, position, timeout: _ } = self;
+        format.is_some() || root.is_some() || sides.is_some() || *position != Position::default()
     }
 
     /// Reads the case, if one is given.

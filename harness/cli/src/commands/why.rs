@@ -8,6 +8,8 @@ use super::meshed::{Failure, MeshArguments, input};
 use check::why::Mesh;
 use clap::Args;
 use contract::files::write_atomically;
+use contract::leafset::ReadError;
+use contract::mesh;
 use report::json::pretty;
 use run::engine::layout::SERIAL;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
@@ -58,7 +60,11 @@ pub fn run(arguments: &Arguments) -> u8 {
 
 fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
     let made = arguments.source.open(&SERIAL, false)?;
-    let mesh = Mesh::open(&made.dir, made.case.as_ref()).map_err(input)?;
+    let read = |error: ReadError| input(error.to_string());
+    let disk = mesh::Mesh::open(&made.dir).map_err(read)?;
+    let tree = disk.tree().map_err(read)?;
+    let mesh = Mesh::of(&disk.manifest, &tree, made.case.as_ref())
+        .map_err(|why| input(format!("{}: {why}", made.dir.display())))?;
     if let Some(Point(point)) = arguments.point {
         print(&mesh.at(point).map_err(input)?, arguments.json.as_deref())?;
         return Ok(EXIT_HOLDS);

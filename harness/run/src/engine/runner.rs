@@ -13,6 +13,7 @@ use super::report::RunReport;
 use contract::case::Case;
 use contract::leafset::{self, LeafSet};
 use contract::manifest::{self, Tree};
+use contract::mesh::Mesh;
 use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -161,15 +162,22 @@ impl Engine {
             self.describe(mesh, case, tree)
                 .map_err(|why| self.unusable(format!("wrote a mesh that cannot be read: {why}")))?;
         }
-        let report = match &mesh {
+        let written =
+            mesh.as_deref().map(Mesh::open).transpose().map_err(|error| {
+                self.unusable(format!("wrote a mesh that cannot be read: {error}"))
+            })?;
+        let report = match &written {
             Some(mesh) if !options.report || !self.writes_report() => {
-                leafset::read_manifest(mesh).map(|manifest| RunReport::of_mesh(&manifest)).map_err(
-                    |error| self.unusable(format!("wrote a mesh that cannot be read: {error}")),
-                )?
+                RunReport::of_mesh(&mesh.manifest)
             }
             _ => RunReport::read(&options.report_path())
                 .map_err(|why| self.unusable(format!("ended, but {why}")))?,
         };
+        // Limits apply to this number, so it must be one of leaves that exist.
+        if let Some(mesh) = written.as_ref().filter(|mesh| mesh.len() != report.cells) {
+            let (stated, found) = (report.cells, mesh.len());
+            return Err(self.unusable(format!("states {stated} cells, and its mesh has {found}")));
+        }
         let report = completed(report, &finished);
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })

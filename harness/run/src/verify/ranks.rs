@@ -87,8 +87,7 @@ impl CaseRun<'_> {
             false => self.promised(case, &mesh),
             true => {
                 let subject = Subject::new(case, &mesh).with_reference(serial);
-                let files = [checks::manifest::check(&subject), checks::linear::check(&subject)];
-                files.into_iter().chain(checks::identical::check(&subject)).collect()
+                checks::only(&subject, &["manifest", "linear", "identical"])
             }
         };
         let holds = results.iter().all(CheckResult::holds);

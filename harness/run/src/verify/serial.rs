@@ -79,15 +79,7 @@ impl CaseRun<'_> {
 
     /// The checks of what the engine promises about any of its meshes, and of the files.
     pub fn promised(&self, case: &Case, mesh: &LeafSet) -> Vec<CheckResult> {
-        let subject = Subject::new(case, mesh);
-        let mut results = vec![checks::manifest::check(&subject), checks::linear::check(&subject)];
-        results.extend(checks::promised(
-            subject.tree(),
-            &subject.terms,
-            Some(case),
-            self.promises(),
-        ));
-        results
+        checks::all(&Subject::new(case, mesh).promising(self.promises()))
     }
 
     /// Compares the digest of the timed run with that of the mesh that was written, if the engine is deterministic.
