@@ -26,3 +26,4 @@ pub mod selection;
 #[cfg(test)]
 mod testing;
 pub mod vtu;
+mod written;

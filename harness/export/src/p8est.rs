@@ -23,6 +23,7 @@ use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
+use crate::written::Written;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
@@ -60,15 +61,18 @@ pub fn write(
         start.extend(header(&ends));
         pad(&mut start);
         out.write_all(&start).map_err(named)?;
-        let mut done = 0;
+        let (mut done, mut written) = (0, Written::default());
         quadrants(mesh, selection, &mut |quadrant| {
             if done % STEP == 0 {
                 options.check()?;
                 options.watch.progress(done, total);
             }
             done += 1;
+            written.add(&quadrant.octant, quadrant.data != FILLER);
             out.write_all(&quadrant.record()).map_err(named)
         })?;
+        written.check_invariants(mesh, selection, counts.leaves);
+        assert_eq!((done, written.volume), (total, KEY_END), "quadrants, which tile the root");
         out.flush().map_err(named)?;
         Ok(start.len() as u64 + total * RECORD_BYTES as u64)
     })?;
