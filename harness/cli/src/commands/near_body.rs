@@ -77,7 +77,8 @@ fn found(arguments: &Arguments) -> Result<Report, ExportError> {
     }
     let gaps = case.map(|case| gaps(&case, &faces, &check)).transpose()?;
     let polygons = Polygons::new(&faces);
-    let report = Report::new(&mesh, &faces, &polygons, gaps.as_deref(), selection == Default::default())?;
+    let report =
+        Report::new(&mesh, &faces, &polygons, gaps.as_deref(), selection == Default::default())?;
     write(arguments, &mesh, &faces, &polygons, gaps.as_deref(), &report)?;
     Ok(report)
 }
