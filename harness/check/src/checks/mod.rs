@@ -31,7 +31,6 @@ pub mod trail;
 pub mod truth;
 
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
-pub(crate) use subject::valid_leaves;
 pub use subject::{CAPACITY, Subject};
 pub use terms::Terms;
 
