@@ -15,6 +15,7 @@ Exit codes: 0 success; 2 the file cannot be read or has cells that are not axis-
 error explains; 3 VTK cannot be imported.
 """
 
+import itertools
 import json
 import os
 import resource
@@ -40,6 +41,27 @@ except (ImportError, OSError) as error:
 
 # Greatest difference between the corners of a cell and those of a cube, in edges of the cell, as in the harness.
 TOLERANCE = 0.01
+# The orders in which the corners of a cube, 4 z + 2 y + x each, may follow each other: VTK's hexahedron in its 24 rotations, whose
+# volume is positive, and its voxel. Three bits per corner.
+HEXAHEDRON, VOXEL = (0, 1, 3, 2, 4, 5, 7, 6), range(8)
+
+
+def code(corners):
+    """The order as one number."""
+    return sum(int(corner) << 3 * place for place, corner in enumerate(corners))
+
+
+def rotations():
+    """The codes of all rotations of a hexahedron."""
+    for axes in itertools.permutations(range(3)):
+        odd = sum(a > b for a, b in itertools.combinations(axes, 2)) % 2
+        for mirrored in range(8):
+            if (odd + mirrored.bit_count()) % 2 == 0:
+                turn = lambda corner: sum((corner >> axis & 1) << place for place, axis in enumerate(axes)) ^ mirrored
+                yield code(turn(corner) for corner in HEXAHEDRON)
+
+
+ORDERS = {VTK_HEXAHEDRON: np.array(sorted(rotations())), VTK_VOXEL: np.array([code(VOXEL)])}
 # Cells that are converted at a time. Larger arrays cost a page fault per page, five times the computation.
 CHUNK = 1 << 12
 READERS = {
@@ -117,10 +139,18 @@ def of_unstructured(grid):
     for first in range(0, count, CHUNK):
         part = slice(first, min(first + CHUNK, count))
         vertices = np.ascontiguousarray(connectivity[8 * part.start : 8 * part.stop].reshape(-1, 8).T)
-        corners[part], edges[part], is_cube = cubes([axis[vertices] for axis in axes])
+        corners[part], edges[part], is_cube, order = cubes([axis[vertices] for axis in axes])
         if not is_cube.all():
             cell = first + int(np.flatnonzero(~is_cube)[0])
             raise Refused(f"has cell {cell}, which is not an axis-aligned cube (minimum corner {corners[cell].tolist()})")
+        for kind, known in ORDERS.items():
+            wrong = np.flatnonzero((kinds[part] == kind) & ~np.isin(order, known))
+            if len(wrong):
+                cell = first + int(wrong[0])
+                raise Refused(
+                    f"has cell {cell}, whose corners are not in the order of VTK's type {kind}, so that its faces or its volume "
+                    f"are inverted (minimum corner {corners[cell].tolist()})"
+                )
     return corners, edges
 
 
@@ -131,7 +161,8 @@ def of_export(path, grid, edges):
     if digest is None and (root is None or not all(grid.GetCellData().HasArray(name) for name in arrays)):
         return None, None
     if root is None or digest is None:
-        raise Refused("was written by harness export, but lacks its root or its digest: it is damaged")
+        lost = "root" if root is None else "digest"
+        raise Refused(f"was written by harness export, but lacks its field {lost}: it is damaged")
     # The digest is that of corners, edges and sides, from which the other arrays follow.
     level, spacing, index, _ = (cell_array(grid, name) for name in arrays)
     with np.errstate(all="ignore"):
@@ -164,7 +195,8 @@ def fields(path, grid):
 
 
 def cubes(vertices):
-    """Minimum corners, mean edges, and whether each cell is a cube, from the coordinates of vertices: [axis][vertex, cell]."""
+    """Minimum corners, mean edges, whether each cell is a cube, and the order of its corners as one number, from the coordinates of
+    vertices: [axis][vertex, cell]."""
     lows, highs = ([bound(axis, axis=0) for axis in vertices] for bound in (np.min, np.max))
     # Which corner of the cell a vertex is, as one bit: a cube has all eight.
     digits = np.zeros(vertices[0].shape, np.uint8)
@@ -177,7 +209,10 @@ def cubes(vertices):
             is_cube &= (from_corner <= TOLERANCE * edge) & (np.abs(high - low - edge) <= TOLERANCE * edge)
             digits |= (along - low > high - along).astype(np.uint8) << axis
     is_cube &= np.bitwise_or.reduce(np.left_shift(np.uint8(1), digits), axis=0) == 255
-    return np.column_stack(lows), edge, is_cube
+    order = np.zeros(digits.shape[1], np.int64)
+    for place, corners in enumerate(digits):
+        order |= corners.astype(np.int64) << 3 * place
+    return np.column_stack(lows), edge, is_cube, order
 
 
 def of_hyper_trees(grid):
@@ -241,7 +276,9 @@ def main():
     path, out, name = sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) == 4 else None
     # A damaged file may state any size: an allocation beyond the memory of the machine fails and is reported.
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    resource.setrlimit(resource.RLIMIT_AS, (memory, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    most = resource.getrlimit(resource.RLIMIT_AS)[1]
+    memory = memory if most == resource.RLIM_INFINITY else min(memory, most)
+    resource.setrlimit(resource.RLIMIT_AS, (memory, most))
     try:
         data = read(path)
         if data is not None and data.IsA("vtkHyperTreeGrid"):

@@ -128,11 +128,11 @@ class FoamTest(unittest.TestCase):
         self.mesh("keep_crossing = false\n" + sphere)
         self.export("--case", self.at / "case.toml")
         self.export("--processors", "3")
-        for processor in range(3):
-            shutil.copytree(TEMPLATE / "0", self.at / f"case/processor{processor}/0")
         self.assertIn("\nMesh OK.", self.check_mesh(ranks=3))
         solver = [("laplacianFoam", "T"), ("potentialFoam", "Phi")]
         for program, name in solver:
+            for part in ("", "processor0", "processor1", "processor2"):
+                shutil.copytree(TEMPLATE.parent / program, self.at / "case" / part / "0", dirs_exist_ok=True)
             outputs = [
                 call(self.at / "case", program),
                 call(self.at / "case", "mpirun", "-n", 3, program, "-parallel"),
@@ -159,8 +159,8 @@ class FoamTest(unittest.TestCase):
                 (case / "system/decomposeParDict").write_text(
                     (TEMPLATE / "system/decomposeParDict").read_text().replace("RANKS", str(count))
                 )
-                for processor in range(count):
-                    shutil.copytree(TEMPLATE / "0", case / f"processor{processor}/0")
+                for part in ["", *(f"processor{processor}" for processor in range(count))]:
+                    shutil.copytree(TEMPLATE.parent / "potentialFoam", case / part / "0")
                 control = case / "system/controlDict"
                 control.write_text(re.sub(r"(writeFormat +)\w+", r"\1ascii", control.read_text()))
                 centres = ["postProcess", "-func", "writeCellCentres", "-time", "0"]
@@ -251,10 +251,34 @@ class RunTest(unittest.TestCase):
         code, _, error = self.run_with("duct.toml", "-", "out", "--inlet", "yMin", "--outlet", "yMax")
         self.assertEqual(code, 0, error)
         self.assertIn("the flow reaches the root's boundary", error)
-        data = (self.at / "out/case/0/U").read_bytes()
-        count = re.search(rb"internalField +nonuniform List<vector> *\n(\d+)\n\(", data)
-        velocity = np.frombuffer(data, "<f8", 3 * int(count[1]), count.end()).reshape(-1, 3)
+        velocity = values(self.at / "out/case/0/U", "vector", 3)
         np.testing.assert_allclose(velocity, np.broadcast_to([0, 1, 0], velocity.shape), atol=1e-6)
+
+    def test_the_fields_of_a_result_are_those_that_were_solved_for(self):
+        """A field of zeros that the solver only reads would pass for a pressure or a temperature."""
+        (self.at / "duct.toml").write_text(self.case)
+        flow = ["--inlet", "yMin", "--outlet", "yMax"]
+        code, _, error = self.run_with("duct.toml", "-", "flow", *flow)
+        self.assertEqual(code, 0, error)
+        self.assertEqual({path.name for path in (self.at / "flow/case/0").iterdir()}, {"U", "Phi"})
+        # The gradient of the potential is minus the velocity, and cells have an edge of 0.25 and more.
+        potential = values(self.at / "flow/case/0/Phi", "scalar", 1)
+        self.assertGreater(np.ptp(potential), 3)
+        code, _, error = self.run_with("duct.toml", "-", "heat", "--solver", "laplacianFoam")
+        self.assertEqual(code, 0, error)
+        self.assertEqual({path.name for path in (self.at / "heat/case/0").iterdir()}, {"T"})
+        self.assertGreater(np.ptp(values(self.at / "heat/case/1/T", "scalar", 1)), 0.1)
+
+    def test_a_solver_that_writes_nothing_has_not_solved(self):
+        (self.at / "duct.toml").write_text(self.case)
+        (self.at / "bin").mkdir()
+        idle = self.at / "bin/potentialFoam"
+        idle.write_text("#!/bin/sh\necho End\n")
+        idle.chmod(0o755)
+        process = self.start("duct.toml", "-", "out", "--inlet", "yMin", "--outlet", "yMax", environment={"PATH": f"{self.at}/bin:{os.environ['PATH']}"})
+        _, error = process.communicate()
+        self.assertEqual(process.returncode, 1, error)
+        self.assertIn("wrote no 0/Phi", error)
 
     def test_crossing_cells_and_the_spacing_of_a_case_are_refused(self):
         (self.at / "duct.toml").write_text(self.case.replace("false", "true"))
@@ -285,6 +309,13 @@ class RunTest(unittest.TestCase):
             with self.assertRaises(ProcessLookupError):
                 os.kill(int((self.at / "pid").read_text()), 0)
             (self.at / "pid").unlink()
+
+
+def values(path, kind, items):
+    """The internal field of a binary field."""
+    data = path.read_bytes()
+    count = re.search(rb"internalField +nonuniform List<" + kind.encode() + rb"> *\n(\d+)\n\(", data)
+    return np.frombuffer(data, "<f8", items * int(count[1]), count.end()).reshape(-1, items)
 
 
 def duct():

@@ -39,7 +39,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         counters.add_voxelised(&work);
         tree.split
     };
-    let Partition { mut ownership, base_starts, level_base } = match is_parallel {
+    let Partition { mut ownership, base_starts, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
         true => record.phase("base tree", comm, || {
             initial::partition(facets.borrow(), &rules, division, mark, comm)
@@ -94,6 +94,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         ownership,
         level_base,
         base_starts,
+        partitioner,
         split,
         crossing,
         sides,

@@ -8,6 +8,7 @@ use crate::mesh::Mesh;
 use crate::partition::base_leaves::Heaviest;
 use crate::stream::Counts;
 use crate::write::{OutDir, Written};
+use files::interrupt::stop_at;
 
 /// Sums over all ranks.
 pub struct Totals {
@@ -64,6 +65,7 @@ pub fn finish(
     let (digests, parts) = manifest::gather(written, comm);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
+            stop_at(format_args!("manifest:0"));
             out.manifest(&Manifest::new(&out.output, mesh, &counts, &digests, &parts))
         }
         _ => Ok(()),

@@ -49,6 +49,7 @@ use case::Case;
 use check::debug_check;
 use comm::Comm;
 use error::Error;
+use files::interrupt::stop_at;
 use grow::grow;
 use lattice::Rules;
 use octant::Level;
@@ -74,6 +75,7 @@ pub fn mesh(
 ) -> Result<Report, Error> {
     let out = options.out.as_ref().map(|output| OutDir::claim(output, comm)).transpose()?;
     let report = mesh_into(out.as_ref(), case, options, comm, record)?;
+    stop_at(format_args!("complete:{}", comm.rank()));
     if let Some(out) = out {
         out.keep();
     }

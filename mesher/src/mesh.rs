@@ -2,8 +2,8 @@
 
 use crate::lattice::Rules;
 use crate::octant::Level;
-use crate::partition::Division;
 use crate::partition::ownership::Ownership;
+use crate::partition::{Division, Partitioner};
 use crate::quantise::FacetCounts;
 use crate::sides::Sides;
 use crate::stream::Leaves;
@@ -39,6 +39,8 @@ pub struct Mesh {
     pub level_base: Level,
     /// Level-19 codes at which base leaves begin; none if they are all octants of that level.
     pub base_starts: Vec<u64>,
+    /// The partitioner that was used; none for a single rank.
+    pub partitioner: Option<Partitioner>,
     /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
     pub split: PerLevel,
     /// Crossing leaves of T0.

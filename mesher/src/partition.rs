@@ -23,7 +23,8 @@ pub mod repartition;
 use crate::octant::Level;
 
 /// The method that assigns base leaves to ranks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Partitioner {
     /// METIS on the graph of base leaves that share a face (the paper's choice)
     Metis,

@@ -17,6 +17,7 @@ use crate::leaves::Totals;
 use crate::manifest::Geometry;
 use crate::mesh::Mesh;
 use crate::octant::{LEVEL_MAX, Level};
+use crate::partition::Partitioner;
 use crate::record::{Phase, Recorder, peak_rss_bytes};
 use crate::sides::Summary;
 use crate::{grade, voxelise};
@@ -134,6 +135,8 @@ pub struct Report {
     pub level_surface: Level,
     /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
+    /// The partitioner that was used: METIS leaves few base leaves to the curve. None for a single rank.
+    pub partitioner: Option<Partitioner>,
     /// Components of non-crossing leaves of the base tree.
     pub components: u64,
     /// Those that are outside, enclosed ones included.
@@ -221,6 +224,7 @@ impl Report {
             root_edge: rules.root.edge,
             level_surface: rules.level_surface,
             level_base: mesh.level_base,
+            partitioner: mesh.partitioner,
             components: outside + inside,
             components_outside: outside,
             components_inside: inside,

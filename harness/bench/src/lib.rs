@@ -4,11 +4,10 @@
 //! - [`targets`]: a table of targets, met or missed;
 //! - [`gate`](mod@gate): candidate against baseline; [`track`]: metrics by commit; [`statistics`] for all of them;
 //! - [`shrink`](mod@shrink): the smallest case that still fails;
-//! - [`selftest`]: meshes of a requested size for the self test.
 
 pub mod experiments;
 pub mod gate;
-pub mod selftest;
+pub mod origin;
 pub mod shrink;
 pub mod statistics;
 pub mod targets;

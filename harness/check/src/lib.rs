@@ -1,7 +1,7 @@
 //! Checks of oct-tree meshes. This crate shares no algorithm with the programs that it checks, and starts no
 //! process.
 //!
-//! - [`checks`]: one file per property; [`audit`](mod@audit): the checks that need only the leaves, for meshes of any size;
+//! - [`checks`]: one file per property; [`audit`](mod@audit): all of them on a mesh on disk, of any size;
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
 //! - [`geometry`]: diagnosis of a geometry before it is meshed;
 //! - [`leak`]: paths through openings, and their free widths;

@@ -17,6 +17,8 @@ pub struct Promises {
     pub surface: Option<Surface>,
     /// Every leaf that meets an extent box has at least the level of the box.
     pub boxes: bool,
+    /// Exactly the leaves that facets cross are labelled crossing.
+    pub crossing: bool,
     /// Every leaf has its side. Without this promise, the sides in leaf words have no meaning.
     pub sides: Option<Sides>,
     /// Leaves that touch in this way differ in edge length by at most `ratio`.

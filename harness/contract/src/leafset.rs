@@ -11,6 +11,7 @@ use crate::digest::Digest;
 use crate::files::{self, named};
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::manifest::{self, Manifest, Part, Sides, Tally};
+use crate::mesh::{self, Mesh, NODES_MAX};
 use crate::npy::{self, NpyError, PartFile};
 use ::files::Claim;
 
@@ -23,34 +24,6 @@ pub struct LeafSet {
     pub parts: Vec<Vec<u64>>,
     /// The words of all parts, sorted.
     pub words: Vec<u64>,
-}
-
-/// A leaf-set directory whose manifest and part headers were read and are valid. No leaf has been read.
-#[derive(Debug)]
-pub struct LeafDir {
-    /// The manifest.
-    pub manifest: Manifest,
-    /// The part files, in the manifest's order.
-    pub parts: Vec<PartFile>,
-}
-
-/// The leaves of a directory.
-#[derive(Debug)]
-pub enum Leaves {
-    /// Its parts.
-    Words(Box<LeafDir>),
-    /// The tree, if there are no parts.
-    Tree(Box<TreeFile>, Box<Manifest>),
-}
-
-impl Leaves {
-    /// The manifest.
-    pub fn manifest(&self) -> &Manifest {
-        match self {
-            Self::Words(set) => &set.manifest,
-            Self::Tree(_, manifest) => manifest,
-        }
-    }
 }
 
 /// Why a directory is not a leaf set.
@@ -93,9 +66,19 @@ pub enum ReadError {
         /// The cause.
         source: TreeError,
     },
-    /// The directory has a tree but no parts, and they are needed.
-    #[error("{0}: has the tree but no leaf words, which this needs: make them with harness import")]
-    NoWords(PathBuf),
+    /// The words are not those of an oct-tree.
+    #[error("{path}: not a linear oct-tree, because {why}: run harness audit on it")]
+    NotLinear {
+        /// The directory.
+        path: PathBuf,
+        /// The cause.
+        why: String,
+    },
+    /// The tree does not fit the limit of memory.
+    #[error(
+        "{0}: more than {NODES_MAX} distinct octants, which is the limit: use a part of the mesh"
+    )]
+    TooLarge(PathBuf),
     /// A part file that the manifest does not name.
     #[error("{0}: a part file that the manifest does not name")]
     PartExtra(PathBuf),
@@ -106,23 +89,19 @@ pub enum ReadError {
 /// # Errors
 /// If the directory is not a leaf set.
 pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
-    match open_any(dir)? {
-        Leaves::Words(words) => {
-            let LeafDir { manifest, parts } = *words;
-            let read = |part: &PartFile| part.read_all().map_err(|e| ReadError::part(part, e));
-            let parts = parts.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-            Ok(LeafSet::new(manifest, parts))
-        }
-        Leaves::Tree(tree, manifest) => {
-            let mut words = Vec::new();
-            tree.words(&mut |run| {
-                words.extend_from_slice(run);
-                true
-            })
-            .map_err(|source| ReadError::tree(&tree, source))?;
-            Ok(LeafSet::new(*manifest, vec![words]))
-        }
+    let mesh = Mesh::open(dir)?;
+    let mut parts = Vec::new();
+    for part in &mesh.parts {
+        parts.push(match part {
+            mesh::Part::Words(file) => file.read_all().map_err(|e| ReadError::part(file, e))?,
+            mesh::Part::Tree(_) => {
+                let mut words = Vec::new();
+                mesh.visit(&mut |run| words.extend_from_slice(run))?;
+                words
+            }
+        });
     }
+    Ok(LeafSet::new(mesh.manifest, parts))
 }
 
 /// Reads the arrays of leaves in a directory without a manifest, in the order of their names.
@@ -160,17 +139,6 @@ impl ReadError {
     }
 }
 
-/// Opens the parts of a leaf-set directory without reading leaves.
-///
-/// # Errors
-/// If the directory is not a leaf set, or has the tree alone.
-pub fn open(dir: &Path) -> Result<LeafDir, ReadError> {
-    match open_any(dir)? {
-        Leaves::Words(words) => Ok(*words),
-        Leaves::Tree(..) => Err(ReadError::NoWords(dir.to_owned())),
-    }
-}
-
 /// Opens the tree of a leaf-set directory without reading leaves; `None` if there is none.
 ///
 /// # Errors
@@ -187,26 +155,6 @@ pub fn open_tree(dir: &Path, manifest: &Manifest) -> Result<Option<TreeFile>, Re
         ))),
     });
     tree.map(Some).map_err(|source| ReadError::Tree { path, source })
-}
-
-/// Opens a leaf-set directory without reading leaves: its parts or, if it has none, its tree.
-///
-/// # Errors
-/// If the directory is not a leaf set.
-pub fn open_any(dir: &Path) -> Result<Leaves, ReadError> {
-    let manifest = read_manifest(dir)?;
-    if manifest.parts.is_empty()
-        && let Some(tree) = open_tree(dir, &manifest)?
-    {
-        return Ok(Leaves::Tree(Box::new(tree), Box::new(manifest)));
-    }
-    let mut parts = Vec::new();
-    for part in &manifest.parts {
-        let path = dir.join(&part.file);
-        parts.push(PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?);
-    }
-    refuse_extra_parts(dir, &manifest)?;
-    Ok(Leaves::Words(Box::new(LeafDir { manifest, parts })))
 }
 
 /// Reads only the manifest.
@@ -238,7 +186,7 @@ pub fn read_manifest(dir: &Path) -> Result<Manifest, ReadError> {
 }
 
 /// A part file that the manifest does not name shows that manifest and directory do not belong together.
-fn refuse_extra_parts(dir: &Path, manifest: &Manifest) -> Result<(), ReadError> {
+pub(crate) fn refuse_extra_parts(dir: &Path, manifest: &Manifest) -> Result<(), ReadError> {
     let io = |source| ReadError::Io { path: dir.to_owned(), source };
     for entry in fs::read_dir(dir).map_err(io)? {
         let name = entry.map_err(io)?.file_name();
@@ -340,7 +288,7 @@ mod tests {
             let mut manifest = set.manifest.clone();
             change(&mut manifest);
             manifest.write(dir.path()).unwrap();
-            open(dir.path()).unwrap_err().to_string()
+            Mesh::open(dir.path()).unwrap_err().to_string()
         };
         assert!(why(&|m| m.schema = "other".to_owned()).contains("its schema is \"other\", not"));
         assert!(

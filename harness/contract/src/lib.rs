@@ -1,7 +1,7 @@
 //! The formats that the programs exchange, implemented independently of them, and the algebra of octants and trees.
 //!
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
-//!   [`leafset`], [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
+//!   [`leafset`], [`mesh`] (the reader of meshes of any size), [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`];
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
 //!   [`triangle`] (exact facet-octant test).
@@ -15,6 +15,7 @@ pub mod import;
 pub mod lattice;
 pub mod leafset;
 pub mod manifest;
+pub mod mesh;
 pub mod npy;
 pub mod octant;
 pub mod parity;

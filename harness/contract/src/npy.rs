@@ -6,7 +6,6 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
 use npyz::{DType, NpyHeader};
 
 /// Longer than any header that the programs write, so that one read suffices.
@@ -32,7 +31,10 @@ pub enum NpyError {
     /// The file does not begin with an npy header.
     #[error("has no npy header: {0}")]
     Header(std::io::Error),
-    /// The type is not little-endian u64.
+    /// The words are big-endian.
+    #[error("has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'")]
+    Swapped,
+    /// The array does not consist of words.
     #[error("has type {0}, not '<u8'")]
     Type(String),
     /// The array is not one-dimensional.
@@ -62,6 +64,7 @@ impl PartFile {
         let (header, offset) = read_header(&head).map_err(NpyError::Header)?;
         match header.dtype() {
             DType::Plain(t) if t.to_string() == "<u8" => {}
+            DType::Plain(t) if t.to_string() == ">u8" => return Err(NpyError::Swapped),
             other => return Err(NpyError::Type(other.descr())),
         }
         let &[len] = header.shape() else {
@@ -130,72 +133,6 @@ impl PartFile {
             }
         }
         Ok(low)
-    }
-}
-
-/// A part file mapped into memory. Pages are read when they are first used.
-#[derive(Debug)]
-pub struct MappedPart {
-    bytes: Mmap,
-    /// Position of the first word in `bytes`. Nothing aligns it in files of other programs.
-    offset: usize,
-    len: usize,
-}
-
-impl PartFile {
-    /// Maps the file into memory. The process is killed (SIGBUS) if it reads a page that another process has cut
-    /// off the file in the meantime.
-    ///
-    /// # Errors
-    /// If the file cannot be mapped.
-    pub fn map(&self) -> std::io::Result<MappedPart> {
-        // SAFETY: the mapping is only read, byte by byte, and any bytes form valid words. A change of the file by
-        // another process can change their values, and no invariant in memory depends on these.
-        let bytes = unsafe { Mmap::map(&self.file) }?;
-        let fits = |n: u64| usize::try_from(n).map_err(std::io::Error::other);
-        let (offset, len) = (fits(self.offset)?, fits(self.len)?);
-        if bytes.len() < offset + 8 * len {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
-        }
-        Ok(MappedPart { bytes, offset, len })
-    }
-}
-
-impl MappedPart {
-    /// Number of words.
-    pub fn len(&self) -> usize {
-        self.len
-    }
-
-    /// Whether the part has no words.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// Announces that few words will be read, at random places. Has an effect on speed alone.
-    pub fn expect_few_reads(&self) {
-        // An error means that the system does not know this kind of advice.
-        let _ = self.bytes.advise(memmap2::Advice::Random);
-    }
-
-    /// The word with this index. Panics if there is none.
-    pub fn word(&self, index: usize) -> u64 {
-        assert!(index < self.len, "word {index} of {}", self.len);
-        let at = self.offset + 8 * index;
-        u64::from_le_bytes(self.bytes[at..at + 8].try_into().expect("eight bytes"))
-    }
-
-    /// Index of the first word in a sorted range that is not less than `word`; the range's end if there is none.
-    pub fn lower_bound(&self, range: Range<usize>, word: u64) -> usize {
-        let (mut low, mut high) = (range.start, range.end);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            match self.word(middle) < word {
-                true => low = middle + 1,
-                false => high = middle,
-            }
-        }
-        low
     }
 }
 
@@ -292,22 +229,10 @@ mod tests {
         for probe in [0, 1, 2, 5000, 9801, 9802] {
             let expected = words.partition_point(|&w| w < probe) as u64;
             assert_eq!(part.lower_bound(0..part.len(), probe).unwrap(), expected);
-            let mapped = part.map().unwrap();
-            assert_eq!(mapped.lower_bound(0..mapped.len(), probe), expected as usize);
-            assert_eq!(mapped.lower_bound(3..5, probe), (expected as usize).clamp(3, 5));
+            let bound = part.lower_bound(3..5, probe).unwrap();
+            assert_eq!(bound, expected.clamp(3, 5));
         }
-        let mapped = part.map().unwrap();
-        assert!((0..mapped.len()).all(|i| mapped.word(i) == words[i]));
-        assert!(!part.is_empty() && !mapped.is_empty() && part.path() == file.path());
-        assert!(std::panic::catch_unwind(|| mapped.word(100)).is_err());
-        // A file from which another process has cut words off.
-        std::fs::OpenOptions::new()
-            .write(true)
-            .open(file.path())
-            .unwrap()
-            .set_len(128 + 99 * 8)
-            .unwrap();
-        assert!(part.map().is_err());
+        assert!(!part.is_empty() && part.path() == file.path());
     }
 
     #[test]
@@ -327,7 +252,7 @@ mod tests {
         write(file.path(), &[]).unwrap();
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!((part.len(), part.read_all().unwrap()), (0, Vec::new()));
-        assert!(part.is_empty() && part.map().unwrap().is_empty());
+        assert!(part.is_empty());
     }
 
     #[test]

@@ -21,9 +21,9 @@ pub mod near_body;
 pub mod options;
 pub mod ordered;
 pub mod p8est;
-mod part;
 pub mod pieces;
 pub mod selection;
 #[cfg(test)]
 mod testing;
 pub mod vtu;
+mod written;

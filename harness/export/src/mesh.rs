@@ -10,14 +10,13 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use contract::case::Case;
 use contract::lattice::Root;
-use contract::leafset::{self, LeafDir, Leaves};
 use contract::manifest::Manifest;
+use contract::mesh::{self, Part, Readers};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
 use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::part::{Part, Readers};
 use crate::selection::Selection;
 
 /// Number of words that are read at once: few enough that a slice reads little besides its own leaves.
@@ -65,7 +64,8 @@ impl<'a> Visitor<'a> {
         self.with_readers(|readers| {
             let (mut intervals, mut before) = (Vec::new(), 0);
             for (part, file) in self.mesh.parts.iter().enumerate() {
-                let mut bound = |key| readers.lower_bound(part, 0..file.len(), key);
+                let mut bound =
+                    |key| readers.lower_bound(part, 0..file.len(), key).map_err(ExportError::from);
                 let interval = bound(keys.start)?..bound(keys.end)?;
                 before += interval.start;
                 intervals.extend((!interval.is_empty()).then_some((part, interval)));
@@ -104,13 +104,7 @@ impl Mesh {
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, ExportError> {
-        let (manifest, parts) = match leafset::open_any(path)? {
-            Leaves::Words(words) => {
-                let LeafDir { manifest, parts } = *words;
-                (manifest, parts.into_iter().map(Part::Words).collect())
-            }
-            Leaves::Tree(tree, manifest) => (*manifest, vec![Part::of_tree(*tree)?]),
-        };
+        let mesh::Mesh { manifest, parts, .. } = mesh::Mesh::open(path)?;
         Ok(Self { manifest, parts, leaves_by_rank: OnceLock::new() })
     }
 
@@ -295,7 +289,8 @@ impl Mesh {
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
         let file = &self.parts[part];
-        let (words, ranks) = readers.words(part, &octant, interval.clone())?;
+        let (words, ranks) =
+            readers.words(part, &octant, interval.clone()).map_err(ExportError::from)?;
         let mut ranks = ranks.into_iter();
         // Leaves that ascend and do not overlap begin where the one before ends, or later.
         let mut key_min = word::key_of(octant.corner);

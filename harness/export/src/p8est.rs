@@ -23,6 +23,7 @@ use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
+use crate::written::Written;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
@@ -60,15 +61,18 @@ pub fn write(
         start.extend(header(&ends));
         pad(&mut start);
         out.write_all(&start).map_err(named)?;
-        let mut done = 0;
+        let (mut done, mut written) = (0, Written::default());
         quadrants(mesh, selection, &mut |quadrant| {
             if done % STEP == 0 {
                 options.check()?;
                 options.watch.progress(done, total);
             }
             done += 1;
+            written.add(&quadrant.octant, quadrant.data != FILLER);
             out.write_all(&quadrant.record()).map_err(named)
         })?;
+        written.check_invariants(mesh, selection, counts.leaves);
+        assert_eq!((done, written.volume), (total, KEY_END), "quadrants, which tile the root");
         out.flush().map_err(named)?;
         Ok(start.len() as u64 + total * RECORD_BYTES as u64)
     })?;
@@ -168,14 +172,18 @@ impl Counts {
     }
 }
 
-/// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices.
+/// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices. If their
+/// difference has lost digits of the edge, the edge is the attribute of the tree.
 fn connectivity(root: &Root) -> Vec<u8> {
     let mut bytes = b"p8est\0\0\0".to_vec();
     bytes.extend(VERSION);
     bytes.resize(ALIGNMENT, 0);
     // Format, bytes of an index, and numbers of vertices, trees, edges, trees at edges, corners, trees at corners, bytes of
     // attributes; the last number is reserved.
-    numbers(&mut bytes, &[FORMAT, 4, 8, 1, 0, 0, 0, 0, 0, 0]);
+    let opposite = root.to_user([UNITS_PER_EDGE; 3]);
+    let is_lost = opposite[0] - root.origin[0] != root.edge;
+    let attribute = if is_lost { &root.edge.to_le_bytes()[..] } else { &[] };
+    numbers(&mut bytes, &[FORMAT, 4, 8, 1, 0, 0, 0, 0, attribute.len() as u64, 0]);
     for vertex in 0..8 {
         let corner = std::array::from_fn(|a| (vertex >> a & 1) * UNITS_PER_EDGE);
         for coordinate in root.to_user(corner) {
@@ -186,6 +194,7 @@ fn connectivity(root: &Root) -> Vec<u8> {
     (0..8u32).for_each(|vertex| bytes.extend(vertex.to_le_bytes()));
     bytes.extend([0; 6 * 4]);
     bytes.extend(0..6u8);
+    bytes.extend(attribute);
     bytes.extend([0; 2 * 4]);
     pad(&mut bytes);
     bytes
@@ -311,6 +320,18 @@ mod tests {
             let read = read(&path, Format::P4est, &request)
                 .and_then(|cells| leaf_set(&cells, None, None, "test".to_owned()));
             prop_assert!(read.map_or(true, |set| set.manifest.digest != mesh.manifest.digest));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_root_is_kept_to_the_last_bit(origin in prop::array::uniform3(-1e3f64..1e3), edge in 1e-3f64..1e3) {
+            let root = Root { origin, edge };
+            let (_dir, mesh) = stored(vec![words_of(|o| o.level < 2)], root);
+            let (dir, _) = exported(&mesh, &Selection::default());
+            let found = import(&dir.path().join("forest.p8est"), true).manifest.root;
+            prop_assert_eq!(found.edge.to_bits(), edge.to_bits());
+            prop_assert_eq!(found.origin.map(f64::to_bits), origin.map(f64::to_bits));
         }
     }
 

@@ -76,6 +76,8 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             warm_up: false,
             oversubscribed: comm == Comm::Mpi && ranks > 2,
             command: "mesher uav.toml".into(),
+            program: String::new(),
+            geometry: None,
             facets: 1000,
             cells,
             digest: "0".repeat(32),
@@ -244,6 +246,64 @@ fn two_programs_are_never_in_one_series() {
 /// Number of figures of the record of one program.
 fn files_of_one() -> usize {
     report(tempfile::tempdir().unwrap().path(), &record(), &[]).unwrap().figures
+}
+
+/// A name that is no name of a file, and one that is another's after that: every figure has files of its own, and hatchings that
+/// the drawing finds.
+#[test]
+fn figures_of_any_case_and_program_have_files_of_their_own() {
+    let named = |case: &'static str, engine: &'static str| {
+        record().into_iter().map(move |mut line| {
+            if let Entry::Run(run) = &mut line.entry {
+                (run.setup.case, run.setup.engine) = (case.into(), engine.into());
+            }
+            line
+        })
+    };
+    let both = named("a b", "p/4").chain(named("a-b", "p-4")).collect::<Vec<_>>();
+    let place = tempfile::tempdir().unwrap();
+    let written = report(place.path(), &both, &[]).unwrap();
+    let drawn = files(place.path(), "svg");
+    assert_eq!(drawn.len(), written.figures);
+    for name in
+        ["phases-strong-p-4-a-b-50M", "phases-strong-p-4-a-b-50M-2", "speedup-p-4-a-b-50M-2"]
+    {
+        assert!(drawn.iter().any(|d| d == name), "{name} is missing among {drawn:?}");
+    }
+    for name in &drawn {
+        let text =
+            std::fs::read_to_string(place.path().join(format!("figures/{name}.svg"))).unwrap();
+        for reference in text.split("url(#").skip(1) {
+            let (id, _) = reference.split_once(')').unwrap();
+            assert!(text.contains(&format!("id=\"{id}\"")), "{name} has no {id}");
+        }
+    }
+}
+
+/// The cost of the second mesh per cell is lower than that of the first.
+#[test]
+fn an_efficiency_above_one_has_its_reason_in_figure_table_and_summary() {
+    let mut lines = record();
+    for line in &mut lines {
+        if let Entry::Run(run) = &mut line.entry
+            && run.setup.experiment == "weak"
+            && run.setup.ranks == 1
+        {
+            run.useful_s = Spread::of(&[run.useful_s.sum * 5.0]);
+            run.phases.iter_mut().for_each(|p| p.useful_s = Spread::of(&[p.useful_s.sum * 5.0]));
+        }
+    }
+    let place = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &lines, &[]).unwrap().page).unwrap();
+    let reason =
+        "Computation scaling is above 1 where all ranks together take less CPU time per cell";
+    // The figure of the efficiency, the table of the experiment, that of its phases, and the causes on 16, 32 and 64 ranks.
+    assert_eq!(page.matches(reason).count(), 6, "{page}");
+    assert!(
+        !std::fs::read_to_string(report(place.path(), &record(), &[]).unwrap().page)
+            .unwrap()
+            .contains(reason)
+    );
 }
 
 #[test]

@@ -1,10 +1,13 @@
-//! All checks that need only a leaf-set directory, for meshes of any size.
+//! All checks of a mesh on disk, of any size.
 //!
 //! One pass over the part files, which are merged while they are read, or over the tree if there are none, computes the tally, checks the order and
 //! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
-//! variety of a mesh and not with its size; an option limits it. Without promises, the checks are those of the
-//! definition; they use the requirements in the manifest, without T0, facets or another mesh, and the head of each names
-//! what it cannot detect without them. With promises, exactly those are checked, against a case if there is one.
+//! variety of a mesh and not with its size; an option limits it. Without a case, the checks use the requirements in the
+//! manifest, and the head of each names what it cannot detect. With a case, they are a whole check: a mesh that passes is the
+//! mesh of the definition. With promises of less than the definition, exactly those are checked.
+//!
+//! Invariants of a report: no two checks have one name, and each result has its own invariants; the tree of a mesh has no more
+//! distinct octants than leaves and their ancestors; reading takes no longer than the audit.
 
 #[cfg(test)]
 mod tests;
@@ -13,19 +16,17 @@ use std::fmt;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::checks::{self, CheckResult, Terms};
+use crate::checks::{self, CheckResult, Pass, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::leafset::{self, Leaves, ReadError};
-use contract::manifest::{Keep, Manifest, Tree as Kind};
+use contract::leafset::{self, ReadError};
+use contract::manifest::Manifest;
+use contract::mesh::{Mesh, NODES_MAX, Part};
+use contract::octant::LEVEL_MAX;
 use contract::tree::Tree;
 
-pub(crate) mod merge;
-mod pass;
 pub mod record;
-
-use pass::Pass;
 
 /// Options of an audit.
 #[derive(Clone, Debug)]
@@ -36,7 +37,7 @@ pub struct AuditOptions {
 
 impl Default for AuditOptions {
     fn default() -> Self {
-        Self { nodes_max: 32_000_000 }
+        Self { nodes_max: NODES_MAX }
     }
 }
 
@@ -66,10 +67,36 @@ impl AuditReport {
         self.checks.iter().filter(|check| !check.was_run())
     }
 
+    /// Whether needless splits were not sought, because memory does not suffice.
+    pub fn exceeds_memory(&self) -> bool {
+        self.not_run().any(|check| check.name == checks::NEEDLESS)
+    }
+
     /// Whether any property of the leaves was checked, beyond their files and counts.
     pub fn checked_anything(&self) -> bool {
         let formal = [checks::FILES, "manifest", "linear"];
         self.checks.iter().any(|c| !c.holds() || c.was_run() && !formal.contains(&c.name))
+    }
+}
+
+impl AuditReport {
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        self.checks.iter().for_each(CheckResult::check_invariants);
+        let mut names: Vec<&str> = self.checks.iter().map(|check| check.name).collect();
+        names.sort_unstable();
+        assert!(
+            names.windows(2).all(|pair| pair[0] != pair[1]),
+            "a check appears twice: {names:?}"
+        );
+        assert!(!names.is_empty(), "an audit without checks");
+        let Self { leaves, nodes, time_read_s, time_wall_s, .. } = *self;
+        let nodes_max = leaves.saturating_mul(u64::from(LEVEL_MAX));
+        assert!(nodes <= nodes_max, "{leaves} leaves have {nodes} distinct octants above them");
+        assert!(
+            0.0 <= time_read_s && time_read_s <= time_wall_s,
+            "an audit of {time_wall_s} s read for {time_read_s} s"
+        );
     }
 }
 
@@ -91,49 +118,45 @@ impl fmt::Display for AuditReport {
     }
 }
 
-/// Name of the check that the tree does not exceed the memory limit.
-pub const CAPACITY: &str = "capacity";
-
 /// Name of the check that the tree has the leaves of the parts.
 pub const TREE: &str = "tree file";
 
-/// What a mesh is required to be.
-#[derive(Clone, Copy, Debug)]
-pub enum Requirements<'a> {
-    /// A mesh of the definition, as far as its leaves show.
-    Definition,
-    /// These promises, on this case.
-    Promises(&'a Promises, Option<&'a Case>),
-}
-
-/// Audits a directory against the definition. If it cannot be read as a leaf set, that is a finding of `files`.
+/// Audits a mesh by itself.
 pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
-    audit_against(dir, options, Requirements::Definition)
+    audit_against(dir, options, None, &Promises::of_definition())
 }
 
-/// Audits a directory against the requirements. If it cannot be read as a leaf set, that is a finding of `files`.
+/// Audits a mesh of which these promises are made, against its case if it is known. A mesh that cannot be read is a finding.
 pub fn audit_against(
     dir: &Path,
     options: &AuditOptions,
-    requirements: Requirements,
+    case: Option<&Case>,
+    promises: &Promises,
 ) -> AuditReport {
     let start = Instant::now();
     let mut report =
         AuditReport { checks: Vec::new(), leaves: 0, nodes: 0, time_read_s: 0.0, time_wall_s: 0.0 };
-    let pass =
-        leafset::open_any(dir).and_then(|set| Pass::over(&set, options).map(|pass| (set, pass)));
+    let read = Mesh::open(dir)
+        .and_then(|mesh| Pass::over(&mesh, options.nodes_max).map(|pass| (mesh, pass)));
     report.time_read_s = start.elapsed().as_secs_f64();
-    match pass {
-        Ok((set, pass)) => {
-            (report.leaves, report.nodes) = (pass.tally.leaves, pass.nodes() as u64);
-            report.checks = checks(set.manifest(), pass, requirements);
-            if let (Leaves::Words(set), Some(_)) = (&set, &set.manifest().hyper_tree_grid) {
-                report.checks.push(tree_file(dir, &set.manifest));
+    match read {
+        Ok((mesh, pass)) => {
+            let manifest = &mesh.manifest;
+            report.leaves = pass.tally.leaves;
+            report.nodes = pass.tree.as_ref().map_or(0, Tree::nodes) as u64;
+            let mut files = CheckResult::new(checks::FILES);
+            let tree = manifest.hyper_tree_grid.is_some();
+            files.examined = manifest.parts.len() as u64 + u64::from(tree);
+            let subject = Subject::of(manifest, pass, case).promising(promises);
+            report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
+            if tree && mesh.parts.iter().all(|part| matches!(part, Part::Words(_))) {
+                report.checks.push(tree_file(dir, manifest));
             }
         }
         Err(e) => report.checks.push(CheckResult::unreadable(&e)),
     }
     report.time_wall_s = start.elapsed().as_secs_f64();
+    report.check_invariants();
     report
 }
 
@@ -159,62 +182,4 @@ fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
         Ok(()) => {}
     }
     result
-}
-
-fn checks(manifest: &Manifest, pass: Pass, requirements: Requirements) -> Vec<CheckResult> {
-    let leaves = pass.tally.leaves;
-    let mut files = CheckResult::new(checks::FILES);
-    let tree = manifest.hyper_tree_grid.is_some();
-    files.examined = manifest.parts.len() as u64 + u64::from(tree);
-    let mut claims = checks::manifest::check_leaves(manifest, &pass.tally, &pass.parts);
-    if let Requirements::Promises(_, Some(case)) = requirements {
-        checks::manifest::check_terms(manifest, &Terms::of_case(case), &mut claims);
-    }
-    let mut checks = vec![files, claims, pass.linear];
-    let Some(tree) = pass.tree else {
-        checks.extend(pass.capacity);
-        return checks;
-    };
-    let mut of_tree = match requirements {
-        Requirements::Promises(promises, case) if !promises.definition => {
-            let terms = case.map_or_else(|| Terms::of_manifest(manifest), Terms::of_case);
-            let terms = Terms { sides: manifest.sides, ..terms };
-            checks::promised(&tree, &terms, case, promises)
-        }
-        _ => of_definition(manifest, &tree),
-    };
-    of_tree.iter_mut().filter(|c| c.examined == 0 && c.was_run()).for_each(|c| c.examined = leaves);
-    checks.extend(of_tree);
-    checks
-}
-
-/// The checks of the definition that need the leaves only.
-fn of_definition(manifest: &Manifest, tree: &Tree) -> Vec<CheckResult> {
-    let terms = Terms::of_manifest(manifest);
-    let (results, terms) = match manifest.tree {
-        Kind::Final => {
-            let results = vec![
-                checks::complete::check_holes(tree, &terms),
-                checks::spacing::check_tree(tree, &terms),
-                checks::sides::check_tree(tree, &terms),
-                checks::kept::check_tree(tree, &terms, manifest),
-                checks::balance::check_tree(tree, &terms.root),
-                checks::layer::check_tree(tree, &terms),
-            ];
-            (results, terms)
-        }
-        // T0 precedes deletion and gradation.
-        Kind::Base => {
-            let kept = checks::kept::check_tree(tree, &terms, manifest);
-            let terms = Terms { keep: Keep::All, keep_crossing: true, ..terms };
-            let results = vec![
-                checks::complete::check_holes(tree, &terms),
-                checks::spacing::check_tree(tree, &terms),
-                checks::sides::check_tree(tree, &terms),
-                kept,
-            ];
-            (results, terms)
-        }
-    };
-    results.into_iter().map(|result| checks::with_premise(result, tree, None, &terms)).collect()
 }

@@ -120,16 +120,20 @@ mod tests {
     fn a_record_is_read_back_unchanged() {
         let place = tempfile::tempdir().unwrap();
         let mut set = leaf_set(vec![words_of(|o| o.level == 0)]);
-        for (extra_leaves, holds) in [(0, true), (1, false)] {
+        // What was read is not overwritten.
+        for (extra_leaves, holds, [name, other]) in
+            [(0, true, ["a.json", "b.json"]), (1, false, ["c.json", "d.json"])]
+        {
             set.manifest.leaves += extra_leaves;
             set.write(place.path()).unwrap();
             let record = AuditRecord::of(&audit(place.path(), &AuditOptions::default()));
-            let path = place.path().join("audit.json");
+            let path = place.path().join(name);
             record.write(&path).unwrap();
             assert_eq!(AuditRecord::read(&path).unwrap(), record);
             assert_eq!((record.holds, record.leaves), (holds, 8));
             let manifest = record.checks.iter().find(|c| c.name == "manifest").unwrap();
             assert_eq!(manifest.findings > 0, !holds);
+            let path = place.path().join(other);
             AuditRecord { schema: "octree-audit/9".to_owned(), ..record }.write(&path).unwrap();
             let why = AuditRecord::read(&path).unwrap_err();
             let file = path.display();

@@ -1,8 +1,9 @@
 use super::*;
+use crate::checks::CAPACITY;
 use crate::promises::Touching;
 use contract::import::htg::ImportedTree;
 use contract::leafset::LeafSet;
-use contract::manifest::Sides;
+use contract::manifest::{Keep, Sides};
 use contract::testing::{leaf_set, random_words, words_of};
 use proptest::prelude::*;
 
@@ -53,8 +54,7 @@ fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
     let dir = tempfile::tempdir().unwrap();
     leaf_set(vec![words]).write(dir.path()).unwrap();
     let names = |promises: &Promises| {
-        let requirements = Requirements::Promises(promises, None);
-        let report = audit_against(dir.path(), &AuditOptions::default(), requirements);
+        let report = audit_against(dir.path(), &AuditOptions::default(), None, promises);
         let names: Vec<_> = report.checks.iter().map(|check| check.name).collect();
         (names, found(&report))
     };
@@ -116,30 +116,31 @@ fn a_promise_of_sides_is_not_checked_if_the_mesh_has_none() {
     let text = "spacing_min = 2.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
     let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
     let case = Case::from_parts(text, vec![facet]).unwrap();
-    let sides = Some(crate::promises::Sides { band_cells: 0.0 });
+    let sides = Some(crate::promises::Sides { band_cells: 0.25 });
     let promises = Promises { sides, ..Promises::default() };
     for known in [true, false] {
         let mut set = leaf_set(vec![words_of(|o| o.level < 2)]);
         set.manifest.sides = if known { Sides::Known } else { Sides::Unknown };
         let dir = tempfile::tempdir().unwrap();
         set.write(dir.path()).unwrap();
-        let requirements = Requirements::Promises(&promises, Some(&case));
-        let report = audit_against(dir.path(), &AuditOptions::default(), requirements);
+        let report = audit_against(dir.path(), &AuditOptions::default(), Some(&case), &promises);
         let check = report.checks.iter().find(|check| check.name == "sides").unwrap();
         assert_eq!(check.was_run(), known, "{report}");
         let claims = report.checks.iter().find(|check| check.name == "manifest").unwrap();
         let claims: Vec<&str> = claims.findings.iter().map(|f| f.detail.as_str()).collect();
         let level = "level_surface: 0 in the manifest, but 2 in fact";
         assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest, but 4 in fact"]);
-        // Leaves that the facet crosses are not judged, and are not counted.
+        // Leaves near the facet are not judged, and are not counted.
         assert!(!known || check.examined > 0 && check.examined < 64, "{report}");
     }
 }
 
 #[test]
 fn the_report_states_each_check_and_whether_leaves_were_checked() {
+    let mut layer = CheckResult::new("layer");
+    layer.lacks("no layer");
     let mut report = AuditReport {
-        checks: vec![CheckResult::new("manifest"), CheckResult::nothing("layer", "no layer")],
+        checks: vec![CheckResult::new("manifest"), layer],
         leaves: 3_000_000,
         nodes: 12,
         time_read_s: 0.25,
@@ -156,6 +157,23 @@ fn the_report_states_each_check_and_whether_leaves_were_checked() {
     report.checks.remove(2);
     report.checks[0].report("a finding".to_owned());
     assert!(!report.holds() && report.checked_anything());
+}
+
+#[test]
+fn a_report_that_contradicts_itself_is_a_bug() {
+    let correct = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
+    let faults: [fn(&mut AuditReport); 5] = [
+        |r| r.checks.clear(),
+        |r| r.checks.push(r.checks[0].clone()),
+        |r| r.nodes = 20 * r.leaves,
+        |r| r.time_read_s = r.time_wall_s + 1.0,
+        |r| r.checks[0].findings_total += 1,
+    ];
+    for fault in faults {
+        let mut wrong = correct.clone();
+        fault(&mut wrong);
+        assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong}");
+    }
 }
 
 /// The audit must not pass if memory does not suffice, but it still checks counts and digests.

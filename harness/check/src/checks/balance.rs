@@ -8,38 +8,44 @@
 use std::fmt::Write;
 
 use super::gap::{ALL_AXES, Gap};
-use super::{CheckResult, Subject, hanging};
+use super::{Check, CheckResult, Subject, hanging, several_levels};
 use crate::promises::Touching;
 use contract::lattice::Root;
 use contract::tree::Tree;
 
-const NAME: &str = "balance";
+pub(super) const CHECK: Check = Check {
+    name: "balance",
+    wanted: |subject| {
+        subject.promises.balance.is_some()
+            || subject.promises.definition
+                && subject.manifest.tree == contract::manifest::Tree::Final
+    },
+    needs: several_levels,
+    run,
+};
 
-/// Checks the mesh and counts hanging nodes.
-pub fn check(subject: &Subject) -> CheckResult {
-    let tree = subject.tree_with_deleted();
-    let mut result = check_tree(tree, &subject.terms.root);
-    result.examined = subject.mesh.words.len() as u64;
+fn run(subject: &Subject, result: &mut CheckResult) {
+    let (tree, root) = (subject.tree_with_deleted(), &subject.terms.root);
+    if let Some(touching) = subject.promises.balance {
+        return touching_leaves(subject.tree(), root, touching, subject.promises.levels(), result);
+    }
+    touching_leaves(tree, root, Touching::Corner, 1, result);
     let counts = hanging::count(tree);
     if let Some(edge) = &counts.worst {
-        result.report(format!(
-            "more than one hanging node on an edge of {}",
-            subject.terms.root.describe(edge)
-        ));
+        result.report(format!("more than one hanging node on an edge of {}", root.describe(edge)));
     }
     let [none, one, more] = counts.edges;
     let _ = write!(result.note, "leaf edges with 0, 1, more hanging nodes: {none}, {one}, {more}");
-    result
 }
 
-/// Checks the 2:1 balance of a tree over faces, edges and corners.
-pub fn check_tree(tree: &Tree, root: &Root) -> CheckResult {
-    check_touching(tree, root, Touching::Corner, 1)
-}
-
-/// Checks that leaves that touch in this way differ by at most `levels` levels.
-pub fn check_touching(tree: &Tree, root: &Root, touching: Touching, levels: u8) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
+/// Leaves that touch in this way differ by at most `levels` levels.
+fn touching_leaves(
+    tree: &Tree,
+    root: &Root,
+    touching: Touching,
+    levels: u8,
+    result: &mut CheckResult,
+) {
     let (how, directions): (_, &[[i64; 3]]) = match touching {
         Touching::Corner => ("touch", &ALL_AXES),
         Touching::Edge => ("share part of an edge or face", &[[1, 1, 0], [0, 1, 1], [1, 0, 1]]),
@@ -47,8 +53,7 @@ pub fn check_touching(tree: &Tree, root: &Root, touching: Touching, levels: u8) 
     };
     let what = &format!("leaves that {how} differ by {} levels or more", levels + 1);
     // Distances are integers: octants less than one cell apart touch.
-    Gap { tree, root, margin: &|_| Some(1), directions, levels, what }.check(&mut result);
-    result
+    Gap { tree, root, margin: &|_| Some(1), directions, levels, what }.check(result);
 }
 
 #[cfg(test)]
@@ -58,6 +63,16 @@ mod tests {
     use contract::testing::{graded_words, octants_of, random_words, words_of};
     use contract::word;
     use proptest::prelude::*;
+
+    fn check_touching(tree: &Tree, root: &Root, touching: Touching, levels: u8) -> CheckResult {
+        let mut result = CheckResult::new("balance");
+        touching_leaves(tree, root, touching, levels, &mut result);
+        result
+    }
+
+    fn check_tree(tree: &Tree, root: &Root) -> CheckResult {
+        check_touching(tree, root, Touching::Corner, 1)
+    }
 
     const ROOT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 

@@ -1,40 +1,78 @@
 //! Kept and deleted leaves tile the root.
 //!
-//! Sections 5 and 7 of reference/DEFINITION.md. With T0 the check is exact: leaves fill every kept T0 leaf,
-//! every deleted T0 leaf is empty, those in enclosed components included, and no leaf is coarser than T0. Without T0 the boundary of every hole must
-//! be one that deletion can leave: a leaf lacks a neighbour across a face only if the definition may delete the
-//! neighbours of such a leaf. Without T0 the check cannot detect a missing leaf if all leaves around it may
-//! lack neighbours, for example a crossing leaf among crossing leaves.
+//! Sections 5 and 7 of reference/DEFINITION.md. With the case the check is exact: leaves fill every kept leaf of T0,
+//! every deleted one is empty, those in enclosed components included, and no leaf is coarser than T0. Without it the boundary of
+//! every hole must be one that deletion can leave: a leaf lacks a neighbour across a face only if the definition may delete the
+//! neighbours of such a leaf. Then the check cannot detect a missing leaf if all leaves around it may
+//! lack neighbours, for example a crossing leaf among crossing leaves. A promise of less than the definition is judged beyond a
+//! band around the geometry ([`super::region`]).
 
 use std::fmt::Write;
 
 use super::contact::{self, Contacts};
-use super::{CheckResult, Subject, Terms};
-use contract::manifest::Keep;
+use super::region::Survey;
+use super::truth::{Found, Truth};
+use super::{Check, CheckResult, Subject, Terms, some_leaves};
+use contract::manifest::{Keep, Sides};
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
-const NAME: &str = "complete";
+pub(super) const CHECK: Check = Check {
+    name: "complete",
+    wanted: |subject| subject.promises.definition || subject.promises.complete,
+    needs: |subject| if subject.case.is_some() { None } else { some_leaves(subject) },
+    run,
+};
 
-/// Compares the mesh with T0. Without T0, checks the boundaries of holes.
-pub fn check(subject: &Subject) -> CheckResult {
-    let tree = subject.tree();
-    let mut result = match subject.tree_base() {
-        Some(base) => {
-            let (terms, result) = (&subject.terms, CheckResult::new(NAME));
-            let mut pair = Pair { tree, base, terms, enclosed: enclosed(subject), result };
-            pair.compare(tree.root(), base.root(), Octant::ROOT);
-            pair.result
+fn run(subject: &Subject, result: &mut CheckResult) {
+    let (tree, terms) = (subject.tree(), &subject.terms);
+    let deletes = terms.keep != Keep::All || !terms.keep_crossing;
+    if !subject.promises.definition && deletes {
+        return Survey::of(subject, result, Survey::check_complete);
+    }
+    match subject.truth() {
+        Some(truth) => {
+            truth.compare(tree, &mut |found| compare(&found, terms, result));
+            if let Some(base) = subject.tree_base() {
+                truth.compare(base, &mut |found| {
+                    if found.is_hole() {
+                        let what = "T0 does not tile the root; it has no leaf in";
+                        report(result, what, &found.octant, terms);
+                    }
+                });
+            }
         }
-        None => check_holes(tree, &subject.terms),
-    };
-    result.examined = subject.mesh.words.len() as u64;
-    let leaves = subject.mesh.words.iter().filter(|&&w| word::fault(w).is_none());
-    let volume: u128 = leaves.map(|&w| u128::from(word::span(word::level(w)))).sum();
+        None if terms.sides == Sides::Unknown && deletes => {
+            return result.lacks(super::UNKNOWN_SIDES);
+        }
+        None => check_holes(tree, terms, result),
+    }
+    let volume: u128 = (0..)
+        .zip(subject.pass.tally.by_level)
+        .map(|(level, leaves)| u128::from(leaves) * u128::from(word::span(level)))
+        .sum();
     let fraction = volume as f64 / word::KEY_END as f64;
     let _ = write!(result.note, "the mesh fills {:.6} % of the root", 100.0 * fraction);
-    result
+}
+
+fn compare(found: &Found, terms: &Terms, result: &mut CheckResult) {
+    let what = match found.base {
+        None => "a leaf is coarser than T0:",
+        Some(kind) => match (Truth::keeps(kind, terms), found.is_hole()) {
+            (true, true) => "the mesh has a hole:",
+            (false, false) if terms.keeps(Truth::side(kind) as Kind) => {
+                "an enclosed T0 leaf still exists, at least in part:"
+            }
+            (false, false) => "a T0 leaf that must be deleted still exists, at least in part:",
+            _ => return,
+        },
+    };
+    report(result, what, &found.octant, terms);
+}
+
+fn report(result: &mut CheckResult, what: &str, octant: &Octant, terms: &Terms) {
+    result.report_with(|| format!("{what} {}", terms.root.describe(octant)));
 }
 
 impl Terms {
@@ -51,14 +89,13 @@ impl Terms {
 }
 
 /// Checks the boundaries of holes, from the leaves only.
-pub fn check_holes(tree: &Tree, terms: &Terms) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
+fn check_holes(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     if tree.root() == Handle::HOLE {
         // A body that fills the root leaves an empty mesh, unless nothing is ever deleted.
         if terms.keep == Keep::All && terms.keep_crossing {
             result.report("the mesh has no leaves, although nothing is deleted".to_owned());
         }
-        return result;
+        return;
     }
     let matters = |kind: Kind, level: u8| !terms.may_face_hole(kind, level);
     Contacts { tree, sought: HOLES, matters: &matters }.visit(&mut |octant, kind, across| {
@@ -69,76 +106,6 @@ pub fn check_holes(tree: &Tree, terms: &Terms) -> CheckResult {
             });
         }
     });
-    result
-}
-
-/// The leaves of T0 in enclosed components, sorted.
-fn enclosed(subject: &Subject) -> Vec<u64> {
-    let Some((words, components)) = subject.components() else { return Vec::new() };
-    let leaves = components.iter().filter(|c| c.enclosed).flat_map(|c| &c.leaves);
-    let mut enclosed: Vec<u64> = leaves.map(|&i| words[i as usize]).collect();
-    enclosed.sort_unstable();
-    enclosed
-}
-
-/// The final tree and T0, traversed together.
-struct Pair<'a> {
-    tree: &'a Tree,
-    base: &'a Tree,
-    terms: &'a Terms,
-    /// Leaves of T0 that are deleted whatever their side.
-    enclosed: Vec<u64>,
-    result: CheckResult,
-}
-
-impl Pair<'_> {
-    fn compare(&mut self, handle: Handle, base: Handle, octant: Octant) {
-        if let Some(kind) = base.as_leaf() {
-            self.compare_leaf(handle, kind, octant);
-        } else if base == Handle::HOLE {
-            self.report("T0 does not tile the root; it has no leaf in", octant);
-        } else if handle.as_leaf().is_some() {
-            self.report("a leaf is coarser than T0:", octant);
-        } else {
-            let level = octant.level;
-            for d in 0..8 {
-                let (handle, base) =
-                    (self.tree.child(handle, d, level), self.base.child(base, d, level));
-                self.compare(handle, base, octant.child(d));
-            }
-        }
-    }
-
-    /// Compares the content of the mesh with a T0 leaf.
-    fn compare_leaf(&mut self, handle: Handle, kind: Kind, octant: Octant) {
-        let leaf =
-            word::key_of(octant.corner) << 7 | u64::from(octant.level) << 2 | u64::from(kind);
-        let enclosed = self.enclosed.binary_search(&leaf).is_ok();
-        let keeps = self.terms.keeps(kind) && !enclosed;
-        if enclosed && handle != Handle::HOLE {
-            self.report("an enclosed T0 leaf still exists, at least in part:", octant);
-        } else if !keeps && handle != Handle::HOLE {
-            self.report("a T0 leaf that must be deleted still exists, at least in part:", octant);
-        } else if keeps && self.tree.kinds(handle) & HOLES != 0 {
-            let hole = self.first_hole(handle, octant);
-            self.report("the mesh has a hole:", hole);
-        }
-    }
-
-    /// The first hole in an octant that has one.
-    fn first_hole(&self, handle: Handle, octant: Octant) -> Octant {
-        let child = |d| (self.tree.child(handle, d, octant.level), octant.child(d));
-        let has_hole = |&(handle, _): &(Handle, Octant)| self.tree.kinds(handle) & HOLES != 0;
-        match handle.is_node().then(|| (0..8).map(child).find(has_hole)).flatten() {
-            Some((handle, octant)) => self.first_hole(handle, octant),
-            None => octant,
-        }
-    }
-
-    fn report(&mut self, what: &str, octant: Octant) {
-        let root = &self.terms.root;
-        self.result.report_with(|| format!("{what} {}", root.describe(&octant)));
-    }
 }
 
 #[cfg(test)]
@@ -156,7 +123,11 @@ mod tests {
         for (lacks, percent) in [("", "100.000000"), ("7", "87.500000"), ("3.7", "98.437500")] {
             let side = |o: &Octant| (o.path() != lacks).then_some(Side::Outside);
             let words = words_with_sides(|o| o.level == 0 || o.path() == "3", side);
-            let result = check(&Subject::new(&case, &leaf_set(vec![words])));
+            let mesh = leaf_set(vec![words]);
+            let [result] = &super::super::only(&Subject::new(&case, &mesh), &["complete"])[..]
+            else {
+                panic!()
+            };
             assert_eq!(result.note, format!("the mesh fills {percent} % of the root"));
         }
     }
@@ -168,7 +139,9 @@ mod tests {
             [(Keep::All, true, 1), (Keep::All, false, 0), (Keep::Outside, true, 0)]
         {
             let terms = Terms { keep, keep_crossing, ..Terms::of_manifest(&manifest) };
-            assert_eq!(check_holes(&Tree::default(), &terms).findings_total, findings);
+            let mut result = CheckResult::new("complete");
+            check_holes(&Tree::default(), &terms, &mut result);
+            assert_eq!(result.findings_total, findings);
         }
     }
 }

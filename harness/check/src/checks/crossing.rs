@@ -1,99 +1,92 @@
 //! Crossing leaves are exactly those that facets cross.
 //!
-//! Sections 2 and 7 of reference/DEFINITION.md. With T0: a leaf of T0 is crossing iff a facet crosses it, and a
-//! leaf of the mesh is crossing iff the T0 leaf that contains it is. Without T0: a leaf that a facet crosses is
-//! crossing, and a crossing leaf is crossed or, if it is finer than the surface, lies in a crossed octant of
-//! the surface's level. The check ignores facets outside the root, and does not detect a missing crossing leaf
-//! (`complete` does).
+//! Sections 2 and 7 of reference/DEFINITION.md: a leaf is crossing iff a facet crosses the leaf of T0 that contains it. As a
+//! promise of its own, without a T0: a leaf that a facet crosses is crossing, and a crossing leaf is crossed or, if it is
+//! finer than the surface, lies in a crossed octant of the surface's level. There is no band: one facet in one point decides.
+//! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does).
 
-use super::facets::{Facets, Visit};
-use super::{CheckResult, Subject, components, identical, valid_leaves};
-use contract::word::{self, Side};
+use super::surface::Crossed;
+use super::truth::Truth;
+use super::{Check, CheckResult, Subject, UNKNOWN_SIDES, contact};
+use contract::manifest::Sides;
+use contract::octant::Octant;
+use contract::tree::{Kind, Tree};
+use contract::word::Side;
 
-const NAME: &str = "crossing";
+pub(super) const CHECK: Check = Check {
+    name: "crossing",
+    wanted: |subject| {
+        subject.promises.crossing || subject.promises.definition && subject.case.is_some()
+    },
+    needs: super::nothing,
+    run,
+};
 
-/// Checks T0 and the mesh or, without T0, the mesh alone.
-pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    let facets = subject.facets();
-    match subject.base {
-        Some(base) => {
-            let words = valid_leaves(&base.words);
-            exact(facets, &words, &mut result, &subject.terms.root);
-            let differs = |w, base| is_crossing(w) != is_crossing(base);
-            inherited(subject, &words, &differs, &mut result);
-        }
-        None => without_base(subject, facets, &mut result),
+const CROSSING: Kind = Side::Crossing as Kind;
+
+fn run(subject: &Subject, result: &mut CheckResult) {
+    if subject.terms.sides == Sides::Unknown {
+        return result.lacks(UNKNOWN_SIDES);
     }
-    result.examined = subject.mesh.words.len() as u64;
-    result
+    let (Some(facets), Some(truth)) = (subject.facets(), subject.truth()) else {
+        return result.lacks(super::NO_GEOMETRY);
+    };
+    if !subject.promises.definition {
+        return by_itself(subject, &Crossed::new(facets, &subject.terms, None), result);
+    }
+    of_truth("", subject.tree(), truth, subject, result);
+    if let Some(base) = subject.tree_base() {
+        of_truth("T0: ", base, truth, subject, result);
+    }
 }
 
-/// Whether the side of a leaf is crossing.
-fn is_crossing(word: u64) -> bool {
-    word & 3 == Side::Crossing as u64
-}
-
-/// Every leaf of T0 is crossing iff a facet crosses it.
-fn exact(facets: &Facets, words: &[u64], result: &mut CheckResult, root: &contract::lattice::Root) {
-    facets.walk(words, &mut |visit, _, crossed| {
-        if let Visit::Leaf(i) = visit
-            && crossed != is_crossing(words[i])
-        {
-            let what = if crossed { "a facet crosses" } else { "no facet crosses" };
-            result.report_with(|| format!("{what} the T0 {}", identical::describe(words[i], root)));
+/// Leaves are crossing iff those of T0 are that contain them.
+fn of_truth(prefix: &str, tree: &Tree, truth: &Truth, subject: &Subject, result: &mut CheckResult) {
+    truth.compare(tree, &mut |found| {
+        let Some(kind) = found.base.filter(|_| !found.is_hole()) else { return };
+        let crossed = kind == CROSSING;
+        if crossed != (found.kinds == 1 << CROSSING) {
+            report(prefix, crossed, found.kinds, &found.octant, subject, result);
         }
     });
 }
 
-/// Reports every leaf of the mesh whose side differs from that of the T0 leaf that contains it.
-pub(super) fn inherited(
+/// Leaves are crossing iff facets cross them, or the octant of the surface's level around them.
+fn by_itself(subject: &Subject, crossed: &Crossed, result: &mut CheckResult) {
+    let surface = subject.terms.level_surface;
+    // The leaves of an octant follow each other.
+    let mut last = None;
+    crossed.visit(subject.tree(), &mut |octant, kind, facet| {
+        result.examined += 1;
+        let mut inherits = || {
+            let above = octant.ancestor(surface.min(octant.level));
+            let known = last.filter(|&(octant, _)| octant == above);
+            let (_, is_crossed) =
+                *last.insert(known.unwrap_or_else(|| (above, crossed.meets(&above))));
+            is_crossed
+        };
+        let is_right = match facet {
+            Some(_) => kind == CROSSING,
+            None => kind != CROSSING || octant.level > surface && inherits(),
+        };
+        if !is_right {
+            report("", facet.is_some(), 1 << kind, &octant, subject, result);
+        }
+    });
+}
+
+fn report(
+    prefix: &str,
+    crossed: bool,
+    kinds: u8,
+    octant: &Octant,
     subject: &Subject,
-    base: &[u64],
-    differs: &dyn Fn(u64, u64) -> bool,
     result: &mut CheckResult,
 ) {
-    let root = &subject.terms.root;
-    for &w in &valid_leaves(&subject.mesh.words) {
-        if let Some(from) = enclosing(base, w).map(|i| base[i])
-            && differs(w, from)
-        {
-            result.report_with(|| {
-                let (side, leaf) = (word::side(from), identical::describe(w, root));
-                format!("a T0 leaf is {side}, but contains the {leaf}")
-            });
-        }
-    }
-}
-
-/// The index of the one of some sorted leaves that equals or contains this leaf.
-pub(super) fn enclosing(words: &[u64], leaf: u64) -> Option<usize> {
-    let i = components::leaf_at(words, word::octant(leaf).bounds().0)?;
-    (word::level(words[i]) <= word::level(leaf)).then_some(i)
-}
-
-/// Checks the mesh alone.
-fn without_base(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
-    let words = valid_leaves(&subject.mesh.words);
-    let (surface, root) = (subject.terms.level_surface, &subject.terms.root);
-    let mut crossed_at_surface = false;
-    facets.walk(&words, &mut |visit, octant, crossed| {
-        let Visit::Leaf(i) = visit else {
-            if octant.level <= surface {
-                crossed_at_surface = crossed && octant.level == surface;
-            }
-            return;
-        };
-        let in_crossed = octant.level > surface && crossed_at_surface;
-        if crossed && !is_crossing(words[i]) {
-            result.report_with(|| {
-                format!("a facet crosses the {}", identical::describe(words[i], root))
-            });
-        } else if is_crossing(words[i]) && !crossed && !in_crossed {
-            result.report_with(|| {
-                format!("no facet crosses the {}", identical::describe(words[i], root))
-            });
-        }
+    let what = if crossed { "a facet crosses" } else { "no facet crosses" };
+    result.report_with(|| {
+        let (given, leaf) = (contact::name(kinds), subject.terms.root.describe(octant));
+        format!("{prefix}{what} the {given} leaf {leaf}")
     });
 }
 
@@ -101,12 +94,15 @@ fn without_base(subject: &Subject, facets: &Facets, result: &mut CheckResult) {
 mod tests {
     use super::*;
     use contract::case::Case;
-    use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
 
     /// The facet lies in octant 0 of level 1, the surface's level, and there in its child 0. Leaves have level 2.
     #[test]
-    fn without_a_base_tree_a_leaf_finer_than_the_surface_inherits_its_side() {
+    fn as_a_promise_of_its_own_a_leaf_finer_than_the_surface_inherits_its_side() {
+        let check = |subject: Subject| {
+            let crossing = crate::promises::Promises { crossing: true, ..Default::default() };
+            super::super::only(&subject.promising(&crossing), &["crossing"]).remove(0)
+        };
         let text =
             "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
         let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
@@ -115,7 +111,7 @@ mod tests {
             let side = |path: &str| if crossing(path) { Side::Crossing } else { Side::Outside };
             let words = words_with_sides(|o| o.level < 2, |o| Some(side(&o.path())));
             let mesh = leaf_set(vec![words]);
-            let result = check(&Subject::new(&case, &mesh));
+            let result = check(Subject::new(&case, &mesh));
             assert_eq!(result.examined, 64);
             result.findings.into_iter().map(|finding| finding.detail).collect::<Vec<_>>()
         };
@@ -136,7 +132,7 @@ mod tests {
         let side =
             |o: &Octant| Some(if is_crossing(o.path()) { Side::Crossing } else { Side::Outside });
         let mesh = leaf_set(vec![words_with_sides(|o| ["root", "0"].contains(&&*o.path()), side)]);
-        let result = check(&Subject::new(&case, &mesh));
+        let result = check(Subject::new(&case, &mesh));
         let text = &result.findings[0].detail;
         assert!(result.findings_total == 1 && text.contains("octant 1 "), "{result}");
     }

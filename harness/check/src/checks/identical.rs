@@ -4,17 +4,23 @@
 //! reference is the only correct one. The check cannot detect an error that both programs make; the other
 //! checks do.
 
-use super::{CheckResult, Subject};
+use super::{Check, CheckResult, nothing};
 use contract::lattice::Root;
 use contract::word::{self, Leaf};
 
-const NAME: &str = "identical";
+/// Name of the check.
+pub const NAME: &str = "identical";
 
-/// Compares the mesh with the reference; `None` without a reference.
-pub fn check(subject: &Subject) -> Option<CheckResult> {
-    let reference = subject.reference?;
-    Some(compare(&subject.mesh.words, &reference.words, &subject.terms.root))
-}
+pub(super) const CHECK: Check = Check {
+    name: NAME,
+    wanted: |subject| subject.reference.is_some(),
+    needs: nothing,
+    run: |subject, result| {
+        if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference) {
+            *result = compare(&mesh.words, &reference.words, &subject.terms.root);
+        }
+    },
+};
 
 /// Compares two sorted sequences of words. The total is the number of leaves in only one of them, and the one
 /// listed finding is the first difference.

@@ -1,95 +1,84 @@
 //! The mesh has leaves in exactly those components of T0 that are kept, and the manifest counts the components.
 //!
-//! Section 5 of reference/DEFINITION.md. With T0: no leaf lies in a component that is deleted (enclosed, without a
+//! Section 5 of reference/DEFINITION.md. With the case: no leaf lies in a component that is deleted (enclosed, without a
 //! seed, or on the side that is not wanted), every other component has leaves, and the manifest states the numbers
-//! of components and of enclosed leaves (`complete` establishes that no part of a component is missing). Without T0,
-//! see [`check_tree`].
+//! of components and of enclosed leaves (`complete` establishes that no part of a component is missing). Without it,
+//! see [`alone`].
 
 mod alone;
 
-pub use alone::check_tree;
-
 use super::components::Component;
-use super::{CheckResult, Subject, Terms, crossing, identical, valid_leaves};
-use contract::manifest::{Components, EnclosedComponents};
+use super::truth::Truth;
+use super::{Check, CheckResult, Subject, Terms, for_definition, some_leaves};
+use contract::manifest::{Components, EnclosedComponents, Sides};
+use contract::octant::Octant;
+use contract::tree::Tree;
 use contract::word::{self, Side};
 
 /// Name of the check.
 pub const NAME: &str = "kept";
 
-/// Checks the mesh against the components of T0 or, without T0, by itself.
-pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = match subject.components() {
-        Some((words, components)) => with_base(subject, words, components),
-        None => check_tree(subject.tree(), &subject.terms, &subject.mesh.manifest),
-    };
-    result.examined = subject.mesh.words.len() as u64;
-    result
+pub(super) const CHECK: Check = Check {
+    name: NAME,
+    wanted: for_definition,
+    needs: |subject| if subject.truth().is_some() { None } else { some_leaves(subject) },
+    run,
+};
+
+fn run(subject: &Subject, result: &mut CheckResult) {
+    match subject.truth() {
+        Some(truth) => with_truth(subject, truth, result),
+        None if subject.terms.sides == Sides::Unknown => result.lacks(super::UNKNOWN_SIDES),
+        None => alone::check(subject.tree(), &subject.inputs, subject.manifest, result),
+    }
 }
 
-fn with_base(subject: &Subject, words: &[u64], components: &[Component]) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    let found = leaves_by_component(subject, words, components);
-    for (component, (count, example)) in components.iter().zip(found) {
-        kept_or_deleted(component, count, example, &subject.terms, &mut result);
+fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
+    for component in &truth.components {
+        let leaves = component.leaves.iter().map(|&i| word::octant(truth.words[i as usize]));
+        let example = leaves.filter(|leaf| has_leaves(subject.tree(), leaf)).next();
+        kept_or_deleted(component, example, &subject.terms, result);
     }
-    let counts = count(components, &subject.terms);
-    let sets = [("", Some(subject.mesh)), ("T0: ", subject.base)];
-    for (prefix, manifest) in sets.map(|(prefix, set)| (prefix, set.map(|set| &set.manifest))) {
+    let counts = count(&truth.components, &subject.inputs);
+    let base = subject.base.as_ref().map(|(base, _)| &base.manifest);
+    for (prefix, manifest) in [("", Some(subject.manifest)), ("T0: ", base)] {
         if let Some(counted) = manifest.and_then(|m| m.components.as_ref()) {
-            same_counts(prefix, counted, &counts, &subject.terms, &mut result);
+            same_counts(prefix, counted, &counts, &subject.terms, result);
         }
     }
     result.note = note(&counts);
-    if subject.mesh.manifest.components.is_none() {
+    if subject.manifest.components.is_none() {
         result.note += "; the manifest does not count them";
     }
-    result
 }
 
-/// For each component, the number of the mesh's leaves in it and the first of them.
-fn leaves_by_component(
-    subject: &Subject,
-    words: &[u64],
-    components: &[Component],
-) -> Vec<(u64, Option<u64>)> {
-    let mut component_of = vec![None; words.len()];
-    for (c, component) in components.iter().enumerate() {
-        component.leaves.iter().for_each(|&i| component_of[i as usize] = Some(c));
-    }
-    let mut found = vec![(0, None); components.len()];
-    for leaf in valid_leaves(&subject.mesh.words) {
-        if let Some(c) = crossing::enclosing(words, leaf).and_then(|i| component_of[i]) {
-            let (count, first) = &mut found[c];
-            *count += 1;
-            first.get_or_insert(leaf);
-        }
-    }
-    found
+/// Whether a mesh has any leaf in an octant, or one that contains it.
+fn has_leaves(tree: &Tree, octant: &Octant) -> bool {
+    tree.at(octant) != contract::tree::Handle::HOLE
 }
 
 /// A component has leaves in the mesh iff it is kept.
 fn kept_or_deleted(
     component: &Component,
-    count: u64,
-    example: Option<u64>,
+    example: Option<Octant>,
     terms: &Terms,
     result: &mut CheckResult,
 ) {
     let (side, first) = (component.side, &component.first);
     let wanted = terms.keeps(side as u8);
-    let why = match (component.enclosed, terms.seeds.is_empty()) {
+    let enclosed = component.enclosed && terms.deletes_enclosed();
+    let why = match (enclosed, terms.seeds.is_empty()) {
         (true, _) => "is enclosed".to_owned(),
         (false, true) => format!("is {side}"),
         (false, false) => format!("{} a seed", if wanted { "has" } else { "does not have" }),
     };
     let total = component.leaves.len();
-    match (wanted && !component.enclosed, example) {
+    match (wanted && !enclosed, example) {
         (false, Some(leaf)) => result.report_with(|| {
-            let leaf = identical::describe(leaf, &terms.root);
+            let leaf = terms.root.describe(&leaf);
             format!(
-                "a component of {total} leaves of T0 {why} and must be deleted, but the mesh has leaves in it ({count}), \
-                 first the {leaf}"
+                "a component of {total} leaves of T0 {why} and must be deleted, but the mesh has leaves in it, first in the leaf \
+                 of T0 {leaf}"
             )
         }),
         (true, None) => result.report_with(|| {
@@ -101,7 +90,7 @@ fn kept_or_deleted(
 }
 
 /// The components by side, as a manifest states them.
-pub fn count(components: &[Component], terms: &Terms) -> Components {
+fn count(components: &[Component], terms: &Terms) -> Components {
     let of_side = |side| components.iter().filter(|c| c.side == side).count() as u64;
     let enclosed = || components.iter().filter(|c| c.enclosed);
     let first = enclosed().map(|c| c.first).min_by_key(|o| (o.level, word::key_of(o.corner)));

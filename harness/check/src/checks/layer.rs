@@ -9,25 +9,44 @@
 //! 2:1 balance, which `balance` checks: an imbalance is one violation and is reported once.
 
 use super::gap::{ALL_AXES, Gap};
+use super::surface::Crossed;
 use super::trail::Trail;
-use super::{CheckResult, Subject, Terms, contact};
-use contract::manifest::Keep;
+use super::{Check, CheckResult, Subject, Terms, contact, several_levels, some_leaves};
+use contract::manifest::{Keep, Tree as MeshKind};
 use contract::octant::CELLS_PER_EDGE;
 use contract::tree::{DELETED, Kind, Kinds, Region, Tree};
 use contract::word::Side;
 
-const NAME: &str = "layer";
+pub(super) const CHECK: Check = Check {
+    name: "layer",
+    wanted: |subject| {
+        subject.promises.layers
+            || subject.promises.definition && subject.manifest.tree == MeshKind::Final
+    },
+    needs: |subject| {
+        let tree = subject.tree_with_deleted();
+        let is_crossed = tree.kinds(tree.root()) & CROSSING_OR_DELETED != 0;
+        let has_extra_layer = !subject.terms.keep_crossing && is_crossed;
+        let none = subject.terms.layer_cells_min == 1 && !has_extra_layer;
+        let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
+        some_leaves(subject).or_else(|| none.then(why)).or_else(|| several_levels(subject))
+    },
+    run,
+};
 
-/// Checks the mesh, together with the deleted crossing leaves if T0 is known and they are deleted.
-pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = check_tree(subject.tree_with_deleted(), &subject.terms);
-    result.examined = subject.mesh.words.len() as u64;
-    result
+fn run(subject: &Subject, result: &mut CheckResult) {
+    let terms = &subject.terms;
+    match subject.facets().filter(|_| !subject.promises.definition) {
+        // Such a promise says nothing about the sides of leaves.
+        Some(facets) => {
+            let crossed = Crossed::new(facets, terms, subject.promises.surface);
+            check_tree(&crossed.labelled(subject.tree()), terms, result);
+        }
+        None => check_tree(subject.tree_with_deleted(), terms, result),
+    }
 }
 
-/// Checks all layers of a tree, that at the surface included.
-pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
+fn check_tree(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     let n = i64::from(terms.layer_cells_min);
     let margin = |level: u8| {
         let required = terms.keep == Keep::All || level < terms.level_surface;
@@ -36,10 +55,9 @@ pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
     if n > 1 {
         let what = &format!("a layer is thinner than {n} cells");
         Gap { tree, root: &terms.root, margin: &margin, directions: &ALL_AXES, levels: 1, what }
-            .check(&mut result);
+            .check(result);
     }
-    SurfaceLayer { tree, terms }.check_children(&mut Trail::new(tree), &mut result);
-    result
+    SurfaceLayer { tree, terms }.check_children(&mut Trail::new(tree), result);
 }
 
 /// Edge of a cell of this level, in level-19 cells.
@@ -167,6 +185,12 @@ mod tests {
 
     /// Leaves of level 2, and in one octant of level 3, the surface's: the first of them is crossing or deleted, and one cell
     /// away from a coarser leaf.
+    fn checked(tree: &Tree, terms: &Terms) -> CheckResult {
+        let mut result = CheckResult::new("layer");
+        check_tree(tree, terms, &mut result);
+        result
+    }
+
     #[test]
     fn a_deleted_leaf_requires_only_its_neighbours_to_be_fine() {
         let findings = |kind, digit, n, keep_crossing| {
@@ -178,7 +202,7 @@ mod tests {
                 builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
             }
             let terms = terms(n, 3, Keep::Outside, keep_crossing);
-            check_tree(&builder.finish(), &terms).findings_total
+            checked(&builder.finish(), &terms).findings_total
         };
         const CROSSING: Kind = Side::Crossing as Kind;
         for n in 1..=4 {
@@ -197,7 +221,7 @@ mod tests {
             let words = contract::testing::words_with_sides(split, |o| {
                 Some(if o.corner == [0; 3] { side } else { Side::Outside })
             });
-            let result = check_tree(&Tree::of_words(&words), &terms(5, 2, Keep::Outside, true));
+            let result = checked(&Tree::of_words(&words), &terms(5, 2, Keep::Outside, true));
             result.findings_total
         };
         assert_eq!(findings(Side::Crossing), findings(Side::Outside));
@@ -218,7 +242,7 @@ mod tests {
             // Crossing leaves finer than the surface require the extra layer only, which `is_thin` does not model.
             let at_surface = |w: &&u64| word::side(**w) != Side::Crossing || word::level(**w) == surface;
             let words: Vec<u64> = words.iter().filter(at_surface).copied().collect();
-            let result = check_tree(&Tree::of_words(&words), &terms);
+            let result = checked(&Tree::of_words(&words), &terms);
             prop_assert_eq!(result.holds(), !is_thin(&words, &terms), "{}", result);
         }
     }

@@ -6,35 +6,43 @@
 
 use std::fmt::Debug;
 
-use super::{CheckResult, Subject, Terms};
-use contract::digest::Digest;
-use contract::leafset::LeafSet;
-use contract::manifest::{Components, Manifest, Tally, Tree};
+use super::{Check, CheckResult, Pass, Subject, Terms, always, nothing};
+use contract::manifest::{BySide, Components, Geometry, Manifest, Sides, Tree};
 
-const NAME: &str = "manifest";
+pub(super) const CHECK: Check = Check { name: "manifest", wanted: always, needs: nothing, run };
 
-/// Checks the manifest of the mesh and, if it is known, that of T0.
-pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    let sets = [("", Some(subject.mesh), Tree::Final), ("T0: ", subject.base, Tree::Base)];
-    for (prefix, set, tree) in sets {
-        if let Some(set) = set {
-            same(prefix, "tree", &set.manifest.tree, &tree, &mut result);
-            against_terms(prefix, &set.manifest, &subject.terms, &mut result);
-            against_leaves(prefix, set, &mut result);
+fn run(subject: &Subject, result: &mut CheckResult) {
+    result.examined = 0;
+    of_leaves("", subject.manifest, &subject.pass, result);
+    of_inputs("", subject.manifest, &subject.inputs, result);
+    if let Some((base, pass)) = &subject.base {
+        // A mesh with an engine's T0 beside it is a final one.
+        same("", "tree", &subject.manifest.tree, &Tree::Final, result);
+        same("T0: ", "tree", &base.manifest.tree, &Tree::Base, result);
+        of_leaves("T0: ", &base.manifest, pass, result);
+        of_inputs("T0: ", &base.manifest, &subject.inputs, result);
+    }
+    for (prefix, manifest) in [
+        ("", Some(subject.manifest)),
+        ("T0: ", subject.base.as_ref().map(|(base, _)| &base.manifest)),
+    ] {
+        // A mesh of another geometry, or one that is older than its geometry.
+        if let (Some(case), Some(claimed)) = (subject.case, manifest.and_then(|m| m.geometry)) {
+            same(prefix, "geometry", &claimed, &Geometry::of(&case.facets_lattice), result);
         }
     }
     // Of different leaves, `identical` reports the cause.
-    if let Some(reference) = subject.reference.filter(|r| r.words == subject.mesh.words) {
-        against_reference(subject, &reference.manifest, &mut result);
+    if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)
+        && mesh.words == reference.words
+    {
+        of_reference(subject, &reference.manifest, result);
     }
-    result
 }
 
 /// The manifest describes the components as that of the equal reference does, if both count them. This is the only check of
 /// the counts in a mesh whose T0 is not known, such as one made on several ranks.
-fn against_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResult) {
-    let mesh = &subject.mesh.manifest;
+fn of_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResult) {
+    let mesh = subject.manifest;
     let mut place = |field: &str, claimed: Option<[f64; 3]>, found: Option<[f64; 3]>| {
         let equal = match (claimed, found) {
             (Some(a), Some(b)) => subject.terms.same_place(a, b),
@@ -63,7 +71,7 @@ fn against_reference(subject: &Subject, reference: &Manifest, result: &mut Check
 }
 
 /// The inputs in the manifest are those of the case.
-fn against_terms(prefix: &str, manifest: &Manifest, terms: &Terms, result: &mut CheckResult) {
+fn of_inputs(prefix: &str, manifest: &Manifest, terms: &Terms, result: &mut CheckResult) {
     let claimed = Terms::of_manifest(manifest);
     same(prefix, "root", &claimed.root, &terms.root, result);
     same(prefix, "level_surface", &claimed.level_surface, &terms.level_surface, result);
@@ -75,36 +83,20 @@ fn against_terms(prefix: &str, manifest: &Manifest, terms: &Terms, result: &mut 
     same(prefix, "enclosed", &claimed.enclosed, &terms.enclosed, result);
 }
 
-fn against_leaves(prefix: &str, set: &LeafSet, result: &mut CheckResult) {
-    let parts: Vec<_> =
-        set.parts.iter().map(|words| (words.len() as u64, Digest::of(words))).collect();
-    against_tally(prefix, &set.manifest, &Tally::of(&set.words), &parts, result);
-}
-
-/// Checks the inputs in the manifest only.
-pub fn check_terms(manifest: &Manifest, terms: &Terms, result: &mut CheckResult) {
-    against_terms("", manifest, terms, result);
-}
-
-/// Checks the counts and digests only. `parts` are the number of leaves and the digest of each part.
-pub fn check_leaves(manifest: &Manifest, tally: &Tally, parts: &[(u64, Digest)]) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    against_tally("", manifest, tally, parts, &mut result);
-    result
-}
-
-fn against_tally(
-    prefix: &str,
-    manifest: &Manifest,
-    tally: &Tally,
-    parts: &[(u64, Digest)],
-    result: &mut CheckResult,
-) {
+fn of_leaves(prefix: &str, manifest: &Manifest, pass: &Pass, result: &mut CheckResult) {
+    let Pass { tally, parts, .. } = pass;
     result.examined += tally.leaves;
     same(prefix, "leaves", &manifest.leaves, &tally.leaves, result);
     same(prefix, "leaves_by_level", &manifest.leaves_by_level, &tally.by_level, result);
     same(prefix, "leaves_by_side", &manifest.leaves_by_side, &tally.by_side, result);
     same(prefix, "digest", &manifest.digest, &tally.digest, result);
+    let BySide { outside, inside, crossing } = tally.by_side;
+    if manifest.sides == Sides::Unknown && outside < tally.leaves {
+        result.report(format!(
+            "{prefix}sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
+            tally.leaves
+        ));
+    }
     for (i, (claimed, found)) in manifest.octant_digests.iter().zip(&tally.octants).enumerate() {
         same(prefix, &format!("octant_digests[{i}]"), claimed, found, result);
     }

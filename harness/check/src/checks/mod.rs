@@ -1,8 +1,9 @@
-//! The checks, one per file. The head of each file names the property of reference/DEFINITION.md that it
+//! The checks, one per file, in one table. The head of each file names the property of reference/DEFINITION.md that it
 //! checks, and the errors that it cannot detect.
 //!
-//! A check never trusts the program under test. It derives what it needs from the case, from the leaves and, if
-//! it is known, from the base tree T0, whose own correctness `spacing`, `crossing` and `sides` establish.
+//! A check never trusts the program under test. It derives what it needs from the leaves and, if the case is known, from its
+//! facets: the harness makes T0 itself, with the sides of its leaves ([`truth`]). A T0 of the program under test is compared
+//! with that one.
 
 pub mod balance;
 pub mod complete;
@@ -17,8 +18,9 @@ pub mod kept;
 pub mod layer;
 pub mod linear;
 pub mod manifest;
-mod premise;
-mod promised;
+mod needless;
+mod outcome;
+mod pass;
 mod region;
 mod result;
 pub mod sides;
@@ -27,29 +29,110 @@ mod subject;
 mod surface;
 mod terms;
 pub mod trail;
+pub mod truth;
 
-pub use premise::with_premise;
-pub use promised::promised;
+pub use outcome::Outcome;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
-pub use subject::Subject;
 pub(crate) use subject::valid_leaves;
+pub use subject::{CAPACITY, Subject};
 pub use terms::Terms;
 
-/// Runs all checks of the definition, in the order in which their findings are most helpful. `identical` is omitted
-/// without a reference.
+pub(crate) use needless::NAME as NEEDLESS;
+pub(crate) use pass::Pass;
+
+/// Why what needs sides is not checked.
+const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
+/// Why what needs facets is not checked.
+const NO_GEOMETRY: &str = "the geometry is unknown without a case";
+
+/// A property of meshes.
+#[derive(Clone, Copy, Debug)]
+pub struct Check {
+    /// Its name in reports.
+    pub name: &'static str,
+    /// Whether the mesh must have it.
+    wanted: fn(&Subject) -> bool,
+    /// What the mesh lacks, so that the check could find nothing. A check without its premise cannot fail, so it must not count
+    /// as one that holds.
+    needs: fn(&Subject) -> Option<String>,
+    run: fn(&Subject, &mut CheckResult),
+}
+
+/// All checks, in the order in which findings are most helpful.
+pub const CHECKS: [Check; 13] = [
+    manifest::CHECK,
+    linear::CHECK,
+    complete::CHECK,
+    spacing::CHECK,
+    surface::CHECK,
+    spacing::BOXES,
+    crossing::CHECK,
+    sides::CHECK,
+    kept::CHECK,
+    balance::CHECK,
+    layer::CHECK,
+    needless::CHECK,
+    identical::CHECK,
+];
+
+/// Runs all checks that the subject must pass.
 pub fn all(subject: &Subject) -> Vec<CheckResult> {
-    let results = [
-        manifest::check(subject),
-        linear::check(subject),
-        complete::check(subject),
-        spacing::check(subject),
-        crossing::check(subject),
-        sides::check(subject),
-        kept::check(subject),
-        balance::check(subject),
-        layer::check(subject),
-    ];
-    let (tree, base) = (subject.tree_with_deleted(), subject.tree_base());
-    let noted = results.map(|result| with_premise(result, tree, base, &subject.terms));
-    noted.into_iter().chain(identical::check(subject)).collect()
+    run(subject, |check| (check.wanted)(subject))
+}
+
+/// Runs the checks with these names.
+pub fn only(subject: &Subject, names: &[&str]) -> Vec<CheckResult> {
+    run(subject, |check| names.contains(&check.name))
+}
+
+fn run(subject: &Subject, choose: impl Fn(&Check) -> bool) -> Vec<CheckResult> {
+    let is_of_files =
+        |check: &Check| [manifest::CHECK.name, linear::CHECK.name].contains(&check.name);
+    let chosen = CHECKS.iter().filter(|check| choose(check));
+    // Counts and digests need no tree.
+    let possible = chosen.filter(|check| subject.capacity().is_none() || is_of_files(check));
+    possible.map(|check| check.result(subject)).chain(subject.capacity()).collect()
+}
+
+impl Check {
+    fn result(&self, subject: &Subject) -> CheckResult {
+        let mut result = CheckResult::new(self.name);
+        (self.run)(subject, &mut result);
+        if result.holds() && result.was_run() {
+            result.nothing_to_check = (self.needs)(subject);
+        }
+        match result.was_run() {
+            true if result.examined == 0 => result.examined = subject.pass.tally.leaves,
+            true => {}
+            false => result.examined = 0,
+        }
+        result.check_invariants();
+        result
+    }
+}
+
+/// For checks that need nothing in particular.
+fn nothing(_: &Subject) -> Option<String> {
+    None
+}
+
+fn always(_: &Subject) -> bool {
+    true
+}
+
+fn for_definition(subject: &Subject) -> bool {
+    subject.promises.definition
+}
+
+/// For checks that need leaves of more than one level.
+fn several_levels(subject: &Subject) -> Option<String> {
+    let tree = subject.tree_with_deleted();
+    let level = tree.finest_level(tree.root(), 0);
+    let uniform = tree.coarsest_level(tree.root(), 0) >= level;
+    some_leaves(subject).or_else(|| uniform.then(|| format!("all leaves have level {level}")))
+}
+
+fn some_leaves(subject: &Subject) -> Option<String> {
+    let is_empty = subject.tree_with_deleted().root() == contract::tree::Handle::HOLE;
+    is_empty.then(|| "the mesh has no leaves".to_owned())
 }

@@ -1,7 +1,11 @@
 //! The result of a check.
+//!
+//! Invariants: the listed findings are the first ones, and as many as there are, up to a limit; each is one of this check; a
+//! check that had nothing to check has examined nothing and found nothing. `identical` counts leaves and lists one difference.
 
 use std::fmt;
 
+use super::Outcome;
 use contract::leafset::ReadError;
 
 /// Findings that are listed in full; further ones are counted only.
@@ -49,16 +53,43 @@ impl CheckResult {
         }
     }
 
-    /// The result of a check whose premise is missing.
-    pub fn nothing(name: &'static str, why: impl Into<String>) -> Self {
-        Self { nothing_to_check: Some(why.into()), ..Self::new(name) }
-    }
-
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
     pub fn unreadable(error: &ReadError) -> Self {
         let mut result = Self::new(FILES);
         result.report(error.to_string());
         result
+    }
+
+    /// States that a premise is missing.
+    pub fn lacks(&mut self, why: &str) {
+        self.nothing_to_check = Some(why.to_owned());
+    }
+
+    /// Adds the findings of another result.
+    pub fn append(&mut self, other: &Self) {
+        let room = FINDINGS_LISTED - self.findings.len();
+        self.findings.extend(other.findings.iter().take(room).cloned());
+        self.findings_total += other.findings_total;
+        self.examined += other.examined;
+    }
+
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        let Self { name, examined, findings, findings_total, nothing_to_check, .. } = self;
+        assert!(
+            findings.len() as u64 == (*findings_total).min(FINDINGS_LISTED as u64)
+                || *name == "identical",
+            "{name} lists {} of {findings_total} findings",
+            findings.len()
+        );
+        assert!(
+            findings.iter().all(|finding| finding.check == *name && !finding.detail.is_empty()),
+            "{name} has a finding of another check, or without text: {findings:?}"
+        );
+        assert!(
+            nothing_to_check.is_none() || *findings_total == 0 && *examined == 0,
+            "{name} had nothing to check, examined {examined} objects and has {findings_total} findings"
+        );
     }
 
     /// Whether there are no findings. A check that had nothing to check has none, but shows nothing about the mesh.
@@ -69,6 +100,20 @@ impl CheckResult {
     /// Whether the check examined something.
     pub fn was_run(&self) -> bool {
         self.nothing_to_check.is_none()
+    }
+
+    /// The outcome: a check without findings that examined nothing was left out.
+    pub fn outcome(&self) -> Outcome {
+        if let Some(why) = &self.nothing_to_check {
+            return Outcome::left_out(format!("there is nothing to check: {why}"));
+        }
+        if self.holds() {
+            return Outcome::held(self.examined);
+        }
+        let listed = self.findings.iter().map(|finding| finding.detail.clone());
+        let unlisted = self.findings_total - self.findings.len() as u64;
+        let more = (unlisted > 0).then(|| format!("and {unlisted} more"));
+        Outcome::fail(listed.chain(more).collect::<Vec<_>>().join("\n"))
     }
 
     /// Adds a finding.
@@ -131,8 +176,27 @@ mod tests {
         result.report_with(|| unreachable!("this text is not listed"));
         assert!(!result.holds());
         assert!(result.to_string().ends_with("\n    finding 19\n    and 1 more"));
-        let nothing = CheckResult::nothing("sides", "no leaves");
+        let mut nothing = CheckResult::new("sides");
+        nothing.lacks("no leaves");
         assert!(nothing.holds() && !nothing.was_run());
         assert_eq!(nothing.to_string(), "sides      nothing to check: no leaves");
+    }
+    #[test]
+    fn a_result_that_contradicts_itself_is_a_bug() {
+        let mut correct = CheckResult { examined: 3, ..CheckResult::new("sides") };
+        (0..2 * FINDINGS_LISTED).for_each(|i| correct.report(format!("finding {i}")));
+        correct.check_invariants();
+        type Fault = fn(&mut CheckResult);
+        let faults: [Fault; 4] = [
+            |r| r.findings_total = 3,
+            |r| drop(r.findings.pop()),
+            |r| r.findings[0].check = "balance",
+            |r| r.lacks("nothing"),
+        ];
+        for fault in faults {
+            let mut wrong = correct.clone();
+            fault(&mut wrong);
+            assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong}");
+        }
     }
 }

@@ -1,43 +1,61 @@
-//! Each component has one side, and it is the side that seeds or, without seeds, rays determine.
+//! Each leaf has its side: crossing iff a facet crosses the leaf of T0 that contains it, else the side of its component, which
+//! seeds or, without seeds, rays determine.
 //!
-//! Section 4 of reference/DEFINITION.md. With T0: the components of its leaves (connected through faces) are
-//! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf must
-//! have the side of its component. The manifest must state the number of ambiguous components. Every leaf of the mesh
-//! must have the side of the T0 leaf that contains it. Without T0: no outside leaf shares part of a face with
-//! an inside leaf, and no leaf has a side that is deleted. The check cannot detect that all rays are wrong,
-//! which is possible on a body that is not watertight; the oracles can.
+//! Section 4 of reference/DEFINITION.md. With the case: the components of T0's leaves (connected through faces) are
+//! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf of the mesh and of
+//! an engine's T0 must have the side of T0's leaf. The manifest must state the number of ambiguous components. Without the case:
+//! no outside leaf shares part of a face with an inside leaf, and no leaf has a side that is deleted. The check cannot detect that
+//! all rays are wrong, which is possible on a body that is not watertight; the oracles can. A promise of less than the
+//! definition is judged beyond a band around the geometry ([`super::region`]).
 
 use super::components::Component;
 use super::contact::{self, Contacts};
-use super::{CheckResult, Subject, Terms, crossing, identical};
-use contract::leafset::LeafSet;
-use contract::manifest::Ambiguous;
+use super::region::Survey;
+use super::truth::Truth;
+use super::{Check, CheckResult, Subject, Terms, UNKNOWN_SIDES, some_leaves};
+use contract::manifest::{Ambiguous, Manifest, Sides};
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kind, Tree};
-use contract::word::{self, Side};
+use contract::word::Side;
 
-const NAME: &str = "sides";
-
-/// Checks the mesh against T0 and T0 against seeds or rays or, without T0, the mesh alone.
-pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = check_tree(subject.tree(), &subject.terms);
-    result.examined = subject.mesh.words.len() as u64;
-    if let (Some(base), Some((words, components))) = (subject.base, subject.components()) {
-        crossing::inherited(subject, words, &|w, base| w & 3 != base & 3, &mut result);
-        labelled(components, words, &subject.terms, &mut result);
-        for (prefix, set) in [("", subject.mesh), ("T0: ", base)] {
-            ambiguous(prefix, set, components, &subject.terms, &mut result);
+pub(super) const CHECK: Check = Check {
+    name: "sides",
+    wanted: |subject| subject.promises.definition || subject.promises.sides.is_some(),
+    needs: |subject| match subject.truth() {
+        Some(truth) => {
+            truth.components.is_empty().then(|| "all leaves of T0 are crossing".to_owned())
         }
-        let undecided = components.iter().filter(|c| c.ambiguous).count();
-        result.note = format!("{} components, {undecided} ambiguous", components.len());
+        None => some_leaves(subject).or_else(|| {
+            let kinds = subject.tree().kinds(subject.tree().root()) & !HOLES;
+            (kinds.count_ones() == 1).then(|| "all leaves have the same side".to_owned())
+        }),
+    },
+    run,
+};
+
+fn run(subject: &Subject, result: &mut CheckResult) {
+    if subject.terms.sides == Sides::Unknown {
+        return result.lacks(UNKNOWN_SIDES);
     }
-    result
+    if !subject.promises.definition {
+        return Survey::of(subject, result, Survey::check_sides);
+    }
+    let terms = &subject.terms;
+    not_kept(subject.tree(), subject.tree().root(), Octant::ROOT, terms, result);
+    of_neighbours(subject.tree(), terms, result);
+    let Some(truth) = subject.truth() else { return };
+    of_components("", subject.tree(), truth, subject, result);
+    ambiguous("", subject.manifest, &truth.components, terms, result);
+    if let (Some(tree), Some((base, _))) = (subject.tree_base(), &subject.base) {
+        of_components("T0: ", tree, truth, subject, result);
+        ambiguous("T0: ", &base.manifest, &truth.components, terms, result);
+    }
+    let undecided = truth.components.iter().filter(|c| c.ambiguous).count();
+    result.note = format!("{} components, {undecided} ambiguous", truth.components.len());
 }
 
-/// Checks the sides of neighbours, from the leaves only.
-pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    not_kept(tree, tree.root(), Octant::ROOT, terms, &mut result);
+/// Inside and outside leaves share no face.
+fn of_neighbours(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     let inside = 1 << Side::Inside as u8;
     let matters = |kind: Kind, _: u8| kind == Side::Outside as Kind;
     Contacts { tree, sought: inside, matters: &matters }.visit(&mut |outside, _, across| {
@@ -48,7 +66,33 @@ pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
             });
         }
     });
-    result
+}
+
+/// Leaves have the sides of the leaves of T0 that contain them.
+fn of_components(
+    prefix: &str,
+    tree: &Tree,
+    truth: &Truth,
+    subject: &Subject,
+    result: &mut CheckResult,
+) {
+    let judges = if subject.terms.seeds.is_empty() { "rays" } else { "seeds" };
+    truth.compare(tree, &mut |found| {
+        let Some(kind) = found.base.filter(|_| !found.is_hole()) else { return };
+        let side = Truth::side(kind);
+        if found.kinds == 1 << side as u8 {
+            return;
+        }
+        result.report_with(|| {
+            let (given, leaf) =
+                (contact::name(found.kinds), subject.terms.root.describe(&found.octant));
+            let why = match side {
+                Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
+                _ => format!("{judges} show that its component is {side}"),
+            };
+            format!("{prefix}the leaf is {given}, but {why}: {leaf}")
+        });
+    });
 }
 
 /// Reports leaves whose side is deleted.
@@ -70,31 +114,15 @@ fn not_kept(tree: &Tree, handle: Handle, octant: Octant, terms: &Terms, result: 
     }
 }
 
-/// Every leaf of T0 has the side of its component.
-fn labelled(components: &[Component], words: &[u64], terms: &Terms, result: &mut CheckResult) {
-    let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
-    for component in components {
-        for &i in &component.leaves {
-            if word::side(words[i as usize]) != component.side {
-                let (side, count) = (component.side, component.leaves.len());
-                result.report_with(|| {
-                    let leaf = identical::describe(words[i as usize], &terms.root);
-                    format!("{judges} show that a component of {count} leaves is {side}, but it contains the T0 {leaf}")
-                });
-            }
-        }
-    }
-}
-
 /// The manifest states the number of ambiguous components, and its example is in one of them.
 fn ambiguous(
     prefix: &str,
-    set: &LeafSet,
+    manifest: &Manifest,
     components: &[Component],
     terms: &Terms,
     result: &mut CheckResult,
 ) {
-    let Ambiguous { count, example } = set.manifest.components_ambiguous;
+    let Ambiguous { count, example } = manifest.components_ambiguous;
     let found: Vec<_> = components.iter().filter(|c| c.ambiguous).collect();
     if count != found.len() as u64 {
         let total = found.len();

@@ -2,56 +2,59 @@
 //!
 //! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has at least the level of the surface,
 //! and every leaf whose interior meets the interior of a box has at least the level of the box. T0 is the
-//! smallest such tree: every octant that it splits is crossed and coarser than the surface, or meets a box of a
-//! finer level. Without T0 the check establishes only that leaves are fine enough. It cannot detect needless
-//! refinement by gradation; `identical` does.
+//! smallest such tree: an engine's T0 splits what the harness's own splits, and nothing else. Of the mesh the check
+//! establishes only that leaves labelled crossing are fine enough; `complete` compares all of them with T0, and `needless`
+//! detects needless refinement.
 
-use super::facets::{Facets, Visit};
-use super::{CheckResult, Subject, Terms, identical, valid_leaves};
+use super::{Check, CheckResult, Subject, Terms, for_definition, some_leaves};
 use contract::manifest::ExtentBox;
 use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
-use contract::word::{self, Side};
+use contract::word::Side;
 
-const NAME: &str = "spacing";
+pub(super) const CHECK: Check = Check {
+    name: "spacing",
+    wanted: for_definition,
+    needs: |subject| {
+        let kinds = subject.tree().kinds(subject.tree().root());
+        let without = kinds & 1 << Side::Crossing as u8 == 0 && subject.terms.boxes.is_empty();
+        let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
+        let missing = some_leaves(subject).or_else(|| without.then(uncrossed));
+        missing.filter(|_| subject.base.is_none())
+    },
+    run,
+};
 
-/// Checks the mesh and, if it is known, T0.
-pub fn check(subject: &Subject) -> CheckResult {
-    let mut result = check_tree(subject.tree(), &subject.terms);
-    result.examined = subject.mesh.words.len() as u64;
-    if let (Some(base), Some(tree)) = (subject.base, subject.tree_base()) {
-        boxes_met(tree, &subject.terms, "T0 ", &mut result);
-        least(subject.facets(), &valid_leaves(&base.words), &subject.terms, &mut result);
-        result.examined += base.words.len() as u64;
-    }
-    result
-}
+/// The promise of boxes alone.
+pub(super) const BOXES: Check = Check {
+    name: "boxes",
+    wanted: |subject| !subject.promises.definition && subject.promises.boxes,
+    needs: |subject| subject.terms.boxes.is_empty().then(|| "the case has no boxes".to_owned()),
+    run: |subject, result| boxes_met(subject.tree(), &subject.terms, result),
+};
 
-/// Checks that the leaves of a tree are fine enough.
-pub fn check_tree(tree: &Tree, terms: &Terms) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    boxes_met(tree, terms, "", &mut result);
-    crossing_fine(tree, tree.root(), Octant::ROOT, terms, &mut result);
-    result
-}
-
-/// Checks that every leaf that meets a box has at least the level of the box.
-pub fn check_boxes(tree: &Tree, terms: &Terms) -> CheckResult {
-    let mut result = CheckResult::new("boxes");
-    boxes_met(tree, terms, "", &mut result);
-    match terms.boxes.is_empty() {
-        true => CheckResult::nothing(result.name, "the case has no boxes"),
-        false => result,
-    }
+fn run(subject: &Subject, result: &mut CheckResult) {
+    let (tree, terms) = (subject.tree(), &subject.terms);
+    boxes_met(tree, terms, result);
+    crossing_fine(tree, tree.root(), Octant::ROOT, terms, result);
+    let (Some(base), Some(truth)) = (subject.tree_base(), subject.truth()) else { return };
+    truth.compare(base, &mut |found| {
+        let what = match found.base {
+            None => "a facet or a box requires T0 to split the leaf",
+            Some(_) if found.is_finer => "T0 needlessly splits a leaf; it has",
+            Some(_) => return,
+        };
+        result.report_with(|| format!("{what} {}", terms.root.describe(&found.octant)));
+    });
 }
 
 /// Every leaf that meets a box has at least the level of the box.
-fn boxes_met(tree: &Tree, terms: &Terms, prefix: &str, result: &mut CheckResult) {
+fn boxes_met(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     for extent in &terms.boxes {
         box_met(tree, tree.root(), Octant::ROOT, extent, &mut |leaf| {
             result.report_with(|| {
                 let (leaf, level) = (terms.root.describe(&leaf), extent.level);
-                format!("the {prefix}leaf {leaf} meets a box that requires level {level}")
+                format!("the leaf {leaf} meets a box that requires level {level}")
             });
         });
     }
@@ -99,27 +102,4 @@ fn crossing_fine(
         let (leaf, level) = (terms.root.describe(&octant), terms.level_surface);
         result.report(format!("the crossing leaf {leaf} is coarser than level {level}"));
     }
-}
-
-/// T0 is fine enough at the surface, and every split is required.
-fn least(facets: &Facets, words: &[u64], terms: &Terms, result: &mut CheckResult) {
-    facets.walk(words, &mut |visit, octant, crossed| {
-        let surface_splits = crossed && octant.level < terms.level_surface;
-        match visit {
-            Visit::Leaf(i) if surface_splits => {
-                debug_assert_eq!(word::level(words[i]), octant.level);
-                let level = terms.level_surface;
-                result.report_with(|| {
-                    let leaf = identical::describe(words[i], &terms.root);
-                    format!("a facet crosses the T0 {leaf}, which is coarser than level {level}")
-                });
-            }
-            Visit::Split if !surface_splits && terms.box_that_splits(octant).is_none() => {
-                result.report_with(|| {
-                    format!("T0 needlessly splits {}", terms.root.describe(octant))
-                });
-            }
-            _ => {}
-        }
-    });
 }

@@ -2,54 +2,83 @@
 
 use std::cell::OnceCell;
 
-use super::Terms;
-use super::components::{self, Component};
 use super::facets::Facets;
+use super::truth::Truth;
+use super::{CheckResult, Pass, Terms};
+use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset::LeafSet;
-use contract::tree::{Builder, DELETED, Tree};
+use contract::manifest::{Keep, Manifest, Sides, Tree as Kind};
+use contract::tree::{Builder, DELETED, Kind as LeafKind, Tree};
 use contract::word::{self, Side};
 
-/// A mesh and its case, with T0 and a reference if they are known. Trees are built when a check first needs them.
+/// Name of the check that the tree of the mesh and T0 fit their limits.
+pub const CAPACITY: &str = "capacity";
+
+/// A mesh, with its case, the engine's T0 and a reference if they are known. What needs much time is found when a check first
+/// needs it.
 pub struct Subject<'a> {
-    /// The case.
-    pub case: &'a Case,
-    /// The requirements of the case.
+    /// The manifest of the mesh.
+    pub manifest: &'a Manifest,
+    /// The case, if it is known.
+    pub case: Option<&'a Case>,
+    /// The inputs of the case or, without one, of the manifest.
+    pub inputs: Terms,
+    /// The inputs as far as they concern the leaves: T0 precedes deletion.
     pub terms: Terms,
-    /// The final mesh.
-    pub mesh: &'a LeafSet,
-    /// T0: all leaves with their sides.
-    pub base: Option<&'a LeafSet>,
+    /// What the mesh must keep.
+    pub promises: Promises,
+    /// The mesh in memory, if it is there.
+    pub mesh: Option<&'a LeafSet>,
     /// The mesh that `mesh` must equal.
     pub reference: Option<&'a LeafSet>,
-    tree: OnceCell<Tree>,
-    tree_base: OnceCell<Tree>,
-    tree_with_deleted: OnceCell<Tree>,
-    components: OnceCell<(Vec<u64>, Vec<Component>)>,
+    /// The engine's T0, and what a pass over it found.
+    pub(super) base: Option<(&'a LeafSet, Pass)>,
+    pub(crate) pass: Pass,
     facets: OnceCell<Facets>,
+    truth: OnceCell<Option<Truth>>,
+    with_deleted: OnceCell<Tree>,
 }
 
 impl<'a> Subject<'a> {
-    /// The mesh of a case.
+    /// The mesh of a case, in memory.
     pub fn new(case: &'a Case, mesh: &'a LeafSet) -> Self {
+        let pass = Pass::of(mesh, "");
+        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, pass, Some(case)) }
+    }
+
+    /// A mesh in memory, of an unknown case.
+    pub fn alone(mesh: &'a LeafSet) -> Self {
+        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, Pass::of(mesh, ""), None) }
+    }
+
+    /// A mesh by the pass over its leaves.
+    pub(crate) fn of(manifest: &'a Manifest, pass: Pass, case: Option<&'a Case>) -> Self {
+        let inputs = case.map_or_else(|| Terms::of_manifest(manifest), Terms::of_case);
+        let inputs = Terms { sides: manifest.sides, ..inputs };
+        let terms = match manifest.tree {
+            Kind::Final => inputs.clone(),
+            Kind::Base => Terms { keep: Keep::All, keep_crossing: true, ..inputs.clone() },
+        };
         Self {
+            manifest,
             case,
-            terms: Terms::of_case(case),
-            mesh,
-            base: None,
+            inputs,
+            terms,
+            promises: Promises::of_definition(),
+            mesh: None,
             reference: None,
-            tree: OnceCell::new(),
-            tree_base: OnceCell::new(),
-            tree_with_deleted: OnceCell::new(),
-            components: OnceCell::new(),
+            base: None,
+            pass,
             facets: OnceCell::new(),
+            truth: OnceCell::new(),
+            with_deleted: OnceCell::new(),
         }
     }
 
-    /// The subject, which has none yet, with its base tree.
+    /// The subject with the base tree that the engine made.
     pub fn with_base(self, base: &'a LeafSet) -> Self {
-        debug_assert!(self.base.is_none(), "what was found out with another base tree is kept");
-        Self { base: Some(base), ..self }
+        Self { base: Some((base, Pass::of(base, "T0: "))), ..self }
     }
 
     /// The subject with the mesh that it must equal.
@@ -57,58 +86,79 @@ impl<'a> Subject<'a> {
         Self { reference: Some(reference), ..self }
     }
 
-    /// The final mesh as a tree.
+    /// The subject, which must keep these promises instead of the definition.
+    pub fn promising(self, promises: &Promises) -> Self {
+        Self { promises: promises.clone(), ..self }
+    }
+
+    /// The mesh as a tree.
     pub fn tree(&self) -> &Tree {
-        self.tree.get_or_init(|| Tree::of_words(&self.mesh.words))
+        self.pass.tree.as_ref().expect("without a tree, no check of it runs")
     }
 
-    /// T0 as a tree, if it is known.
-    pub fn tree_base(&self) -> Option<&Tree> {
-        self.base.map(|b| self.tree_base.get_or_init(|| Tree::of_words(&b.words)))
+    /// The engine's T0 as a tree.
+    pub(super) fn tree_base(&self) -> Option<&Tree> {
+        self.base.as_ref().and_then(|(_, pass)| pass.tree.as_ref())
     }
 
-    /// The final mesh together with the deleted crossing leaves of T0, if T0 is known. If gradation may have
-    /// refined them before they were deleted (because a box is finer than the surface), their kind is
-    /// [`DELETED`].
+    /// A finding if the tree of the mesh or T0 exceeds its limit, so that the checks that need it cannot run.
+    pub(super) fn capacity(&self) -> Option<CheckResult> {
+        let mut result = CheckResult::new(CAPACITY);
+        let trees = [Some(&self.pass), self.base.as_ref().map(|(_, pass)| pass)];
+        if trees.into_iter().flatten().any(|pass| pass.tree.is_none()) {
+            result.report(
+                "a tree has more distinct octants than the limit and was not checked; increase the limit".to_owned(),
+            );
+        } else if self.case.is_some() && self.truth().is_none() {
+            result.report(format!(
+                "T0 of the case has more than {} leaves, and its mesh was not checked",
+                Truth::LEAVES_MAX
+            ));
+        }
+        (!result.holds()).then_some(result)
+    }
+
+    /// The mesh together with the deleted crossing leaves of T0, if the case is known. If gradation may have refined
+    /// them before they were deleted (because a box is finer than the surface), their kind is [`DELETED`]. A mesh whose sides
+    /// are unknown gets those of T0.
     pub fn tree_with_deleted(&self) -> &Tree {
-        let Some(base) = self.base.filter(|_| !self.terms.keep_crossing) else {
+        let unknown = self.terms.sides == Sides::Unknown;
+        let Some(truth) = self.truth().filter(|_| !self.terms.keep_crossing || unknown) else {
             return self.tree();
         };
-        self.tree_with_deleted.get_or_init(|| {
-            let crossing = Side::Crossing as u8;
-            let kind = if self.terms.has_box_finer_than_surface() { DELETED } else { crossing };
-            let deleted = base.words.iter().filter(|&&w| (w & 3) as u8 == crossing);
-            let mut all: Vec<_> = self.mesh.words.iter().map(|&w| (w, (w & 3) as u8)).collect();
-            all.extend(deleted.map(|&w| (w, kind)));
-            all.sort_unstable();
+        self.with_deleted.get_or_init(|| {
+            let crossing = Side::Crossing as LeafKind;
+            let deleted = if self.terms.has_box_finer_than_surface() { DELETED } else { crossing };
             let mut builder = Builder::default();
-            for (w, kind) in all.into_iter().filter(|&(w, _)| word::fault(w).is_none()) {
-                // `linear` and `complete` report overlaps.
-                let _ = builder.push_leaf(word::key(w), word::level(w), kind);
-            }
+            truth.leaves(self.tree(), &mut |octant, kind, base| {
+                let kind = match kind {
+                    Some(kind) if !unknown => kind,
+                    Some(_) => base.map_or(Side::Outside, Truth::side) as LeafKind,
+                    None if base == Some(crossing) && !self.terms.keep_crossing => deleted,
+                    None => return,
+                };
+                let pushed = builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
+                pushed.expect("the leaves of a tree are in order and do not overlap");
+            });
             builder.finish()
         })
     }
 
-    /// The valid leaves of T0 and their components, if T0 is known.
-    pub(super) fn components(&self) -> Option<(&[u64], &[Component])> {
-        let base = self.base?;
-        let (words, found) = self.components.get_or_init(|| {
-            let words = valid_leaves(&base.words);
-            let found = components::find(&words, &self.terms, &self.case.facets_lattice);
-            (words, found)
-        });
-        Some((words, found))
+    /// T0 of the case with the sides of its leaves; `None` without a case, or if it is too large.
+    pub fn truth(&self) -> Option<&Truth> {
+        let case = self.case?;
+        let make = || Truth::new(self.facets()?, &case.facets_lattice, &self.inputs);
+        self.truth.get_or_init(make).as_ref()
     }
 
     /// The case's facets, prepared for crossing tests.
-    pub(super) fn facets(&self) -> &Facets {
-        self.facets.get_or_init(|| Facets::new(&self.case.facets_lattice))
+    pub(super) fn facets(&self) -> Option<&Facets> {
+        let case = self.case?;
+        Some(self.facets.get_or_init(|| Facets::new(&case.facets_lattice)))
     }
 }
 
-/// The sorted words that are leaves and overlap no earlier one. A check that needs a linear mesh continues with
-/// these; `linear` reports the others.
+/// The sorted words that are leaves and overlap no earlier one.
 pub(crate) fn valid_leaves(words: &[u64]) -> Vec<u64> {
     let mut builder = Builder::default();
     words.iter().copied().filter(|&w| builder.push(w).is_ok()).collect()

@@ -5,12 +5,25 @@
 //! missing from the mesh; `complete` does.
 
 use super::facets::Facets;
-use super::{CheckResult, Terms};
+use super::{Check, CheckResult, NO_GEOMETRY, Terms, nothing};
 use crate::promises::Surface;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::Octant;
 use contract::tree::{Builder, Handle, Kind, Tree};
 use contract::word::{self, Side};
+
+pub(super) const CHECK: Check = Check {
+    name: "surface",
+    wanted: |subject| !subject.promises.definition && subject.promises.surface.is_some(),
+    needs: nothing,
+    run: |subject, result| match subject.facets() {
+        Some(facets) => {
+            let crossed = Crossed::new(facets, &subject.terms, subject.promises.surface);
+            crossed.check(subject.tree(), result);
+        }
+        None => result.lacks(NO_GEOMETRY),
+    },
+};
 
 /// The facets and the depth to which they may reach into a leaf.
 pub struct Crossed<'a> {
@@ -28,9 +41,7 @@ impl<'a> Crossed<'a> {
         Self { facets, terms, tolerance }
     }
 
-    /// Checks the promise.
-    pub fn check(&self, tree: &Tree) -> CheckResult {
-        let mut result = CheckResult::new("surface");
+    fn check(&self, tree: &Tree, result: &mut CheckResult) {
         let level = self.terms.level_surface;
         self.visit(tree, &mut |octant, _, facet| {
             let Some(facet) = facet else { return };
@@ -44,10 +55,15 @@ impl<'a> Crossed<'a> {
                 });
             }
         });
-        match result.examined {
-            0 => CheckResult::nothing(result.name, "the geometry crosses no leaf of the mesh"),
-            _ => result,
+        if result.examined == 0 {
+            result.lacks("the geometry crosses no leaf of the mesh");
         }
+    }
+
+    /// Whether a facet crosses an octant, whatever the tolerance.
+    pub fn meets(&self, octant: &Octant) -> bool {
+        let (low, high) = octant.bounds();
+        self.facets.first_meeting(&self.facets.all(), low, high).is_some()
     }
 
     /// The tree with the sides of its leaves replaced: crossing if a facet crosses a leaf of the surface level, else
@@ -65,7 +81,7 @@ impl<'a> Crossed<'a> {
     }
 
     /// Visits every leaf in Morton order, with a facet that reaches into it deeper than the tolerance.
-    fn visit(&self, tree: &Tree, visit: &mut dyn FnMut(Octant, Kind, Option<u32>)) {
+    pub fn visit(&self, tree: &Tree, visit: &mut dyn FnMut(Octant, Kind, Option<u32>)) {
         self.descend(tree, tree.root(), Octant::ROOT, &self.facets.all(), visit);
     }
 
@@ -122,7 +138,9 @@ mod tests {
 
     fn checked(facet: FacetLattice, tolerance_cells: f64) -> CheckResult {
         let surface = Some(Surface { tolerance_cells });
-        Crossed::new(&Facets::new(&[facet]), &terms(), surface).check(&tree())
+        let mut result = CheckResult::new("surface");
+        Crossed::new(&Facets::new(&[facet]), &terms(), surface).check(&tree(), &mut result);
+        result
     }
 
     #[test]

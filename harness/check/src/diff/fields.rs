@@ -1,7 +1,7 @@
 //! The fields of two manifests that differ, in words.
 
 use contract::lattice::Root;
-use contract::manifest::{BySide, Components, ExtentBox, Manifest, Sides};
+use contract::manifest::{BySide, Components, ExtentBox, Geometry, Manifest, Sides};
 use serde::Serialize;
 use std::fmt::Display;
 
@@ -21,6 +21,9 @@ pub fn differing_inputs(a: (&str, &Manifest), b: (&str, &Manifest)) -> Vec<Strin
         list(m.seeds.iter().map(|&seed| point(m.root.rounded(m.root.to_user(seed)))))
     });
     same("enclosed", &|m| key(&m.enclosed));
+    if a.1.geometry.is_some() && b.1.geometry.is_some() {
+        same("geometry", &|m| geometry(m.geometry.as_ref()));
+    }
     fields
 }
 
@@ -64,6 +67,10 @@ fn key(value: &impl Serialize) -> String {
 
 fn root(root: &Root) -> String {
     format!("{} with edge {}", point(root.origin), root.edge)
+}
+
+fn geometry(of: Option<&Geometry>) -> String {
+    of.map_or(String::new(), |of| format!("{} facets with the digest {}", of.facets, of.digest))
 }
 
 fn extent_box(extent: &ExtentBox, root: &Root) -> String {

@@ -2,13 +2,15 @@
 //! one are unknown, only the cells are compared.
 //!
 //! All leaves are read once, to count and digest them, with memory for one buffer, from the parts or the tree. A comparison that trusts the digests in the
-//! manifests reads only the first octant that differs.
+//! manifests reads only the first octant that differs. Words that are not a linear oct-tree are refused.
+//!
+//! Invariants of a report: octants of level 3 ascend, and differ only if the meshes do; the first difference has an octant, and
+//! rules a first difference; meshes whose roots differ are not the same, whatever their words.
 
 #[cfg(test)]
 mod tests;
 
 pub mod fields;
-mod mesh;
 mod region;
 pub mod rule;
 mod witness;
@@ -20,9 +22,9 @@ use crate::checks::Terms;
 use contract::case::Case;
 use contract::leafset::ReadError;
 use contract::manifest::{Manifest, Sides, Tally};
+use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word;
-use mesh::Mesh;
 
 /// What a comparison trusts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,6 +49,8 @@ pub struct DiffReport {
     pub contradictions: Vec<String>,
     /// Manifest fields that differ, with both values.
     pub fields: Vec<String>,
+    /// Whether the roots differ, to the last bit.
+    pub roots_differ: bool,
     /// Level-3 octants whose digests differ.
     pub octants: Vec<Octant>,
     /// The first difference of the leaves, with the leaves of both meshes.
@@ -59,9 +63,35 @@ pub struct DiffReport {
 const LEAVES_RULED: u64 = 200_000_000;
 
 impl DiffReport {
-    /// Whether the leaves are the same.
+    /// Whether the leaf words are the same.
     pub fn same_leaves(&self) -> bool {
         self.octants.is_empty()
+    }
+
+    /// Whether the meshes are the same: their leaves and their roots.
+    pub fn same_mesh(&self) -> bool {
+        self.same_leaves() && !self.roots_differ
+    }
+
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        let Self { octants, leaf, rules, fields, roots_differ, .. } = self;
+        let key = |octant: &Octant| word::key_of(octant.corner);
+        assert!(
+            octants.iter().all(|octant| octant.level == 3)
+                && octants.is_sorted_by(|a, b| key(a) < key(b)),
+            "octants that differ do not ascend, or are not of level 3: {octants:?}"
+        );
+        assert!(
+            leaf.is_none() || !octants.is_empty(),
+            "equal leaves have a first difference: {leaf:?}"
+        );
+        assert!(rules.is_empty() || leaf.is_some(), "rules without a difference: {rules:?}");
+        let is_listed = fields.iter().any(|field| field.starts_with("root: "));
+        assert!(
+            *roots_differ == is_listed,
+            "roots differ: {roots_differ}, and among the fields: {is_listed}"
+        );
     }
 }
 
@@ -78,11 +108,18 @@ impl fmt::Display for DiffReport {
         }
         if self.same_leaves() {
             let leaves = self.leaves;
-            return match self.compared {
-                Trust::Leaves => write!(f, "the leaves are the same ({leaves} compared)"),
+            match self.compared {
+                Trust::Leaves => write!(f, "the leaves are the same ({leaves} compared)")?,
                 Trust::Manifests => {
-                    write!(f, "the leaves are the same ({leaves}, by the digests in the manifests)")
+                    write!(
+                        f,
+                        "the leaves are the same ({leaves}, by the digests in the manifests)"
+                    )?;
                 }
+            }
+            return match self.roots_differ {
+                true => write!(f, ", but in other roots, so the cells differ"),
+                false => Ok(()),
             };
         }
         let paths: Vec<_> = self.octants.iter().take(OCTANTS_LISTED).map(Octant::path).collect();
@@ -141,6 +178,7 @@ pub fn diff(
             break;
         }
     }
+    report.check_invariants();
     Ok(report)
 }
 
@@ -155,6 +193,7 @@ pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
         compared,
         leaves: a.leaves,
         fields: fields::differing(a, b),
+        roots_differ: a.root != b.root,
         octants,
         ..DiffReport::default()
     }
@@ -164,7 +203,7 @@ pub fn manifests(a: &Manifest, b: &Manifest) -> DiffReport {
 /// whether the manifest contradicts the whole words.
 fn recount(mesh: &mut Mesh, mask: u64) -> Result<bool, ReadError> {
     let (mut whole, mut masked) = (Tally::default(), Tally::default());
-    mesh.visit(|words| {
+    mesh.visit(&mut |words| {
         words.iter().for_each(|&word| whole.add(word));
         if mask != u64::MAX {
             words.iter().for_each(|&word| masked.add(word & mask));
@@ -203,7 +242,7 @@ fn first_difference(
     mask: u64,
 ) -> Result<Option<Differing>, ReadError> {
     let words = |mesh: &Mesh| -> Result<Vec<u64>, ReadError> {
-        let mut words = mesh.octant(index)?;
+        let mut words = mesh.octant(&level_3(index))?;
         words.iter_mut().for_each(|word| *word &= mask);
         Ok(words)
     };
@@ -233,7 +272,12 @@ fn rules(
     if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
         return undecided("unknown: the meshes are too large to be held in memory");
     }
-    let (words_a, words_b) = (a.words()?, b.words()?);
+    let words = |mesh: &Mesh| -> Result<Vec<u64>, ReadError> {
+        let mut all = Vec::new();
+        mesh.visit(&mut |words| all.extend_from_slice(words))?;
+        Ok(all)
+    };
+    let (words_a, words_b) = (words(a)?, words(b)?);
     let terms = Terms::of_manifest(&a.manifest);
     Ok(rule::Dispute { a: &words_a, b: &words_b, terms: &terms, case }.rule(x, y))
 }

@@ -2,7 +2,8 @@ use super::*;
 use contract::import::htg::ImportedTree;
 use contract::leafset;
 use contract::manifest::octant_index;
-use contract::testing::{leaf_set, words_of};
+use contract::testing::{leaf_set, random_words, words_of};
+use proptest::prelude::*;
 
 fn written(words: Vec<u64>) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
@@ -176,4 +177,81 @@ fn a_part_larger_than_the_buffer_is_read_to_its_end() {
     let found = compared(b.path());
     assert_eq!((found.octants, found.contradictions.len()), (vec![level_3(511)], 0));
     assert_eq!(found.rules, ["section 4 (side): give the case file (--case) to decide it"]);
+}
+
+proptest! {
+    #[test]
+    fn a_drawn_change_is_found_at_its_first_leaf(words in random_words(3), at in any::<prop::sample::Index>(), way in 0..3) {
+        prop_assume!(!words.is_empty());
+        let (i, mut changed) = (at.index(words.len()), words.clone());
+        match way {
+            0 => changed[i] = changed[i] & !3 | (changed[i] + 1) & 1,
+            1 => drop(changed.remove(i)),
+            _ => {}
+        }
+        let (a, b) = (written(words.clone()), written(changed.clone()));
+        let report = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+        prop_assert_eq!(report.same_leaves(), changed == words);
+        prop_assert_eq!(report.same_mesh(), changed == words);
+        if changed != words {
+            let octant = word::octant(words[i]);
+            let leaf = report.leaf.unwrap();
+            prop_assert!(leaf.contains(&octant.path()), "{}", leaf);
+        }
+    }
+}
+
+#[test]
+fn meshes_in_different_roots_differ() {
+    let words = words_of(|o| o.level < 2);
+    let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
+    let mut moved = leaf_set(vec![words]);
+    moved.manifest.root.edge = moved.manifest.root.edge.next_up();
+    moved.write(b.path()).unwrap();
+    for trust in [Trust::Leaves, Trust::Manifests] {
+        let report = diff(a.path(), b.path(), None, trust).unwrap();
+        assert!(report.same_leaves() && !report.same_mesh(), "{report}");
+        assert!(
+            report.to_string().ends_with("but in other roots, so the cells differ"),
+            "{report}"
+        );
+    }
+}
+
+#[test]
+fn words_that_are_no_linear_tree_are_refused() {
+    let words = words_of(|o| o.level < 2);
+    let good = written(words.clone());
+    let mut overlapping = words.clone();
+    overlapping.insert(1, words[0]);
+    for bad in [[&words[1..], &words[..1]].concat(), overlapping] {
+        let bad = written(bad);
+        for (a, b) in [(&good, &bad), (&bad, &good), (&bad, &bad)] {
+            let error = diff(a.path(), b.path(), None, Trust::Leaves).unwrap_err();
+            assert!(matches!(error, ReadError::NotLinear { .. }), "{error}");
+        }
+    }
+}
+
+#[test]
+fn a_report_that_contradicts_itself_is_a_bug() {
+    let words = words_of(|o| o.level < 2);
+    let (a, b) = (written(words.clone()), written(words[..60].to_vec()));
+    let correct = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+    let faults: [fn(&mut DiffReport); 5] = [
+        |r| r.octants.clear(),
+        |r| r.octants.reverse(),
+        |r| r.octants[0].level = 2,
+        |r| r.leaf = None,
+        |r| r.roots_differ = true,
+    ];
+    for (i, fault) in faults.iter().enumerate() {
+        let mut wrong = correct.clone();
+        wrong.rules.push("a rule".to_owned());
+        fault(&mut wrong);
+        assert!(
+            std::panic::catch_unwind(|| wrong.check_invariants()).is_err(),
+            "fault {i}: {wrong}"
+        );
+    }
 }

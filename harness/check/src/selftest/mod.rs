@@ -3,7 +3,10 @@
 //!
 //! A corruption that the responsible check misses is a gap in that check, even if another check reports it,
 //! because the next corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a
-//! false alarm and fails the self test, too.
+//! false alarm and fails the self test, too. The audit of the mesh with its case must report every corruption of the mesh.
+//!
+//! Invariants of a report: every corruption of the catalogue was tried or applies to no mesh, and no other was; the expected
+//! check has a finding iff it reported the corruption.
 
 use std::fmt;
 use std::fs;
@@ -11,6 +14,7 @@ use std::path::Path;
 
 use crate::audit::{self, AuditOptions};
 use crate::checks::{self, CheckResult, Subject};
+use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset::{self, LeafSet};
 
@@ -22,7 +26,6 @@ mod kept;
 mod leaves;
 mod manifests;
 mod mutant;
-pub mod scale;
 mod sides;
 mod table;
 
@@ -78,15 +81,18 @@ pub struct Kill {
     pub audit_expected: bool,
     /// Checks of the audit that reported it.
     pub audit_caught_by: Vec<&'static str>,
+    /// Whether the audit with the case misses it, although the mesh on disk is another one.
+    pub whole_audit_missed: bool,
     /// First finding of the check that must report it.
     pub finding: Option<String>,
 }
 
 impl Kill {
-    /// Whether the expected check reported it, in the audit as well if that is expected.
+    /// Whether the expected check reported it, in the audit as well if that is expected. An audit with the case must report any
+    /// corruption of the mesh.
     pub fn killed(&self) -> bool {
         let audited = !self.audit_expected || self.audit_caught_by.contains(&self.expected);
-        self.caught_by.contains(&self.expected) && audited
+        self.caught_by.contains(&self.expected) && audited && !self.whole_audit_missed
     }
 }
 
@@ -99,19 +105,38 @@ pub struct SelftestReport {
     pub alarms: Vec<String>,
     /// Corruptions that applied to no mesh.
     pub unused: Vec<&'static str>,
-    /// Corruptions that were not tried, with the reason.
-    pub left_out: Vec<(&'static str, String)>,
 }
 
 impl SelftestReport {
     /// Whether every corruption applied and was reported, and there were no false alarms.
     pub fn holds(&self) -> bool {
-        self.alarms.is_empty() && self.unused.is_empty() && self.kills.iter().all(Kill::killed)
+        let alarmed = !self.alarms.is_empty() || !self.unused.is_empty() || self.kills.is_empty();
+        !alarmed && self.kills.iter().all(Kill::killed)
     }
 
-    /// Number of trials in which the audit reported a finding.
-    pub fn found_by_audit(&self) -> usize {
-        self.kills.iter().filter(|kill| !kill.audit_caught_by.is_empty()).count()
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        for mutant in catalogue() {
+            let mut trials = self.kills.iter().filter(|kill| kill.mutant == mutant.name).peekable();
+            let is_unused = self.unused.contains(&mutant.name);
+            assert!(
+                trials.peek().is_some() != is_unused,
+                "{} was tried, or it applies nowhere",
+                mutant.name
+            );
+            for kill in trials {
+                assert_eq!(kill.expected, mutant.expected, "the check for {}", mutant.name);
+                let by_expected = kill.caught_by.contains(&kill.expected);
+                assert_eq!(kill.finding.is_some(), by_expected, "the finding for {}", mutant.name);
+            }
+        }
+        let names: Vec<&str> = catalogue().iter().map(|mutant| mutant.name).collect();
+        let known = |name: &&str| names.contains(name);
+        assert!(
+            self.kills.iter().map(|kill| &kill.mutant).all(known),
+            "a corruption of no catalogue"
+        );
+        assert!(self.unused.iter().all(known), "a corruption of no catalogue: {:?}", self.unused);
     }
 }
 
@@ -131,7 +156,8 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
     for correct in &cases {
         let unchanged = Mutation::of(correct);
         let examined = examine(correct, &unchanged, &scratch.join("unchanged"))?;
-        let results = examined.checks.into_iter().chain(examined.audit);
+        let Examined { checks, audit, whole } = examined;
+        let results = checks.into_iter().chain(audit).chain(whole);
         let alarms = results.filter(|r| !r.holds());
         report.alarms.extend(alarms.map(|r| format!("{}: {r}", correct.case.name)));
     }
@@ -140,13 +166,14 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
         for correct in &cases {
             if let Some(mutation) = (mutant.make)(correct) {
                 let examined = examine(correct, &mutation, &scratch.join("mutant"))?;
-                report.kills.push(kill(&mutant, correct, &examined));
+                report.kills.push(kill(&mutant, correct, &mutation, &examined));
             }
         }
         if report.kills.len() == kills {
             report.unused.push(mutant.name);
         }
     }
+    report.check_invariants();
     Ok(report)
 }
 
@@ -154,9 +181,10 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
 struct Examined {
     checks: Vec<CheckResult>,
     audit: Vec<CheckResult>,
+    /// Of the audit with the case.
+    whole: Vec<CheckResult>,
 }
 
-/// Writes a mutation into `dir`, checks and audits it, and removes `dir`.
 fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::Result<Examined> {
     fs::create_dir(dir)?;
     mutation.mesh.write(dir)?;
@@ -170,16 +198,22 @@ fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::
             checks::all(&subject.with_reference(&correct.mesh))
         }
     };
-    let audit = audit::audit(dir, &AuditOptions::default()).checks;
+    let options = AuditOptions::default();
+    let audit = audit::audit(dir, &options).checks;
+    let definition = Promises::of_definition();
+    let whole = audit::audit_against(dir, &options, Some(&correct.case), &definition).checks;
     fs::remove_dir_all(dir)?;
-    Ok(Examined { checks, audit })
+    Ok(Examined { checks, audit, whole })
 }
 
-fn kill(mutant: &Mutant, correct: &SelftestCase, examined: &Examined) -> Kill {
+fn kill(mutant: &Mutant, correct: &SelftestCase, mutation: &Mutation, examined: &Examined) -> Kill {
     let failed = |results: &[CheckResult]| -> Vec<&'static str> {
         results.iter().filter(|r| !r.holds()).map(|r| r.name).collect()
     };
     let expected = examined.checks.iter().find(|r| r.name == mutant.expected);
+    let (before, after) = (&correct.mesh, &mutation.mesh);
+    let is_of_mesh = mutation.tamper.is_some()
+        || (&before.manifest, &before.parts) != (&after.manifest, &after.parts);
     Kill {
         mutant: mutant.name,
         case: correct.case.name.clone(),
@@ -187,6 +221,57 @@ fn kill(mutant: &Mutant, correct: &SelftestCase, examined: &Examined) -> Kill {
         caught_by: failed(&examined.checks),
         audit_expected: mutant.audit,
         audit_caught_by: failed(&examined.audit),
+        whole_audit_missed: is_of_mesh && failed(&examined.whole).is_empty(),
         finding: expected.and_then(|r| r.findings.first()).map(|f| f.detail.clone()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A report in which every corruption was tried once and reported.
+    fn correct() -> SelftestReport {
+        let kill = |mutant: &Mutant| Kill {
+            mutant: mutant.name,
+            case: "a case".to_owned(),
+            expected: mutant.expected,
+            caught_by: vec![mutant.expected],
+            audit_expected: mutant.audit,
+            audit_caught_by: vec![mutant.expected],
+            whole_audit_missed: false,
+            finding: Some("a finding".to_owned()),
+        };
+        let kills = catalogue().iter().map(kill).collect();
+        SelftestReport { kills, ..SelftestReport::default() }
+    }
+
+    #[test]
+    fn a_report_that_contradicts_itself_is_a_bug() {
+        correct().check_invariants();
+        assert!(correct().holds());
+        let faults: [fn(&mut SelftestReport); 6] = [
+            |r| drop(r.kills.pop()),
+            |r| r.unused.push(r.kills[0].mutant),
+            |r| r.kills[0].expected = "files",
+            |r| r.kills[0].caught_by.clear(),
+            |r| r.kills[0].finding = None,
+            |r| r.unused.push("another"),
+        ];
+        for (i, fault) in faults.iter().enumerate() {
+            let mut wrong = correct();
+            fault(&mut wrong);
+            let seen = std::panic::catch_unwind(|| wrong.check_invariants());
+            assert!(seen.is_err(), "fault {i}");
+        }
+    }
+
+    #[test]
+    fn a_corruption_that_the_audit_with_the_case_misses_survives() {
+        let mut report = correct();
+        report.kills[0].whole_audit_missed = true;
+        assert!(
+            !report.holds() && report.to_string().contains("missed by the audit with the case")
+        );
     }
 }

@@ -11,26 +11,16 @@ pub(super) fn write(report: &SelftestReport, f: &mut fmt::Formatter<'_>) -> fmt:
         .alarms
         .iter()
         .try_for_each(|alarm| writeln!(f, "FALSE ALARM on a correct mesh: {alarm}"))?;
-    report
-        .unused
-        .iter()
-        .try_for_each(|name| writeln!(f, "NO MESH to which this applies: {name}"))?;
-    let left_out = &report.left_out;
-    left_out.iter().try_for_each(|(name, why)| writeln!(f, "left out: {name}: {why}"))?;
+    report.unused.iter().try_for_each(|name| writeln!(f, "applies to no case: {name}"))?;
     let names: BTreeSet<_> = report.kills.iter().map(|k| k.mutant).collect();
     let survivors = report.kills.iter().filter(|k| !k.killed()).count();
     let (corruptions, trials, alarms) = (names.len(), report.kills.len(), report.alarms.len());
     write!(
         f,
         "{corruptions} corruptions in {trials} trials: {survivors} survived, {alarms} false alarms"
-    )?;
-    match left_out.len() {
-        0 => Ok(()),
-        count => write!(f, ", {count} left out"),
-    }
+    )
 }
 
-/// The head and one row per trial.
 fn rows(report: &SelftestReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let heads = ("corruption", "case", "expected");
     let width = |of: fn(&Kill) -> usize, head: &str| {
@@ -41,10 +31,11 @@ fn rows(report: &SelftestReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     for kill in &report.kills {
         let verdict = if kill.killed() { "killed" } else { "SURVIVED" };
         let by = kill.caught_by.join(", ");
-        let audit = match kill.audit_caught_by.as_slice() {
-            [] => String::new(),
-            by => format!("; audit: {}", by.join(", ")),
-        };
+        let audit =
+            match kill.audit_caught_by.as_slice() {
+                [] => String::new(),
+                by => format!("; audit: {}", by.join(", ")),
+            } + if kill.whole_audit_missed { "; missed by the audit with the case" } else { "" };
         let Kill { mutant, case: on, expected, .. } = kill;
         writeln!(f, "{mutant:name$}  {on:case$}  {expected:10}  {verdict:8}  {by}{audit}")?;
         if let Some(finding) = &kill.finding {
@@ -78,6 +69,7 @@ mod tests {
             caught_by: caught_by.to_vec(),
             audit_expected: !audit.is_empty(),
             audit_caught_by: audit.to_vec(),
+            whole_audit_missed: false,
             finding: None,
         };
         let mut report = SelftestReport::default();
@@ -97,12 +89,10 @@ mod tests {
             side          a case  sides       killed    sides\n";
         let counts = "2 corruptions in 3 trials: 1 survived, 0 false alarms";
         assert_eq!(report.to_string(), format!("{rows}{counts}"));
-        assert_eq!(report.found_by_audit(), 1);
         report.alarms.push("an alarm".to_owned());
         report.unused.push("unused");
-        report.left_out.push(("left", "why".to_owned()));
-        let rest = "FALSE ALARM on a correct mesh: an alarm\nNO MESH to which this applies: unused\nleft out: left: why\n\
-            2 corruptions in 3 trials: 1 survived, 1 false alarms, 1 left out";
+        let rest = "FALSE ALARM on a correct mesh: an alarm\napplies to no case: unused\n\
+            2 corruptions in 3 trials: 1 survived, 1 false alarms";
         assert_eq!(report.to_string(), format!("{rows}{rest}"));
         assert_eq!(one_line(&"x".repeat(160)), "x".repeat(160));
         assert_eq!(one_line(&"x".repeat(161)), "x".repeat(160) + "...");

@@ -1,8 +1,13 @@
-//! The answer to a question about a point; JSON of the schema `octree-why/1` when serialised.
+//! The answer to a question about a point; JSON of the schema `octree-why/2` when serialised.
+//!
+//! Invariants: the leaf and the leaf of T0 contain the point; every ancestor of the leaf has its split, in order. A chain begins
+//! with the octant that is split; each leaf is finer and near enough for its rule; each further octant is the parent of
+//! the leaf before it, and the cause is one of the last octant. A cause has a facet or a box. Only a point without a leaf is
+//! in a deleted part.
 
 use super::Mesh;
 use super::base::{Cause, Surface};
-use super::chain::{Chain, Link, Rule, SEARCHES_MAX};
+use super::chain::{Chain, Link, Rule};
 use super::side::Decision;
 use contract::lattice::Root;
 use contract::manifest::{self, Keep};
@@ -11,7 +16,7 @@ use contract::word::Side;
 use serde::Serialize;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-why/1";
+pub const SCHEMA: &str = "octree-why/2";
 
 /// Facets that are listed for a cause; further ones are counted only.
 const FACETS_LISTED: usize = 8;
@@ -68,6 +73,8 @@ pub struct Answer {
     pub splits: Vec<Split>,
     /// What could not be explained, and why.
     pub left_out: Vec<String>,
+    #[serde(skip)]
+    pub(super) layer_cells_min: u32,
 }
 
 /// An octant that is split, and why.
@@ -79,8 +86,6 @@ pub struct Split {
     pub links: Vec<LinkRecord>,
     /// The cause in the inputs; none if no rule requires the split.
     pub cause: Option<CauseRecord>,
-    /// Whether no shorter chain exists.
-    pub is_shortest: bool,
 }
 
 /// A leaf that forces the previous octant of a chain to split.
@@ -159,16 +164,94 @@ pub struct Deletion {
     pub rule: String,
 }
 
+impl Answer {
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        let Self { point, leaf, base_leaf, side, deleted_by, splits, .. } = self;
+        for place in leaf.iter().chain(base_leaf) {
+            // The point is rounded to the lattice, and printed coordinates to some decimals.
+            let near = |a: usize| {
+                let slack = (place.max[a] - place.min[a]) / 128.0;
+                (place.min[a] - slack..=place.max[a] + slack).contains(&point[a])
+            };
+            assert!((0..3).all(near), "{point:?} is not in the {}", user_place(place));
+        }
+        if let (Some(leaf), Some(base)) = (leaf, base_leaf) {
+            let (leaf, base) = (&leaf.octant, &base.octant);
+            assert!(
+                leaf.contains(base) || base.contains(leaf),
+                "{leaf} is apart from {base} of T0"
+            );
+        }
+        assert_eq!(leaf.is_some(), side.is_some(), "a leaf has a side, and only a leaf");
+        assert!(
+            deleted_by.is_none() || leaf.is_none(),
+            "the leaf {leaf:?} was deleted: {deleted_by:?}"
+        );
+        let end = leaf.as_ref().or(base_leaf.as_ref()).map(|place| place.octant);
+        assert_eq!(
+            splits.len(),
+            end.map_or(0, |end| usize::from(end.level)),
+            "splits above {end:?}"
+        );
+        for (split, level) in splits.iter().zip(0..) {
+            let octant = &split.octant.octant;
+            assert_eq!(
+                end.map(|end| end.ancestor(level)),
+                Some(*octant),
+                "the split of level {level}"
+            );
+            split.check_invariants(self.layer_cells_min);
+        }
+    }
+}
+
+impl Split {
+    fn check_invariants(&self, layer_cells_min: u32) {
+        let Some(cause) = &self.cause else {
+            return assert!(self.links.is_empty(), "a chain of {:?} leads to no cause", self.links);
+        };
+        let (mut octant, mut is_source, mut ends) = (self.octant.octant, false, false);
+        for link in &self.links {
+            let leaf = link.leaf.octant;
+            assert!(link.octant.octant == octant && !ends, "{link:?} does not follow {octant}");
+            let distance = octant.distance(&leaf);
+            let reach = i64::from(layer_cells_min - 1) * i64::from(leaf.edge());
+            let is_right = match link.rule {
+                "layer" => leaf.level > octant.level && distance < reach,
+                "balance" => leaf.level > octant.level + 1 && distance == 0,
+                _ => distance == 0,
+            };
+            // The parent of a source is split before the layer of the source's level is made.
+            let is_early =
+                !is_source || leaf.level > octant.level + 1 || link.rule == "extra_layer";
+            assert!(is_right && is_early, "{link:?} does not force the split of {octant}");
+            assert_eq!(link.distance_cells, distance / i64::from(leaf.edge()), "{link:?}");
+            (is_source, ends) = (link.rule == "layer", link.rule == "extra_layer");
+            octant = if ends { leaf } else { leaf.ancestor(leaf.level - 1) };
+        }
+        let CauseRecord { octant: at, facets, facets_count, is_crossed, boxes, .. } = cause;
+        let is_of_octant = match self.links.is_empty() {
+            true => octant.contains(&at.octant),
+            false => octant == at.octant,
+        };
+        assert!(is_of_octant, "the cause of {octant} is one of {}", at.octant);
+        assert!(*is_crossed || !boxes.is_empty(), "{octant} is split without a facet or a box");
+        assert_eq!(
+            facets.len() as u64,
+            (*facets_count).min(FACETS_LISTED as u64),
+            "facets of {octant}"
+        );
+        assert!(*is_crossed || *facets_count == 0, "{facets_count} facets do not cross {octant}");
+    }
+}
+
 impl Mesh<'_> {
     /// Explains the leaf at a point, in the user's units.
     ///
     /// # Errors
     /// One sentence, if the point lies outside the root or the mesh is invalid.
     pub fn at(&self, point: [f64; 3]) -> Result<Answer, String> {
-        // Without facets, the search for crossing leaves reads the words of coarse octants.
-        if matches!(self.surface, Surface::Facets(_)) {
-            self.leaves.expect_few_reads();
-        }
         let root = &self.terms.root;
         let lattice = root.quantise_seed(point).ok_or_else(|| {
             let (from, to) = (root.origin, root.to_user([contract::lattice::UNITS_PER_EDGE; 3]));
@@ -177,21 +260,22 @@ impl Mesh<'_> {
         let cell = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
         let leaf = self.leaves.leaf_at(cell);
         let base = (!matches!(self.surface, Surface::Unknown)).then(|| self.base_leaf_at(cell));
-        let octant = leaf.map(|leaf| leaf.octant).or(base);
+        let octant = leaf.map(|(octant, _)| octant).or(base);
         let mut answer = Answer {
             schema: SCHEMA,
             point,
-            leaf: leaf.map(|leaf| self.place(&leaf.octant)),
+            leaf: leaf.map(|(octant, _)| self.place(&octant)),
             base_leaf: base.map(|base| self.place(&base)),
-            side: leaf.map(|leaf| leaf.side),
+            side: leaf.map(|(_, kind)| Side::ALL[usize::from(kind)]),
             side_decided_by: SideReason::Unknown,
             deleted_by: None,
             splits: octant.map_or(Vec::new(), |octant| self.splits_above(&octant)),
             left_out: Vec::new(),
+            layer_cells_min: self.terms.layer_cells_min,
         };
         self.explain_side(base, &mut answer);
         self.leave_out(&mut answer);
-        self.refuse_invalid()?;
+        answer.check_invariants();
         Ok(answer)
     }
 
@@ -203,24 +287,16 @@ impl Mesh<'_> {
         let cause = of_base.checked_sub(1).and_then(|level| {
             self.base_cause(&octant.ancestor(level as u8)).map(|cause| self.cause(&cause))
         });
-        let mut searches_left = SEARCHES_MAX;
         let split = |ancestor: Octant| {
             let octant = self.place(&ancestor);
             if usize::from(ancestor.level) < of_base {
-                return Split {
-                    octant,
-                    links: Vec::new(),
-                    cause: cause.clone(),
-                    is_shortest: true,
-                };
+                return Split { octant, links: Vec::new(), cause: cause.clone() };
             }
-            let Some(Chain { links, cause, is_shortest, .. }) =
-                self.chain(&ancestor, &mut searches_left)
-            else {
-                return Split { octant, links: Vec::new(), cause: None, is_shortest: true };
+            let Some(Chain { links, cause }) = self.chain(&ancestor) else {
+                return Split { octant, links: Vec::new(), cause: None };
             };
             let links = links.iter().map(|link| self.link(link)).collect();
-            Split { octant, links, cause: Some(self.cause(&cause)), is_shortest }
+            Split { octant, links, cause: Some(self.cause(&cause)) }
         };
         ancestors.map(split).collect()
     }
@@ -365,7 +441,7 @@ impl Mesh<'_> {
                  candidate, a seed or a face on the root's boundary may have been missed"
             ));
         }
-        if self.leaves.manifest.tree == manifest::Tree::Base {
+        if self.manifest.tree == manifest::Tree::Base {
             add("gradation: the mesh is a base tree");
         }
     }

@@ -1,9 +1,9 @@
 //! Why a leaf has its size and its side, and which splits of a mesh have no cause.
 //!
-//! - [`leaves`]: the leaves on disk; [`crossings`]: the facets of an octant;
+//! - [`leaves`]: the leaves by octant; [`crossings`]: the facets of an octant;
 //! - [`base`](mod@base): T0 where it is needed, octant by octant (section 3 of reference/DEFINITION.md);
 //! - [`gradation`]: the leaves that force an octant to split (section 6);
-//! - [`chain`]: the shortest chain of them to a cause of T0, and [`bound`] of its length; [`side`]: the rays or the seed of a component (section 4);
+//! - [`chain`]: a chain of them to a cause of T0; [`side`]: the rays or the seed of a component (section 4);
 //! - [`answer`]: the result as data, [`text`]: for people; [`unneeded`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
@@ -11,11 +11,11 @@
 //! finer levels, and every question about an octant is answered from finer octants in its neighbourhood.
 
 use std::cell::RefCell;
-use std::path::Path;
 
 use contract::case::Case;
-use contract::manifest;
+use contract::manifest::{self, Geometry, Manifest};
 use contract::octant::Octant;
+use contract::tree::Tree;
 use rustc_hash::FxHashMap;
 
 use crate::checks::Terms;
@@ -23,7 +23,6 @@ use crate::diff::fields::differing_inputs;
 
 pub mod answer;
 pub mod base;
-pub mod bound;
 pub mod chain;
 pub mod crossings;
 pub mod gradation;
@@ -33,14 +32,14 @@ pub mod text;
 pub mod unneeded;
 
 use base::Surface;
-use bound::Bounds;
 use crossings::Crossings;
 use leaves::Leaves;
 
-/// A mesh on disk with the inputs that explain it.
+/// A mesh with the inputs that explain it.
 #[derive(Debug)]
 pub struct Mesh<'a> {
-    leaves: Leaves,
+    manifest: &'a Manifest,
+    leaves: Leaves<'a>,
     terms: Terms,
     surface: Surface<'a>,
     /// Whether the leaves are those of T0, which precedes gradation.
@@ -49,8 +48,6 @@ pub struct Mesh<'a> {
     distrusts: bool,
     /// Deepest level of a leaf that can force an octant to split; no search goes deeper.
     level_deepest: u8,
-    /// What the search for a chain expects.
-    bounds: Bounds,
     /// Answers for octants that were asked about before.
     known: Known,
 }
@@ -59,23 +56,39 @@ pub struct Mesh<'a> {
 #[derive(Debug, Default)]
 struct Known {
     crossed: RefCell<FxHashMap<u64, bool>>,
-    distances: RefCell<FxHashMap<u64, Option<i64>>>,
     deep: RefCell<FxHashMap<u64, bool>>,
     justified: RefCell<FxHashMap<u64, bool>>,
 }
 
 impl<'a> Mesh<'a> {
-    /// Opens a leaf-set directory. Without its case, facets are not known.
+    /// A mesh of this case. Without its case, facets are not known.
     ///
     /// # Errors
-    /// One sentence, if the directory is not a leaf set, or if the case is not that of the mesh.
-    pub fn open(dir: &Path, case: Option<&'a Case>) -> Result<Self, String> {
-        let leaves = Leaves::open(dir).map_err(|error| error.to_string())?;
-        let mut terms = Terms::of_manifest(&leaves.manifest);
-        if let Some(case) = case.filter(|case| Terms::of_case(case) != terms) {
-            return Err(other_inputs(dir, &leaves.manifest, case));
+    /// One sentence, if the case is not that of the mesh.
+    pub fn of(
+        manifest: &'a Manifest,
+        tree: &'a Tree,
+        case: Option<&'a Case>,
+    ) -> Result<Self, String> {
+        let terms = Terms::of_manifest(manifest);
+        let is_other = |case: &&Case| {
+            let geometry = || Geometry::of(&case.facets_lattice);
+            Terms::of_case(case) != terms || manifest.geometry.is_some_and(|g| g != geometry())
+        };
+        match case.filter(is_other) {
+            Some(case) => Err(other_inputs(manifest, case)),
+            None => Ok(Self::new(manifest, tree, terms, case)),
         }
-        let is_base = leaves.manifest.tree == manifest::Tree::Base;
+    }
+
+    /// A mesh of these inputs.
+    pub(crate) fn new(
+        manifest: &'a Manifest,
+        tree: &'a Tree,
+        mut terms: Terms,
+        case: Option<&'a Case>,
+    ) -> Self {
+        let is_base = manifest.tree == manifest::Tree::Base;
         if is_base {
             (terms.keep, terms.keep_crossing) = (manifest::Keep::All, true);
         }
@@ -84,28 +97,15 @@ impl<'a> Mesh<'a> {
             None if terms.keep_crossing => Surface::Leaves,
             None => Surface::Unknown,
         };
-        let of_mesh =
-            leaves.manifest.leaves_by_level.iter().rposition(|&n| n > 0).unwrap_or(0) as u8;
-        let level_deepest = of_mesh.max(required(&terms));
-        let known = Known::default();
-        let bounds = Bounds::new(&terms);
-        Ok(Self { leaves, terms, surface, is_base, distrusts: false, level_deepest, bounds, known })
+        let level_deepest = tree.finest_level(tree.root(), 0).max(required(&terms));
+        let (leaves, known) = (Leaves::new(tree), Known::default());
+        Self { manifest, leaves, terms, surface, is_base, distrusts: false, level_deepest, known }
     }
 
     /// The same mesh, in which needless splits justify nothing.
     fn distrusting(self) -> Self {
         let level_deepest = required(&self.terms);
         Self { distrusts: true, level_deepest, ..self }
-    }
-
-    /// An error if a search found a word that no correct mesh contains.
-    fn refuse_invalid(&self) -> Result<(), String> {
-        match self.leaves.invalid() {
-            None => Ok(()),
-            Some(word) => Err(format!(
-                "the mesh contains the invalid word {word:#018x}; `harness audit` lists what is wrong with it"
-            )),
-        }
     }
 
     /// An octant as text, with its bounds in the user's units.
@@ -115,15 +115,15 @@ impl<'a> Mesh<'a> {
 }
 
 /// The error of a case that is not that of a mesh, with the inputs that differ.
-fn other_inputs(dir: &Path, of_mesh: &manifest::Manifest, case: &Case) -> String {
-    let of_case = case.manifest(of_mesh.tree, String::new());
+fn other_inputs(of_mesh: &Manifest, case: &Case) -> String {
+    let geometry = Some(Geometry::of(&case.facets_lattice));
+    let of_case = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
     let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &of_case));
     if of_mesh.sides == manifest::Sides::Unknown {
         differing.push("the sides of the mesh are unknown".to_owned());
     }
     format!(
-        "{} was made from other inputs than the case ({}); give the case file from which the mesh was made",
-        dir.display(),
+        "the mesh was made from other inputs than the case ({}); give the case file from which it was made",
         differing.join("; ")
     )
 }

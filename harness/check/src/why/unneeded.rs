@@ -65,11 +65,11 @@ impl Mesh<'_> {
                 .to_owned());
         }
         let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
-        refuse_too_large(self.leaves.manifest.leaves, &meminfo)?;
+        refuse_too_large(self.leaves.count(&Octant::ROOT), &meminfo)?;
         let mesh = self.distrusting();
         let mut found = Unneeded {
             schema: SCHEMA,
-            leaves: mesh.leaves.manifest.leaves,
+            leaves: mesh.leaves.count(&Octant::ROOT),
             splits: 0,
             unneeded: 0,
             subtrees: 0,
@@ -78,7 +78,7 @@ impl Mesh<'_> {
             largest: None,
         };
         mesh.search_unneeded(&Octant::ROOT, first, &mut found);
-        mesh.refuse_invalid()?;
+        found.check_invariants();
         Ok(found)
     }
 
@@ -117,6 +117,30 @@ impl Mesh<'_> {
 }
 
 /// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
+impl Unneeded {
+    /// Panics if an invariant of the answer does not hold.
+    pub fn check_invariants(&self) {
+        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, first, largest, .. } = self;
+        assert!(
+            subtrees <= unneeded && unneeded <= splits && (*unneeded == 0) == (*subtrees == 0),
+            "{unneeded} of {splits} splits in {subtrees} octants are needless"
+        );
+        assert!(unneeded_leaves <= leaves, "{unneeded_leaves} of {leaves} leaves are needless");
+        let of_first: u64 = first.iter().map(|subtree| subtree.leaves).sum();
+        assert!(
+            first.len() as u64 <= *subtrees && of_first <= *unneeded_leaves,
+            "{} of {subtrees} octants are listed, with {of_first} of {unneeded_leaves} leaves",
+            first.len()
+        );
+        let most = first.iter().map(|subtree| subtree.leaves).max().unwrap_or(0);
+        let largest = largest.as_ref().map_or(0, |largest| largest.leaves);
+        assert!(
+            most <= largest && largest <= *unneeded_leaves,
+            "the largest of {unneeded_leaves} leaves has {largest}, and one listed has {most}"
+        );
+    }
+}
+
 fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
     let kilobytes = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
     let kilobytes =
@@ -164,6 +188,36 @@ impl fmt::Display for Unneeded {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counts_of_needless_splits_that_contradict_each_other_are_a_bug() {
+        let root = contract::lattice::Root { origin: [0.0; 3], edge: 1.0 };
+        let subtree = Subtree { octant: Place::new(&Octant::ROOT.child(3), &root), leaves: 8 };
+        let correct = Unneeded {
+            schema: SCHEMA,
+            leaves: 64,
+            splits: 9,
+            unneeded: 2,
+            subtrees: 1,
+            unneeded_leaves: 8,
+            first: vec![subtree.clone()],
+            largest: Some(subtree),
+        };
+        correct.check_invariants();
+        let faults: [fn(&mut Unneeded); 6] = [
+            |u| u.unneeded = 10,
+            |u| u.subtrees = 0,
+            |u| u.unneeded_leaves = 65,
+            |u| u.first.push(u.first[0].clone()),
+            |u| u.largest = None,
+            |u| u.first[0].leaves = 9,
+        ];
+        for fault in faults {
+            let mut wrong = correct.clone();
+            fault(&mut wrong);
+            assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong:?}");
+        }
+    }
 
     #[test]
     fn a_mesh_that_exceeds_the_available_memory_is_refused_before_the_audit() {

@@ -2,7 +2,7 @@
 
 use crate::no_false_alarms::{hulls, settings, soup};
 use crate::support;
-use check::checks::{Subject, Terms, components, kept, manifest};
+use check::checks::{self, CheckResult, Subject, Terms, components};
 use contract::leafset::LeafSet;
 use contract::manifest::Manifest;
 use contract::word;
@@ -16,8 +16,12 @@ fn within(mesh: &[u64], base: &[u64], leaves: &[u32]) -> (Vec<u64>, Vec<u64>) {
     mesh.iter().partition(|&&w| containing(w).is_some_and(|i| leaves.contains(&i)))
 }
 
+fn check(subject: &Subject, name: &str) -> CheckResult {
+    checks::only(subject, &[name]).remove(0)
+}
+
 fn reported(subject: &Subject) -> bool {
-    !kept::check(subject).holds()
+    !check(subject, "kept").holds()
 }
 
 proptest! {
@@ -36,10 +40,10 @@ proptest! {
                 words.extend(component.leaves.iter().map(|&i| base[i as usize]));
             }
             let mesh = counted(words);
-            let alone = Subject::new(&correct.case, &mesh);
-            // Without T0, `sides` reports leaves of the side that is not kept.
-            prop_assert!(reported(&alone) || !is_kept && !component.enclosed, "without T0: {text}");
-            prop_assert!(reported(&Subject::new(&correct.case, &mesh).with_base(&correct.base)), "{text}");
+            let alone = Subject::alone(&mesh);
+            // Without the case, `sides` reports leaves of the side that is not kept.
+            prop_assert!(reported(&alone) || !is_kept && !component.enclosed, "without the case: {text}");
+            prop_assert!(reported(&Subject::new(&correct.case, &mesh)), "{text}");
         }
     }
 }
@@ -48,21 +52,21 @@ proptest! {
 fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
     let text = include_str!("../../../selftest-cases/enclosed.toml");
     let correct = support::selftest_case("enclosed", text);
-    let check = |change: fn(&mut Manifest)| {
+    let found = |change: fn(&mut Manifest)| {
         let mut mesh = correct.mesh.clone();
         change(&mut mesh.manifest);
         let subject = Subject::new(&correct.case, &mesh).with_reference(&correct.mesh);
-        manifest::check(&subject).findings_total
+        check(&subject, "manifest").findings_total
     };
-    assert_eq!(check(|_| ()), 0);
-    assert_eq!(check(|m| m.components = None), 0);
-    assert_eq!(check(|m| m.components.as_mut().unwrap().inside += 1), 1);
-    assert_eq!(check(|m| m.components.as_mut().unwrap().enclosed.example = None), 1);
-    assert_eq!(check(|m| m.components_ambiguous.count += 1), 1);
+    assert_eq!(found(|_| ()), 0);
+    assert_eq!(found(|m| m.components = None), 0);
+    assert_eq!(found(|m| m.components.as_mut().unwrap().inside += 1), 1);
+    assert_eq!(found(|m| m.components.as_mut().unwrap().enclosed.example = None), 1);
+    assert_eq!(found(|m| m.components_ambiguous.count += 1), 1);
     let note = |change: fn(&mut Manifest)| {
         let mut mesh = correct.mesh.clone();
         change(&mut mesh.manifest);
-        kept::check(&Subject::new(&correct.case, &mesh).with_base(&correct.base)).note
+        check(&Subject::new(&correct.case, &mesh), "kept").note
     };
     let expected = format!(
         "components of T0: 9 outside, 1 inside; the far field does not reach 1 of those outside, which are deleted \

@@ -2,8 +2,8 @@
 
 mod agreement;
 mod kept;
+mod many_parts;
 mod no_false_alarms;
 mod promises;
 mod selftest;
-mod selftest_at_scale;
 mod support;

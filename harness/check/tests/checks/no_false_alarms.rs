@@ -86,13 +86,16 @@ proptest! {
             prop_assert!(result.holds(), "{text}{result}");
         }
         for result in checks::all(&Subject::new(&correct.case, &correct.mesh)) {
-            prop_assert!(result.holds(), "without T0: {text}{result}");
+            prop_assert!(result.holds(), "without T0 and reference: {text}{result}");
         }
+        let definition = Promises::of_definition();
         for set in [&correct.mesh, &correct.base] {
             let dir = tempfile::tempdir().unwrap();
             set.write(dir.path()).unwrap();
-            let report = audit::audit(dir.path(), &AuditOptions::default());
-            prop_assert!(report.holds(), "{text}{report}");
+            for case in [None, Some(&correct.case)] {
+                let report = audit::audit_against(dir.path(), &AuditOptions::default(), case, &definition);
+                prop_assert!(report.holds(), "{text}{report}");
+            }
         }
     }
 
@@ -102,6 +105,7 @@ proptest! {
     fn meshes_of_the_reference_keep_every_promise(facets in hulls(), text in settings()) {
         let promises = Promises {
             complete: true,
+            crossing: true,
             surface: Some(Surface { tolerance_cells: 0.0 }),
             boxes: true,
             sides: Some(Sides { band_cells: 1.0 }),
@@ -110,9 +114,8 @@ proptest! {
             ..Promises::default()
         };
         let Ok(correct) = support::meshes_of_facets(&text, &facets) else { return Ok(()) };
-        let subject = Subject::new(&correct.case, &correct.mesh);
-        let results = checks::promised(subject.tree(), &subject.terms, Some(&correct.case), &promises);
-        prop_assert_eq!(results.len(), 6);
+        let results = checks::all(&Subject::new(&correct.case, &correct.mesh).promising(&promises));
+        prop_assert_eq!(results.len(), 2 + 7);
         for result in results {
             prop_assert!(result.holds(), "{text}{result}");
         }

@@ -24,12 +24,8 @@ fn enclosed_space_must_be_deleted_or_kept_as_the_case_requires() {
         (&kept, &deleted, Some("a leaf must be deleted")),
         (&deleted, &kept, Some("the mesh has a hole")),
     ] {
-        let subject = Subject::new(&of.case, &mesh.mesh);
-        let [result] =
-            &checks::promised(subject.tree(), &subject.terms, Some(&of.case), &complete)[..]
-        else {
-            panic!("one promise is one check")
-        };
+        let subject = Subject::new(&of.case, &mesh.mesh).promising(&complete);
+        let [.., result] = &checks::all(&subject)[..] else { panic!("one promise is one check") };
         assert!(result.was_run(), "{result}");
         let first = result.findings.first().map(|finding| finding.detail.as_str());
         match finding {

@@ -16,15 +16,14 @@ use check::why::Mesh;
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::testing::assert_text;
+use contract::tree::Tree;
 use contract::word;
 use geometries::Facet;
 use proptest::prelude::*;
 
-/// Calls `examine` with a mesh on disk.
 fn with_mesh<T>(set: &LeafSet, case: Option<&Case>, examine: impl FnOnce(Mesh) -> T) -> T {
-    let dir = tempfile::tempdir().unwrap();
-    set.write(dir.path()).unwrap();
-    examine(Mesh::open(dir.path(), case).unwrap())
+    let tree = Tree::of_words(&set.words);
+    examine(Mesh::of(&set.manifest, &tree, case).unwrap())
 }
 
 /// Final mesh and T0 of facets and the text of a case.

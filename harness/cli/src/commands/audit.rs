@@ -1,22 +1,33 @@
-//! `harness audit`: checks a mesh by itself, or against promises on a case.
+//! `harness audit`: checks a mesh by itself, or against its case, or against promises on a case.
 
 use super::import::{Failure, Imported, Source};
+use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
-use check::audit::{AuditOptions, Requirements, audit_against};
+use check::audit::{AuditOptions, audit_against};
+use check::promises::Promises;
 use clap::Args;
 use contract::case::Case;
 use contract::manifest;
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tempfile::TempDir;
 
 /// `harness audit`.
 #[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  harness audit mesh                                   what the leaves alone show
+  harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, needless splits
+  harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
+  harness audit mesh --case body.toml --promises p4est a mesh that need not keep the whole definition
+
+Exit codes: 0 all checks hold; 1 a check has findings; 2 invalid input; 3 nothing was checked, memory does not suffice, or \
+Python or VTK is missing.")]
 pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
-    mesh: PathBuf,
+    mesh: Input,
     /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines or path of a file
     /// with a table of promises
     #[arg(long, value_name = "ENGINE")]
@@ -29,7 +40,7 @@ pub struct Arguments {
     nodes_max: Option<usize>,
     /// Write verdict, times and memory as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// How to read a mesh without a manifest.
     #[command(flatten)]
     source: Source,
@@ -52,35 +63,33 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
-        println!("left out: {why}");
-        return Ok(if *require_checks { EXIT_MISSING } else { EXIT_HOLDS });
+        return Err((EXIT_MISSING, format!("left out: {why}")));
     }
     // The temporary directory of an imported mesh lives as long as this value.
     let imported = match mesh.join(manifest::FILE).exists() {
-        true if source.is_given(engine.is_some()) => {
-            let why =
-                "has a manifest, which states root, case and sides: omit the options for them";
+        true if source.is_given() => {
+            let why = "has a manifest, which states root and sides: omit the options for them";
             return Err(input(format!("{} {why}", mesh.display())));
         }
         true => None,
         false => Some(imported(mesh, source, case.as_ref())?),
     };
-    let directory = imported.as_ref().map_or(mesh.as_path(), TempDir::path);
+    let directory = imported.as_ref().map_or(&**mesh, TempDir::path);
     let default = AuditOptions::default();
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
-    let requirements = match &engine {
-        Some(engine) => Requirements::Promises(&engine.promises, case.as_ref()),
-        None => Requirements::Definition,
-    };
-    let report = audit_against(directory, &options, requirements);
+    let definition = Promises::of_definition();
+    let promises = engine.as_ref().map_or(&definition, |engine| &engine.promises);
+    let report = audit_against(directory, &options, case.as_ref(), promises);
     println!("{report}");
     if let Some(path) = json {
         let written = AuditRecord::of(&report).write(path);
         written.map_err(|error| input(format!("{}: {error}", path.display())))?;
     }
+    let not_run = || report.not_run().next().is_some();
     Ok(match report.holds() {
         false => EXIT_FAILED,
-        true if *require_checks && report.not_run().next().is_some() => EXIT_MISSING,
+        true if !report.checked_anything() || report.exceeds_memory() => EXIT_MISSING,
+        true if *require_checks && not_run() => EXIT_MISSING,
         true => EXIT_HOLDS,
     })
 }

@@ -1,10 +1,10 @@
 //! `harness diff`: prints the first difference between two leaf-set directories.
 
+use super::values::Input;
 use check::diff::{self, Trust};
 use clap::Args;
 use contract::case::Case;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::path::PathBuf;
 
 /// `harness diff`.
 #[derive(Args, Debug)]
@@ -12,22 +12,25 @@ use std::path::PathBuf;
 Prints the inputs and counts that differ, the first leaf that differs, and the rule of reference/DEFINITION.md that decides \
 which mesh is right.
 
-Exit codes: 0 the leaves are the same; 1 they differ; 2 invalid input.")]
+Exit codes: 0 the meshes are the same; 1 their leaves or their roots differ; 2 invalid input.")]
 pub struct Arguments {
     /// A leaf-set directory
-    a: PathBuf,
+    a: Input,
     /// The leaf-set directory to compare with
-    b: PathBuf,
+    b: Input,
     /// The case of both meshes: its facets help to find the deciding rule
     #[arg(long)]
-    case: Option<PathBuf>,
+    case: Option<Input>,
     /// Compare the counts and digests in the manifests instead of reading all leaves
     #[arg(long)]
     trust_manifests: bool,
+    /// Compare the leaves as octants, whatever the roots are
+    #[arg(long)]
+    ignore_root: bool,
 }
 
 /// Compares and prints; returns the exit code.
-pub fn run(Arguments { a, b, case, trust_manifests }: &Arguments) -> u8 {
+pub fn run(Arguments { a, b, case, trust_manifests, ignore_root }: &Arguments) -> u8 {
     let trust = if *trust_manifests { Trust::Manifests } else { Trust::Leaves };
     let compared = case.as_deref().map(Case::read).transpose().map_err(|error| error.to_string());
     match compared
@@ -35,7 +38,8 @@ pub fn run(Arguments { a, b, case, trust_manifests }: &Arguments) -> u8 {
     {
         Ok(report) => {
             println!("A {}\nB {}\n{report}", a.display(), b.display());
-            if report.same_leaves() { EXIT_HOLDS } else { EXIT_FAILED }
+            let is_same = report.same_mesh() || *ignore_root && report.same_leaves();
+            if is_same { EXIT_HOLDS } else { EXIT_FAILED }
         }
         Err(error) => {
             eprintln!("harness: {error}");

@@ -1,6 +1,6 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
-use super::values::root;
+use super::values::{Input, root};
 use clap::Args;
 use contract::case::Case;
 use contract::import::htg::ImportedTree;
@@ -30,7 +30,7 @@ file is not such a mesh, which is explained in one sentence, or cannot be writte
 formats only).")]
 pub struct Arguments {
     /// The mesh: a file, or an OpenFOAM case or polyMesh
-    mesh: PathBuf,
+    mesh: Input,
     /// The directory to make
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -66,14 +66,10 @@ pub struct Source {
 pub type Failure = (u8, String);
 
 impl Source {
-    /// Whether any option is given that has no effect on a leaf-set directory. A case has one if `with_promises`.
-    pub fn is_given(&self, with_promises: bool) -> bool {
-        let Self { format, root, case, sides, position, timeout: _ } = self;
-        format.is_some()
-            || root.is_some()
-            || case.is_some() && !with_promises
-            || sides.is_some()
-            || *position != Position::default()
+    /// Whether any option is given that has no effect on a leaf-set directory.
+    pub fn is_given(&self) -> bool {
+        let Self { format, root, case: _, sides, position, timeout: _ } = self;
+        format.is_some() || root.is_some() || sides.is_some() || *position != Position::default()
     }
 
     /// Reads the case, if one is given.

@@ -1,23 +1,16 @@
 //! `harness selftest`: corrupts correct meshes and prints which check detects each corruption.
 
 use super::programs::ProgramArguments;
-use super::values::cell_count;
-use bench::experiments::execute::Failed;
-use bench::selftest::source as made_by_mesher;
-use check::selftest::scale::{self, Options, Source};
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
 use contract::leafset;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use run::engine::failure::End;
-use run::engine::interrupt;
 use run::engine::layout::SERIAL;
 use run::engine::options::RunOptions;
 use run::engine::programs::Programs;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -27,21 +20,6 @@ pub struct Arguments {
     /// Corrupt the meshes of this case file instead of the built-in ones; may be repeated
     #[arg(long, value_name = "CASE")]
     pub case: Vec<PathBuf>,
-    /// Corrupt a mesh of any size and audit it: a leaf-set directory or a case file to mesh; may be repeated
-    #[arg(long, value_name = "DIR|CASE", conflicts_with = "case")]
-    pub at_scale: Vec<PathBuf>,
-    /// Approximate number of cells of meshes from case files [default: from the spacing of the case]
-    #[arg(long, value_name = "N", requires = "at_scale", value_parser = cell_count)]
-    pub cells: Option<u64>,
-    /// Concurrent trials at scale; each needs the memory of one audit
-    #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub jobs: u16,
-    /// Seed of the positions of corruptions at scale
-    #[arg(long, value_name = "N", requires = "at_scale", default_value_t = 1)]
-    pub seed: u64,
-    /// Directory for temporary files at scale: two to four times the size of a mesh [default: the temporary directory]
-    #[arg(long, value_name = "DIR", requires = "at_scale")]
-    pub scratch: Option<PathBuf>,
     /// Time limit of every run of reference or mesher
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     pub timeout: u64,
@@ -65,9 +43,6 @@ pub fn run(arguments: &Arguments) -> u8 {
 type Failure = (u8, String);
 
 fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
-    if !arguments.at_scale.is_empty() {
-        return at_scale(arguments);
-    }
     let programs = find(arguments)?;
     if !programs.reference.program().is_file() {
         let path = programs.reference.program().display();
@@ -92,76 +67,6 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
     let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
     println!("{report}");
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
-}
-
-/// Runs the self test on meshes of any size.
-fn at_scale(arguments: &Arguments) -> Result<u8, Failure> {
-    let input = |error: std::io::Error| (EXIT_INPUT, error.to_string());
-    let mut place = tempfile::Builder::new();
-    place.prefix("harness-selftest-");
-    let scratch = match &arguments.scratch {
-        Some(directory) => place.tempdir_in(directory),
-        None => place.tempdir(),
-    };
-    let scratch = scratch.map_err(input)?;
-    let made = scratch.path().join("made");
-    fs::create_dir(&made).map_err(input)?;
-    let sources = arguments.at_scale.iter().map(|path| source(arguments, path, &made));
-    let sources = sources.collect::<Result<Vec<Source>, Failure>>()?;
-    let options = Options {
-        seed: arguments.seed,
-        jobs: usize::from(arguments.jobs),
-        interrupted: interrupt::requested,
-    };
-    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-    bar.set_style(
-        ProgressStyle::with_template("{pos}/{len} trials [{elapsed}]")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
-    let progress = |done: usize, all: usize| {
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
-    };
-    let report = scale::run(&sources, &options, scratch.path(), &progress);
-    bar.finish_and_clear();
-    let report = report.map_err(|error| match error.kind() {
-        ErrorKind::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
-        _ => input(error),
-    })?;
-    println!("{report}");
-    let (trials, found) = (report.kills.len(), report.found_by_audit());
-    if trials == 0 {
-        return Err((EXIT_MISSING, "left out: no corruption applies to these meshes".to_owned()));
-    }
-    let killed = report.kills.iter().filter(|kill| kill.killed()).count();
-    println!(
-        "the audit found {found} of {trials}; {} only by comparison with the untouched mesh",
-        killed.saturating_sub(found)
-    );
-    Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
-}
-
-/// Returns the mesh in a leaf-set directory, or that of a case file, which the mesher writes into `made`.
-fn source(arguments: &Arguments, path: &Path, made: &Path) -> Result<Source, Failure> {
-    if path.is_dir() {
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        return Ok(Source { name, mesh: path.to_owned(), base: None });
-    }
-    let programs = find(arguments)?;
-    if !programs.mesher.program().is_file() {
-        let path = programs.mesher.program().display();
-        return Err((
-            EXIT_MISSING,
-            format!("the mesher is missing: build {path}, or give another path with --mesher"),
-        ));
-    }
-    let limit = Duration::from_secs(arguments.timeout);
-    let place = made.join(format!("{}", fs::read_dir(made).map_or(0, Iterator::count)));
-    fs::create_dir(&place).map_err(|error| (EXIT_INPUT, error.to_string()))?;
-    made_by_mesher(&programs, path, arguments.cells, &place, limit).map_err(|why| match why {
-        Failed::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
-        Failed::Reason(why) => (EXIT_INPUT, format!("{}: {why}", path.display())),
-    })
 }
 
 /// Writes the built-in cases; returns their paths.

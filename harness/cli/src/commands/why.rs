@@ -1,13 +1,16 @@
 //! `harness why`: explains the leaf at a point, or finds splits that no rule requires.
 
+use super::values::Output;
 use std::fmt::Display;
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::meshed::{Failure, MeshArguments, input};
 use check::why::Mesh;
 use clap::Args;
 use contract::files::write_atomically;
+use contract::leafset::ReadError;
+use contract::mesh;
 use report::json::pretty;
 use run::engine::layout::SERIAL;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
@@ -38,7 +41,7 @@ pub struct Arguments {
     unneeded: bool,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Octants to list with --unneeded
     #[arg(long, value_name = "N", default_value = "10")]
     first: NonZero<usize>,
@@ -58,7 +61,11 @@ pub fn run(arguments: &Arguments) -> u8 {
 
 fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
     let made = arguments.source.open(&SERIAL, false)?;
-    let mesh = Mesh::open(&made.dir, made.case.as_ref()).map_err(input)?;
+    let read = |error: ReadError| input(error.to_string());
+    let disk = mesh::Mesh::open(&made.dir).map_err(read)?;
+    let tree = disk.tree().map_err(read)?;
+    let mesh = Mesh::of(&disk.manifest, &tree, made.case.as_ref())
+        .map_err(|why| input(format!("{}: {why}", made.dir.display())))?;
     if let Some(Point(point)) = arguments.point {
         print(&mesh.at(point).map_err(input)?, arguments.json.as_deref())?;
         return Ok(EXIT_HOLDS);

@@ -8,6 +8,7 @@ use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::manifest::{self, Manifest, Part, Sides, Tally, Tree};
 use crate::npy;
+use crate::word;
 use ::files::Claim;
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -64,7 +65,24 @@ impl ImportedTree {
         manifest.set_tally(tally);
         manifest.root = tree.root;
         manifest.sides = if tree.has_sides() { Sides::Known } else { Sides::Unknown };
-        Ok(Some(Self { tree, manifest }))
+        let imported = Self { tree, manifest };
+        imported.check_invariants();
+        Ok(Some(imported))
+    }
+
+    /// Panics if an invariant of the answer does not hold: every leaf has a level and a side, and the leaves fit the root.
+    pub fn check_invariants(&self) {
+        let Manifest { leaves, leaves_by_level, leaves_by_side: sides, .. } = &self.manifest;
+        let of_levels: u64 = leaves_by_level.iter().sum();
+        let of_sides = sides.outside + sides.inside + sides.crossing;
+        assert!(
+            *leaves == of_levels && *leaves == of_sides,
+            "{leaves} leaves, {of_levels} by level and {of_sides} by side"
+        );
+        let spans =
+            (0..).zip(leaves_by_level).map(|(l, &n)| u128::from(n) * u128::from(word::span(l)));
+        let filled: u128 = spans.sum();
+        assert!(filled <= u128::from(word::KEY_END), "leaves fill {filled} of {}", word::KEY_END);
     }
 
     /// Writes the leaf words as a new directory, or into one that is empty, in one part.

@@ -1,12 +1,12 @@
 //! Imported cells as a leaf set with its manifest.
 
 use super::cells::Cells;
-use super::{ImportError, root};
+use super::{ImportError, TOLERANCE, root};
 use crate::case::Case;
 use crate::digest::Digest;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
-use crate::manifest::{Manifest, Sides, Tree};
+use crate::manifest::{Manifest, Sides, Tally, Tree};
 use crate::word;
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
@@ -45,7 +45,40 @@ pub fn leaf_set(
         }
     };
     let manifest = Manifest { root, sides, ..manifest };
-    Ok(LeafSet::new(manifest, Vec::new()).with_parts(vec![words]))
+    let set = LeafSet::new(manifest, Vec::new()).with_parts(vec![words]);
+    check_invariants(cells, &set);
+    Ok(set)
+}
+
+/// Panics if an invariant of the answer does not hold: the leaves are a linear oct-tree, as many as there are cells, and fill
+/// the same part of the root; the manifest has their counts and digest.
+pub fn check_invariants(cells: &Cells, set: &LeafSet) {
+    let LeafSet { manifest, words, .. } = set;
+    assert_eq!(cells.len(), words.len(), "cells and leaves");
+    let mut end = 0;
+    for &leaf in words {
+        let fault = word::fault(leaf);
+        assert!(
+            fault.is_none() && word::key(leaf) >= end,
+            "the leaf {leaf:#018x} after {end:#x}: {fault:?}"
+        );
+        end = word::key(leaf) + word::span(word::level(leaf));
+    }
+    let of_cells = cells.edges.iter().map(|edge| (edge / manifest.root.edge).powi(3)).sum::<f64>();
+    let span = |&leaf: &u64| word::span(word::level(leaf)) as f64 / word::KEY_END as f64;
+    let of_leaves = words.iter().map(span).sum::<f64>();
+    assert!(
+        (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells,
+        "cells fill {of_cells} of the root, and their leaves {of_leaves}"
+    );
+    let Tally { leaves, by_level, by_side, digest, octants } = Tally::of(words);
+    assert_eq!(manifest.leaves, leaves, "leaves");
+    assert_eq!(manifest.leaves_by_level, by_level, "leaves by level");
+    assert_eq!(manifest.leaves_by_side, by_side, "leaves by side");
+    assert!(manifest.digest == digest && manifest.octant_digests == octants, "digests of {digest}");
+    let known = manifest.sides == Sides::Known;
+    assert!(known == cells.sides.is_some(), "sides are known: {known}");
+    assert!(known || by_side.outside == leaves, "unknown sides are {by_side:?}");
 }
 
 #[cfg(test)]
@@ -70,6 +103,32 @@ mod tests {
             cells.digest = Some(digest);
             let root = moved.then_some(Root { edge: 0.6, ..ROOT });
             assert_eq!(import(&cells, root).is_ok(), holds);
+        }
+    }
+
+    #[test]
+    fn an_imported_mesh_that_is_not_its_cells_is_a_bug() {
+        let words = words_of(|o| o.level == 0 || o.level < 3 && o.corner == [0; 3]);
+        let cells = cells_of(&words, &ROOT);
+        let correct = leaf_set(&cells, Some(ROOT), None, "test".to_owned()).unwrap();
+        type Fault = fn(&mut LeafSet);
+        let faults: [Fault; 7] = [
+            |set| *set = set.with_parts(vec![set.words[1..].to_vec()]),
+            |set| set.words.swap(0, 1),
+            |set| *set = set.with_parts(vec![[&set.words[..1], &set.words[..21]].concat()]),
+            |set| {
+                let moved = set.words.iter().map(|w| if word::level(*w) == 1 { w + 4 } else { *w });
+                *set = set.with_parts(vec![moved.collect()]);
+            },
+            |set| set.manifest.digest.0 ^= 1,
+            |set| set.manifest.leaves_by_level[1] += 1,
+            |set| set.manifest.sides = Sides::Unknown,
+        ];
+        for (i, fault) in faults.iter().enumerate() {
+            let mut wrong = correct.clone();
+            fault(&mut wrong);
+            let seen = std::panic::catch_unwind(|| check_invariants(&cells, &wrong));
+            assert!(seen.is_err(), "fault {i}");
         }
     }
 

@@ -109,6 +109,12 @@ impl From<io::Error> for ImportError {
 /// format: a program that writes manifests did not finish such a directory.
 pub fn guess(path: &Path) -> Result<Format, ImportError> {
     let is_directory = fs::metadata(path)?.is_dir();
+    if path.join(manifest::FILE).is_file() {
+        return Err(ImportError::content(format!(
+            "is a complete leaf set, with its manifest {}: use it as it is",
+            manifest::FILE
+        )));
+    }
     if is_directory && path.join(manifest::part_name(0)).is_file() {
         return Err(ImportError::content(format!(
             "has parts and no {}, so the program that wrote them may not have finished: if it writes none, choose \
@@ -136,7 +142,9 @@ fn of_content(head: &[u8]) -> Option<Format> {
     let starts = |with: &[u8]| head.starts_with(with);
     if starts(b"\x93NUMPY") {
         let text = String::from_utf8_lossy(head);
-        let is_words = text.contains("'descr': '<u8'") && text.contains(",), ");
+        let is_words =
+            ["<u8", ">u8"].iter().any(|kind| text.contains(&format!("'descr': '{kind}'")))
+                && text.contains(",), ");
         return Some(if is_words { Format::LeafWords } else { Format::Npy });
     }
     if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") {

@@ -8,7 +8,8 @@
 //! Trees are placed by their vertices. `--root` maps the least cube around them onto the root: most forests are in the
 //! unit cube, whatever the size of the body.
 //!
-//! A forest that `harness export` wrote has one byte of data per quadrant: the side, or [`FILLER`]. `--sides data` reads it.
+//! A forest that `harness export` wrote has one byte of data per quadrant: the side, or [`FILLER`]. `--sides data` reads it. The
+//! attribute of its only tree, if it has one, is the edge of the root to the last bit.
 
 use super::cells::Cells;
 use super::{ImportError, Request, root, side};
@@ -43,7 +44,10 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     let (ends, data_bytes) = forest_header(&mut input, trees.len())?;
     input.align()?;
     let with_sides = sides_requested(request, data_bytes)?;
-    let stated = root::derive(&trees)?;
+    let stated = match (trees.corners.as_slice(), trees.edges.as_slice()) {
+        (&[origin], &[edge]) => Root { origin, edge },
+        _ => root::derive(&trees)?,
+    };
     let placed = request.root.unwrap_or(stated);
     let scale = placed.edge / stated.edge;
     let sides = with_sides.then(Vec::new);
@@ -142,6 +146,9 @@ fn connectivity(input: &mut Input) -> Result<Cells, ImportError> {
     else {
         unreachable!("ten numbers were read");
     };
+    if format.swap_bytes() == FORMAT {
+        return Err(damaged("its bytes are swapped: a big-endian machine wrote it"));
+    }
     if format != FORMAT || index_bytes != 4 {
         return Err(damaged(&format!(
             "its format is {format:#x} with indices of {index_bytes} bytes, and {FORMAT:#x} with 4 is supported"
@@ -153,7 +160,7 @@ fn connectivity(input: &mut Input) -> Result<Cells, ImportError> {
     input.items(if corners > 0 { trees } else { 0 }, 8 * 4)?;
     // Neighbours across the six faces: trees and faces.
     input.items(trees, 6 * (4 + 1))?;
-    input.items(trees, attribute_bytes)?;
+    let attributes = input.items(trees, attribute_bytes)?;
     for (count, pairs) in [(edges, edge_trees), (corners, corner_trees)] {
         input.items(count.saturating_add(1), 4)?;
         input.items(if count > 0 { pairs } else { 0 }, 4 + 1)?;
@@ -161,7 +168,16 @@ fn connectivity(input: &mut Input) -> Result<Cells, ImportError> {
     match (vertices, trees) {
         (0, 1) => Ok(Cells { corners: vec![[0.0; 3]], edges: vec![1.0], ..Cells::default() }),
         (0, _) => Err(damaged("it has several trees and no vertices that place them")),
-        _ => cubes(coordinates, tree_to_vertex),
+        _ => {
+            let mut trees = cubes(coordinates, tree_to_vertex)?;
+            if let (Ok(bytes), [edge]) = (attributes.try_into(), &mut trees.edges[..]) {
+                // Any program may have attributes of eight bytes.
+                let exact = f64::from_le_bytes(bytes);
+                let is_edge = (exact - *edge).abs() <= 1e-9 * *edge;
+                *edge = if is_edge { exact } else { *edge };
+            }
+            Ok(trees)
+        }
     }
 }
 
@@ -239,6 +255,11 @@ fn add_tree(
     let mut next = 0;
     for quadrant in quadrants.chunks_exact(stride) {
         let at @ [x, y, z, level] = decode(quadrant);
+        if level > i32::from(LEVEL_MAX) {
+            return Err(ImportError::content(format!(
+                "has a quadrant of level {level} at [{x}, {y}, {z}], and the levels of a mesh are 0 to {LEVEL_MAX}"
+            )));
+        }
         next = interval(at, length).filter(|interval| interval.start == next).map(|i| i.end).ok_or_else(|| {
             damaged(&format!(
                 "the quadrant with the corner [{x}, {y}, {z}] and the level {level} is not an octant of level 0 to \

@@ -26,10 +26,15 @@ pub fn derive(cells: &Cells) -> Result<Root, ImportError> {
     let (low, high) = bounds(cells);
     let depth = (cells.edges[coarsest] / finest).log2().round();
     let finite = low.iter().chain(&high).all(|c| c.is_finite()) && finest > 0.0;
-    if !finite || !(0.0..=f64::from(LEVEL_MAX)).contains(&depth) {
-        return Err(unusable(
-            "a coordinate is not finite, or an edge is not positive or too small",
-        ));
+    if !finite || !depth.is_finite() {
+        return Err(unusable("a coordinate is not finite, or an edge is not positive"));
+    }
+    if depth > f64::from(LEVEL_MAX) {
+        return Err(ImportError::content(format!(
+            "has cells of {} levels, with edges from {finest} to {}, and the levels of a mesh are 0 to {LEVEL_MAX}",
+            depth + 1.0,
+            cells.edges[coarsest]
+        )));
     }
     // The extent of all cells is known more precisely than the edge of one, and is a whole number of finest cells.
     let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);

@@ -37,7 +37,15 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
     for part in parts(path)? {
         let of_part = |why: String| ImportError::content(why).of_file(&part);
         let file = PartFile::open(&part).map_err(|error| of_part(format!("the part {error}")))?;
-        for word in file.read_all()? {
+        let words = file.read_all()?;
+        let is_leaf = |word: u64| octant(word, with_sides).is_ok();
+        let swapped = !words.iter().all(|&word| is_leaf(word))
+            && words.iter().all(|&word| is_leaf(word.swap_bytes()));
+        if swapped {
+            let why = "the bytes of its words are swapped: a big-endian machine wrote them";
+            return Err(of_part(why.to_owned()));
+        }
+        for word in words {
             let cell = cells.len();
             let octant = octant(word, with_sides).map_err(|why| {
                 of_part(format!("cell {cell} is the word {word:#018x}, in which {why}"))

@@ -180,6 +180,18 @@ impl Tree {
         }
     }
 
+    /// What the tree has at an octant: a node, a leaf, or a hole. Within a leaf it is the leaf's handle.
+    pub fn at(&self, octant: &Octant) -> Handle {
+        let mut handle = self.root;
+        for level in 1..=octant.level {
+            if !handle.is_node() {
+                break;
+            }
+            handle = self.child(handle, octant.ancestor(level).digit(), level - 1);
+        }
+        handle
+    }
+
     /// The leaf that contains a level-19 cell, and its kind.
     pub fn locate(&self, cell: [u32; 3]) -> Option<(Octant, Kind)> {
         debug_assert!(cell.iter().all(|&c| c < CELLS_PER_EDGE));

@@ -293,3 +293,46 @@ fn the_format_can_be_given() {
         assert!(read(format).is_err(), "{format:?}");
     }
 }
+
+#[test]
+fn swapped_bytes_a_21st_level_and_a_complete_leaf_set_are_named() {
+    let why = refusal("brick.p8est", "", |bytes| {
+        for number in bytes[32..112].chunks_exact_mut(8) {
+            number.reverse();
+        }
+    });
+    assert!(why.contains("bytes are swapped"), "{why}");
+    let place = tempfile::tempdir().unwrap();
+    let words = leaves("unitcube.csv", root([0.0, 0.0, 0.0, 1.0]));
+    let refused = |path: &Path| imported(path, &Request::default()).unwrap_err().to_string();
+    let path = place.path().join("words.npy");
+    let swapped: Vec<u64> = words.iter().map(|word| word.swap_bytes()).collect();
+    npy::write(&path, &swapped).unwrap();
+    assert!(refused(&path).contains("bytes of its words are swapped"), "{}", refused(&path));
+    let bytes = words.iter().flat_map(|word| word.to_be_bytes());
+    let header = npy::header(">u8", &format!("({},)", words.len()));
+    fs::write(&path, header.into_iter().chain(bytes).collect::<Vec<u8>>()).unwrap();
+    assert!(refused(&path).contains("bytes are swapped"), "{}", refused(&path));
+    // Twenty-one levels, 0 to 20, of a mesh that is refined towards its corner.
+    let mut table = "x,y,z,edge\n".to_owned();
+    for level in 1..=20 {
+        let edge = 0.5f64.powi(level);
+        (1..8).for_each(|d: u32| {
+            let [x, y, z] = [0, 1, 2].map(|a| f64::from(d >> a & 1) * edge);
+            table += &format!("{x},{y},{z},{edge}\n");
+        });
+    }
+    fs::write(place.path().join("deep.csv"), table).unwrap();
+    let why = refused(&place.path().join("deep.csv"));
+    assert!(
+        why.contains("has cells of 20 levels")
+            || why.contains("the levels of a mesh are 0 to 19")
+            || why.contains("level 20"),
+        "{why}"
+    );
+    let mesh = place.path().join("mesh");
+    let set = imported(&sample("unitcube.csv"), &Request::default()).unwrap();
+    set.create(&mesh).unwrap();
+    let why = refused(&mesh);
+    assert!(why.contains("complete leaf set"), "{why}");
+}

@@ -8,6 +8,7 @@ use contract::import::htg::ImportedTree;
 use contract::import::{self, Format, ImportError, Request, leaf_set};
 use contract::lattice::Root;
 use contract::leafset::{self, LeafSet};
+use contract::npy;
 use contract::word::{key, span};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,98 +1,217 @@
-//! The faces of a cell: the pieces of the six faces of its cube, as polygons.
+//! The faces of a mesh: those between two cells, then those of each patch.
 //!
-//! A face of the cube that touches finer cells is split into their faces, and what is left of it, into the largest squares of
-//! the quadtree that touch no cell. An edge of a polygon has every point of the mesh that bisects it, or bisects a half of it,
-//! and so on. Two polygons with a common piece of an edge therefore divide it in the same way, which closes every cell: a
-//! point that bisects an edge of one face is a corner of a smaller square beside it, or lies where no cell needs it.
+//! Invariants, which are asserted before any file has its name:
+//! - a face between cells is that of the cell with the lower number, and these faces ascend by both numbers: OpenFOAM's upper-triangular order;
+//! - a face has at least four vertices, and every point of the mesh is a vertex;
+//! - every cell is closed: each edge of a cell belongs to two of its faces, which run along it in opposite directions;
+//! - the faces of the patches point out of the cells and enclose their volume, so each of them lies within the root.
 
 use contract::octant::CELLS_PER_EDGE;
+use contract::word;
 
-use super::points::{Near, Point};
-use super::tree::{Content, Tree};
-use super::walk::{Around, Follow};
+use super::leaves::Leaves;
+use super::patches::Patches;
+use super::points::{Point, Points};
+use super::squares::squares;
+use crate::error::ExportError;
+use crate::options::Options;
 
-/// A square that a cell shares with another cell or with a boundary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Square {
-    /// Minimum corner.
-    pub corner: Point,
-    /// The edge is that of an octant of this level.
-    pub level: u8,
-    /// The axis of its normal.
-    pub axis: u8,
-    /// Whether it is on the high side of the cell along the axis.
-    pub is_high: bool,
-    /// A cell, or one of [`Content::HOLE`], [`Content::CUT`] and [`Content::OUTSIDE`].
-    pub across: Content,
+/// The faces.
+#[derive(Clone, Debug, Default)]
+pub struct Faces {
+    /// The cell that each face belongs to.
+    pub owner: Vec<u32>,
+    /// The cells across the faces between two cells, which come first.
+    pub neighbour: Vec<u32>,
+    /// Index of the first face of every patch, and the number of all faces.
+    pub starts: Vec<usize>,
+    /// The vertices of all faces, around normals that point away from the owners.
+    vertices: Vec<u32>,
+    /// Where the vertices of each face end.
+    ends: Vec<u64>,
 }
 
-/// Appends the squares of a cell.
-pub fn squares<P: Follow>(tree: &Tree, around: &Around<P>, squares: &mut Vec<Square>) {
-    let edge = around.octant.edge();
-    for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
-        let mut corner = around.octant.corner;
-        corner[axis] += if is_high { edge } else { 0 };
-        let across = around.across(axis, usize::from(is_high));
-        let level = around.octant.level;
-        split(tree, Square { corner, level, axis: axis as u8, is_high, across }, squares);
-    }
-}
-
-/// Appends the squares of a square whose `across` may be split.
-fn split(tree: &Tree, square: Square, squares: &mut Vec<Square>) {
-    if !square.across.is_node() {
-        return squares.push(square);
-    }
-    let axis = usize::from(square.axis);
-    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let begin = squares.len();
-    let edge = square.edge() / 2;
-    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let mut corner = square.corner;
-        corner[u] += i * edge;
-        corner[v] += j * edge;
-        // The children that touch the square are on the side from which it is seen.
-        let digit = (i as usize) << u | (j as usize) << v | usize::from(!square.is_high) << axis;
-        let across = tree.child(square.across, digit);
-        split(tree, Square { corner, level: square.level + 1, across, ..square }, squares);
-    }
-    let parts = &squares[begin..];
-    let across = parts[0].across;
-    if across.as_cell().is_none()
-        && parts.len() == 4
-        && parts.iter().all(|part| part.across == across && part.level == square.level + 1)
-    {
-        squares.truncate(begin);
-        squares.push(Square { across, ..square });
-    }
-}
-
-impl Square {
-    fn edge(&self) -> u32 {
-        CELLS_PER_EDGE >> self.level
-    }
-
-    /// The corners, counterclockwise around the positive axis, the minimum corner first.
-    pub fn corners(&self) -> [Point; 4] {
-        let axis = usize::from(self.axis);
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
-            let mut corner = self.corner;
-            corner[u] += i * self.edge();
-            corner[v] += j * self.edge();
-            corner
-        })
-    }
-
-    /// Replaces `polygon` by the numbers of the vertices of the face of a cell: counterclockwise around the positive axis, or clockwise, the
-    /// minimum corner first in both cases.
-    pub fn polygon(&self, around: &Around<Near>, clockwise: bool, polygon: &mut Vec<u32>) {
-        let axis = usize::from(self.axis);
-        let mut face = around.more.on_face(axis, self.is_high);
-        for level in around.octant.level + 1..=self.level {
-            let bit = |a: usize| usize::from(self.corner[a % 3] & CELLS_PER_EDGE >> level != 0);
-            face = face.quarter(bit(axis + 1) | bit(axis + 2) << 1);
+impl Faces {
+    /// The faces of the cells among leaves.
+    ///
+    /// # Errors
+    /// If the user interrupts.
+    pub fn new(
+        leaves: &Leaves,
+        points: &Points,
+        patches: &mut Patches,
+        options: &Options,
+    ) -> Result<Self, ExportError> {
+        let mut all = Self::default();
+        let mut of_patches = vec![Self::default(); patches.names.len()];
+        let (mut of_cell, mut owned) = (Vec::new(), Vec::new());
+        leaves.walk(points.near(), options, &mut |cell, around| {
+            squares(leaves, around, &mut of_cell);
+            owned.clear();
+            for (i, square) in of_cell.iter().enumerate() {
+                match square.across.as_cell() {
+                    // The cell on the high side has the higher number.
+                    Some(across) => owned.extend(square.is_high.then_some((across, i))),
+                    None => {
+                        let patch = &mut of_patches[patches.of(square)];
+                        square.polygon(around, &mut patch.vertices);
+                        patch.end(cell);
+                    }
+                }
+            }
+            owned.sort_unstable();
+            for &(across, i) in &owned {
+                of_cell[i].polygon(around, &mut all.vertices);
+                all.end(cell);
+                all.neighbour.push(across);
+            }
+            Ok(())
+        })?;
+        for patch in of_patches {
+            all.starts.push(all.count());
+            let before = all.vertices.len() as u64;
+            all.owner.extend(patch.owner);
+            all.vertices.extend(patch.vertices);
+            all.ends.extend(patch.ends.iter().map(|end| before + end));
         }
-        face.polygon(clockwise, polygon);
+        all.starts.push(all.count());
+        Ok(all)
+    }
+
+    /// Ends a face of a cell, whose vertices have been appended.
+    fn end(&mut self, owner: u32) {
+        self.owner.push(owner);
+        self.ends.push(self.vertices.len() as u64);
+    }
+
+    /// Number of faces.
+    pub fn count(&self) -> usize {
+        self.owner.len()
+    }
+
+    /// The vertices of a face.
+    pub fn vertices(&self, face: usize) -> &[u32] {
+        let begin = face.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.vertices[begin as usize..self.ends[face] as usize]
+    }
+
+    /// Asserts the invariants.
+    ///
+    /// # Panics
+    /// If one is violated.
+    pub fn check_invariants(&self, leaves: &Leaves, points: &Points) {
+        let pairs = || self.owner.iter().zip(&self.neighbour);
+        let disordered = pairs().position(|(owner, neighbour)| owner >= neighbour);
+        assert_eq!(disordered, None, "a face belongs to the cell with the higher number");
+        let disordered = pairs().zip(pairs().skip(1)).position(|(a, b)| a >= b);
+        assert_eq!(disordered, None, "a face is not in upper-triangular order");
+        let cells = leaves.count();
+        assert!(
+            self.owner.iter().chain(&self.neighbour).all(|&cell| cell < cells),
+            "a face of cell {cells} or beyond"
+        );
+        let (mut used, mut sums) =
+            (vec![false; points.count() as usize], vec![0u64; cells as usize]);
+        let mut volume = 0;
+        for (face, &owner) in self.owner.iter().enumerate() {
+            let vertices = self.vertices(face);
+            assert!(
+                vertices.len() >= 4,
+                "face {face} of cell {owner} has {} vertices",
+                vertices.len()
+            );
+            vertices.iter().for_each(|&v| used[v as usize] = true);
+            let sum = edges(vertices);
+            let to = &mut sums[owner as usize];
+            *to = to.wrapping_add(sum);
+            match self.neighbour.get(face) {
+                Some(&across) => sums[across as usize] = sums[across as usize].wrapping_sub(sum),
+                None => volume += volume_below(vertices.iter().map(|&v| points.at(v))),
+            }
+        }
+        assert_eq!(used.iter().position(|used| !used), None, "a point belongs to no face");
+        assert_eq!(sums.iter().position(|&sum| sum != 0), None, "a cell is not closed");
+        let of_cells: u64 = leaves.cells().map(|w| word::span(word::level(w))).sum();
+        assert_eq!(
+            volume,
+            2 * i128::from(of_cells),
+            "twice the volume within the patches is not that of {cells} cells"
+        );
+    }
+}
+
+/// A sum over the edges of a polygon, in which the edges of a closed surface cancel, and others practically never.
+fn edges(vertices: &[u32]) -> u64 {
+    let next = vertices.iter().cycle().skip(1);
+    let edge = |(&from, &to): (&u32, &u32)| {
+        let mixed =
+            |a: u32, b: u32| contract::digest::mix(u64::from(a) << 32 | u64::from(b)) as u64;
+        if from < to { mixed(from, to) } else { mixed(to, from).wrapping_neg() }
+    };
+    vertices.iter().zip(next).map(edge).fold(0, u64::wrapping_add)
+}
+
+/// Twice the signed volume between a polygon that is normal to the x axis and the plane x = 0; 0 for other polygons.
+fn volume_below(polygon: impl Iterator<Item = Point>) -> i128 {
+    let corners: Vec<[i64; 3]> = polygon.map(|p| p.map(i64::from)).collect();
+    assert!(
+        corners.iter().flatten().all(|&c| c <= i64::from(CELLS_PER_EDGE)),
+        "a face outside of the root: {corners:?}"
+    );
+    if corners.iter().any(|c| c[0] != corners[0][0]) {
+        return 0;
+    }
+    let next = corners.iter().cycle().skip(1);
+    let area: i64 = corners.iter().zip(next).map(|(a, b)| a[1] * b[2] - a[2] * b[1]).sum();
+    i128::from(area) * i128::from(corners[0][0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{ASCII, mesh_of, options};
+    use super::*;
+    use contract::testing::words_of;
+
+    /// Asserts that a change of the faces of a small mesh is noticed, and for the stated reason.
+    fn assert_noticed(why: &str, change: impl Fn(&mut Faces)) {
+        let words = words_of(|o| o.level == 0 || o.level == 1 && o.corner == [0; 3]);
+        let options = options(ASCII);
+        let mesh = mesh_of(&words, |_| false, &options);
+        mesh.faces.check_invariants(&mesh.leaves, &mesh.points);
+        let mut faces = mesh.faces.clone();
+        change(&mut faces);
+        let check =
+            std::panic::AssertUnwindSafe(|| faces.check_invariants(&mesh.leaves, &mesh.points));
+        let caught = std::panic::catch_unwind(check).unwrap_err();
+        let message = caught.downcast_ref::<String>().cloned();
+        let message =
+            message.or_else(|| caught.downcast_ref::<&str>().map(|m| (*m).to_owned())).unwrap();
+        assert!(message.contains(why), "{message}");
+    }
+
+    #[test]
+    fn planted_wrong_faces_are_noticed() {
+        assert_noticed("higher number", |f| std::mem::swap(&mut f.owner[3], &mut f.neighbour[3]));
+        assert_noticed("upper-triangular", |f| f.neighbour.swap(0, 1));
+        assert_noticed("or beyond", |f| *f.neighbour.last_mut().unwrap() = 15);
+        // A hanging node is missing in one face.
+        assert_noticed("not closed", |f| {
+            let face = (0..f.count()).find(|&face| f.vertices(face).len() == 5).unwrap();
+            let begin = f.ends[face - 1] as usize;
+            f.vertices.remove(begin + 4);
+            f.ends[face..].iter_mut().for_each(|end| *end -= 1);
+        });
+        assert_noticed("no face", |f| {
+            let last = f.vertices.iter().copied().max().unwrap();
+            f.vertices.iter_mut().filter(|v| **v == last).for_each(|v| *v -= 1);
+        });
+        // All cells are closed, but inside out.
+        assert_noticed("the volume within", |f| {
+            let mut begin = 0;
+            for &end in &f.ends {
+                f.vertices[begin..end as usize].reverse();
+                begin = end as usize;
+            }
+        });
     }
 }

@@ -1,11 +1,10 @@
 //! OpenFOAM's files: the dictionary `FoamFile`, then one list, in ASCII or binary.
 //!
 //! Faces are a `faceList` in ASCII. In binary they are a `faceCompactList`, two lists of labels of which the first has the
-//! position of each face in the second; both are written at the same time, from two places of the file on.
+//! position of each face in the second.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::os::unix::fs::FileExt;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::options::{Label, Style};
@@ -18,21 +17,10 @@ pub fn label_max(label: Label) -> u64 {
     }
 }
 
-fn label_bytes(label: Label) -> u64 {
-    match label {
-        Label::Bits32 => 4,
-        Label::Bits64 => 8,
-    }
-}
-
-const BUFFER_BYTES: usize = 1 << 16;
-/// Room for a count that is written after its list.
-const COUNT_DIGITS: usize = 20;
-
 /// The dictionary at the beginning of a file.
 pub fn header(style: Style, class: &str, object: &str, note: &str) -> String {
     let format = if style.is_ascii { "ascii" } else { "binary" };
-    let bits = 8 * label_bytes(style.label);
+    let bits = if style.label == Label::Bits32 { 32 } else { 64 };
     let note = if note.is_empty() { String::new() } else { format!("    note \"{note}\";\n") };
     format!(
         "FoamFile\n{{\n    version 2.0;\n    format {format};\n    arch \"LSB;label={bits};scalar=64\";\n{note}    \
@@ -40,26 +28,15 @@ pub fn header(style: Style, class: &str, object: &str, note: &str) -> String {
     )
 }
 
-fn write_label(out: &mut impl Write, style: Style, label: i64) -> io::Result<()> {
-    debug_assert!(label.unsigned_abs() <= label_max(style.label));
-    match (style.is_ascii, style.label) {
-        (true, _) => out.write_all(itoa::Buffer::new().format(label).as_bytes()),
-        (false, Label::Bits32) => out.write_all(&(label as i32).to_le_bytes()),
-        (false, Label::Bits64) => out.write_all(&label.to_le_bytes()),
-    }
-}
-
-/// A file with one list, whose length is known.
+/// A file with lists.
 #[derive(Debug)]
 pub struct List {
     out: BufWriter<File>,
     style: Style,
-    /// A binary list without items has no parentheses.
-    has_end: bool,
 }
 
 impl List {
-    /// Begins a list of `count` items.
+    /// Begins a file whose list has `count` items.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -71,15 +48,28 @@ impl List {
         note: &str,
         count: u64,
     ) -> io::Result<Self> {
-        let mut out = BufWriter::with_capacity(BUFFER_BYTES, File::create(dir.join(object))?);
-        let has_end = style.is_ascii || count > 0;
-        writeln!(out, "{}{count}", header(style, class, object, note))?;
-        out.write_all(match (has_end, style.is_ascii) {
-            (false, _) => b"",
-            (true, false) => b"(",
-            (true, true) => b"(\n",
-        })?;
-        Ok(Self { out, style, has_end })
+        let out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
+        let mut list = Self { out, style };
+        write!(list.out, "{}{count}\n{}", header(style, class, object, note), list.begin(count))?;
+        Ok(list)
+    }
+
+    /// A binary list without items has no parentheses.
+    fn begin(&self, count: u64) -> &'static str {
+        match (self.style.is_ascii, count) {
+            (true, _) => "(\n",
+            (false, 0) => "",
+            (false, _) => "(",
+        }
+    }
+
+    fn number(&mut self, label: i64) -> io::Result<()> {
+        debug_assert!(label.unsigned_abs() <= label_max(self.style.label));
+        match (self.style.is_ascii, self.style.label) {
+            (true, _) => self.out.write_all(itoa::Buffer::new().format(label).as_bytes()),
+            (false, Label::Bits32) => self.out.write_all(&(label as i32).to_le_bytes()),
+            (false, Label::Bits64) => self.out.write_all(&label.to_le_bytes()),
+        }
     }
 
     /// Adds a label.
@@ -87,8 +77,8 @@ impl List {
     /// # Errors
     /// If the file cannot be written.
     pub fn label(&mut self, label: i64) -> io::Result<()> {
-        write_label(&mut self.out, self.style, label)?;
-        self.end_line()
+        self.number(label)?;
+        if self.style.is_ascii { self.out.write_all(b"\n") } else { Ok(()) }
     }
 
     /// Adds a point. Its coordinates are written so that they are read back without a change.
@@ -107,99 +97,32 @@ impl List {
     }
 
     /// Adds a face to a `faceList`.
-    fn face(&mut self, vertices: &[u64]) -> io::Result<()> {
-        write_label(&mut self.out, self.style, vertices.len() as i64)?;
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn face(&mut self, vertices: &[u32]) -> io::Result<()> {
+        self.number(vertices.len() as i64)?;
         for (i, &vertex) in vertices.iter().enumerate() {
             self.out.write_all(if i == 0 { b"(" } else { b" " })?;
-            write_label(&mut self.out, self.style, vertex as i64)?;
+            self.number(i64::from(vertex))?;
         }
         self.out.write_all(b")\n")
     }
 
-    fn end_line(&mut self) -> io::Result<()> {
-        if self.style.is_ascii { self.out.write_all(b"\n") } else { Ok(()) }
-    }
-
-    /// Ends the list, and waits until the file is on disk.
+    /// Ends a list, after which another one of `count` items follows.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn finish(mut self) -> io::Result<()> {
-        self.out.write_all(if self.has_end { b")\n" } else { b"\n" })?;
+    pub fn next(&mut self, count: u64) -> io::Result<()> {
+        write!(self.out, ")\n{count:<20}\n{}", self.begin(count))
+    }
+
+    /// Ends the last list, which has `count` items, and waits until the file is on disk.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish(mut self, count: u64) -> io::Result<()> {
+        self.out.write_all(if self.begin(count).is_empty() { b"\n" } else { b")\n" })?;
         self.out.into_inner()?.sync_all()
-    }
-}
-
-/// The file `faces`.
-#[derive(Debug)]
-pub enum Faces {
-    /// A `faceList`.
-    Listed(List),
-    /// A `faceCompactList`.
-    Compact(Compact),
-}
-
-/// The two lists of a `faceCompactList`.
-#[derive(Debug)]
-pub struct Compact {
-    positions: List,
-    vertices: BufWriter<File>,
-    /// Position of the second list's length in the file.
-    at_count: u64,
-    count: u64,
-}
-
-impl Faces {
-    /// Begins a list of `count` faces.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn create(dir: &Path, style: Style, count: u64) -> io::Result<Self> {
-        if style.is_ascii {
-            return Ok(Self::Listed(List::create(dir, style, "faceList", "faces", "", count)?));
-        }
-        let mut positions = List::create(dir, style, "faceCompactList", "faces", "", count + 1)?;
-        let begin = positions.out.stream_position()?;
-        let at_count = begin + (count + 1) * label_bytes(style.label) + ")\n".len() as u64;
-        let mut file = File::options().write(true).open(dir.join("faces"))?;
-        file.seek(SeekFrom::Start(at_count + COUNT_DIGITS as u64))?;
-        let mut vertices = BufWriter::with_capacity(BUFFER_BYTES, file);
-        vertices.write_all(b"\n(")?;
-        positions.label(0)?;
-        Ok(Self::Compact(Compact { positions, vertices, at_count, count: 0 }))
-    }
-
-    /// Adds a face. Returns false if its vertices exceed what labels can count.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn push(&mut self, vertices: &[u64]) -> io::Result<bool> {
-        match self {
-            Self::Listed(list) => list.face(vertices)?,
-            Self::Compact(Compact { positions, vertices: out, count, .. }) => {
-                *count += vertices.len() as u64;
-                if *count > label_max(positions.style.label) {
-                    return Ok(false);
-                }
-                positions.label(*count as i64)?;
-                vertices.iter().try_for_each(|&v| write_label(out, positions.style, v as i64))?;
-            }
-        }
-        Ok(true)
-    }
-
-    /// Ends the list, and waits until the file is on disk.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn finish(self) -> io::Result<()> {
-        let Compact { positions, mut vertices, at_count, count } = match self {
-            Self::Listed(list) => return list.finish(),
-            Self::Compact(compact) => compact,
-        };
-        vertices.write_all(b")\n")?;
-        let file = vertices.into_inner()?;
-        file.write_all_at(format!("{count:<COUNT_DIGITS$}").as_bytes(), at_count)?;
-        positions.finish()
     }
 }

@@ -4,123 +4,117 @@
 //! and every cell is closed. `checkMesh -allTopology` verifies that. Cells are numbered in Morton order, which yields
 //! OpenFOAM's upper-triangular order of faces: a cell on the high side of another has the higher number.
 //!
-//! The files are written cell by cell. Only the tree of the cells and that of the points are kept, both with equal subtrees stored once, so
-//! memory does not grow with the number of cells but with the detail of the surface: 18 MB for 50 million cells around an aircraft, 190 MB for 938
-//! million. Directories of processors need the faces between them, 3 to 5 bytes each, and each thread a bit for every point near other
-//! directories and 0.004 bytes for all others.
+//! All is held in arrays: about 130 bytes per cell, a fifth of what OpenFOAM needs to read the mesh.
 //!
-//! - [`tree`]: the cells; [`walk`](mod@walk): what is across their faces; [`faces`]: the faces; [`points`]: the numbers of points; [`corners`]: where they are;
-//! - [`regions`], [`patches`], [`solids`], [`processors`]; [`face_list`]: the faces between processors; [`own`]: the points of one;
-//! - [`survey`](mod@survey): the numbers of faces in all directories; [`directory`]: what one has; [`poly_mesh`]: its files; [`face_files`]: those with the faces;
-//!   [`cell_files`]: those with a label for each cell; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
+//! - [`leaves`]: the cells, and a walk over them; [`squares`]: their faces; [`points`]: the points; [`faces`](mod@faces): all faces, and the invariants;
+//! - [`regions`], [`patches`]; [`directory`]: the part of each processor; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
 
-pub mod cell_files;
-pub mod corners;
-pub mod directory;
-pub mod face_files;
-pub mod face_list;
-pub mod faces;
-pub mod lists;
-pub mod notes;
-pub mod own;
-pub mod patches;
-pub mod points;
-pub mod poly_mesh;
-pub mod processors;
-pub mod regions;
-pub mod solids;
-pub mod survey;
+mod directory;
+mod faces;
+mod leaves;
+mod lists;
+mod notes;
+mod patches;
+mod points;
+mod regions;
+mod squares;
 #[cfg(test)]
 mod tests;
-pub mod tree;
-pub mod walk;
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use contract::files::{Staging, nearest_directory};
+use contract::lattice::Root;
 use contract::manifest::Sides;
-use contract::tree::{Builder, DELETED};
+use contract::octant::Octant;
 use contract::word;
 
 use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::mesh::Mesh;
+use crate::mesh;
 use crate::options;
 use crate::options::{Options, Processors, Summary};
 use crate::ordered::in_order;
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
-use directory::{Counts, Directory};
+use directory::{Directory, directories};
+use faces::Faces;
+use leaves::{CELLS_MAX, CUT, Leaves};
 use patches::Patches;
 use points::Points;
-use processors::Distribution;
-use regions::{Regions, Size, visit_retained};
-use survey::{Domain, Model, survey};
-use tree::{CELLS_MAX, Tree};
+use regions::{Regions, Size};
+
+/// A mesh for OpenFOAM.
+pub struct Mesh<'a> {
+    leaves: Leaves,
+    points: Points,
+    faces: Faces,
+    patches: Patches<'a>,
+    /// The rank that wrote each cell, if there are several.
+    ranks: Option<Vec<u32>>,
+    root: Root,
+    /// Whether the sides of cells are known.
+    has_sides: bool,
+    options: &'a Options<'a>,
+}
 
 /// Writes the selected leaves as `path`, which is a case's `constant/polyMesh`, or as one
 /// `processorN/constant/polyMesh` per processor in the same case. Directories appear under their names when all are complete.
 ///
 /// # Errors
 /// If the mesh cannot be read, if a directory exists and is not empty, if a file cannot be written, or if the options contradict the mesh.
+///
+/// # Panics
+/// If an invariant of the answer is violated: see [`Faces::check_invariants`] and `check_parts`.
 pub fn write(
-    mesh: &Mesh,
+    mesh: &mesh::Mesh,
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
-    let mut model = read(mesh, selection, options)?;
-    let regions = connect(&mut model, options.foam.regions)?;
-    model.points = corners::points(&model.tree, options)?;
-    let distribution = distribute(&model, mesh, options.foam.processors)?;
-    let targets = targets(path, distribution.as_ref().map(Distribution::processors))?;
-    let mut patches = Patches::new(options.foam.case, *selection != Selection::default())
-        .map_err(ExportError::Request)?;
-
-    let survey = survey(&model, &mut patches, distribution.as_ref())?;
+    let has_ranks = mesh.has_ranks();
+    let (of_mesh, regions) = read(mesh, selection, options)?;
+    let processors = distribute(&of_mesh, options.foam.processors, || {
+        has_ranks.then_some(()).ok_or_else(|| mesh.ranks_unknown())
+    })?;
+    let parts = directories(&of_mesh, processors.as_deref());
+    check_parts(&of_mesh, &parts);
+    let numbers = processors.map(|of_cells| numbers(&of_cells));
+    let targets = targets(path, numbers.is_some().then_some(parts.len()))?;
 
     let named = |error| ExportError::write(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
-    let make = |processor: usize| {
-        let dir = staging.path().join(processor.to_string());
+    let make = |part: usize| {
+        let dir = staging.path().join(part.to_string());
         fs::create_dir(&dir).map_err(named)?;
-        let domain = Domain(distribution.as_ref().map(|of_cells| (of_cells, processor as u32)));
-        let write = || {
-            let directory = Directory::new(&model, &patches, &survey, domain, &dir)?;
-            poly_mesh::write(&directory).map(|()| directory.counts)
-        };
-        write().map_err(|error| match error {
+        parts[part].write(&of_mesh, numbers.as_deref(), &dir).map_err(|error| match error {
             ExportError::Write(error) => named(error),
             error => error,
         })
     };
-    let cells = u64::from(model.tree.cells());
-    let (mut counts, mut done) = (Vec::new(), 0);
-    in_order(targets.len(), options.jobs, make, |_, of_directory: Counts| {
-        done += of_directory.cells;
-        counts.push(of_directory);
+    let cells = u64::from(of_mesh.leaves.count());
+    let mut done = 0;
+    in_order(targets.len(), options.jobs, make, |part, ()| {
+        done += parts[part].cells.len() as u64;
         options.watch.progress(done, cells);
         Ok(())
     })?;
     let (files, bytes) = sizes(staging.path()).map_err(named)?;
     options.check()?;
     staging.publish(|staged| {
-        for (processor, target) in targets.iter().enumerate() {
+        for (part, target) in targets.iter().enumerate() {
             let place = || {
                 fs::create_dir_all(target.parent().unwrap_or(target))?;
-                fs::rename(staged.join(processor.to_string()), target)
+                fs::rename(staged.join(part.to_string()), target)
             };
             place().map_err(|error| ExportError::write(target, error))?;
         }
         Ok::<(), ExportError>(())
     })?;
-    let mut notes = notes::notes(&counts, &regions, options.foam.regions);
+    let mut notes = notes::notes(&of_mesh, &parts, &regions);
     notes.extend(notes::crossing(mesh, selection));
-    if counts.len() > 1 && !survey.has_addressing(&model) {
-        notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
-    }
     Ok(Summary { leaves: cells, files, bytes, notes })
 }
 
@@ -136,24 +130,22 @@ fn sizes(staging: &Path) -> io::Result<(u64, u64)> {
     Ok((files, bytes))
 }
 
-/// The selected leaves as cells.
+/// The selected leaves as a mesh, and all regions of them, of which only the largest may have been kept.
 fn read<'a>(
-    mesh: &Mesh,
+    mesh: &mesh::Mesh,
     selection: &Selection,
     options: &'a Options<'a>,
-) -> Result<Model<'a>, ExportError> {
+) -> Result<(Mesh<'a>, Vec<Size>), ExportError> {
     let root = mesh.manifest.root;
     if options.foam.case.is_some_and(|case| case.root != root) {
         return Err(ExportError::Request(
             "the mesh has another root than the case: give the case that was meshed".to_owned(),
         ));
     }
-    let ranks = mesh.leaves_by_rank()?.len();
-    let mut ranks = (ranks > 1).then(|| Distribution::new(ranks as u32));
-    let (mut builder, mut visited, mut cells) = (Builder::default(), 0u64, 0);
-    mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
-        visited += 1;
-        options.check_at(visited)?;
+    let mut ranks = (mesh.leaves_by_rank()?.len() > 1).then(Vec::new);
+    let (mut words, mut cells) = (Vec::new(), 0);
+    mesh.visit(mesh::Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
+        options.check_at(words.len() as u64)?;
         let is_exported = selection.has(&leaf);
         cells += u64::from(is_exported);
         if cells > CELLS_MAX {
@@ -162,70 +154,128 @@ fn read<'a>(
             )));
         }
         if let Some(ranks) = &mut ranks {
-            ranks.push(leaf.rank, u32::from(is_exported));
+            ranks.extend(is_exported.then_some(leaf.rank));
         }
-        let kind = if is_exported { leaf.side as u8 } else { DELETED };
-        let pushed = builder.push_leaf(word::key_of(leaf.octant.corner), leaf.octant.level, kind);
-        pushed.expect("the leaves of a visit ascend and do not overlap");
+        let Octant { corner, level } = leaf.octant;
+        let side = if is_exported { leaf.side as u64 } else { CUT };
+        words.push(word::key_of(corner) << 7 | u64::from(level) << 2 | side);
         Ok(())
     })?;
     if cells == 0 {
         return Err(nothing_selected(mesh));
     }
-    Ok(Model {
-        tree: Tree::new(&builder.finish()),
-        ranks,
-        points: Points::default(),
-        root,
-        has_sides: mesh.manifest.sides == Sides::Known,
-        options,
-    })
+    let patches = Patches::new(options.foam.case, *selection != Selection::default());
+    let (leaves, patches) = (Leaves::new(words), patches.map_err(ExportError::Request)?);
+    let has_sides = mesh.manifest.sides == Sides::Known;
+    build(leaves, Mesh { has_sides, ..Mesh::empty(patches, ranks, root, options) })
 }
 
-/// Finds the regions, and removes those that are not to be exported.
-fn connect(model: &mut Model, keep: options::Regions) -> Result<Vec<Size>, ExportError> {
-    let regions = Regions::new(&model.tree, model.options)?;
-    let sizes = regions.sizes();
-    if keep == options::Regions::Largest && sizes.len() > 1 {
-        let retained = regions.retain(sizes[0].0);
-        if let Some(ranks) = &mut model.ranks {
-            *ranks = ranks.retain(|visit| visit_retained(&model.tree, &retained, visit));
+/// Leaves out the regions that are not to be exported, and finds points and faces.
+fn build<'a>(mut leaves: Leaves, mut mesh: Mesh<'a>) -> Result<(Mesh<'a>, Vec<Size>), ExportError> {
+    let regions = Regions::new(&leaves, mesh.options)?;
+    if mesh.options.foam.regions == options::Regions::Largest && regions.sizes.len() > 1 {
+        let is_kept = |cell: u32| regions.of_cell[cell as usize] == regions.sizes[0].0;
+        leaves = leaves.retain(is_kept);
+        if let Some(ranks) = &mut mesh.ranks {
+            let mut cells = 0..;
+            ranks.retain(|_| cells.next().is_some_and(is_kept));
         }
-        model.tree = retained;
     }
-    Ok(sizes.into_iter().map(|(_, size)| size).collect())
+    mesh.points = Points::new(&leaves, mesh.options)?;
+    mesh.faces = Faces::new(&leaves, &mesh.points, &mut mesh.patches, mesh.options)?;
+    mesh.faces.check_invariants(&leaves, &mesh.points);
+    mesh.leaves = leaves;
+    Ok((mesh, regions.sizes.into_iter().map(|(_, size)| size).collect()))
 }
 
-/// The cells of each processor directory.
+impl<'a> Mesh<'a> {
+    fn empty(
+        patches: Patches<'a>,
+        ranks: Option<Vec<u32>>,
+        root: Root,
+        options: &'a Options<'a>,
+    ) -> Self {
+        let (leaves, points, faces) = Default::default();
+        Self { leaves, points, faces, patches, ranks, root, has_sides: true, options }
+    }
+
+    /// Whether labels can hold the numbers of the whole mesh, so that each processor can state which part of it it has.
+    fn has_addressing(&self) -> bool {
+        let most = self.faces.count().max(self.points.count() as usize);
+        (most as u64) < lists::label_max(self.options.foam.style.label)
+    }
+}
+
+/// The processor of each cell.
 fn distribute(
-    model: &Model,
     mesh: &Mesh,
     processors: Option<Processors>,
-) -> Result<Option<Distribution>, ExportError> {
-    let cells = model.tree.cells();
-    let distribution = match processors {
+    require_ranks: impl FnOnce() -> Result<(), ExportError>,
+) -> Result<Option<Vec<u32>>, ExportError> {
+    let cells = u64::from(mesh.leaves.count());
+    let of_cells = match processors {
         None => return Ok(None),
-        Some(Processors::Equal(count)) if count <= cells => Distribution::equal(cells, count),
-        Some(Processors::Equal(count)) => {
+        Some(Processors::Equal(count)) if u64::from(count) > cells => {
             return Err(ExportError::Request(format!(
                 "{cells} cells are too few for {count} processors: choose fewer"
             )));
         }
-        Some(Processors::Ranks) if !mesh.has_ranks() => return Err(mesh.ranks_unknown()),
+        // Intervals of the curve.
+        Some(Processors::Equal(count)) => {
+            (0..cells).map(|cell| (cell * u64::from(count) / cells) as u32).collect()
+        }
         Some(Processors::Ranks) => {
-            model.ranks.clone().unwrap_or_else(|| Distribution::equal(cells, 1))
+            require_ranks()?;
+            mesh.ranks.clone().unwrap_or_else(|| vec![0; cells as usize])
         }
     };
-    match (0..distribution.processors()).find(|&p| distribution.count(p) == 0) {
-        None => Ok(Some(distribution)),
+    let mut counts = Vec::new();
+    for &rank in &of_cells {
+        counts.resize(counts.len().max(rank as usize + 1), 0u32);
+        counts[rank as usize] += 1;
+    }
+    match counts.iter().position(|&count| count == 0) {
+        None => Ok(Some(of_cells)),
         Some(rank) => Err(ExportError::Request(format!(
             "rank {rank} has no cell that is exported, and OpenFOAM needs one on each processor: choose a number of processors"
         ))),
     }
 }
 
+/// The number of each cell on its processor.
+fn numbers(processors: &[u32]) -> Vec<u32> {
+    let mut next = vec![0; processors.iter().max().map_or(0, |last| *last as usize + 1)];
+    let number = |&processor: &u32| {
+        let number: u32 = next[processor as usize];
+        next[processor as usize] += 1;
+        number
+    };
+    processors.iter().map(number).collect()
+}
+
+/// Asserts that the directories together have every cell once, every face between two processors twice, in the same order on both, and every other face once.
+fn check_parts(mesh: &Mesh, parts: &[Directory]) {
+    let cells: usize = parts.iter().map(|part| part.cells.len()).sum();
+    assert_eq!(cells, mesh.leaves.count() as usize, "cells of all directories");
+    let own =
+        |part: &Directory| part.internal.len() + part.patches.iter().map(Vec::len).sum::<usize>();
+    let between = |part: &Directory| part.between.values().map(Vec::len).sum::<usize>();
+    let faces: usize = parts.iter().map(|part| 2 * own(part) + between(part)).sum();
+    assert_eq!(
+        faces,
+        2 * mesh.faces.count(),
+        "faces of all directories, those within one counted twice"
+    );
+    for (here, part) in parts.iter().enumerate() {
+        for (&there, faces) in &part.between {
+            let opposite = parts[there as usize].between.get(&(here as u32));
+            assert_eq!(opposite, Some(faces), "faces between processors {here} and {there}");
+        }
+    }
+}
+
 /// The directories to write, none of which may exist with content.
-fn targets(path: &Path, processors: Option<u32>) -> Result<Vec<PathBuf>, ExportError> {
+fn targets(path: &Path, processors: Option<usize>) -> Result<Vec<PathBuf>, ExportError> {
     let exists = |path: &Path| {
         Err(ExportError::Request(format!(
             "{} exists: remove it, or choose another case",
@@ -255,4 +305,11 @@ fn targets(path: &Path, processors: Option<u32>) -> Result<Vec<PathBuf>, ExportE
         }
     }
     Ok((0..count).map(|n| case.join(format!("processor{n}")).join("constant/polyMesh")).collect())
+}
+
+/// The error of labels that are too narrow.
+fn narrow() -> ExportError {
+    ExportError::Request(
+        "the mesh has more faces than 32-bit labels can number: choose --label 64".to_owned(),
+    )
 }

@@ -2,10 +2,11 @@
 
 use contract::word::Side;
 
-use super::directory::Counts;
+use super::Mesh;
+use super::directory::Directory;
 use super::patches::{CUT, SIDES};
 use super::regions::Size;
-use crate::mesh::Mesh;
+use crate::mesh;
 use crate::options;
 use crate::selection::Selection;
 
@@ -13,17 +14,22 @@ use crate::selection::Selection;
 const REGIONS_LISTED: usize = 5;
 
 /// The lines, for the directories that were written and for all regions of the selected leaves, largest first.
-pub fn notes(counts: &[Counts], regions: &[Size], kept: options::Regions) -> Vec<String> {
-    let totals = totals(counts);
+pub fn notes(mesh: &Mesh, parts: &[Directory], regions: &[Size]) -> Vec<String> {
+    let faces = mesh.faces.starts.windows(2).map(|ends| ends[1] - ends[0]);
+    let totals: Vec<(&str, usize)> =
+        mesh.patches.names.iter().map(String::as_str).zip(faces).collect();
     let mut notes = vec![patches(&totals)];
     notes.extend(without_faces(&totals));
-    notes.extend((counts.len() > 1).then(|| processors(counts)));
-    notes.extend((regions.len() > 1).then(|| unconnected(regions, kept)));
+    notes.extend((parts.len() > 1).then(|| processors(parts)));
+    notes.extend((regions.len() > 1).then(|| unconnected(regions, mesh.options.foam.regions)));
+    if parts.len() > 1 && !mesh.has_addressing() {
+        notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
+    }
     notes
 }
 
 /// A warning about exported cells that the geometry crosses.
-pub fn crossing(mesh: &Mesh, selection: &Selection) -> Option<String> {
+pub fn crossing(mesh: &mesh::Mesh, selection: &Selection) -> Option<String> {
     let is_selected = selection.side.is_none_or(|side| side == Side::Crossing);
     (is_selected && mesh.manifest.leaves_by_side.crossing > 0).then(|| {
         "warning: the geometry crosses cells of this mesh, and a flow passes through walls inside them: mesh with \
@@ -32,27 +38,15 @@ pub fn crossing(mesh: &Mesh, selection: &Selection) -> Option<String> {
     })
 }
 
-/// The patches of the whole mesh with their numbers of faces, in order.
-fn totals(counts: &[Counts]) -> Vec<(&str, u64)> {
-    let mut patches: Vec<(&str, u64)> = Vec::new();
-    for (name, faces) in counts.iter().flat_map(|counts| &counts.patches) {
-        match patches.iter_mut().find(|(known, _)| known == name) {
-            Some((_, total)) => *total += faces,
-            None => patches.push((name, *faces)),
-        }
-    }
-    patches
-}
-
 /// The patches that have faces.
-fn patches(totals: &[(&str, u64)]) -> String {
+fn patches(totals: &[(&str, usize)]) -> String {
     let listed = totals.iter().filter(|(_, faces)| *faces > 0);
     let listed: Vec<_> = listed.map(|(name, faces)| format!("{name} {faces}")).collect();
     format!("faces of each patch: {}", listed.join(", "))
 }
 
 /// A warning about solids without faces.
-fn without_faces(totals: &[(&str, u64)]) -> Option<String> {
+fn without_faces(totals: &[(&str, usize)]) -> Option<String> {
     let solids = totals.iter().filter(|(name, _)| !SIDES.contains(name) && *name != CUT);
     let empty: Vec<_> = solids.filter(|(_, faces)| *faces == 0).map(|(name, _)| *name).collect();
     (!empty.is_empty()).then(|| {
@@ -63,16 +57,15 @@ fn without_faces(totals: &[(&str, u64)]) -> Option<String> {
     })
 }
 
-fn processors(counts: &[Counts]) -> String {
-    let cells = || counts.iter().map(|counts| counts.cells);
-    let faces =
-        counts.iter().map(|counts| counts.faces_between.iter().map(|(_, n)| n).sum::<u64>());
+fn processors(parts: &[Directory]) -> String {
+    let cells = || parts.iter().map(|part| part.cells.len());
+    let faces = parts.iter().flat_map(|part| part.between.values().map(Vec::len));
     format!(
         "{} processors of {} to {} cells, {} faces between them",
-        counts.len(),
+        parts.len(),
         cells().min().unwrap_or(0),
         cells().max().unwrap_or(0),
-        faces.sum::<u64>() / 2
+        faces.sum::<usize>() / 2
     )
 }
 

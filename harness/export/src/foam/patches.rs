@@ -7,9 +7,8 @@ use contract::case::Case;
 use contract::octant::UNITS_PER_CELL;
 use contract::stl;
 
-use super::faces::Square;
-use super::tree::{CUTS, Content, HOLES, Tree};
-use super::walk::{Around, Follow};
+use super::leaves::Content;
+use super::squares::Square;
 
 /// Patches of the root's sides.
 pub const SIDES: [&str; 6] = ["xMin", "xMax", "yMin", "yMax", "zMin", "zMax"];
@@ -77,30 +76,17 @@ impl<'a> Patches<'a> {
         if is_body { "wall" } else { "patch" }
     }
 
-    /// Whether a patch is one of several solids.
-    pub fn is_of_several(&self, patch: usize) -> bool {
-        self.facets.is_some() && self.type_of(patch) == "wall"
-    }
-
-    /// Whether an octant may have cells with faces in a patch, or in that of another solid.
-    pub fn may_touch<P: Follow>(&self, patch: usize, tree: &Tree, around: &Around<P>) -> bool {
-        if patch < SIDES.len() {
-            return around.across(patch / 2, patch % 2) == Content::OUTSIDE;
-        }
-        around.may_touch(tree, if self.type_of(patch) == "wall" { HOLES } else { CUTS })
-    }
-
-    /// The patch of a face that no cell is across; `None` if it depends on the distance to solids.
-    pub fn of(&self, square: &Square) -> Option<usize> {
+    /// The patch of a face that no cell is across.
+    pub fn of(&mut self, square: &Square) -> usize {
         match square.across {
-            Content::OUTSIDE => Some(2 * usize::from(square.axis) + usize::from(square.is_high)),
-            Content::CUT => Some(self.names.len() - 1),
-            _ => self.facets.is_none().then_some(SIDES.len()),
+            Content::Outside => 2 * square.axis + usize::from(square.is_high),
+            Content::Cut => self.names.len() - 1,
+            _ => self.nearest(square),
         }
     }
 
     /// The patch of the solid with the facet nearest to the centre of a face.
-    pub fn nearest(&mut self, square: &Square) -> usize {
+    fn nearest(&mut self, square: &Square) -> usize {
         let Some(facets) = &self.facets else { return SIDES.len() };
         let [low, _, high, _] = square.corners();
         let units = UNITS_PER_CELL as f64 / 2.0;

@@ -22,6 +22,7 @@ use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::pieces::nothing_selected;
 use crate::selection::Selection;
+use crate::written::Written;
 use siblings::{Family, Open};
 use windows::Windows;
 
@@ -39,12 +40,13 @@ pub fn write(
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
     let mut nodes = vec![1u64];
-    let leaves = families(mesh, selection, 0, options, &mut |family| {
+    let counted = families(mesh, selection, 0, options, &mut |family| {
         let level = usize::from(family.level);
         nodes.resize(nodes.len().max(level + 1), 0);
         nodes[level] += if level > 0 { 8 } else { 0 };
         Ok(())
     })?;
+    let leaves = counted.cells;
     if leaves == 0 {
         return Err(nothing_selected(mesh));
     }
@@ -56,9 +58,13 @@ pub fn write(
         let out = BufWriter::with_capacity(1 << 20, file);
         let out = TreeWriter::new(out, shape.clone(), with_ranks).map_err(named)?;
         let mut windows = Windows::new(out, shape, with_ranks);
-        families(mesh, selection, leaves, options, &mut |family| {
+        let mut shown = 0;
+        let written = families(mesh, selection, leaves, options, &mut |family| {
+            shown += u64::from(family.leaves());
             windows.put(&family).map_err(named)
         })?;
+        written.check_invariants(mesh, selection, leaves);
+        assert_eq!(shown, leaves, "nodes that are neither split nor masked, and leaves");
         let file = windows.finish().map_err(named)?;
         let file = file.into_inner().map_err(|error| named(error.into_error()))?;
         Ok::<_, ExportError>(file.metadata().map_err(named)?.len())
@@ -66,7 +72,7 @@ pub fn write(
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
 
-/// Visits the selected leaves and passes on all siblings, those of each level in Morton order; returns the number of leaves. `total` is that
+/// Visits the selected leaves and passes on all siblings, those of each level in Morton order; returns the leaves. `total` is their
 /// number in the second pass.
 fn families(
     mesh: &Mesh,
@@ -74,17 +80,17 @@ fn families(
     total: u64,
     options: &Options<'_>,
     take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
-) -> Result<u64, ExportError> {
+) -> Result<Written, ExportError> {
     let with_sides = mesh.manifest.sides == Sides::Known;
-    let (mut open, mut leaves) = (Open::default(), 0u64);
+    let (mut open, mut written) = (Open::default(), Written::default());
     mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
-        if leaves.is_multiple_of(REPORT) {
+        if written.cells.is_multiple_of(REPORT) {
             options.check()?;
-            options.watch.progress(leaves.min(total), total.max(1));
+            options.watch.progress(written.cells.min(total), total.max(1));
         }
-        leaves += 1;
+        written.add(&leaf.octant, true);
         open.push(&leaf, with_sides, take)
     })?;
     open.finish(take)?;
-    Ok(leaves)
+    Ok(written)
 }

@@ -16,6 +16,14 @@ pub(super) struct Family {
     pub(super) parts: [i32; 8],
 }
 
+impl Family {
+    /// Number of siblings that are neither split nor masked.
+    pub(super) fn leaves(&self) -> u32 {
+        let siblings = !(self.siblings.split | self.siblings.deleted);
+        if self.level == 0 { u32::from(siblings & 1) } else { siblings.count_ones() }
+    }
+}
+
 /// The families that contain the last leaf, or the octants that contain it: one for each level down to its own.
 #[derive(Debug, Default)]
 pub(super) struct Open {

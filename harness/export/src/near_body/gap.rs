@@ -94,7 +94,7 @@ mod tests {
             assert!((gap.least - expected).abs() < 1e-6 && (gap.centre - expected).abs() < 1e-6);
         }
         let polygons = Polygons::new(&faces);
-        let report = Report::new(&mesh, &faces, &polygons, Some(&gaps)).unwrap();
+        let report = Report::new(&mesh, &faces, &polygons, Some(&gaps), true).unwrap();
         let ranks = report.ranks.as_ref().unwrap();
         let gap = report.gap.as_ref().unwrap();
         for (found, expected) in [

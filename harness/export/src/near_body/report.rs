@@ -74,7 +74,10 @@ pub struct Ranks {
 }
 
 impl Report {
-    /// A report on the front of a mesh; `gaps` are those of its faces.
+    /// A report on the front of a mesh; `gaps` are those of its faces, which are all or those of selected leaves.
+    ///
+    /// # Panics
+    /// If an invariant of the report or of the surface is violated.
     ///
     /// # Errors
     /// If the mesh cannot be read.
@@ -83,6 +86,7 @@ impl Report {
         faces: &[Face],
         polygons: &Polygons,
         gaps: Option<&[Gap]>,
+        is_whole: bool,
     ) -> Result<Self, ExportError> {
         let root = &mesh.manifest.root;
         let area = |face: &Face| edge_of_level(root, face.level).powi(2);
@@ -91,7 +95,7 @@ impl Report {
             faces_by_level[face.leaf_level as usize] += 1;
         }
         let cells = mesh.leaves_by_rank()?;
-        Ok(Self {
+        let report = Self {
             schema: SCHEMA,
             faces: faces.len() as u64,
             area: faces.iter().map(area).sum(),
@@ -99,8 +103,77 @@ impl Report {
             faces_by_level,
             gap: gaps.and_then(|gaps| GapStatistics::of(root, faces, gaps)),
             ranks: mesh.has_ranks().then(|| Ranks::of(cells.to_vec(), faces)),
-        })
+        };
+        report.check_invariants(mesh.len(), root);
+        check_surface(faces, polygons, is_whole && report.edges_open == 0);
+        Ok(report)
     }
+
+    /// Asserts what the numbers of a report on a mesh of `cells` cells must satisfy.
+    fn check_invariants(&self, cells: u64, root: &Root) {
+        let Self { faces, area, .. } = *self;
+        assert_eq!(self.faces_by_level.iter().sum::<u64>(), faces, "faces of all levels");
+        let smallest = faces as f64 * edge_of_level(root, LEVEL_MAX).powi(2);
+        assert!(
+            area.is_finite() && area >= smallest * (1.0 - 1e-9),
+            "{faces} faces of area {area}"
+        );
+        if let Some(ranks) = &self.ranks {
+            assert_eq!(ranks.faces.iter().sum::<u64>(), faces, "faces of all ranks");
+            assert_eq!(ranks.cells.iter().sum::<u64>(), cells, "cells of all ranks");
+            let most = ranks.cells.len() as f64 + 1e-9;
+            let lambdas = [ranks.lambda_cells, ranks.lambda_faces];
+            assert!(
+                lambdas.iter().all(|l| (1.0 - 1e-9..=most).contains(l)),
+                "lambda {lambdas:?} on {} ranks",
+                ranks.cells.len()
+            );
+        }
+        if let Some(GapStatistics { least, centre, least_cells, centre_cells }) = self.gap {
+            for Spread { min, median, p95, max } in [least, centre, least_cells, centre_cells] {
+                assert!(
+                    0.0 <= min && min <= median && median <= p95 && p95 <= max,
+                    "gaps {min} {median} {p95} {max}"
+                );
+            }
+            let is_less =
+                least.min <= centre.min && least.median <= centre.median && least.max <= centre.max;
+            assert!(
+                is_less,
+                "the least distances {least:?} exceed those of the centres {centre:?}"
+            );
+        }
+    }
+}
+
+/// Asserts that every polygon is the square of its face with points on its edges, that it faces the leaf, and that the areas of a closed front cancel.
+fn check_surface(faces: &[Face], polygons: &Polygons, is_closed: bool) {
+    assert_eq!(polygons.ends.len(), faces.len(), "a polygon for every face");
+    let mut sum = [0i64; 3];
+    for (face, corners) in faces.iter().zip(polygons.iter()) {
+        let area = area(corners.iter().map(|&c| polygons.points[c as usize]));
+        let edge = i64::from(face.edge());
+        let mut expected = [0; 3];
+        expected[usize::from(face.axis)] =
+            if face.is_leaf_above { 2 * edge * edge } else { -2 * edge * edge };
+        assert_eq!(area, expected, "twice the area of {face:?}");
+        (0..3).for_each(|a| sum[a] += area[a]);
+    }
+    assert!(!is_closed || sum == [0; 3], "a closed front of areas that add up to {sum:?}");
+}
+
+/// Twice the area vector of a polygon, in level-19 cells.
+fn area(corners: impl Iterator<Item = [u32; 3]>) -> [i64; 3] {
+    let corners: Vec<[i64; 3]> = corners.map(|c| c.map(i64::from)).collect();
+    let next = corners.iter().cycle().skip(1);
+    let mut area = [0; 3];
+    for (p, q) in corners.iter().zip(next) {
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            area[a] += p[b] * q[c] - p[c] * q[b];
+        }
+    }
+    area
 }
 
 impl Ranks {
@@ -196,5 +269,72 @@ impl fmt::Display for Report {
                 "{ranks} ranks: lambda {lambda_cells:.3} by cells, {lambda_faces:.3} by exposed faces"
             ),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::near_body::front::front;
+    use crate::selection::Selection;
+    use crate::testing::on_disk;
+    use contract::testing::words_with_sides;
+    use contract::word::Side;
+
+    /// A report on the cells around a hole, and what it is made of.
+    fn sample() -> (Report, Vec<Face>, Polygons, u64, Root) {
+        let words = words_with_sides(
+            |o| o.level < 2 || o.level < 3 && o.corner[0] == 0,
+            |o| (o.ancestor(2).corner.map(|c| c >> 17) != [1, 2, 1]).then_some(Side::Outside),
+        );
+        let (_dir, mesh) = on_disk(&words, 3, |i| i / 20);
+        let faces = front(&mesh, &Selection::default(), &|| Ok(())).unwrap();
+        let polygons = Polygons::new(&faces);
+        let gap = |i: usize| Gap { least: 0.5 + i as f64, centre: 0.6 + i as f64 };
+        let gaps: Vec<Gap> = (0..faces.len()).map(gap).collect();
+        let report = Report::new(&mesh, &faces, &polygons, Some(&gaps), true).unwrap();
+        (report, faces, polygons, mesh.len(), mesh.manifest.root)
+    }
+
+    fn message(caught: Box<dyn std::any::Any + Send>) -> String {
+        caught.downcast_ref::<String>().expect("a message with values").clone()
+    }
+
+    #[test]
+    fn planted_wrong_numbers_are_noticed() {
+        let noticed = |why: &str, change: &dyn Fn(&mut Report)| {
+            let (mut report, _, _, cells, root) = sample();
+            change(&mut report);
+            let check = std::panic::AssertUnwindSafe(|| report.check_invariants(cells, &root));
+            let message = message(std::panic::catch_unwind(check).unwrap_err());
+            assert!(message.contains(why), "{message}");
+        };
+        noticed("faces of all levels", &|r| r.faces += 1);
+        noticed("of area", &|r| r.area = f64::NAN);
+        noticed("faces of all ranks", &|r| r.ranks.as_mut().unwrap().faces[1] += 1);
+        noticed("cells of all ranks", &|r| r.ranks.as_mut().unwrap().cells[0] -= 1);
+        noticed("lambda", &|r| r.ranks.as_mut().unwrap().lambda_faces = 0.9);
+        noticed("gaps", &|r| r.gap.as_mut().unwrap().least.p95 = 1e9);
+        noticed("exceed those of the centres", &|r| r.gap.as_mut().unwrap().centre.min = 0.1);
+    }
+
+    #[test]
+    fn planted_wrong_surfaces_are_noticed() {
+        let noticed = |why: &str, change: &dyn Fn(&mut Vec<Face>, &mut Polygons)| {
+            let (_, mut faces, mut polygons, ..) = sample();
+            check_surface(&faces, &polygons, true);
+            change(&mut faces, &mut polygons);
+            let check = std::panic::AssertUnwindSafe(|| check_surface(&faces, &polygons, true));
+            let message = message(std::panic::catch_unwind(check).unwrap_err());
+            assert!(message.contains(why), "{message}");
+        };
+        noticed("a polygon for every face", &|faces, _| faces.truncate(3));
+        noticed("twice the area", &|faces, _| faces[0].is_leaf_above ^= true);
+        noticed("twice the area", &|_, polygons| polygons.corners.swap(0, 1));
+        noticed("that add up to", &|faces, polygons| {
+            faces.pop();
+            polygons.ends.pop();
+            polygons.corners.truncate(*polygons.ends.last().unwrap() as usize);
+        });
     }
 }

@@ -27,6 +27,7 @@ use crate::options::{Options, Summary};
 use crate::ordered::in_order;
 use crate::pieces::{Piece, pieces};
 use crate::selection::Selection;
+use crate::written::Written;
 use file::VtuFile;
 use header::Content;
 use piece::{Encoded, Encoder};
@@ -51,7 +52,10 @@ pub fn write_file(
     let bytes = files::fill_atomically(path, named, |file| {
         let file = file.try_clone().map_err(named)?;
         let mut file = VtuFile::begin(file, content(mesh), pieces.len()).map_err(named)?;
-        encode(mesh, selection, &pieces, options, |_, piece| file.append(&piece).map_err(named))?;
+        let written = encode(mesh, selection, &pieces, options, |_, piece| {
+            file.append(&piece).map_err(named)
+        })?;
+        written.check_invariants(mesh, selection, leaves(&pieces));
         let bytes = file.finish().map_err(named)?;
         options.check()?;
         Ok(bytes)
@@ -63,14 +67,14 @@ thread_local! {
     static ENCODER: RefCell<Encoder> = RefCell::default();
 }
 
-/// Encodes pieces on threads and hands them to `take` in order.
+/// Encodes pieces on threads and hands them to `take` in order; returns all that was taken.
 fn encode(
     mesh: &Mesh,
     selection: &Selection,
     pieces: &[Piece],
     options: &Options<'_>,
     mut take: impl FnMut(usize, Encoded) -> Result<(), ExportError> + Send,
-) -> Result<(), ExportError> {
+) -> Result<Written, ExportError> {
     let content = content(mesh);
     let visitor = mesh.visitor();
     let make = |index: usize| {
@@ -83,17 +87,18 @@ fn encode(
                 Ok::<(), ExportError>(())
             })?;
             options.check()?;
-            Ok(encoder.encode(&content))
+            Ok::<Encoded, ExportError>(encoder.encode(&content))
         })
     };
     let total = leaves(pieces);
-    let mut done = 0;
+    let mut written = Written::default();
     in_order(pieces.len(), options.jobs, make, |index, piece| {
-        done += piece.cells;
+        written.append(&piece.written);
         take(index, piece)?;
-        options.watch.progress(done, total);
+        options.watch.progress(written.cells, total);
         Ok(())
-    })
+    })?;
+    Ok(written)
 }
 
 /// What files of this mesh state about themselves before they have leaves.

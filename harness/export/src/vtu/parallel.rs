@@ -40,7 +40,7 @@ pub fn write_files(
     let place = Staging::beside(&names.directory).map_err(named)?;
     let (mut whole, mut bytes, mut written) = (content(mesh), 0, Vec::new());
     let mut begun: Option<VtuFile> = None;
-    encode(mesh, selection, &pieces, options, |index, piece| {
+    let cells = encode(mesh, selection, &pieces, options, |index, piece| {
         let mut file = match begun.take() {
             Some(file) => file,
             None => {
@@ -59,6 +59,7 @@ pub fn write_files(
         }
         Ok(())
     })?;
+    cells.check_invariants(mesh, selection, leaves(&pieces));
     options.check()?;
     bytes += place.publish(|staged| names.publish(staged, &whole, &written))?;
     Ok(Summary {

@@ -11,6 +11,7 @@ use super::header::{Content, Place};
 use super::points::{Points, unpacked};
 use super::zlib::{Known, Zlib};
 use crate::leaf::Leaf;
+use crate::written::Written;
 
 /// VTK's number of the cell type hexahedron.
 const HEXAHEDRON: u8 = 12;
@@ -20,8 +21,8 @@ const HEXAHEDRON: u8 = 12;
 pub struct Encoded {
     /// Number of points.
     pub points: u64,
-    /// Number of cells.
-    pub cells: u64,
+    /// The cells.
+    pub written: Written,
     /// Digest of the leaves.
     pub digest: Digest,
     /// Position of each array in `bytes`, in the order in which `header` lists the arrays.
@@ -47,13 +48,11 @@ impl Encoder {
         let Content { root, with_ranks, with_sides, .. } = content;
         let Self { leaves, points, zlib, offsets, types } = self;
         points.set(leaves);
+        points.check_invariants(leaves);
         let cells = leaves.len();
-        let mut to = Encoded {
-            points: points.packed.len() as u64,
-            cells: cells as u64,
-            ..Encoded::default()
-        };
+        let mut to = Encoded { points: points.packed.len() as u64, ..Encoded::default() };
         for leaf in leaves.iter() {
+            to.written.add(&leaf.octant, true);
             to.digest.add(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
         }
         let edges = |leaf: &Leaf| root.edge / f64::from(1u32 << leaf.octant.level);
@@ -82,7 +81,7 @@ impl Encoded {
     /// Its place if its bytes begin at `start` of the appended data.
     pub fn place(&self, start: u64) -> Place {
         let offsets = self.offsets.iter().map(|offset| start + offset).collect();
-        Place { points: self.points, cells: self.cells, offsets }
+        Place { points: self.points, cells: self.written.cells, offsets }
     }
 
     fn push<const N: usize>(

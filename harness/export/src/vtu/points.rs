@@ -43,6 +43,22 @@ impl Points {
         }
     }
 
+    /// Asserts that every cell has eight points, of which the first and the seventh are its lowest and its highest corner, and that the
+    /// last point is that of a cell.
+    ///
+    /// # Panics
+    /// If that is not so.
+    pub fn check_invariants(&self, leaves: &[Leaf]) {
+        assert_eq!(self.connectivity.len(), 8 * leaves.len(), "eight points per cell");
+        for (Leaf { octant, .. }, corners) in leaves.iter().zip(self.connectivity.chunks_exact(8)) {
+            let [low, high] = [0, 6].map(|i| unpacked(self.packed[corners[i] as usize]));
+            let expected = octant.corner.map(|c| c + octant.edge());
+            assert!(low == octant.corner && high == expected, "{octant} from {low:?} to {high:?}");
+        }
+        let last = self.connectivity.iter().max().map_or(0, |last| *last as usize + 1);
+        assert_eq!(last, self.packed.len(), "points of cells and all points");
+    }
+
     /// Adds all leaves of an octant, `depth` levels below it. Most points are corners of several leaves of a block, and
     /// are then searched once.
     fn add(&mut self, block: &[Leaf], depth: u32) {
@@ -139,6 +155,28 @@ mod tests {
         distinct.dedup();
         assert_eq!(distinct.len(), points.packed.len());
         points
+    }
+
+    #[test]
+    fn planted_wrong_points_are_noticed() {
+        let noticed = |why: &str, change: &dyn Fn(&mut Points)| {
+            let words = words_of(|o| o.level < 2);
+            let leaf =
+                |&w: &u64| Leaf { octant: word::octant(w), side: word::side(w), rank: 0, index: 0 };
+            let leaves: Vec<Leaf> = words.iter().map(leaf).collect();
+            let mut points = Points::default();
+            points.set(&leaves);
+            points.check_invariants(&leaves);
+            change(&mut points);
+            let check = std::panic::AssertUnwindSafe(|| points.check_invariants(&leaves));
+            let caught = std::panic::catch_unwind(check).unwrap_err();
+            let message = caught.downcast_ref::<String>().unwrap();
+            assert!(message.contains(why), "{message}");
+        };
+        noticed("eight points", &|p| p.connectivity.truncate(500));
+        noticed("from [", &|p| p.connectivity.swap(0, 1));
+        noticed("from [", &|p| p.packed[40] += 1);
+        noticed("all points", &|p| p.packed.push(0));
     }
 
     #[test]

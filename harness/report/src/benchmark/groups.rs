@@ -81,10 +81,9 @@ impl<'a> Subject<'a> {
 
     /// A name for files: the case, and before it the program unless that is the mesher of this repository.
     pub fn file(&self) -> String {
-        let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };
         match self.engine {
             OWN => self.case.to_owned(),
-            engine => format!("{}-{}", engine.chars().map(plain).collect::<String>(), self.case),
+            engine => format!("{engine}-{}", self.case),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The page of a benchmark report.
 
+use super::above_one::reasons;
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
 use super::lint::{Finding, RULES, Verdict};
@@ -79,6 +80,7 @@ fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
                 li {
                     b { (Subject::of(&group.setup)) } ", " (group.setup.experiment) " scaling, " (grouped(group.cells())) " cells: "
                     (with_code(&sentence(&group.typical, &groups.reference(group).typical, network)))
+                    @if let Some(why) = reasons(&[group.efficiency(groups.reference(group), network)], &group.setup.experiment) { ". " (why) }
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! `harness report DIR`: figures, a page, a LaTeX fragment and an artifact description from records.
 
+mod above_one;
 pub mod balance;
 pub mod figures;
 pub mod groups;
@@ -12,9 +13,10 @@ pub mod programs;
 pub mod scaling;
 pub mod tables;
 
+use crate::figure::check::check_invariants;
 #[cfg(feature = "figures")]
 use crate::figure::raster;
-use crate::figure::{Body, Figure, csv, heat, svg, tikz};
+use crate::figure::{Body, Figure, csv, heat, name_apart, svg, tikz};
 use crate::track::figures as trend;
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
@@ -49,6 +51,9 @@ pub fn report(directory: &Path, lines: &[Line], history: &[Record]) -> io::Resul
     let tracked = analyse(history, &Rules::default());
     let mut figures = figures::figures(&groups);
     figures.extend(trend::by_case(history, &tracked));
+    let mut figures: Vec<Figure> = figures.into_iter().map(Figure::without_zeros).collect();
+    name_apart(&mut figures);
+    check_invariants(&figures);
     let trend = (!history.is_empty()).then(|| {
         let changes = bench::track::summary(&tracked);
         format!("{} commits, {} metrics\n{changes}", history.len(), tracked.len())

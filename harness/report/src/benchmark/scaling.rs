@@ -1,5 +1,6 @@
 //! Figures over ranks: speedup, efficiency and its factors, time by phase.
 
+use super::above_one::{check_invariants, reasons, reasons_of_speedups};
 use super::groups::{Subject, by_subject, cells_label, point, provenance, repetitions};
 use super::paper::{self, cited};
 use crate::figure::{Axis, Bars, Body, Claims, Figure, Point, Provenance, Series, svg};
@@ -85,6 +86,9 @@ fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
             ));
         }
     }
+    let efficiencies: Vec<Efficiency> =
+        mesh.iter().map(|g| g.efficiency(groups.reference(g), &groups.network)).collect();
+    let is_above = series[1..].iter().flat_map(|s| &s.points).any(|p| p.y > p.x);
     let cells = mesh[0].cells();
     let is_of_the_papers_size = (45_000_000..=55_000_000).contains(&cells);
     if is_of_the_papers_size {
@@ -97,7 +101,7 @@ fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
         caption: format!(
             "Speedup of {subject} with {} cells at n = {} over one rank of the same program: {}. {}. Hollow markers: projected from \
              simulated ranks (critical path of CPU times plus messages at {:.2} µs and {:.1} GB/s), or measured with more ranks than \
-             cores.{} Lines join powers of two.",
+             cores.{} Lines join powers of two.{}",
             grouped(cells),
             mesh[0].setup.layer_cells_min,
             base_case,
@@ -108,7 +112,8 @@ fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
                 " The points of the paper are from its text (22 min on 1 rank, 117 s on 32) and are for another geometry."
             } else {
                 ""
-            }
+            },
+            reasons_of_speedups(&efficiencies, is_above)
         ),
         x: ranks_axis(mesh),
         y: Axis::log("speedup"),
@@ -163,13 +168,16 @@ fn efficiency(
         ("communication", Efficiency::communication),
         ("computation scaling", |e| e.computation_scaling),
     ];
+    let efficiencies: Vec<Efficiency> =
+        simulated.iter().map(|g| g.efficiency(groups.reference(g), &groups.network)).collect();
+    efficiencies.iter().for_each(check_invariants);
     let mut series = vec![ideal(&simulated, |_| 1.0)];
     for (style, (name, value)) in factors.into_iter().enumerate() {
-        let factor = |g: &&Group| {
-            let e = g.efficiency(groups.reference(g), &groups.network);
-            Point { count: g.time_s.count, ..Point::exact(g.setup.ranks as f64, value(&e)) }
+        let factor = |(g, e): (&&Group, &Efficiency)| Point {
+            count: g.time_s.count,
+            ..Point::exact(g.setup.ranks as f64, value(e))
         };
-        let points = simulated.iter().map(factor).collect();
+        let points = simulated.iter().zip(&efficiencies).map(factor).collect();
         series.push(Series::new(
             &format!("{}: {name}", subject.engine),
             Provenance::Projected,
@@ -177,7 +185,6 @@ fn efficiency(
             points,
         ));
     }
-    // In weak scaling, computation scaling exceeds 1: the fixed costs per cell fall as the mesh grows.
     let efficiency_max = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
     let last = simulated.last()?;
     let base_case = base_cases(groups, &[last]);
@@ -195,9 +202,10 @@ fn efficiency(
         title: format!("Efficiency in {experiment} scaling: {subject}, {size}"),
         caption: format!(
             "Efficiencies by the POP definitions in {experiment} scaling of {subject}, {size}, n = {}. The base case is {base_case}. {}, \
-             projected from simulated ranks. Lines join powers of two.",
+             projected from simulated ranks. Lines join powers of two.{}",
             last.setup.layer_cells_min,
-            last.rank_times_caption()
+            last.rank_times_caption(),
+            reasons(&efficiencies, experiment).map_or(String::new(), |why| format!(" {why}"))
         ),
         x: ranks_axis(&simulated),
         y: Axis { range: Some((0.0, efficiency_max * 1.1)), ..Axis::linear("efficiency") },

@@ -1,11 +1,12 @@
 //! The tables of the page of a benchmark report.
 
+use super::above_one::{check_invariants, reasons};
 use super::groups::{Subject, is_summarised};
 use crate::page::table;
 use bench::experiments::entry::Phase;
 use bench::experiments::group::{Group, Groups, Projection};
 use bench::experiments::number::grouped;
-use bench::experiments::pop;
+use bench::experiments::pop::{self, Efficiency};
 use bench::experiments::table::division;
 use maud::{Markup, html};
 
@@ -42,19 +43,30 @@ pub fn experiments(groups: &Groups) -> Markup {
             names.push(&group.setup.experiment);
         }
     }
-    let rows = |name: &str| -> Vec<Vec<Markup>> {
-        let of_experiment = groups.all.iter().filter(|g| g.setup.experiment == name);
-        of_experiment.map(|group| row(groups, group)).collect()
+    let of_experiment = |name: &str| -> Vec<(&Group, Efficiency)> {
+        let of = groups.all.iter().filter(|g| g.setup.experiment == name);
+        of.map(|g| (g, g.efficiency(groups.reference(g), &groups.network))).collect()
+    };
+    let table_of = |name: &str| {
+        let (of, efficiencies): (Vec<&Group>, Vec<Efficiency>) =
+            of_experiment(name).into_iter().unzip();
+        efficiencies.iter().for_each(check_invariants);
+        let rows: Vec<Vec<Markup>> = of.iter().zip(&efficiencies).map(|(g, e)| row(g, e)).collect();
+        html! { h3 { (name) } (table(None, &EXPERIMENT, &rows)) (remark(&efficiencies, name)) }
     };
     html! {
         p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions. Exposed faces are those that the mesh shows to the body; W is the number of cells that each weighs." }
-        @for name in names { h3 { (name) } (table(None, &EXPERIMENT, &rows(name))) }
+        @for name in names { (table_of(name)) }
     }
 }
 
-fn row(groups: &Groups, group: &Group) -> Vec<Markup> {
+/// Why efficiencies of a table exceed 1.
+fn remark(efficiencies: &[Efficiency], experiment: &str) -> Markup {
+    html! { @if let Some(why) = reasons(efficiencies, experiment) { p { (why) } } }
+}
+
+fn row(group: &Group, e: &Efficiency) -> Vec<Markup> {
     let (s, t) = (&group.setup, group.time_s);
-    let e = group.efficiency(groups.reference(group), &groups.network);
     let lambda = |counter: &str| {
         let counted = group.typical.counters.get(counter);
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(s.ranks)))
@@ -155,8 +167,10 @@ fn phases_of(groups: &Groups, group: &Group) -> Markup {
         "messages, max over ranks",
         "MB, max over ranks",
     ];
-    let row = |p: &Phase| {
-        let e = pop::phase_efficiency(run, p, reference, network);
+    let efficiency = |p: &Phase| pop::phase_efficiency(run, p, reference, network);
+    let efficiencies: Vec<Efficiency> = run.phases.iter().map(efficiency).collect();
+    efficiencies.iter().for_each(check_invariants);
+    let row = |(p, e): (&Phase, &Efficiency)| {
         fields([
             p.name.clone(),
             format!("{:.4}", p.useful_s.sum / run.setup.ranks as f64),
@@ -171,12 +185,13 @@ fn phases_of(groups: &Groups, group: &Group) -> Markup {
             format!("{:.3}", p.message_bytes.max / 1e6),
         ])
     };
-    let rows: Vec<Vec<Markup>> = run.phases.iter().map(row).collect();
+    let rows: Vec<Vec<Markup>> = run.phases.iter().zip(&efficiencies).map(row).collect();
     let s = &run.setup;
     html! {
         h3 {
             "phases: " (Subject::of(s)) ", " (s.experiment) " scaling, " (grouped(run.cells)) " cells, " (s.ranks) " simulated ranks"
         }
         (table(None, &columns, &rows))
+        (remark(&efficiencies, &s.experiment))
     }
 }

@@ -5,6 +5,7 @@
 //! meaningful; captions state the confidence intervals.
 
 pub mod canvas;
+pub mod check;
 pub mod csv;
 pub mod heat;
 pub mod palette;
@@ -15,6 +16,8 @@ pub mod svg;
 pub mod tikz;
 
 pub use scale::tick_label;
+
+use std::collections::BTreeSet;
 
 /// An axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -240,6 +243,43 @@ impl Figure {
     pub fn points(&self) -> Vec<(Provenance, Point)> {
         let Body::Points { series, .. } = &self.body else { return Vec::new() };
         series.iter().flat_map(|s| s.points.iter().map(|p| (s.provenance, *p))).collect()
+    }
+}
+
+/// The text as a part of a file's name, of an address and of a label: other characters than ASCII letters, digits, `.`, `-` and
+/// `_` become `-`.
+pub fn file_name(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    text.chars().map(|c| if is_plain(c) { c } else { '-' }).collect()
+}
+
+impl Figure {
+    /// The figure without the points at which a logarithmic axis is not defined, such as a time that was measured as 0. The caption states
+    /// how many there are.
+    pub fn without_zeros(mut self) -> Self {
+        let Body::Points { series, .. } = &mut self.body else { return self };
+        let (x_min, y_min) = (self.x.log.then_some(0.0), self.y.log.then_some(0.0));
+        let before: usize = series.iter().map(|s| s.points.len()).sum();
+        for s in series.iter_mut() {
+            s.points
+                .retain(|p| x_min.is_none_or(|min| p.x > min) && y_min.is_none_or(|min| p.y > min));
+        }
+        match before - series.iter().map(|s| s.points.len()).sum::<usize>() {
+            0 => {}
+            n => self.caption += &format!(" The axes cannot show {n} values of 0."),
+        }
+        self
+    }
+}
+
+/// Makes the names of figures plain, and different from each other: the second of a name ends in `-2`.
+pub fn name_apart(figures: &mut [Figure]) {
+    let mut taken = BTreeSet::new();
+    for figure in figures {
+        let plain = file_name(&figure.id);
+        let names = std::iter::once(plain.clone()).chain((2..).map(|n| format!("{plain}-{n}")));
+        let mut free = names.filter(|name| taken.insert(name.clone()));
+        figure.id = free.next().expect("there are always more numbers");
     }
 }
 

@@ -192,7 +192,39 @@ impl Picture {
         let key = request.colour.key(&values, &root);
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
         let (colour, command) = (request.colour, request.command.clone());
-        Ok(Self { root, slice, colour, window, squares, key, section, command })
+        let picture = Self { root, slice, colour, window, squares, key, section, command };
+        picture.check_invariants();
+        Ok(picture)
+    }
+
+    /// Asserts that the window is in the root, that every square is in it and has a colour, and that the section lies in the window.
+    ///
+    /// # Panics
+    /// If that is not so.
+    pub fn check_invariants(&self) {
+        let [low, high] = self.window;
+        let slack = self.root.edge * 1e-6;
+        let axes = plane_axes(self.slice.axis);
+        for i in 0..2 {
+            let (from, to) =
+                (self.root.origin[axes[i]], self.root.origin[axes[i]] + self.root.edge);
+            let is_inside = from - slack <= low[i] && low[i] < high[i] && high[i] <= to + slack;
+            assert!(
+                is_inside,
+                "the window {:?} is not within the root from {from} to {to}",
+                self.window
+            );
+        }
+        for square in &self.squares.squares {
+            let [from, to] = self.corners(square);
+            let is_shown = (0..2).all(|i| from[i] < high[i] + slack && to[i] > low[i] - slack);
+            assert!(is_shown, "{square:?} is outside of the window {:?}", self.window);
+            assert!(self.key.iter().any(|e| e.value == square.value), "{square:?} has no colour");
+        }
+        let is_within =
+            |p: &Planar| (0..2).all(|i| (low[i] - slack..=high[i] + slack).contains(&p[i]));
+        let beyond = self.section.iter().flatten().flatten().find(|p| !is_within(p));
+        assert!(beyond.is_none(), "the section leaves the window {:?} at {beyond:?}", self.window);
     }
 
     /// One sentence on what the picture shows.

@@ -128,7 +128,35 @@ impl Squares {
             found.outline(detail.outlined_max);
             found.merge_siblings();
         }
+        found.check_invariants(detail);
         Ok(found)
+    }
+
+    /// Asserts that squares are those of octants in the root, do not overlap and are as many as can be shown, and that every leaf is in one.
+    ///
+    /// # Panics
+    /// If that is not so.
+    pub fn check_invariants(&self, detail: &Detail) {
+        let count = self.squares.len();
+        assert!(
+            count <= detail.squares_max.max(1),
+            "{count} squares of at most {}",
+            detail.squares_max
+        );
+        let leaves: u64 = self.squares.iter().map(|s| s.leaves).sum();
+        assert_eq!(leaves, self.leaves, "leaves of all squares and of the slice");
+        // The Morton codes of octants in the lowest layer of the root.
+        let interval = |s: &Square| {
+            let first = contract::word::key_of([s.corner[0], s.corner[1], 0]);
+            (first, first + contract::word::span(s.level))
+        };
+        for s in &self.squares {
+            let is_octant = s.level <= detail.level_max
+                && s.corner.iter().all(|c| c % s.edge() == 0 && *c < CELLS_PER_EDGE);
+            assert!(is_octant && s.leaves > 0, "{s:?} is not the square of an octant with leaves");
+        }
+        let overlap = self.squares.windows(2).find(|w| interval(&w[0]).1 > interval(&w[1]).0);
+        assert!(overlap.is_none(), "squares overlap or are not in Morton order: {overlap:?}");
     }
 
     /// Adds the next square in Morton order, merged into the last one if both are too small to be drawn.

@@ -258,3 +258,31 @@ fn labels_of_the_vertical_axis_have_room_and_planes_far_from_the_origin_their_di
         assert_eq!(plane_name(&root, Slice::new(&root, 2, z).unwrap()), name);
     }
 }
+
+/// Asserts that a change of a picture is noticed, and for the stated reason.
+fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
+    let (_dir, mesh) = on_disk(vec![eight_and_seven()]);
+    let facet = [[1.0f32, 1.0, -1.0], [7.0, 1.0, 9.0], [1.0, 7.0, 9.0]];
+    let request = Request { body: Some(&[facet]), selection: at(2, 1.0), ..request(Colour::Level) };
+    let mut picture = Picture::collect(&mesh, &request, &VECTOR).unwrap();
+    change(&mut picture);
+    let check = std::panic::AssertUnwindSafe(|| {
+        picture.check_invariants();
+        picture.squares.check_invariants(&VECTOR);
+    });
+    let caught = std::panic::catch_unwind(check).unwrap_err();
+    let message = caught.downcast_ref::<String>().cloned();
+    let message = message.unwrap_or_else(|| panic!("no message"));
+    assert!(message.contains(why), "{message}");
+}
+
+#[test]
+fn planted_wrong_pictures_are_noticed() {
+    assert_noticed("not within the root", |p| p.window[1][0] = 9.0);
+    assert_noticed("outside of the window", |p| p.window = [[6.0; 2], [8.0; 2]]);
+    assert_noticed("has no colour", |p| p.key.truncate(1));
+    assert_noticed("leaves the window", |p| p.section.as_mut().unwrap()[0][0][1] = -5.0);
+    assert_noticed("not the square of an octant", |p| p.squares.squares[0].corner[0] += 1);
+    assert_noticed("leaves of all squares", |p| p.squares.leaves += 1);
+    assert_noticed("overlap", |p| p.squares.squares.swap(0, 5));
+}

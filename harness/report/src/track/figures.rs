@@ -4,7 +4,8 @@
 
 use crate::figure::palette::MARKERS;
 use crate::figure::{
-    Axis, Body, Claims, Figure, Mark, Point, Provenance, Series as Plotted, svg, tick_label,
+    Axis, Body, Claims, Figure, Mark, Point, Provenance, Series as Plotted, file_name, svg,
+    tick_label,
 };
 use bench::track::history::Record;
 use bench::track::{Change, Series};
@@ -124,7 +125,7 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
         Plotted::new("drift", Provenance::Bound, 4, points.to_vec())
     }));
     Figure {
-        id: format!("metric-{}", series.name.replace(['/', ' '], "-")),
+        id: file_name(&format!("metric-{}", series.name)),
         title: series.name.clone(),
         caption: String::new(),
         x: commits(records.len()),

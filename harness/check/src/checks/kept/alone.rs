@@ -9,7 +9,6 @@
 #[cfg(test)]
 mod tests;
 
-use super::NAME;
 use crate::checks::{CheckResult, Terms, components, contact};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};
 use contract::octant::{Octant, UNITS_PER_CELL};
@@ -17,28 +16,26 @@ use contract::tree::{Handle, Tree};
 use contract::word::{self, Leaf, Side};
 
 /// Checks a tree, final or T0, by itself.
-pub fn check_tree(tree: &Tree, terms: &Terms, manifest: &Manifest) -> CheckResult {
-    let mut result = CheckResult::new(NAME);
-    seeds_in_flow(tree, terms, &mut result);
+pub(super) fn check(tree: &Tree, terms: &Terms, manifest: &Manifest, result: &mut CheckResult) {
+    seeds_in_flow(tree, terms, result);
     if let Some(counted) = &manifest.components {
-        possible(tree, counted, manifest.tree, terms, &mut result);
+        possible(tree, counted, manifest.tree, terms, result);
     }
     let Some(octants) = uniform_octants(tree) else {
         result.note =
             format!("components are not known: over {OCTANTS_MAX} octants have leaves of one side");
-        return result;
+        return;
     };
     let found = Found { terms, groups: components::groups(&octants), octants };
     if manifest.tree == Kind::Final {
-        found.check_enclosed(&mut result);
+        found.check_enclosed(result);
     }
     if !terms.seeds.is_empty() {
-        found.check_seeds(&mut result);
+        found.check_seeds(result);
     }
     if let Some(counted) = &manifest.components {
-        found.check_counts(counted, manifest.tree, &mut result);
+        found.check_counts(counted, manifest.tree, result);
     }
-    result
 }
 
 /// The components of a tree's leaves, as lists of indices of [`uniform_octants`].

@@ -1,5 +1,39 @@
 use super::*;
 use contract::case::Case;
+use contract::word;
+
+/// What the surveys of a case share.
+struct Geometry {
+    terms: Terms,
+    facets: Facets,
+    truth: Truth,
+    lattice: Vec<contract::lattice::FacetLattice>,
+}
+
+impl Geometry {
+    fn of(case: &Case) -> Self {
+        let (terms, facets) = (Terms::of_case(case), Facets::new(&case.facets_lattice));
+        let truth = Truth::new(&facets, &case.facets_lattice, &terms).unwrap();
+        Self { terms, facets, truth, lattice: case.facets_lattice.clone() }
+    }
+
+    fn survey<'a>(&'a self, tree: &'a Tree, band_cells: f64) -> Survey<'a> {
+        let Self { terms, facets, truth, lattice } = self;
+        Survey { terms, tree, truth, facets, parity: Parity::new(lattice), band_cells }
+    }
+
+    fn sides(&self, tree: &Tree, band_cells: f64) -> CheckResult {
+        let mut result = CheckResult::new("sides");
+        self.survey(tree, band_cells).check_sides(&mut result);
+        result
+    }
+
+    fn complete(&self, tree: &Tree, band_cells: f64) -> CheckResult {
+        let mut result = CheckResult::new("complete");
+        self.survey(tree, band_cells).check_complete(&mut result);
+        result
+    }
+}
 
 /// A tetrahedron in a root of edge 8 with leaves of edge 1, without the facets from number `count`.
 fn tetrahedron(count: usize, seeds: &str) -> Case {
@@ -13,8 +47,8 @@ fn tetrahedron(count: usize, seeds: &str) -> Case {
 
 fn positions(count: usize, seeds: &str, paths: &[&[u8]]) -> Vec<Position> {
     let case = tetrahedron(count, seeds);
-    let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-    let space = Space::new(&terms, &facets, &case.facets_lattice);
+    let (geometry, tree) = (Geometry::of(&case), Tree::default());
+    let space = geometry.survey(&tree, 0.0);
     let octant = |path: &&[u8]| path.iter().fold(Octant::ROOT, |o, &digit| o.child(digit));
     paths.iter().map(|path| space.position(octant(path))).collect()
 }
@@ -35,23 +69,19 @@ fn a_place_is_near_the_surface_or_in_a_component_that_is_kept_or_not() {
 #[test]
 fn a_band_wider_than_the_root_leaves_nothing_to_check() {
     let case = tetrahedron(4, "[]");
-    let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-    let space = Space::new(&terms, &facets, &case.facets_lattice);
+    let geometry = Geometry::of(&case);
     let tree = Tree::of_words(&contract::testing::words_of(|o| o.level < 2));
     for (band_cells, was_run) in [(0.0, true), (8.0, false)] {
-        let survey = Survey { tree: &tree, space: &space, band_cells };
-        assert_eq!(
-            [survey.check_sides().was_run(), survey.check_complete().was_run()],
-            [was_run; 2]
-        );
+        let results = [geometry.sides(&tree, band_cells), geometry.complete(&tree, band_cells)];
+        assert_eq!(results.map(|result| result.examined > 0), [was_run; 2]);
     }
 }
 
 #[test]
 fn places_within_the_band_are_not_judged() {
     let case = tetrahedron(4, "[]");
-    let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-    let space = Space::new(&terms, &facets, &case.facets_lattice);
+    let geometry = Geometry::of(&case);
+    let Geometry { terms, facets, .. } = &geometry;
     let words = contract::testing::words_of(|o| o.level < 3);
     let tree = Tree::of_words(&words);
     for band_cells in [0.0, 0.5, 1.0, 1.5] {
@@ -63,10 +93,10 @@ fn places_within_the_band_are_not_judged() {
             facets.meeting(&facets.all(), low, high).is_empty()
         };
         let expected = words.iter().filter(is_beyond).count() as u64;
-        let survey = Survey { tree: &tree, space: &space, band_cells };
-        assert_eq!(survey.check_complete().examined, expected, "{band_cells}");
+        let result = geometry.complete(&tree, band_cells);
+        assert_eq!(result.examined, expected, "{band_cells}");
         assert!((1..512).contains(&expected), "{expected}");
-        let findings = survey.check_complete().findings;
+        let findings = result.findings;
         assert!(!findings.is_empty(), "{band_cells}");
         for detail in findings.iter().map(|finding| &finding.detail) {
             let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
@@ -76,7 +106,7 @@ fn places_within_the_band_are_not_judged() {
 }
 
 /// Leaves of edge 1 with the sides of the components, and of which kind they are.
-fn labelled(space: &Space) -> Vec<u64> {
+fn labelled(space: &Survey) -> Vec<u64> {
     let side = |octant: &Octant| match space.position(*octant) {
         Position::On(side, _) => Some(side),
         Position::Near => Some(Side::Crossing),
@@ -89,27 +119,25 @@ fn labelled(space: &Space) -> Vec<u64> {
 fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_are_counted() {
     for (count, undecided) in [(4, false), (3, true)] {
         let case = tetrahedron(count, "[]");
-        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let (geometry, none) = (Geometry::of(&case), Tree::default());
+        let space = geometry.survey(&none, 0.0);
         let mut words = labelled(&space);
         // Of the largest octant around the leaf that no facet meets.
         let position = |w: &u64| {
             let around = (0..=3).map(|level| word::octant(*w).ancestor(level));
             let is_free = |octant: &Octant| {
                 let (low, high) = octant.bounds();
+                let facets = &geometry.facets;
                 facets.meeting(&facets.all(), low, high).is_empty()
             };
             around.into_iter().find(is_free).map_or(Position::Near, |o| space.position(o))
         };
         let count =
             |of: &dyn Fn(Position) -> bool| words.iter().filter(|w| of(position(w))).count() as u64;
-        let judged = count(&|position| matches!(position, Position::On(..)));
+        let judged = count(&|position| position != Position::Undecided);
         let not_judged = count(&|position| position == Position::Undecided);
         assert_eq!(not_judged > 0, undecided);
-        let check = |words: &[u64]| {
-            let tree = Tree::of_words(words);
-            Survey { tree: &tree, space: &space, band_cells: 0.0 }.check_sides()
-        };
+        let check = |words: &[u64]| geometry.sides(&Tree::of_words(words), 0.0);
         let note = format!(
             "leaves beyond 0 cells from the geometry; {not_judged} are not judged, because their rays disagree"
         );
@@ -117,9 +145,23 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         assert_eq!((result.findings_total, result.examined, &result.note), (0, judged, &note));
         let far = words.iter().position(|w| matches!(position(w), Position::On(..))).unwrap();
         words[far] ^= 1;
-        let (result, leaf) = (check(&words), terms.root.describe(&word::octant(words[far])));
+        let (result, leaf) = (check(&words), case.root.describe(&word::octant(words[far])));
         let expected = format!("the inside leaf {leaf} is in a component that is outside");
         assert_eq!((result.findings_total, &result.findings[0].detail), (1, &expected));
+        // A label of its own: a crossing leaf where no facet is, even if the rays disagree, and a crossed leaf without it.
+        let (mut spurious, mut lost) = (labelled(&space), labelled(&space));
+        let at = |of: Position| words.iter().position(|w| position(w) == of);
+        if let Some(at) = at(Position::Undecided).or(Some(far)) {
+            spurious[at] = spurious[at] & !3 | Side::Crossing as u64;
+        }
+        lost[at(Position::Near).unwrap()] &= !3;
+        for (words, text) in [(spurious, "the crossing leaf"), (lost, "is crossed by a facet")] {
+            let result = check(&words);
+            assert!(
+                result.findings_total == 1 && result.findings[0].detail.contains(text),
+                "{result}"
+            );
+        }
     }
 }
 
@@ -127,20 +169,19 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
 fn a_hole_that_the_geometry_crosses_is_a_finding_if_the_band_has_no_width() {
     for keep_crossing in [true, false] {
         let case = Case { keep_crossing, ..tetrahedron(4, "[]") };
-        let (terms, facets) = (Terms::of_case(&case), Facets::new(&case.facets_lattice));
-        let space = Space::new(&terms, &facets, &case.facets_lattice);
+        let (geometry, none) = (Geometry::of(&case), Tree::default());
+        let space = geometry.survey(&none, 0.0);
         let mut words = labelled(&space);
         words.retain(|w| w & 3 != Side::Outside as u64);
         let inside = words.iter().filter(|&w| w & 3 == Side::Inside as u64).count() as u64;
         let crossing = |w: &u64| w & 3 == Side::Crossing as u64;
         let lost = words.remove(words.iter().position(crossing).unwrap());
         let check = |words: &[u64], band_cells| {
-            let tree = Tree::of_words(words);
-            let result = Survey { tree: &tree, space: &space, band_cells }.check_complete();
+            let result = geometry.complete(&Tree::of_words(words), band_cells);
             let first = result.findings.first().map(|finding| finding.detail.clone());
             (first, result.findings_total, result.examined)
         };
-        let hole = |w| format!("the mesh has a hole: {}", terms.root.describe(&word::octant(w)));
+        let hole = |w| format!("the mesh has a hole: {}", case.root.describe(&word::octant(w)));
         let (first, findings, examined) = check(&words, 0.0);
         assert_eq!((first.is_some(), findings), (keep_crossing, u64::from(keep_crossing)));
         assert!(!keep_crossing || first == Some(hole(lost)));

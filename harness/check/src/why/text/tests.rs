@@ -27,7 +27,7 @@ fn link(rule: &'static str, octant: &[u8], leaf: &[u8], distance_cells: i64) -> 
 }
 
 fn split(octant: &[u8], links: Vec<LinkRecord>, cause: Option<CauseRecord>) -> Split {
-    Split { octant: place(octant), links, cause, is_shortest: true }
+    Split { octant: place(octant), links, cause }
 }
 
 fn answer(splits: Vec<Split>) -> Answer {
@@ -41,6 +41,7 @@ fn answer(splits: Vec<Split>) -> Answer {
         deleted_by: None,
         splits,
         left_out: Vec::new(),
+        layer_cells_min: 4,
     }
 }
 
@@ -96,25 +97,23 @@ fn a_chain_is_printed_link_by_link_and_what_it_shares_by_reference() {
     let shared = || link("balance", &[1, 0], &[1, 0, 0, 0], 0);
     let first = split(&[0], vec![link("layer", &[0], &[1, 0, 0], 1), shared()], end());
     let second = split(&[0, 3], vec![link("layer", &[0, 3], &[1, 0, 2], 2), shared()], end());
-    let mut third =
-        split(&[0, 3, 1], vec![link("extra_layer", &[0, 3, 1], &[1, 0, 3, 0], 0)], end());
-    third.is_shortest = false;
+    let third = split(&[0, 3, 1], vec![link("extra_layer", &[0, 3, 1], &[1, 0, 3, 0], 0)], end());
     let touching =
         split(&[0], vec![link("layer", &[0], &[1, 0, 0], 0)], Some(cause(&[1], &[], 0, &[3])));
     let text = sizes(vec![first, second, third, touching]);
     let expected = "  level 1: octant 0 (level 1), (0, 0, 0) to (8, 8, 8) is split\n    \
             by section 6 (layer): only 1 cell of level 3 away is the leaf octant 1.0.0 (level 3), (8, 0, 0) to (10, 2, 2)\n    \
             its parent is split by section 6 (balance): it touches the leaf octant 1.0.0.0 (level 4), (8, 0, 0) to (9, 1, 1), 2 levels finer\n    \
-            its parent is split by section 3: facet 7 crosses it\n    the shortest chain: 2 leaves\n  \
+            its parent is split by section 3: facet 7 crosses it\n    a chain of 2 leaves\n  \
             level 2: octant 0.3 (level 2), (4, 4, 0) to (8, 8, 4) is split\n    \
             by section 6 (layer): only 2 cells of level 3 away is the leaf octant 1.0.2 (level 3), (8, 2, 0) to (10, 4, 2)\n    \
-            its parent is split as in the chain of level 1\n    the shortest chain: 2 leaves\n  \
+            its parent is split as in the chain of level 1\n    a chain of 2 leaves\n  \
             level 3: octant 0.3.1 (level 3), (6, 4, 0) to (8, 6, 2) is split\n    \
             by section 6 (extra layer): it touches the deleted crossing leaf octant 1.0.3.0 (level 4), (10, 2, 0) to (11, 3, 1)\n    \
-            it is crossing by section 4: facet 7 crosses it\n    a chain of 1 leaf; a shorter one may exist\n  \
+            it is crossing by section 4: facet 7 crosses it\n    a chain of 1 leaf\n  \
             level 1: octant 0 (level 1), (0, 0, 0) to (8, 8, 8) is split\n    \
             by section 6 (layer): it touches the leaf octant 1.0.0 (level 3), (8, 0, 0) to (10, 2, 2)\n    \
-            its parent is split by section 3: box 3 meets it\n    the shortest chain: 1 leaf\n";
+            its parent is split by section 3: box 3 meets it\n    a chain of 1 leaf\n";
     assert_eq!(text, expected);
 }
 

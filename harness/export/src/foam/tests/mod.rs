@@ -18,10 +18,11 @@ use contract::testing::{leaf_set, random_words, words_with_sides};
 use contract::word::{self, Side};
 use proptest::prelude::*;
 
-use super::faces::Square;
-use super::points::{Near, Point};
-use super::walk::Around;
+use super::leaves::Around;
+use super::points::Point;
+use super::squares::{Square, squares};
 use super::*;
+use crate::mesh::Mesh as OnDisk;
 use crate::options::{Foam, Label, Style};
 use crate::testing::Unwatched;
 
@@ -34,17 +35,17 @@ struct Complex {
     neighbour: Vec<usize>,
 }
 
-fn options<'a>(style: Style) -> Options<'a> {
+pub fn options<'a>(style: Style) -> Options<'a> {
     let foam = Foam { style, ..Foam::default() };
     Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam }
 }
 
-const ASCII: Style = Style { is_ascii: true, label: Label::Bits32 };
+pub const ASCII: Style = Style { is_ascii: true, label: Label::Bits32 };
 
-fn on_disk(set: &LeafSet) -> (tempfile::TempDir, Mesh) {
+fn on_disk(set: &LeafSet) -> (tempfile::TempDir, OnDisk) {
     let dir = tempfile::tempdir().unwrap();
     set.create(&dir.path().join("mesh")).unwrap();
-    let mesh = Mesh::open(&dir.path().join("mesh")).unwrap();
+    let mesh = OnDisk::open(&dir.path().join("mesh")).unwrap();
     (dir, mesh)
 }
 
@@ -76,77 +77,52 @@ fn complex_in(dir: &Path) -> Complex {
     }
 }
 
-/// Sorted words as cells, without those that are cut.
-fn model_of<'a>(
+/// Sorted words as leaves, some of which are cut.
+fn leaves_of(words: &[u64], is_cut: impl Fn(u64) -> bool) -> Leaves {
+    Leaves::new(words.iter().map(|&w| if is_cut(w) { w | CUT } else { w }).collect())
+}
+
+/// The mesh of these leaves.
+pub fn mesh_of<'a>(
     words: &[u64],
     is_cut: impl Fn(u64) -> bool,
     options: &'a Options<'a>,
-) -> Model<'a> {
-    let mut builder = Builder::default();
-    for &w in words {
-        let (octant, side) = (word::octant(w), (w & 3) as u8);
-        let kind = if is_cut(w) { DELETED } else { side };
-        builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
-    }
-    let tree = Tree::new(&builder.finish());
-    Model {
-        points: corners::points(&tree, options).unwrap(),
-        tree,
-        ranks: None,
-        root: Root { origin: [0.0; 3], edge: 1.0 },
-        has_sides: true,
-        options,
+) -> Mesh<'a> {
+    let root = Root { origin: [0.0; 3], edge: 1.0 };
+    let patches = Patches::new(None, true).unwrap();
+    build(leaves_of(words, is_cut), Mesh::empty(patches, None, root, options)).unwrap().0
+}
+
+impl Mesh<'_> {
+    fn all_points(&self) -> Vec<Point> {
+        (0..self.points.count()).map(|number| self.points.at(number)).collect()
     }
 }
 
-impl Model<'_> {
-    fn all_points(&self) -> Vec<Point> {
-        let mut points = Vec::new();
-        let add = &mut |point| {
-            points.push(point);
-            Ok::<(), ()>(())
-        };
-        self.points.visit(0..self.points.count() as u32, add).unwrap();
-        points
-    }
-
-    fn visit_all(&self, mut each: impl FnMut(u32, &Around<Near>, &[Square])) {
-        let all = std::iter::once(0..self.tree.cells());
-        let each = |cell, around: &Around<Near>, squares: &[Square]| {
-            each(cell, around, squares);
+impl Leaves {
+    fn visit_all(&self, options: &Options, mut each: impl FnMut(u32, &Around<()>, &[Square])) {
+        let mut of_cell = Vec::new();
+        let visit = &mut |cell, around: &Around<()>| {
+            squares(self, around, &mut of_cell);
+            each(cell, around, &of_cell);
             Ok(())
         };
-        survey::visit(self, self.points.near(), all, each).unwrap();
+        self.walk((), options, visit).unwrap();
     }
 }
 
-/// The complex of sorted words, without files. Faces are in the order of their owners.
+/// The complex of sorted words, without files.
 fn complex_of(words: &[u64]) -> Complex {
     let options = options(ASCII);
-    let model = model_of(words, |_| false, &options);
-    let points = model.all_points().into_iter().map(|p| p.map(f64::from)).collect();
-    let mut complex = Complex { points, ..Complex::default() };
-    let (mut boundary, mut polygon) = (Vec::new(), Vec::new());
-    model.visit_all(|cell, around, squares| {
-        for square in squares {
-            square.polygon(around, !square.is_high, &mut polygon);
-            let vertices = polygon.iter().map(|&number| number as usize).collect();
-            match square.across.as_cell() {
-                Some(_) if !square.is_high => {}
-                Some(across) => {
-                    complex.faces.push(vertices);
-                    complex.owner.push(cell as usize);
-                    complex.neighbour.push(across as usize);
-                }
-                None => boundary.push((cell as usize, vertices)),
-            }
-        }
-    });
-    for (cell, vertices) in boundary {
-        complex.faces.push(vertices);
-        complex.owner.push(cell);
+    let mesh = mesh_of(words, |_| false, &options);
+    let vertices = |face| mesh.faces.vertices(face).iter().map(|&v| v as usize).collect();
+    let indices = |cells: &[u32]| cells.iter().map(|&cell| cell as usize).collect();
+    Complex {
+        points: mesh.all_points().into_iter().map(|p| p.map(f64::from)).collect(),
+        faces: (0..mesh.faces.count()).map(vertices).collect(),
+        owner: indices(&mesh.faces.owner),
+        neighbour: indices(&mesh.faces.neighbour),
     }
-    complex
 }
 
 impl Complex {

@@ -1,4 +1,4 @@
-//! What is found from equal surroundings at once: the points, and the regions.
+//! The points, and the regions.
 
 use super::*;
 
@@ -21,28 +21,28 @@ proptest! {
     #[test]
     fn points_are_the_corners_of_cells_and_of_the_squares_at_missing_cells(words in random_words(5), has_cut in any::<bool>()) {
         let options = options(ASCII);
-        let model = model_of(&words, |word| has_cut && is_cut(word), &options);
+        let mesh = mesh_of(&words, |word| has_cut && is_cut(word), &options);
         let mut expected: BTreeSet<Point> = BTreeSet::new();
-        model.visit_all(|_, around, squares| {
+        mesh.leaves.visit_all(&options, |_, around, squares| {
             let edge = around.octant.edge();
             let corner = |digit: u32| std::array::from_fn(|a| around.octant.corner[a] + edge * (digit >> a & 1));
             expected.extend((0..8).map(corner));
             expected.extend(squares.iter().flat_map(Square::corners));
         });
-        let points = model.all_points();
+        let points = mesh.all_points();
         assert_sorted(&points);
         prop_assert_eq!(points.into_iter().collect::<BTreeSet<_>>(), expected);
     }
 
     #[test]
     fn regions_are_the_cells_that_faces_connect(words in random_words(4), one_in in 1u64..5) {
-        let options = options(ASCII);
+        let mut options = options(ASCII);
         let holes = words.iter().copied().filter(|&w| contract::digest::mix(w) % 5 < u128::from(one_in));
         let words: Vec<u64> = holes.collect();
-        let mut model = model_of(&words, is_cut, &options);
-        let cells = model.tree.cells() as usize;
+        let leaves = leaves_of(&words, is_cut);
+        let cells = leaves.count() as usize;
         let (mut sets, mut volumes): (Vec<usize>, _) = ((0..cells).collect(), vec![0; cells]);
-        model.visit_all(|cell, around, squares| {
+        leaves.visit_all(&options, |cell, around, squares| {
             volumes[cell as usize] = word::span(around.octant.level);
             for across in squares.iter().filter_map(|square| square.across.as_cell()) {
                 let (a, b) = (sets[cell as usize], sets[across as usize]);
@@ -55,25 +55,50 @@ proptest! {
             size.cells += 1;
             size.volume += volumes[cell];
         }
-        let mut expected: Vec<Size> = expected.into_values().collect();
-        expected.sort_by_key(|&size| std::cmp::Reverse(size));
-        model.ranks = Some(Distribution::equal(cells as u32, 3));
-        let ranks = model.ranks.clone().unwrap();
-        let before = model.points.count();
-        prop_assert_eq!(&connect(&mut model, options::Regions::Largest).unwrap(), &expected);
-        let Some(&largest) = expected.first() else { return Ok(()) };
-        prop_assert_eq!(u64::from(model.tree.cells()), largest.cells);
-        prop_assert_eq!(connect(&mut model, options::Regions::All).unwrap(), vec![largest]);
+        let size_of = |cell: usize| expected[&sets[cell]];
+        let mut sizes: Vec<Size> = expected.values().copied().collect();
+        sizes.sort_by_key(|&size| std::cmp::Reverse(size));
+        let Some(&largest) = sizes.first() else { return Ok(()) };
+        // The one that has the first cell, of several that are as large.
+        let region = sets[(0..cells).find(|&cell| size_of(cell) == largest).unwrap()];
+        options.foam.regions = options::Regions::Largest;
+        let root = Root { origin: [0.0; 3], edge: 1.0 };
+        let ranks = Some((0..cells as u32).map(|cell| cell % 7).collect());
+        let whole = Mesh::empty(Patches::new(None, true).unwrap(), ranks, root, &options);
+        let (mesh, found) = build(leaves, whole).unwrap();
+        prop_assert_eq!(found, sizes);
+        prop_assert_eq!(u64::from(mesh.leaves.count()), largest.cells);
         // Its cells keep their ranks.
-        let region = (0..cells as u32).find(|&c| {
-            let of_region = sets.iter().enumerate().filter(|(_, set)| **set == sets[c as usize]);
-            Size { cells: of_region.clone().count() as u64, volume: of_region.map(|(cell, _)| volumes[cell]).sum() } == largest
-        });
-        let region = sets[region.unwrap() as usize];
-        let kept = (0..cells as u32).filter(|&c| sets[c as usize] == region);
-        let expected: Vec<u32> = kept.map(|c| ranks.place(c).0).collect();
-        let retained = model.ranks.as_ref().unwrap();
-        prop_assert!((0..model.tree.cells()).map(|c| retained.place(c).0).eq(expected));
-        prop_assert!(before >= model.points.count());
+        let kept = (0..cells).filter(|&cell| sets[cell] == region);
+        prop_assert_eq!(mesh.ranks.unwrap(), kept.map(|cell| cell as u32 % 7).collect::<Vec<_>>());
     }
+}
+
+/// Asserts that a change of the directories of a mesh is noticed, and for the stated reason.
+fn assert_noticed(why: &str, change: impl Fn(&mut Vec<Directory>)) {
+    let words = words_with_sides(|o| o.level < 2, |_| Some(Side::Outside));
+    let options = options(ASCII);
+    let mesh = mesh_of(&words, |_| false, &options);
+    let of_cells: Vec<u32> = (0..64).map(|cell| cell / 22).collect();
+    let mut parts = directories(&mesh, Some(&of_cells));
+    check_parts(&mesh, &parts);
+    change(&mut parts);
+    let check = std::panic::AssertUnwindSafe(|| check_parts(&mesh, &parts));
+    let caught = std::panic::catch_unwind(check).unwrap_err();
+    let message = caught.downcast_ref::<String>().unwrap();
+    assert!(message.contains(why), "{message}");
+}
+
+#[test]
+fn planted_wrong_directories_are_noticed() {
+    assert_noticed("cells of all directories", |parts| {
+        parts[1].cells.pop();
+    });
+    assert_noticed("faces of all directories", |parts| {
+        parts[2].internal.pop();
+    });
+    assert_noticed("faces of all directories", |parts| parts[0].patches[0].push(5));
+    assert_noticed("between processors 0 and 1", |parts| {
+        parts[1].between.get_mut(&0).unwrap().swap(0, 1)
+    });
 }

@@ -16,7 +16,8 @@ fn findings(change: impl Fn(&mut Manifest)) -> Vec<String> {
     let mut manifest = leaf_set(vec![]).manifest;
     manifest.keep = Keep::Outside;
     change(&mut manifest);
-    let result = check_tree(&cavity(), &Terms::of_manifest(&manifest), &manifest);
+    let mut result = CheckResult::new("kept");
+    check(&cavity(), &Terms::of_manifest(&manifest), &manifest, &mut result);
     result.findings.into_iter().map(|finding| finding.detail).collect()
 }
 

@@ -1,0 +1,153 @@
+//! T0 as the harness makes it from the case: the least tree that facets and boxes require (section 3 of
+//! reference/DEFINITION.md), with the sides of its leaves (section 4) and the components that are enclosed (section 5).
+//!
+//! Invariants: the words are sorted and tile the root; a leaf is crossing iff a facet crosses it; every other leaf belongs to
+//! one component and has its side.
+
+use super::Terms;
+use super::components::{self, Component};
+use super::facets::Facets;
+use contract::lattice::FacetLattice;
+use contract::octant::Octant;
+use contract::tree::{Builder, HOLES, Handle, Kind, Kinds, Tree};
+use contract::word::{self, Leaf, Side};
+
+/// The kind, in T0's tree, of an outside leaf that is deleted because its component is enclosed.
+const ENCLOSED: Kind = 3;
+
+/// T0 of a case.
+#[derive(Debug)]
+pub struct Truth {
+    /// Its leaf words.
+    pub words: Vec<u64>,
+    /// The components of the leaves that no facet crosses.
+    pub components: Vec<Component>,
+    /// The component of each leaf.
+    component_of: Vec<Option<u32>>,
+    tree: Tree,
+}
+
+/// A part of a mesh: a leaf, a hole, or an octant that has leaves of one kind only, whole or within one leaf of T0.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// The octant.
+    pub octant: Octant,
+    /// What the mesh has there, as one bit.
+    pub kinds: Kinds,
+    /// The kind of the leaf of T0 that contains it; `None` if T0 splits it.
+    pub base: Option<Kind>,
+    /// Whether the mesh splits that leaf of T0.
+    pub is_finer: bool,
+}
+
+impl Found {
+    /// Whether it has no leaf.
+    pub fn is_hole(&self) -> bool {
+        self.kinds == HOLES
+    }
+}
+
+impl Truth {
+    /// Maximum number of leaves. One needs about 40 bytes.
+    pub const LEAVES_MAX: usize = 1 << 26;
+
+    /// T0 of the inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
+    pub fn new(facets: &Facets, lattice: &[FacetLattice], terms: &Terms) -> Option<Self> {
+        let mut words = Vec::new();
+        if !base_tree(facets, terms, Octant::ROOT, &facets.all(), &mut words) {
+            return None;
+        }
+        let components = components::find(&words, terms, lattice);
+        let mut component_of = vec![None; words.len()];
+        let mut kinds: Vec<Kind> = words.iter().map(|&w| (w & word::SIDE_BITS) as Kind).collect();
+        for (index, Component { leaves, side, enclosed, .. }) in (0..).zip(&components) {
+            for leaf in leaves.iter().map(|&leaf| leaf as usize) {
+                component_of[leaf] = Some(index);
+                words[leaf] = words[leaf] & !word::SIDE_BITS | *side as u64;
+                kinds[leaf] = if *enclosed { ENCLOSED } else { *side as Kind };
+            }
+        }
+        let mut builder = Builder::default();
+        for (&w, &kind) in words.iter().zip(&kinds) {
+            let pushed = builder.push_leaf(word::key(w), word::level(w), kind);
+            pushed.expect("the leaves of T0 are in order and do not overlap");
+        }
+        Some(Self { words, components, component_of, tree: builder.finish() })
+    }
+
+    /// The side of a leaf of T0 of this kind.
+    pub fn side(kind: Kind) -> Side {
+        if kind == ENCLOSED { Side::Outside } else { Side::ALL[usize::from(kind)] }
+    }
+
+    /// Whether a leaf of T0 of this kind is kept.
+    pub fn keeps(kind: Kind, terms: &Terms) -> bool {
+        (kind != ENCLOSED || !terms.deletes_enclosed()) && terms.keeps(Self::side(kind) as Kind)
+    }
+
+    /// The component of the leaf of T0 that contains an octant; `None` if a facet crosses that leaf.
+    pub fn component_at(&self, octant: &Octant) -> Option<&Component> {
+        let leaf = components::leaf_at(&self.words, octant.bounds().0)?;
+        self.component_of[leaf].map(|index| &self.components[index as usize])
+    }
+
+    /// Visits the parts of a mesh, in Morton order.
+    pub fn compare(&self, mesh: &Tree, visit: &mut dyn FnMut(Found)) {
+        self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, false, visit);
+    }
+
+    /// Visits every leaf and every hole of a mesh with the kind of T0, in Morton order. A leaf that T0 splits has none.
+    pub fn leaves(&self, mesh: &Tree, visit: &mut dyn FnMut(Octant, Option<Kind>, Option<Kind>)) {
+        let single = |kinds: Kinds| (kinds != HOLES).then(|| kinds.trailing_zeros() as Kind);
+        self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, true, &mut |found| {
+            visit(found.octant, single(found.kinds), found.base);
+        });
+    }
+
+    fn descend(
+        &self,
+        mesh: &Tree,
+        [handle, base]: [Handle; 2],
+        octant: Octant,
+        every_leaf: bool,
+        visit: &mut dyn FnMut(Found),
+    ) {
+        let kinds = mesh.kinds(handle);
+        let (kind, level) = match base.as_coarser_leaf() {
+            Some((kind, level)) => (Some(kind), level),
+            None => (base.as_leaf(), octant.level),
+        };
+        let is_whole = match kind {
+            Some(_) => !handle.is_node() || kinds.is_power_of_two() && !every_leaf,
+            None => handle.as_leaf().is_some(),
+        };
+        if is_whole {
+            let is_finer = handle != Handle::HOLE && (octant.level > level || handle.is_node());
+            return visit(Found { octant, kinds, base: kind, is_finer });
+        }
+        for digit in 0..8 {
+            let below = [(mesh, handle), (&self.tree, base)];
+            let below = below.map(|(tree, of)| tree.child(of, digit, octant.level));
+            self.descend(mesh, below, octant.child(digit), every_leaf, visit);
+        }
+    }
+}
+
+/// Appends the leaves of T0 in an octant; false if they are too many.
+fn base_tree(
+    facets: &Facets,
+    terms: &Terms,
+    octant: Octant,
+    candidates: &[u32],
+    words: &mut Vec<u64>,
+) -> bool {
+    let (low, high) = octant.bounds();
+    let near = facets.meeting(candidates, low, high);
+    let surface_splits = !near.is_empty() && octant.level < terms.level_surface;
+    if !surface_splits && terms.box_that_splits(&octant).is_none() {
+        let side = if near.is_empty() { Side::Outside } else { Side::Crossing };
+        words.push(word::encode(&Leaf { octant, side }));
+        return words.len() <= Truth::LEAVES_MAX;
+    }
+    (0..8).all(|digit| base_tree(facets, terms, octant.child(digit), &near, words))
+}

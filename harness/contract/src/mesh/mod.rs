@@ -1,0 +1,222 @@
+//! Meshes on disk, of any size: the part files of a leaf-set directory or, if it has none, its tree.
+//!
+//! [`Mesh::stream`] passes on all words as they are, for the checks. [`Mesh::visit`] and [`Mesh::tree`] refuse words that are
+//! not a linear oct-tree, for all who rely on one. [`Readers`] find the leaves of an octant without reading those before it.
+
+mod merge;
+mod part;
+
+use std::path::{Path, PathBuf};
+
+pub use part::{Part, Readers};
+
+use crate::leafset::{self, ReadError};
+use crate::manifest::Manifest;
+use crate::npy::PartFile;
+use crate::octant::Octant;
+use crate::tree::{Builder, Tree};
+use crate::word;
+
+/// Maximum number of distinct nodes of a tree in memory. A node needs up to 120 bytes while the tables grow.
+pub const NODES_MAX: usize = 32_000_000;
+
+/// A leaf-set directory whose manifest and files were opened. No leaf has been read.
+#[derive(Debug)]
+pub struct Mesh {
+    dir: PathBuf,
+    /// The manifest.
+    pub manifest: Manifest,
+    /// The files of words in the manifest's order, or the tree alone.
+    pub parts: Vec<Part>,
+}
+
+impl Mesh {
+    /// Opens a leaf-set directory.
+    ///
+    /// # Errors
+    /// If the directory is not a leaf set.
+    pub fn open(dir: &Path) -> Result<Self, ReadError> {
+        let manifest = leafset::read_manifest(dir)?;
+        let tree = match manifest.parts.is_empty() {
+            true => leafset::open_tree(dir, &manifest)?,
+            false => None,
+        };
+        let mut parts = Vec::new();
+        match tree {
+            Some(tree) => parts.push(Part::of_tree(tree)?),
+            None => {
+                for part in &manifest.parts {
+                    let path = dir.join(&part.file);
+                    let file = PartFile::open(&path);
+                    parts.push(Part::Words(file.map_err(|e| ReadError::Part { path, source: e })?));
+                }
+                leafset::refuse_extra_parts(dir, &manifest)?;
+            }
+        }
+        Ok(Self { dir: dir.to_owned(), manifest, parts })
+    }
+
+    /// Number of leaves in the files, whatever the manifest states.
+    pub fn len(&self) -> u64 {
+        self.parts.iter().map(Part::len).sum()
+    }
+
+    /// Whether there are no leaves.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Passes all words to `run`, until it returns false. Each run comes from the part with the given index. If every part is
+    /// sorted, so is the stream.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or if the tree is damaged.
+    pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), ReadError> {
+        match &self.parts[..] {
+            [Part::Tree(tree)] => tree
+                .0
+                .words(&mut |words| run(0, words))
+                .map_err(|error| ReadError::tree(&tree.0, error)),
+            parts => merge::merge(parts, run),
+        }
+    }
+
+    /// Visits all leaf words in ascending order.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or if the words are not those of a linear oct-tree.
+    pub fn visit(&self, visit: &mut dyn FnMut(&[u64])) -> Result<(), ReadError> {
+        let mut order = Order::default();
+        let mut fault = None;
+        self.stream(&mut |_, words| {
+            fault = words.iter().find_map(|&word| order.fault(word));
+            if fault.is_none() {
+                visit(words);
+            }
+            fault.is_none()
+        })?;
+        fault.map_or(Ok(()), |why| Err(ReadError::NotLinear { path: self.dir.clone(), why }))
+    }
+
+    /// All leaves as a tree.
+    ///
+    /// # Errors
+    /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
+    pub fn tree(&self) -> Result<Tree, ReadError> {
+        let mut builder = Builder::default();
+        self.visit(&mut |words| {
+            if builder.nodes() <= NODES_MAX {
+                words.iter().for_each(|&w| builder.push(w).expect("a visit is linear"));
+            }
+        })?;
+        match builder.nodes() <= NODES_MAX {
+            true => Ok(builder.finish()),
+            false => Err(ReadError::TooLarge(self.dir.clone())),
+        }
+    }
+
+    /// The sorted words of the leaves in an octant.
+    ///
+    /// # Errors
+    /// As [`Mesh::visit`], as far as the words of the octant show it.
+    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, ReadError> {
+        let (start, mut readers) = (word::key_of(octant.corner), Readers::new(&self.parts));
+        let mut all = Vec::new();
+        for (part, file) in self.parts.iter().enumerate() {
+            let first = readers.lower_bound(part, 0..file.len(), start)?;
+            let end = start + word::span(octant.level);
+            let end = readers.lower_bound(part, first..file.len(), end)?;
+            all.extend(readers.words(part, octant, first..end)?.0);
+        }
+        all.sort_unstable();
+        let mut order = Order::default();
+        match all.iter().find_map(|&word| order.fault(word)) {
+            None => Ok(all),
+            Some(why) => Err(ReadError::NotLinear { path: self.dir.clone(), why }),
+        }
+    }
+}
+
+/// The end of the leaves so far, as a Morton code.
+#[derive(Default)]
+struct Order(u64);
+
+impl Order {
+    /// Why a word does not follow the words before it in a linear oct-tree.
+    fn fault(&mut self, word: u64) -> Option<String> {
+        if let Some(why) = word::fault(word) {
+            return Some(format!("the word {word:#018x} is not a leaf: {why}"));
+        }
+        let (begin, octant) = (word::key(word), word::octant(word));
+        if begin < self.0 {
+            return Some(format!("{octant} overlaps or precedes the leaf before it"));
+        }
+        self.0 = begin + word::span(octant.level);
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leafset::LeafSet;
+    use crate::testing::{leaf_set, random_words, words_of};
+    use proptest::prelude::*;
+
+    fn opened(set: &LeafSet) -> (tempfile::TempDir, Mesh) {
+        let dir = tempfile::tempdir().unwrap();
+        set.write(dir.path()).unwrap();
+        let mesh = Mesh::open(dir.path()).unwrap();
+        (dir, mesh)
+    }
+
+    fn in_parts(words: &[u64], part_of: &[usize]) -> LeafSet {
+        let mut parts = vec![Vec::new(); 3];
+        words.iter().zip(part_of).for_each(|(&w, &part)| parts[part].push(w));
+        leaf_set(parts)
+    }
+
+    proptest! {
+        #[test]
+        fn every_way_of_reading_gives_the_leaves_of_the_parts(words in random_words(3), part_of in prop::collection::vec(0usize..3, 600)) {
+            let words: Vec<u64> = words.into_iter().take(part_of.len()).collect();
+            let (_dir, mesh) = opened(&in_parts(&words, &part_of));
+            prop_assert_eq!(mesh.len(), words.len() as u64);
+            let mut visited = Vec::new();
+            mesh.visit(&mut |run| visited.extend_from_slice(run)).unwrap();
+            prop_assert_eq!(&visited, &words);
+            let (tree, expected) = (mesh.tree().unwrap(), Tree::of_words(&words));
+            for octant in words.iter().step_by(7).map(|&w| word::octant(w)) {
+                prop_assert_eq!(tree.locate(octant.corner), expected.locate(octant.corner));
+                let above = octant.ancestor(octant.level.saturating_sub(1));
+                let within = words.iter().copied().filter(|&w| above.contains(&word::octant(w)));
+                prop_assert_eq!(mesh.octant(&above).unwrap(), within.collect::<Vec<u64>>());
+            }
+        }
+
+        #[test]
+        fn words_that_are_no_linear_tree_are_refused(words in random_words(3), at in any::<prop::sample::Index>(), way in 0..4) {
+            prop_assume!(words.len() > 1);
+            let mut parts = vec![words.clone(), vec![]];
+            let (i, other) = (at.index(words.len() - 1), words[at.index(words.len())]);
+            match way {
+                0 => parts[0].swap(i, i + 1),
+                1 => parts[1].push(other),
+                2 => parts[1].push(word::key_of(word::octant(other).ancestor(0).corner) << 7),
+                _ => parts[0][i] |= 3,
+            }
+            let (_dir, mesh) = opened(&leaf_set(parts));
+            for error in [mesh.visit(&mut |_| {}).unwrap_err(), mesh.tree().unwrap_err()] {
+                prop_assert!(matches!(&error, ReadError::NotLinear { .. }), "{}", error);
+                prop_assert!(error.to_string().ends_with("run harness audit on it"), "{}", error);
+            }
+        }
+    }
+
+    #[test]
+    fn leaves_are_counted_in_the_files_and_not_in_the_manifest() {
+        let mut set = leaf_set(vec![words_of(|o| o.level < 1), vec![]]);
+        set.manifest.leaves = u64::MAX;
+        assert_eq!(opened(&set).1.len(), 8);
+    }
+}

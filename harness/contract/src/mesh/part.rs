@@ -1,0 +1,134 @@
+//! The parts of a mesh on disk: files of sorted leaf words, or the tree.
+
+use std::ops::Range;
+use std::path::Path;
+
+use crate::htg::{Cursor, Index, TreeError, TreeFile};
+use crate::leafset::ReadError;
+use crate::npy::PartFile;
+use crate::octant::Octant;
+use crate::word::{self, KEY_END};
+
+/// A part.
+#[derive(Debug)]
+pub enum Part {
+    /// A file of leaf words.
+    Words(PartFile),
+    /// The whole tree.
+    Tree(Box<(TreeFile, Index)>),
+}
+
+impl Part {
+    /// The tree as a part.
+    pub fn of_tree(tree: TreeFile) -> Result<Self, ReadError> {
+        let index = tree.index().map_err(|error| ReadError::tree(&tree, error))?;
+        Ok(Self::Tree(Box::new((tree, index))))
+    }
+
+    /// Its file.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Words(file) => file.path(),
+            Self::Tree(tree) => tree.0.path(),
+        }
+    }
+
+    /// Whether it states the rank of each leaf: a file of words is that of one rank, but a tree may have none.
+    pub fn has_ranks(&self) -> bool {
+        match self {
+            Self::Words(_) => true,
+            Self::Tree(tree) => tree.0.has_ranks(),
+        }
+    }
+
+    /// Number of leaves.
+    pub fn len(&self) -> u64 {
+        match self {
+            Self::Words(file) => file.len(),
+            Self::Tree(tree) => tree.1.leaves,
+        }
+    }
+}
+
+/// One reader for each part. Each thread has readers of its own, because those of trees have buffers.
+pub struct Readers<'a>(Vec<Reader<'a>>);
+
+enum Reader<'a> {
+    Words(&'a PartFile),
+    Tree(&'a TreeFile, Cursor<'a>),
+}
+
+impl<'a> Readers<'a> {
+    /// Readers of all parts.
+    pub fn new(parts: &'a [Part]) -> Self {
+        let reader = |part: &'a Part| match part {
+            Part::Words(file) => Reader::Words(file),
+            Part::Tree(tree) => Reader::Tree(&tree.0, Cursor::new(&tree.0, &tree.1)),
+        };
+        Self(parts.iter().map(reader).collect())
+    }
+
+    /// Index of the first leaf in a range of a part whose Morton code is at least `key`.
+    pub fn lower_bound(
+        &mut self,
+        part: usize,
+        range: Range<u64>,
+        key: u64,
+    ) -> Result<u64, ReadError> {
+        // The code one past the last one does not fit in a word.
+        if key >= KEY_END {
+            return Ok(range.end);
+        }
+        match &mut self.0[part] {
+            Reader::Words(file) => {
+                file.lower_bound(range, key << 7).map_err(|error| ReadError::part(file, error))
+            }
+            Reader::Tree(tree, cursor) => {
+                let before = cursor.leaves_before(key).map_err(|e| ReadError::tree(tree, e))?;
+                Ok(before.clamp(range.start, range.end))
+            }
+        }
+    }
+
+    /// The words at these indices, which are leaves of the octant, and their ranks if the part is a tree with ranks.
+    pub fn words(
+        &mut self,
+        part: usize,
+        octant: &Octant,
+        interval: Range<u64>,
+    ) -> Result<(Vec<u64>, Vec<u32>), ReadError> {
+        let (mut words, mut ranks) = (Vec::new(), Vec::new());
+        match &mut self.0[part] {
+            Reader::Words(file) => {
+                words.resize((interval.end - interval.start) as usize, 0);
+                let read = file.read_at(interval.start, &mut words);
+                read.map_err(|error| ReadError::part(file, error))?;
+            }
+            Reader::Tree(tree, cursor) => {
+                let read = append(cursor, octant, &interval, &mut words, &mut ranks);
+                read.map_err(|error| ReadError::tree(tree, error))?;
+            }
+        }
+        Ok((words, ranks))
+    }
+}
+
+/// Appends those leaves of an octant whose indices are in the interval.
+fn append(
+    cursor: &mut Cursor,
+    octant: &Octant,
+    interval: &Range<u64>,
+    words: &mut Vec<u64>,
+    ranks: &mut Vec<u32>,
+) -> Result<(), TreeError> {
+    let key = word::key_of(octant.corner);
+    let first = cursor.leaves_before(key)?;
+    let end = cursor.leaves_before(key + word::span(octant.level))?;
+    if first >= interval.end || end <= interval.start {
+        return Ok(());
+    }
+    if interval.start <= first && end <= interval.end {
+        return cursor.words_and_ranks(key, octant.level, words, ranks);
+    }
+    (0..8).try_for_each(|digit| append(cursor, &octant.child(digit), interval, words, ranks))
+}

@@ -1,0 +1,175 @@
+//! The leaves of a mesh in Morton order, and a walk over them that knows what is across each face.
+//!
+//! An octant's leaves are an interval of the array, so what an octant contains needs no tree of its own.
+//!
+//! Invariants: words ascend and do not overlap; cells are numbered from 0 in this order, without the leaves that are [`CUT`].
+
+use contract::octant::Octant;
+use contract::word;
+
+use crate::error::ExportError;
+use crate::options::Options;
+
+/// In place of a side: a leaf of the mesh that is not exported.
+pub const CUT: u64 = 3;
+/// Number of cells that can be distinguished.
+pub const CELLS_MAX: u64 = u32::MAX as u64;
+
+/// The leaves.
+#[derive(Debug, Default)]
+pub struct Leaves {
+    words: Vec<u64>,
+    /// How many cells are before each leaf.
+    numbers: Vec<u32>,
+    cells: u32,
+}
+
+/// Content of an octant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// Outside the root.
+    Outside,
+    /// No leaf of the mesh.
+    Hole,
+    /// A leaf of the mesh that is not exported, or part of one.
+    Cut,
+    /// The cell with this number, or part of it.
+    Cell(u32),
+    /// The leaves with these indices.
+    Split(usize, usize),
+}
+
+impl Content {
+    /// The number of the cell that the octant is, or is part of.
+    pub fn as_cell(self) -> Option<u32> {
+        if let Self::Cell(number) = self { Some(number) } else { None }
+    }
+}
+
+impl Leaves {
+    /// Leaves with these words, of which there are at most [`CELLS_MAX`].
+    pub fn new(words: Vec<u64>) -> Self {
+        let mut cells = 0;
+        let number = |word: &u64| {
+            let number = cells;
+            cells += u32::from(word & 3 != CUT);
+            number
+        };
+        let numbers = words.iter().map(number).collect();
+        Self { words, numbers, cells }
+    }
+
+    /// Number of cells.
+    pub fn count(&self) -> u32 {
+        self.cells
+    }
+
+    /// The words of the cells.
+    pub fn cells(&self) -> impl Iterator<Item = u64> {
+        self.words.iter().copied().filter(|word| word & 3 != CUT)
+    }
+
+    /// The leaves without those cells that `is_kept` rejects.
+    pub fn retain(self, is_kept: impl Fn(u32) -> bool) -> Self {
+        let Self { words, numbers, .. } = self;
+        let all = words.into_iter().zip(numbers);
+        let kept = all.filter(|&(word, number)| word & 3 == CUT || is_kept(number));
+        Self::new(kept.map(|(word, _)| word).collect())
+    }
+
+    /// The content of an octant of this level with these leaves.
+    fn content(&self, begin: usize, end: usize, level: u8) -> Content {
+        match self.words[begin..end] {
+            [] => Content::Hole,
+            [one] if word::level(one) <= level => match one & 3 {
+                CUT => Content::Cut,
+                _ => Content::Cell(self.numbers[begin]),
+            },
+            _ => Content::Split(begin, end),
+        }
+    }
+
+    /// The contents of the children, which have this level, of an octant.
+    pub fn children(&self, of: Content, level: u8) -> [Content; 8] {
+        let Content::Split(begin, end) = of else { return [of; 8] };
+        let span = word::span(level);
+        let corner = word::key(self.words[begin]) & !(8 * span - 1);
+        let mut first = begin;
+        std::array::from_fn(|digit| {
+            let key_end = corner + (digit as u64 + 1) * span;
+            let begin = first;
+            first += self.words[first..end].partition_point(|&word| word::key(word) < key_end);
+            self.content(begin, first, level)
+        })
+    }
+
+    /// Visits the cells in the order of their numbers.
+    ///
+    /// # Errors
+    /// The first error of `visit`, or the user's interrupt.
+    pub fn walk<P: Follow>(
+        &self,
+        more: P,
+        options: &Options,
+        visit: &mut impl FnMut(u32, &Around<P>) -> Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
+        let content = self.content(0, self.words.len(), 0);
+        let across = [[Content::Outside; 2]; 3];
+        self.descend(&Around { octant: Octant::ROOT, more, content, across }, options, visit)
+    }
+
+    fn descend<P: Follow>(
+        &self,
+        around: &Around<P>,
+        options: &Options,
+        visit: &mut impl FnMut(u32, &Around<P>) -> Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
+        if let Content::Cell(number) = around.content {
+            options.check_at(u64::from(number))?;
+            return visit(number, around);
+        }
+        if !matches!(around.content, Content::Split(..)) {
+            return Ok(());
+        }
+        let level = around.octant.level + 1;
+        let own = self.children(around.content, level);
+        let beyond = around.across.map(|ends| ends.map(|end| self.children(end, level)));
+        for digit in 0..8 {
+            let across = |axis: usize, side: usize| {
+                let is_sibling = (digit >> axis & 1) != side;
+                let of = if is_sibling { &own } else { &beyond[axis][side] };
+                of[digit ^ 1 << axis]
+            };
+            let child = Around {
+                octant: around.octant.child(digit as u8),
+                more: around.more.child(level, digit),
+                content: own[digit],
+                across: std::array::from_fn(|axis| [across(axis, 0), across(axis, 1)]),
+            };
+            self.descend(&child, options, visit)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a walk finds for an octant from what it found for the parent.
+pub trait Follow: Copy {
+    /// The same for a child, which has this level.
+    fn child(self, level: u8, digit: usize) -> Self;
+}
+
+impl Follow for () {
+    fn child(self, _: u8, _: usize) {}
+}
+
+/// An octant with its content and that of the octants of the same level across its faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Around<P> {
+    /// The octant.
+    pub octant: Octant,
+    /// What else the walk follows.
+    pub more: P,
+    content: Content,
+    /// On the low and on the high side of each axis.
+    pub across: [[Content; 2]; 3],
+}
