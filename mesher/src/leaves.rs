@@ -27,7 +27,9 @@ pub fn emit(
     out: Option<&OutDir>,
     comm: &dyn Comm,
 ) -> Result<(Counts, Written, u64), Error> {
-    let mut heaviest = Heaviest::new(&mesh.base_starts, mesh.level_base);
+    // Boundaries are chosen by bricks of split octants, which fill octants of this level.
+    let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
+    let mut heaviest = Heaviest::new(&mesh.base_starts, level);
     let mut work = || match out.filter(|out| out.output.words) {
         None => {
             let mut written = Written::default();
