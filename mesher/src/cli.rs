@@ -28,7 +28,7 @@ pub struct Args {
     /// Case file (.toml), or STL file together with --spacing-min
     input: PathBuf,
     /// Write the mesh to this directory, which must be empty or not exist; default: write nothing
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Files to write, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "words", requires = "out")]
@@ -76,7 +76,7 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub stall_limit: Option<Duration>,
     /// Print errors only
-    #[arg(long)]
+    #[arg(short, long)]
     pub quiet: bool,
     #[command(flatten)]
     body: Body,

@@ -27,7 +27,7 @@ struct Arguments {
     #[arg(value_name = "CASE.toml")]
     case: PathBuf,
     /// Write the leaf set to this directory, which must be empty or not exist
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Stop after the base tree: all leaves with their sides, before deletion and gradation
     #[arg(long)]

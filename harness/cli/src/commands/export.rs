@@ -25,7 +25,7 @@ pub struct Arguments {
     /// The file to write; its name decides the format. An existing file is replaced, an existing polyMesh is not
     file: PathBuf,
     /// Number of threads [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(short, long, value_name = "N")]
     jobs: Option<NonZero<usize>>,
     /// Which cells are written.
     #[command(flatten)]

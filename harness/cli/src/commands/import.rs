@@ -32,7 +32,7 @@ pub struct Arguments {
     /// The mesh: a file, or an OpenFOAM case or polyMesh
     mesh: Input,
     /// The directory to make
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// How to read the mesh.
     #[command(flatten)]

@@ -40,7 +40,7 @@ pub struct Arguments {
     #[command(flatten)]
     source: MeshArguments,
     /// The picture: .svg, .png, .pdf, .tex or .tikz for a slice, .html or .png for a view; with --paper a directory
-    #[arg(long, value_name = "FILE|DIR")]
+    #[arg(short, long, value_name = "FILE|DIR")]
     out: PathBuf,
     /// What colours show
     #[arg(long, value_enum, default_value = "level")]

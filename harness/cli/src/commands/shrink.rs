@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long)]
     test_only: bool,
     /// Directory for the reduced case [default: shrunk-CASE]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Maximum number of trials
     #[arg(long, value_name = "N", default_value_t = 5000)]

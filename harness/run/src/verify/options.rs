@@ -54,7 +54,7 @@ pub struct Options {
     #[arg(long, value_delimiter = ',', default_value = "auto,3")]
     pub level_bases: Vec<String>,
     /// Directory for reports and for results that are kept [default: a temporary one]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Also keep the results of passing cases
     #[arg(long)]
