@@ -71,6 +71,9 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
         out: Some(bench.place.join("correctness")),
         no_mpi: ranks.is_empty(),
         ranks: Some(ranks),
+        // `harness verify` varies the partition.
+        partitioners: vec!["morton".to_owned()],
+        level_bases: vec!["auto".to_owned()],
         ..Options::of_leaves_alone(vec![path.to_string_lossy().into_owned()])
     };
     let report = verify(&options, &programs).map_err(|error| match error {
