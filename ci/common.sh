@@ -8,12 +8,36 @@ target="${CARGO_TARGET_DIR:-$repo/target}"
 [ -d "${CARGO_HOME:-$HOME/.cargo}/bin" ] && PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 export PATH CARGO_TERM_COLOR="${CARGO_TERM_COLOR:-never}"
 
+# The profile of cargo, and its programs. `dev` is optimised and asserts, and tests and programs share it: .ci/run compiles once.
+profile="${CI_PROFILE:-release}"
+case "$profile" in dev) programs="$target/debug" ;; *) programs="$target/$profile" ;; esac
+
 # By default OpenMPI refuses to run as root, as containers do, and to run more ranks than cores, as a test of
 # 64 ranks on 2 cores does.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 
 # log MESSAGE...: prints the current step and the seconds since the start, so that a log shows the time of each step.
 log() { printf '[%4ds] %s: %s\n' "$SECONDS" "$(basename "$0")" "$*"; }
+
+# step NAME COMMAND...: runs COMMAND, and names the step if it fails. What it cost goes to the file CI_COSTS, if that is set: wall time
+# and CPU time in seconds, and the name.
+step() {
+    local name="$1" code=0 spent TIMEFORMAT='%R %U %S'
+    shift
+    log "$name"
+    spent="$(mktemp)"
+    { time "$@" 2>&3 || code=$?; } 3>&2 2>"$spent"
+    [ -z "${CI_COSTS:-}" ] || awk -v name="$name" 'END { printf "%6.0f s %6.0f s  %s\n", $1, $2 + $3, name }' "$spent" >>"$CI_COSTS"
+    rm -f "$spent"
+    [ "$code" = 0 ] || fail "$code" "failed: $name"
+}
+
+# build_programs: all programs, with the features with which tests are built: others would compile dependencies again.
+build_programs() {
+    local features=()
+    if command -v mpicc >/dev/null; then features=(--features mesher/mpi); fi
+    cargo build --quiet --profile "$profile" --workspace "${features[@]}"
+}
 
 # fail CODE MESSAGE...: prints one sentence and exits with CODE: 2 for invalid input, 3 if something is missing.
 fail() {

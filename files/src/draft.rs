@@ -60,7 +60,12 @@ impl Draft {
         let mut options = OpenOptions::new();
         options.write(true).create_new(true).mode(0o666);
         // An error from here names no temporary file, unlike those of `tempfile_in`.
-        let file = Builder::new().make_in(folder_of(&path), |draft| options.open(draft))?;
+        let folder = folder_of(&path);
+        if !folder.is_dir() {
+            let why = format!("{} is not a directory: create it", folder.display());
+            return Err(io::Error::new(io::ErrorKind::NotFound, why));
+        }
+        let file = Builder::new().make_in(folder, |draft| options.open(draft))?;
         let (file, draft) = file.into_parts();
         let (from, to) = (c_string(&draft)?, c_string(&path)?);
         let output = Output::File { draft: from, name: to, file: file.as_raw_fd() };

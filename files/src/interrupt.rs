@@ -2,19 +2,21 @@
 
 use crate::unfinished::{abandon_all, abandon_others, complete};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
 use signal_hook::consts::{
     SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
     SIGXFSZ,
 };
-use signal_hook::low_level::{self, exit};
-use std::io;
+use signal_hook::low_level;
+pub use signal_hook::low_level::exit as exit_at_once;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
+use std::{env, fmt, io};
 
 /// Exit code of an interrupted program.
 pub const INTERRUPTED: i32 = 130;
@@ -43,7 +45,7 @@ pub fn install(message: &str, linger: Duration) -> io::Result<()> {
             if !is_second {
                 sleep(linger);
             }
-            exit(INTERRUPTED);
+            exit_at_once(INTERRUPTED);
         };
         // SAFETY: the action makes system calls and uses atomics; it neither allocates nor locks.
         unsafe { low_level::register(signal, end)? };
@@ -91,6 +93,14 @@ pub fn abandon() {
 /// Removes all files that are unfinished, also if others are complete: for a program with several outputs.
 pub fn abandon_unfinished() {
     abandon_others();
+}
+
+/// Stops the process, as SIGSTOP does, if the environment variable `STOP_AT` is this point. Tests then send signals, and let it
+/// continue: what happens at a point does not depend on the speed of the machine.
+pub fn stop_at(point: fmt::Arguments) {
+    if env::var_os("STOP_AT").is_some_and(|at| *at == *point.to_string()) {
+        let _ = kill_process(getpid(), Signal::STOP);
+    }
 }
 
 fn is_ignored(signal: i32) -> bool {

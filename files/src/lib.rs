@@ -13,13 +13,15 @@ mod claim;
 mod draft;
 pub mod interrupt;
 mod memory;
+mod text;
 mod unfinished;
 mod uses;
 
 pub use claim::{Claim, ClaimError};
 pub use draft::{Draft, check_writable, write_atomically};
 pub use memory::{Heap, OUT_OF_MEMORY, ends_with};
-pub use uses::{open, read, read_text, register_input, register_output};
+pub use text::{Plain, message};
+pub use uses::{append_log, open, read, read_log, read_text, register_input, register_output};
 
 /// Exit code of a program with a bug: it panicked.
 pub const BUG: i32 = 70;

@@ -1,6 +1,6 @@
 //! What this process reads and writes. No output replaces an input.
 //!
-//! Invariant: a regular file, known by its device and inode, is not registered both as an input and as an output, whichever comes first.
+//! Invariant: a regular file, known by its device and inode, has one of these uses, whichever comes first.
 //! Programs register their outputs before they begin to work, so the clash is found when the input is opened.
 
 use std::collections::BTreeMap;
@@ -14,6 +14,8 @@ use std::sync::Mutex;
 enum Use {
     Input,
     Output,
+    /// Lines are read from it and appended to it.
+    Log,
 }
 
 /// The uses of files by device and inode, with the path that was given.
@@ -24,11 +26,15 @@ static USES: Mutex<BTreeMap<(u64, u64), (Use, PathBuf)>> = Mutex::new(BTreeMap::
 /// # Errors
 /// If it is no regular file, cannot be opened, or is an output of this run.
 pub fn open(path: &Path) -> io::Result<File> {
+    opened(path, Use::Input)
+}
+
+fn opened(path: &Path, role: Use) -> io::Result<File> {
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("it is a directory, a pipe or a device: give a file"));
     }
     let file = File::open(path)?;
-    register(path, &file.metadata()?, Use::Input)?;
+    register(path, &file.metadata()?, role)?;
     Ok(file)
 }
 
@@ -48,6 +54,26 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// As [`open`], or if it is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     io::read_to_string(open(path)?)
+}
+
+/// The bytes of a log of this run, whose last line may have been cut anywhere.
+///
+/// # Errors
+/// As [`open`], or if it is an input.
+pub fn read_log(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    opened(path, Use::Log)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Opens a log of this run to append lines, and creates it if it does not exist.
+///
+/// # Errors
+/// If it cannot be opened or created, or is an input or an output of this run.
+pub fn append_log(path: &Path) -> io::Result<File> {
+    let file = File::options().create(true).append(true).read(true).open(path)?;
+    register(path, &file.metadata()?, Use::Log)?;
+    Ok(file)
 }
 
 /// Registers an input of this run that another process reads. One that is missing is found missing by that process.
@@ -78,7 +104,11 @@ fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
         // A temporary file may have been removed since then, and its inode used again.
         && fs::metadata(name).is_ok_and(|now| (now.dev(), now.ino()) == id)
     {
-        let verb = if role == Use::Output { "reads" } else { "writes" };
+        let verb = match other {
+            Use::Input => "reads",
+            Use::Output => "writes",
+            Use::Log => "appends to",
+        };
         let why =
             format!("this run also {verb} it as {}: give the output another name", name.display());
         return Err(io::Error::new(ErrorKind::InvalidInput, why));
@@ -91,6 +121,7 @@ fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
 mod tests {
     use super::*;
     use crate::{check_writable, write_atomically};
+    use std::io::Write;
 
     #[test]
     fn no_output_is_an_input_whichever_comes_first() {
@@ -120,6 +151,19 @@ mod tests {
             }
             [link, other].iter().for_each(|path| fs::remove_file(path).unwrap());
         }
+    }
+
+    #[test]
+    fn a_log_is_read_and_appended_to_and_nothing_else() {
+        let place = tempfile::tempdir().unwrap();
+        let path = |name: &str| place.path().join(name);
+        append_log(&path("log")).unwrap().write_all(b"line").unwrap();
+        assert_eq!(read_log(&path("log")).unwrap(), b"line");
+        append_log(&path("log")).unwrap();
+        assert!(open(&path("log")).is_err() && check_writable(&path("log")).is_err());
+        fs::write(path("body"), "body").unwrap();
+        open(&path("body")).unwrap();
+        assert!(append_log(&path("body")).is_err() && read_log(&path("body")).is_err());
     }
 
     #[test]

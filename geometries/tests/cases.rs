@@ -209,7 +209,7 @@ fn every_geometry_is_in_the_repository_or_in_the_fetch_table() {
     let shipped = names(".", ".stl").into_iter().map(|name| name.replace(".stl", ""));
     let all: BTreeSet<String> = table.keys().cloned().chain(shipped).collect();
     assert_eq!(used, all, "every geometry has a case and every case a geometry");
-    assert_eq!(all.len(), 18);
+    assert_eq!(all.len(), 20);
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn numbers_of_cells_match_the_sizes_and_small_cases_vary_all_parameters() {
             assert!(entry.inside == Some(Inside::Some), "{}: nothing to keep", entry.name);
         }
     }
-    assert!(layers.is_superset(&BTreeSet::from([1, 2, 3, 4, 5, 6, 10])), "{layers:?}");
+    assert!(layers.is_superset(&BTreeSet::from([1, 2, 3, 4, 5, 6, 10, 36])), "{layers:?}");
     assert_eq!(keeps, BTreeSet::from([Keep::Outside, Keep::Inside, Keep::All]));
     let seeded = [(Keep::Outside, false), (Keep::Inside, true), (Keep::All, true)];
     assert!(keeps_seeded.is_superset(&BTreeSet::from(seeded)), "{keeps_seeded:?}");

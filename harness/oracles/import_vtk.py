@@ -276,7 +276,9 @@ def main():
     path, out, name = sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) == 4 else None
     # A damaged file may state any size: an allocation beyond the memory of the machine fails and is reported.
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    resource.setrlimit(resource.RLIMIT_AS, (memory, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    most = resource.getrlimit(resource.RLIMIT_AS)[1]
+    memory = memory if most == resource.RLIM_INFINITY else min(memory, most)
+    resource.setrlimit(resource.RLIMIT_AS, (memory, most))
     try:
         data = read(path)
         if data is not None and data.IsA("vtkHyperTreeGrid"):

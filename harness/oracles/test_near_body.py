@@ -74,7 +74,7 @@ class NearBodyTest(unittest.TestCase):
         (cls.at / "case.toml").write_text(CASE)
         for program, *arguments in [
             ("reference", "case.toml", "--out", "mesh"),
-            ("harness", "near-body", "mesh", "--case", "case.toml", "--vtp", "a.vtp", "--stl", "a.stl", "--json", "a.json"),
+            ("harness", "near-body", "mesh", "--case", "case.toml", "-o", "a.vtp", "-o", "a.stl", "--json", "a.json"),
         ]:
             subprocess.run([PROGRAMS / program, *arguments], cwd=cls.at, check=True, capture_output=True)
         cls.report = json.loads((cls.at / "a.json").read_text())

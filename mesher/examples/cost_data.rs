@@ -10,23 +10,19 @@ use mesher::error::Error;
 use mesher::kept::Kept;
 use mesher::partition::cost::Counts;
 use mesher::partition::initial::{self, Partition};
-use mesher::partition::{Division, Partitioner, Weights, repartition};
+use mesher::partition::repartition;
 use mesher::voxelise::BinnedFacets;
-use mesher::{grade, ingest, quantise, refine, sides};
+use mesher::{Options, grade, ingest, quantise, refine, sides};
 use std::path::Path;
 
 /// Phases 1 to 7 of a case on this rank: the counts, and the CPU time of sides and of gradation in nanoseconds.
 fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let slice = ingest::read(&case.source, comm)?;
     let quantise::Quantised { rules, facets, .. } = quantise::quantise(case, slice, comm)?;
-    let division = Division {
-        partitioner: Partitioner::Morton,
-        weights: Weights::Rebalance,
-        level_base: None,
-    };
+    let options = Options::default();
     let mark = |level| refine::refine_top(&facets, &rules, level).0.split;
     let Partition { ownership, level_base, .. } =
-        initial::partition(&facets, &rules, &division, mark, comm)?;
+        initial::partition(&facets, &rules, &options.division, mark, comm)?;
     let binned = BinnedFacets::new(&refine::route(&facets, &ownership, comm));
     let (mut tree, _) = refine::refine(&binned, &rules, &ownership);
     let ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);
@@ -34,7 +30,7 @@ fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let counts = Counts::of_rank(&tree, &ownership);
 
     let start = ThreadTime::now();
-    let sides = sides::decide(&tree, &ownership, &facets, &rules, false, comm)?;
+    let sides = sides::decide(&tree, &ownership, &facets, &rules, &options, comm)?;
     let time_sides = start.elapsed();
     let start = ThreadTime::now();
     let kept = Kept::new(&sides.deleted);

@@ -48,8 +48,7 @@ pub fn directory() -> PathBuf {
 /// The leaf words of each rank after refinement (`ungraded`) or after gradation, partitioned by `weights`.
 pub fn leaves_by_rank(ungraded: bool, weights: Weights) -> Vec<Vec<u64>> {
     let division = Division { partitioner: Partitioner::Morton, weights, level_base: None };
-    let options =
-        Options { division, ungraded, out: None, check: true, weight_exposed: None, force: true };
+    let options = Options { division, ungraded, check: true, force: true, ..Options::default() };
     sim::run(RANKS, 1, |comm| {
         words(&case(), &options, comm).expect("the walk-through's case is valid").0
     })

@@ -1,21 +1,27 @@
 //! Checks of the invariants at the end of each phase, on all ranks.
 //!
 //! [`debug_check`] runs them in debug builds, and in release builds with `--check`. Invariants of sets and trees are checked next
-//! to their definitions; those that need other ranks, or the sets of several modules, are here. Each check is a
-//! simple traversal, and takes memory proportional to the sets that it checks. All functions are collective, and panic if an
+//! to their definitions; those that need other ranks, or the sets of several modules, are here. What a phase computes is compared with
+//! its definition, literally: the lattice, T0 ([`base`]), sides ([`sides`](mod@sides)) and gradation ([`graded`](mod@graded)). A check takes
+//! memory proportional to the sets that it checks and to all facets. All functions are collective, and panic if an
 //! invariant is violated. Messages of checks are not counted.
+
+pub mod base;
+pub mod graded;
+pub mod sides;
 
 use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
+use crate::case::Case;
 use crate::comm::{Comm, MessageBuffer};
-use crate::facet::{Facet, crossed};
+use crate::facet::Facet;
 use crate::ingest::Slice;
-use crate::lattice::Rules;
+use crate::lattice::{Root, Rules};
 use crate::leaves::Totals;
 use crate::mesh::{Mesh, Options};
-use crate::octant::{LEVEL_MAX, Level, morton, path, position};
-use crate::partition::ownership::{Ownership, Placement};
-use crate::refine::owners_reached;
+use crate::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour};
+use crate::partition::ownership::{OWNERS_MANY, Ownership};
+use crate::quantise::Quantised;
 use crate::sides::Sides;
 use crate::stream::Counts;
 use crate::tree::{PerLevel, Tree, check_existing, check_split};
@@ -66,48 +72,74 @@ pub fn ownership(ownership: &Ownership, comm: &dyn Comm) {
 
 /// A value has the same hash on all ranks.
 fn same(value: &impl Hash, name: &str, comm: &dyn Comm) {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    let all = comm.all_gather(&[hasher.finish()]);
+    let all = comm.all_gather(&[hash(value)]);
     assert!(
         all.words().iter().all(|h| *h == all.words()[0]),
         "{name} must be the same on all ranks"
     );
 }
 
-/// Each facet is on all ranks that own an octant that its extent reaches, and on no other, once.
-pub fn facets(slice: &[Facet], routed: &[Facet], ownership: &Ownership, comm: &dyn Comm) {
-    let owners = |f: &Facet| {
-        let mut owners = BTreeSet::new();
-        let extent = std::array::from_fn(|a| f.range(a));
-        if crossed(f, [0; 3], 0) & 1 == 1 {
-            owners_reached(ownership, &extent, 0, 0, &mut |owner| _ = owners.insert(owner));
-        }
-        owners
+/// The rules and the facets are those of the case, each coordinate on the nearest lattice point, of two the even one.
+pub fn lattice(given: &[geometries::Facet], case: &Case, quantised: &Quantised) {
+    let Quantised { rules, facets, .. } = quantised;
+    let Root { origin, edge } = rules.root;
+    let is_nearest = |x: f64, a: usize, q: f64| {
+        let off = ((x - origin[a]) * (ROOT_EDGE as f64 / edge) - q).abs();
+        off < 0.5 || off == 0.5 && q % 2.0 == 0.0
     };
-    let reaches = |f: &Facet| owners(f).contains(&comm.rank());
-    assert!(routed.iter().all(reaches), "a rank's facets must reach its octants");
-    let sent = comm.sum(slice.iter().map(|f| owners(f).len() as u64).sum());
-    let received = comm.sum(routed.len() as u64);
-    assert_eq!(sent, received, "facets must be on all ranks whose octants they reach");
+    assert_eq!(given.len(), facets.len(), "each facet must be on the lattice");
+    for (given, f) in given.iter().zip(facets) {
+        let is_right = |(p, q): (&[f32; 3], &[i32; 3])| {
+            (0..3).all(|a| is_nearest(f64::from(p[a]), a, f64::from(q[a])))
+        };
+        assert!(given.iter().zip(&f.v).all(is_right), "{given:?} must not be {f:?} on the lattice");
+    }
+    for (seed, given) in rules.seeds.iter().zip(&case.seeds) {
+        let is_right = (0..3).all(|a| is_nearest(given[a], a, seed.lattice[a] as f64));
+        assert!(is_right, "seed {given:?} must not be at {:?}", seed.lattice);
+    }
+    let cells = |l: Level| edge / 2f64.powi(l as i32);
+    let is_level =
+        |l: Level, spacing: f64| cells(l) <= spacing && (l == 0 || cells(l - 1) > spacing);
+    assert!(is_level(rules.level_surface, case.spacing_min), "level {}", rules.level_surface);
+    for (on_lattice, given) in rules.boxes.iter().zip(&case.boxes) {
+        let ends = [(on_lattice.min, given.min), (on_lattice.max, given.max)];
+        let is_end = |q: i64, x: f64, a: usize| {
+            is_nearest(x, a, q as f64)
+                || q == 0 && x <= origin[a]
+                || q == ROOT_EDGE && x >= origin[a] + edge
+        };
+        let is_right = ends.iter().all(|(q, x)| (0..3).all(|a| is_end(q[a], x[a], a)))
+            && is_level(on_lattice.level, given.spacing);
+        assert!(is_right, "{given:?} must not be {on_lattice:?} on the lattice");
+    }
 }
 
-/// The invariants of T0, and that it is linear and complete.
-pub fn base_tree(tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn Comm) {
-    tree.check_invariants(rules, ownership);
+/// T0 is what the facets of all ranks and the boxes ask for; replicas agree.
+pub fn base_tree(
+    tree: &Tree,
+    facets: &[Facet],
+    rules: &Rules,
+    ownership: &Ownership,
+    comm: &dyn Comm,
+) {
+    tree.check_structure();
     replicas(&[&tree.split, &tree.crossing], ownership, comm);
     is_complete(&tree.split, ownership, comm);
+    base::tree(tree, facets, rules, ownership);
 }
 
-/// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` asks for them; results are the same on all ranks.
-pub fn sides(sides: &Sides, tree: &Tree, ownership: &Ownership, comm: &dyn Comm) {
-    sides.check_invariants(tree, ownership);
+/// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` and seeds ask for them; results are the same on all ranks.
+pub fn sides(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn Comm) {
+    sides.check_invariants(tree);
     replicas(&[&sides.inside, &sides.deleted], ownership, comm);
     same(&format!("{:?}", (sides.rays, sides.summary)), "results of sides", comm);
+    sides::agree_over_faces(sides, tree, ownership, comm);
+    sides::seeds(sides, tree, rules, ownership);
 }
 
-/// The graded tree is a tree, contains the splits `base` of T0, splits no deleted leaf, and is balanced.
-pub fn graded(mesh: &Mesh, base: Option<&PerLevel>, comm: &dyn Comm) {
+/// The tree is linear and complete, replicas agree, and no deleted leaf is split.
+pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
     check_split(split);
     for sets in [crossing, &sides.deleted] {
@@ -118,28 +150,54 @@ pub fn graded(mesh: &Mesh, base: Option<&PerLevel>, comm: &dyn Comm) {
         for b in sides.deleted[l].bricks() {
             assert_eq!(b.bits & cursor.get(b.key), 0, "level {l}: deleted leaves must not split");
         }
-        let mut cursor = set.cursor();
-        for b in base.iter().flat_map(|base| base[l].bricks()) {
-            let lost = b.bits & !cursor.get(b.key);
-            assert_eq!(lost, 0, "level {l}: octants split in T0 must be split in the graded tree");
-        }
     }
     replicas(&[split, crossing, &sides.inside, &sides.deleted], ownership, comm);
     is_complete(split, ownership, comm);
-    is_balanced(split, &sides.deleted, ownership, comm);
 }
 
-/// Every rank that holds a brick has the same octants in it; no other rank has any.
+/// A number that any change of the mesh changes, whatever the partition. Collective.
+pub fn fingerprint(mesh: &Mesh, comm: &dyn Comm) -> u64 {
+    let Mesh { split, crossing, sides, ownership, .. } = mesh;
+    let mut sum = 0u64;
+    for (number, set) in [split, crossing, &sides.inside, &sides.deleted].into_iter().enumerate() {
+        for (l, b) in (0..).zip(set).flat_map(|(l, set)| set.bricks().map(move |b| (l, b))) {
+            if ownership.owns(l, b.key) {
+                sum = sum.wrapping_add(hash(&(number, l, b.key, b.bits)));
+            }
+        }
+    }
+    comm.sum(sum)
+}
+
+fn hash(value: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// Every rank that holds a brick has the same octants in it; no other rank has any. Owners and holders are found by the boundaries
+/// alone.
 fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
+    let boundaries: Vec<_> = ownership.boundaries().collect();
+    // The ranks whose intervals meet a brick, in their order: all of them hold it, the first one owns it.
+    let owners_of = |l: Level, key: u64| -> Vec<usize> {
+        let up = 3 * (LEVEL_MAX + 2 - l);
+        let (start, end) = if l < 2 { (0, u64::MAX) } else { (key << up, (key + 1) << up) };
+        let first = boundaries.partition_point(|b| b.0 <= start) - 1;
+        boundaries[first..].iter().take_while(|b| b.0 < end).map(|b| b.1).collect()
+    };
     let mut out = Vec::new();
     for (number, set) in sets.iter().enumerate() {
         for (l, b) in (0..).zip(*set).flat_map(|(l, set)| set.bricks().map(move |b| (l, b))) {
-            let placement = ownership.placement(l, b.key);
-            let is_held = !matches!(placement, Placement::Remote(_));
+            let owners = owners_of(l, b.key);
+            let is_full = l < 2 || owners.len() >= OWNERS_MANY;
+            let is_held = is_full || owners.contains(&comm.rank());
             assert!(is_held, "level {l}: a rank must hold the bricks that it has");
-            if placement != Placement::Local {
+            let is_owned = owners[0] == comm.rank();
+            assert_eq!(ownership.owns(l, b.key), is_owned, "level {l}: the owner of a brick");
+            if is_full || owners.len() > 1 {
                 let id = (number as u64) << 5 | u64::from(l);
-                out.push((ownership.owner(l, b.key), [id, b.key, b.bits]));
+                out.push((owners[0], [id, b.key, b.bits]));
             }
         }
     }
@@ -150,9 +208,37 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
     }
     for ([id, key], bits) in all {
         let l = (id & 31) as Level;
-        let equal = bits.len() == ownership.holders(l, key) && bits.iter().all(|b| *b == bits[0]);
+        let owners: BTreeSet<usize> = match owners_of(l, key) {
+            owners if l < 2 || owners.len() >= OWNERS_MANY => (0..comm.size()).collect(),
+            owners => owners.into_iter().collect(),
+        };
+        let equal = bits.len() == owners.len() && bits.iter().all(|b| *b == bits[0]);
         assert!(equal, "level {l}: replicas of a brick must be equal on all ranks that hold it");
     }
+}
+
+/// The octants of all ranks in the bricks that this rank owns. Collective.
+fn to_owners(set: BrickSet, l: Level, ownership: &Ownership, comm: &dyn Comm) -> BrickSet {
+    let entry = |b: Brick| (ownership.owner(l, b.key), [b.key, b.bits]);
+    let received =
+        comm.sparse_all_to_all(MessageBuffer::of_entries(set.bricks().map(entry).collect()));
+    let bricks = received.words().as_chunks().0.iter().map(|&[key, bits]| Brick { key, bits });
+    BrickSet::from_unsorted(bricks.collect())
+}
+
+/// The octants one step from those of a brick of level `l`, four bricks along each axis, some of them empty.
+fn face_neighbours(l: Level, b: Brick) -> impl Iterator<Item = Brick> {
+    (0..3).flat_map(|axis| [(axis, false), (axis, true)]).flat_map(move |(axis, up)| {
+        let within = brick::moved(b.bits, axis, up) & brick::valid(l);
+        let next = if l < 2 { None } else { neighbour(l - 2, b.key, axis, up) };
+        let across = if next.is_some() { brick::across(b.bits, axis, up) } else { 0 };
+        [Brick { bits: within, ..b }, Brick { key: next.unwrap_or(b.key), bits: across }]
+    })
+}
+
+/// Whether an octant is one of some leaves or lies in one.
+fn is_in_leaf(leaves: &PerLevel, l: Level, code: u64) -> bool {
+    (0..=l).any(|m| leaves[m as usize].contains(code >> (3 * (l - m))))
 }
 
 /// The leaves of all ranks tile the root: as no octant is split without its parent, their volumes must add up.
@@ -171,60 +257,6 @@ fn is_complete(split: &PerLevel, ownership: &Ownership, comm: &dyn Comm) {
 /// The volume of some octants of a level, in octants of level 19.
 fn volume_of(l: Level, octants: u64) -> u64 {
     u64::from(octants.count_ones()) << (3 * (LEVEL_MAX - l))
-}
-
-/// Kept leaves that touch differ by one level at most. A leaf of level l in a brick touches octants of level l - 2 that are the
-/// brick itself or touch it: they must be split, or lie in a deleted leaf.
-fn is_balanced(split: &PerLevel, deleted: &PerLevel, ownership: &Ownership, comm: &dyn Comm) {
-    for l in 2..=LEVEL_MAX {
-        let above = &split[l as usize - 2];
-        let (mut splits, mut deletions) =
-            (split[l as usize].cursor(), deleted[l as usize].cursor());
-        let (mut near, mut touched) = (above.cursor(), Vec::new());
-        for b in Tree::exists(split, l).filter(|b| ownership.owns(l, b.key)) {
-            let leaves = b.bits & !splits.get(b.key) & !deletions.get(b.key);
-            let near = near.get(b.key >> 6);
-            // Most octants touched are split, and most are in the same brick as the one that touches them.
-            let is_split = |code: u64| match code >> 6 == b.key >> 6 {
-                true => near >> (code & 63) & 1 == 1,
-                false => above.contains(code),
-            };
-            let unknown = octants_touched(l - 2, b.key, leaves).filter(|q| !is_split(*q));
-            touched.extend(unknown.map(as_brick));
-        }
-        let ([touched], _) =
-            ownership.redistribute(l - 2, [BrickSet::from_unsorted(touched)], comm);
-        for code in touched.without(above).codes() {
-            let is_deleted = |m: Level| deleted[m as usize].contains(code >> (3 * (l - 2 - m)));
-            assert!(
-                (0..=l - 2).any(is_deleted),
-                "octant {} of level {} must be split: a leaf two levels deeper touches it",
-                path(l - 2, code),
-                l - 2
-            );
-        }
-    }
-}
-
-/// The octants of level `l` that touch some octants two levels deeper, which lie in octant `code`, from outside of it.
-fn octants_touched(l: Level, code: u64, inner: u64) -> impl Iterator<Item = u64> {
-    let p = position(code).map(i64::from);
-    let steps = if inner == 0 { 0..0 } else { 0..27 };
-    steps.filter_map(move |k: i64| {
-        let step = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
-        let facing = (0..3).fold(inner, |bits, a| match step[a] {
-            -1 => bits & brick::AXES[a][0],
-            1 => bits & brick::AXES[a][3],
-            _ => bits,
-        });
-        let q: [i64; 3] = std::array::from_fn(|a| p[a] + step[a]);
-        let in_root = q.iter().all(|c| (0..1 << l).contains(c));
-        (step != [0; 3] && facing != 0 && in_root).then(|| morton(q.map(|c| c as u32)))
-    })
-}
-
-fn as_brick(code: u64) -> Brick {
-    Brick { key: code >> 6, bits: 1 << (code & 63) }
 }
 
 /// The leaves of each rank are linear, and equal in number to the counts. With the deleted ones, those of all ranks tile the root.

@@ -5,6 +5,9 @@
 use files::OUT_OF_MEMORY;
 use thiserror::Error;
 
+/// Exit code of a job with a rank that keeps the others waiting.
+pub const STALLED: i32 = 75;
+
 /// An error with a message of one sentence: what, where, what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Error {

@@ -1,13 +1,12 @@
 //! Phases 3 to 8: from facets and rules on the lattice to the tree.
 
 use crate::check::{self, debug_check};
-use crate::comm::Comm;
+use crate::comm::{Comm, uncounted};
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::kept::Kept;
 use crate::lattice::Rules;
 use crate::mesh::{Mesh, Options};
-use crate::partition::base_leaves::cells_heaviest;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition::{self, LeafCounts, Sets};
@@ -30,6 +29,8 @@ pub fn grow<F: Borrow<[Facet]>>(
     count: &mut dyn FnMut(&Tree, &Ownership),
 ) -> Result<Mesh, Error> {
     let division = &options.division;
+    let all = || uncounted(comm, || check::base::all_facets(facets.borrow(), comm));
+    let all_facets = if check::is_on(options) { all() } else { Vec::new() };
     let is_parallel = comm.size() > 1;
 
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
@@ -38,7 +39,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         counters.add_voxelised(&work);
         tree.split
     };
-    let Partition { mut ownership, base_leaves, level_base } = match is_parallel {
+    let Partition { mut ownership, base_starts, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
         true => record.phase("base tree", comm, || {
             initial::partition(facets.borrow(), &rules, division, mark, comm)
@@ -50,7 +51,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     let routed = is_parallel
         .then(|| record.phase("route", comm, || refine::route(facets.borrow(), &ownership, comm)));
     if let Some(routed) = &routed {
-        debug_check(options, comm, || check::facets(facets.borrow(), routed, &ownership, comm));
+        debug_check(options, comm, || check::base::routed(routed, &all_facets, &ownership));
     }
     let (mut tree, work) = record.phase("refine", comm, || {
         let binned = BinnedFacets::new(routed.as_deref().unwrap_or(facets.borrow()));
@@ -74,16 +75,17 @@ pub fn grow<F: Borrow<[Facet]>>(
     }
     debug_check(options, comm, || {
         check::ownership(&ownership, comm);
-        check::base_tree(&tree, &rules, &ownership, comm);
+        check::base_tree(&tree, &all_facets, &rules, &ownership, comm);
     });
+    drop(all_facets);
 
     count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let sides = record.phase("sides", comm, || {
-        sides::decide(&tree, &ownership, facets.borrow(), &rules, options.ungraded, comm)
+        sides::decide(&tree, &ownership, facets.borrow(), &rules, options, comm)
     })?;
-    debug_check(options, comm, || check::sides(&sides, &tree, &ownership, comm));
+    debug_check(options, comm, || check::sides(&sides, &tree, &rules, &ownership, comm));
     drop(facets);
     let Tree { split, crossing } = tree;
     let mut mesh = Mesh {
@@ -91,6 +93,8 @@ pub fn grow<F: Borrow<[Facet]>>(
         rules,
         ownership,
         level_base,
+        base_starts,
+        partitioner,
         split,
         crossing,
         sides,
@@ -109,27 +113,28 @@ pub fn grow<F: Borrow<[Facet]>>(
     });
     mesh.split = split;
     counters.add_graded(&work);
-    debug_check(options, comm, || check::graded(&mesh, base.as_ref(), comm));
+    let mut fingerprint = 0;
+    debug_check(options, comm, || {
+        check::graded(&mesh, comm);
+        check::graded::gradation(&mesh, base.as_ref().expect("T0 was stored"), comm);
+        fingerprint = check::fingerprint(&mesh, comm);
+    });
+    drop(base);
 
     // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
     let exposed = options.weight_exposed.map(|weight| {
         let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
         (faces, weight)
     });
-    if !(is_parallel && division.is_of_curve()) {
-        counters.base_leaf_cells_max =
-            cells_heaviest(&mesh.split, &mesh.sides.deleted, &base_leaves);
-    } else if !division.repartitions() {
-        counters.base_leaf_cells_max = repartition_by_leaves(&mut mesh, false, None, comm);
-    } else {
-        counters.base_leaf_cells_max = record.phase("rebalance", comm, || {
-            repartition_by_leaves(&mut mesh, true, exposed.as_ref(), comm)
+    if is_parallel && division.repartitions() {
+        record.phase("rebalance", comm, || {
+            repartition_by_leaves(&mut mesh, exposed.as_ref(), comm);
         });
-    }
-    if is_parallel && division.is_of_curve() {
         debug_check(options, comm, || {
             check::ownership(&mesh.ownership, comm);
-            check::graded(&mesh, None, comm);
+            check::graded(&mesh, comm);
+            let moved = check::fingerprint(&mesh, comm);
+            assert_eq!(moved, fingerprint, "moving octants must not change the mesh");
         });
     }
     if let Some((faces, _)) = exposed {
@@ -139,26 +144,20 @@ pub fn grow<F: Borrow<[Facet]>>(
     Ok(mesh)
 }
 
-/// Counts the leaves by octants of the base level, and repartitions by these counts if `moves` is true, with the exposed faces and the weight of
-/// each if given. Returns the greatest count of leaves. Collective.
+/// Repartitions by the numbers of leaves, with the exposed faces and the weight of each if given. Collective.
 fn repartition_by_leaves(
     mesh: &mut Mesh,
-    moves: bool,
     weighted: Option<&(Vec<exposed::InBrick>, u32)>,
     comm: &dyn Comm,
-) -> u64 {
+) {
     let (inside, deleted) = (&mut mesh.sides.inside, &mut mesh.sides.deleted);
     let sets = Sets { split: &mut mesh.split, crossing: &mut mesh.crossing, inside, deleted };
     let with_crossing = mesh.rules.keep_crossing;
     let mut counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
-    let max = counts.max();
     if let Some((faces, weight)) = weighted.filter(|(_, weight)| *weight > 0) {
         let weights =
             faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)));
         counts.add(weights, &mesh.ownership, mesh.level_base);
     }
-    if moves {
-        mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
-    }
-    max
+    mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
 }

@@ -2,12 +2,12 @@
 //! gradation.
 //!
 //! Invariant: `deleted[l]` holds leaves of the base tree, none of them crossing. If everything is
-//! kept, it is empty at all levels.
+//! kept, it is empty at all levels. [`Sides`](crate::sides::Sides), which stores it, executes this.
 
 use crate::brick;
 use crate::brickset::BrickSet;
 use crate::octant::Level;
-use crate::tree::{PerLevel, Tree};
+use crate::tree::PerLevel;
 
 /// The kept region of a base tree, stored as its complement.
 #[derive(Clone, Copy, Debug)]
@@ -53,14 +53,6 @@ impl<'a> Kept<'a> {
         });
         set
     }
-
-    /// Checks the invariant on the bricks that this rank holds.
-    ///
-    /// # Panics
-    /// If an octant that is not a non-crossing leaf of `base` is deleted.
-    pub fn check_invariants(&self, base: &Tree) {
-        base.check_open_leaves(self.deleted, "is deleted, but no leaf off the surface");
-    }
 }
 
 #[cfg(test)]
@@ -68,15 +60,6 @@ mod tests {
     use super::*;
     use crate::brickset::tests::set;
     use crate::tree::per_level;
-    use crate::tree::tests::small;
-
-    #[test]
-    #[should_panic(expected = "octant 0.0 of level 2 is deleted, but no leaf off the surface")]
-    fn a_deleted_octant_that_is_split_is_found() {
-        let mut deleted = per_level();
-        deleted[2] = set(&[0, 1]);
-        Kept::new(&deleted).check_invariants(&small());
-    }
 
     #[test]
     fn nothing_is_kept_below_a_deleted_root() {

@@ -1,12 +1,55 @@
 //! The environment that launchers of parallel jobs set for each process.
 
+#[cfg(any(feature = "mpi", test))]
+use mesher::error::Error;
 use std::env::var;
+
+/// What launchers call the number of processes that they have started, with the launcher's name. The first that is set counts: mpirun
+/// starts its own helpers with Slurm.
+const SIZES: [(&str, &str); 6] = [
+    ("OMPI_COMM_WORLD_SIZE", "Open MPI's mpirun"),
+    ("MV2_COMM_WORLD_SIZE", "MVAPICH's mpirun"),
+    ("PMI_SIZE", "MPICH's or Intel MPI's mpirun"),
+    ("PMIX_SIZE", "a PMIx launcher"),
+    ("SLURM_STEP_NUM_TASKS", "Slurm's srun"),
+    ("MPI_LOCALNRANKS", "MPICH's mpirun"),
+];
+
+/// The launcher of this process, and the number of processes that it has started.
+fn launcher() -> Option<(&'static str, usize)> {
+    SIZES.iter().find_map(|(v, name)| Some((*name, var(v).ok()?.parse().ok()?)))
+}
 
 /// Number of ranks that a launcher of MPI jobs has started; none without a launcher.
 pub fn ranks() -> Option<usize> {
-    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS"]
-        .iter()
-        .find_map(|v| var(v).ok()?.parse().ok())
+    launcher().map(|(_, ranks)| ranks)
+}
+
+/// Refuses a communicator that is not the whole job: with another MPI's launcher, every process would be a job of its own.
+///
+/// # Errors
+/// If the launcher has started another number of ranks than the MPI library sees.
+#[cfg(any(feature = "mpi", test))]
+pub fn check_size(size: usize, library: &str) -> Result<(), Error> {
+    check(launcher(), size, library)
+}
+
+#[cfg(any(feature = "mpi", test))]
+fn check(launcher: Option<(&str, usize)>, size: usize, library: &str) -> Result<(), Error> {
+    match launcher {
+        Some((name, ranks)) if ranks != size => Err(Error::input(format!(
+            "{name} has started {ranks} ranks, but the MPI library of this mesher, {}, sees {size}: use the mpirun of that library",
+            name_of(library)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The first words of what an MPI library says of itself: some go on for pages.
+#[cfg(any(feature = "mpi", test))]
+fn name_of(library: &str) -> String {
+    let first = library.split(['\n', ',']).next().unwrap_or_default();
+    first.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Whether a launcher has started this process as a rank of an MPI job.
@@ -30,4 +73,19 @@ pub fn end_with_launcher() {
     use rustix::process::{Signal, set_parent_process_death_signal};
     // Without it, the ranks end when they next communicate.
     let _ = set_parent_process_death_signal(Some(Signal::TERM));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_communicator_of_another_size_than_the_job_is_refused_with_both_names() {
+        let library = "MPICH Version:\t4.0.2\nMPICH Release date";
+        let message = check(Some(SIZES[0]).map(|(_, name)| (name, 3)), 1, library).unwrap_err();
+        let expected = "Open MPI's mpirun has started 3 ranks, but the MPI library of this mesher, MPICH Version: 4.0.2, sees 1: \
+                        use the mpirun of that library";
+        assert_eq!((message.exit_code(), message.to_string().as_str()), (2, expected));
+        assert!(check(Some(("srun", 3)), 3, library).is_ok() && check(None, 1, library).is_ok());
+    }
 }

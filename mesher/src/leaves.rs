@@ -5,8 +5,10 @@ use crate::digest::Digests;
 use crate::error::Error;
 use crate::manifest::{self, Manifest};
 use crate::mesh::Mesh;
+use crate::partition::base_leaves::Heaviest;
 use crate::stream::Counts;
 use crate::write::{OutDir, Written};
+use files::interrupt::stop_at;
 
 /// Sums over all ranks.
 pub struct Totals {
@@ -18,17 +20,20 @@ pub struct Totals {
     pub parts: Vec<[u64; 3]>,
 }
 
-/// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Collective.
+/// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Also returns the number of
+/// leaves in its heaviest base leaf. Collective.
 pub fn emit(
     mesh: &Mesh,
     out: Option<&OutDir>,
     comm: &dyn Comm,
-) -> Result<(Counts, Written), Error> {
-    let work = || match out.filter(|out| out.output.words) {
+) -> Result<(Counts, Written, u64), Error> {
+    let mut heaviest = Heaviest::new(&mesh.base_starts, mesh.level_base);
+    let mut work = || match out.filter(|out| out.output.words) {
         None => {
             let mut written = Written::default();
             let counts = mesh.leaves().emit(|words| {
                 written.leaves += words.len() as u64;
+                heaviest.add(words);
                 written.digests.add(words);
                 Ok::<(), Error>(())
             })?;
@@ -36,11 +41,16 @@ pub fn emit(
         }
         Some(out) => {
             let mut part = out.part(comm.rank())?;
-            let counts = mesh.leaves().emit(|words| part.add(words))?;
+            let counts = mesh.leaves().emit(|words| {
+                heaviest.add(words);
+                part.add(words)
+            })?;
             Ok((counts, part.finish()?))
         }
     };
-    agree(comm, work())
+    let result = work();
+    let (counts, written) = agree(comm, result)?;
+    Ok((counts, written, heaviest.max()))
 }
 
 /// Sums over the ranks, and writes the manifest if a directory is given. Collective.
@@ -55,6 +65,7 @@ pub fn finish(
     let (digests, parts) = manifest::gather(written, comm);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
+            stop_at(format_args!("manifest:0"));
             out.manifest(&Manifest::new(&out.output, mesh, &counts, &digests, &parts))
         }
         _ => Ok(()),

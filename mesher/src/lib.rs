@@ -49,6 +49,7 @@ use case::Case;
 use check::debug_check;
 use comm::Comm;
 use error::Error;
+use files::interrupt::stop_at;
 use grow::grow;
 use lattice::Rules;
 use octant::Level;
@@ -74,6 +75,7 @@ pub fn mesh(
 ) -> Result<Report, Error> {
     let out = options.out.as_ref().map(|output| OutDir::claim(output, comm)).transpose()?;
     let report = mesh_into(out.as_ref(), case, options, comm, record)?;
+    stop_at(format_args!("complete:{}", comm.rank()));
     if let Some(out) = out {
         out.keep();
     }
@@ -91,7 +93,8 @@ fn mesh_into(
     let mesh = make(case, options, comm, record, &mut counters)?;
 
     // 9. Leaves: streamed in Morton order into the digest, and to disk on request; and the tree, level by level.
-    let (counts, written) = record.phase("leaves", comm, || leaves::emit(&mesh, out, comm))?;
+    let (counts, written, heaviest) =
+        record.phase("leaves", comm, || leaves::emit(&mesh, out, comm))?;
     debug_check(options, comm, || check::leaves(&mesh, &counts, &written, comm));
 
     if let Some(out) = out.filter(|out| out.output.tree) {
@@ -102,6 +105,7 @@ fn mesh_into(
     let totals =
         record.phase("finish", comm, || leaves::finish(&mesh, &counts, &written, out, comm))?;
     counters.leaves = written.leaves;
+    counters.base_leaf_cells_max = heaviest;
     // The number of rays is a sum over the ranks, the same on all.
     counters.rays = if comm.rank() == 0 { mesh.sides.rays } else { 0 };
     counters.add_traffic(comm.traffic());
@@ -138,7 +142,7 @@ pub fn plan(
     let quantised = quantised(case, options, comm, record)?;
     let volumes = Volumes::new(&quantised.rules.boxes);
     record.report_status("plan");
-    plan::of_case(&quantised.problem(case, &volumes, comm, record), &mut |shift| {
+    plan::of_case(&quantised.problem(case, &volumes, options, comm, record), &mut |shift| {
         pilot(&quantised, &volumes, shift, options, comm)
     })
 }
@@ -148,6 +152,7 @@ impl Quantised {
         &'a self,
         case: &Case,
         volumes: &'a Volumes,
+        options: &'a Options,
         comm: &'a dyn Comm,
         record: &Recorder,
     ) -> plan::Problem<'a> {
@@ -158,6 +163,7 @@ impl Quantised {
             facets_total: self.counts.total,
             spacing_min: case.spacing_min,
             volumes,
+            output: options.out.as_ref(),
             time_cpu_s: record.phases().iter().map(|p| p.time_cpu_s).sum(),
             comm,
         }
@@ -176,8 +182,12 @@ fn quantised(
     debug_check(options, comm, || check::slices(&slice, comm));
 
     // 2. Quantise: the facets and the rules on the lattice.
+    let given = if check::is_on(options) { slice.facets.clone() } else { Vec::new() };
     let quantised = record.phase("quantise", comm, || quantise::quantise(case, slice, comm))?;
-    debug_check(options, comm, || check::rules(&quantised.rules, comm));
+    debug_check(options, comm, || {
+        check::rules(&quantised.rules, comm);
+        check::lattice(&given, case, &quantised);
+    });
     Ok(quantised)
 }
 
@@ -198,7 +208,7 @@ fn pilot(
         };
         let facets = (&quantised.facets[..], quantised.counts);
         let mesh = grow(facets, rules, &options, comm, &mut record, &mut counters, count)?;
-        let (_, written) = record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
+        let (_, written, _) = record.phase("leaves", comm, || leaves::emit(&mesh, None, comm))?;
         Ok(collector.finish(&mesh, written.leaves, &counters, &record, volumes))
     };
     let rules = plan::pilot::coarser(&quantised.rules, shift);
@@ -220,7 +230,7 @@ fn make(
     let quantised = quantised(case, options, comm, record)?;
     let volumes = Volumes::new(&quantised.rules.boxes);
     let planned = plan::before_run(
-        &quantised.problem(case, &volumes, comm, record),
+        &quantised.problem(case, &volumes, options, comm, record),
         options.force,
         record.shows_progress(),
         &mut |shift| pilot(&quantised, &volumes, shift, options, comm),
@@ -233,15 +243,14 @@ fn make(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::comm::{Solo, sim};
     use crate::lattice::{Enclosed, Keep};
-    use crate::partition::{Division, Partitioner, Weights};
     use case::{BoxSpec, RootSpec};
     use geometries::{Generator, Shape};
 
-    fn case() -> Case {
+    pub fn case() -> Case {
         let extent = BoxSpec { min: [-0.2; 3], max: [0.9, 0.2, 0.2], spacing: 0.03 };
         Case {
             source: ingest::Source::Generated(Generator::new(Shape::Sphere, 1280)),
@@ -256,14 +265,8 @@ mod tests {
         }
     }
 
-    fn options() -> Options {
-        let division = Division {
-            partitioner: Partitioner::Morton,
-            weights: Weights::Rebalance,
-            level_base: None,
-        };
-        let (ungraded, out, check, weight_exposed) = (false, None, false, None);
-        Options { division, ungraded, out, check, weight_exposed, force: true }
+    pub fn options() -> Options {
+        Options { force: true, ..Options::default() }
     }
 
     /// The sums over the ranks of pilots that are coarser by 2, 1 and 0 levels.

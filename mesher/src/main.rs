@@ -8,11 +8,11 @@ mod heap;
 mod launch;
 
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
-use files::{BUG, Heap, check_writable, interrupt, write_atomically};
+use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
 use mesher::agreement;
 use mesher::case::Case;
 use mesher::comm::{Comm, Solo, sim};
-use mesher::error::Error;
+use mesher::error::{Error, STALLED};
 use mesher::ingest::Source;
 use mesher::partition::Division;
 use mesher::plan::Plan;
@@ -26,6 +26,7 @@ use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
+use std::thread::sleep;
 use std::time::Duration;
 
 #[global_allocator]
@@ -106,7 +107,10 @@ fn run_mpi(args: &Result<Args, Error>) {
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| mesher::comm::mpi::abort(BUG));
     files::ends_with(mesher::comm::mpi::abort);
-    let code = run(args, &comm);
+    let code = match launch::check_size(comm.size(), &mesher::comm::mpi::library()) {
+        Ok(()) => run(args, &comm),
+        Err(e) => fail(&e, launch::is_first()),
+    };
     drop(comm);
     exit(code);
 }
@@ -141,7 +145,7 @@ fn fail(e: &Error, prints: bool) -> i32 {
 /// Prints a line on the standard error; returns whether that was possible.
 fn complain(line: &dyn Display) -> bool {
     // A launcher puts lines of its own between two writes.
-    stderr().write_all(format!("{line}\n").as_bytes()).is_ok()
+    stderr().write_all(format!("{}\n", message(line)).as_bytes()).is_ok()
 }
 
 /// The result of a run.
@@ -200,19 +204,38 @@ fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
     record.report_status("done");
-    if args.stall_limit.is_some() {
-        // MPI ends without a limit of its own.
+    if let Some(limit) = args.stall_limit {
         comm.enter("done");
+        interrupt::stop_at(format_args!("done:{}", comm.rank()));
         comm.barrier();
+        end_within(limit);
     }
+    interrupt::stop_at(format_args!("end:{}", comm.rank()));
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
-    match result {
-        Ok(outcome) if first && !args.quiet => print(&outcome),
-        Ok(_) => 0,
-        Err(e) => fail(&e, first),
+    let outcome = match result {
+        Ok(outcome) => outcome,
+        Err(e) => return fail(&e, first),
+    };
+    match (if first && !args.quiet { print(&outcome) } else { 0 }, outcome) {
+        (0, Outcome::Planned(plan)) if !plan.fits && !args.force => fail(&plan.refusal(), first),
+        (code, _) => code,
     }
+}
+
+/// Ends the process if it has not ended within the limit: MPI's own end waits for all ranks, without limit.
+fn end_within(limit: Duration) {
+    let end = move || {
+        sleep(limit);
+        complain(&format_args!(
+            "mesher: the run is complete, but another rank has not ended for {} s: look at it with a debugger",
+            limit.as_secs_f64()
+        ));
+        // What the process runs at its exit may wait for that rank as well.
+        interrupt::exit_at_once(STALLED);
+    };
+    let _ = std::thread::Builder::new().spawn(end);
 }
 
 /// A case whose geometry is known to be an input: no output of the run may be that file.
@@ -262,6 +285,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
         Outcome::Meshed(Box::new(report))
     };
+    interrupt::stop_at(format_args!("report:{}", comm.rank()));
     let advice = match options.out {
         Some(_) if !args.plan => {
             "the mesh is complete, only its report is missing; free disk space"

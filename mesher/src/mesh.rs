@@ -2,8 +2,8 @@
 
 use crate::lattice::Rules;
 use crate::octant::Level;
-use crate::partition::Division;
 use crate::partition::ownership::Ownership;
+use crate::partition::{Division, Partitioner};
 use crate::quantise::FacetCounts;
 use crate::sides::Sides;
 use crate::stream::Leaves;
@@ -11,7 +11,7 @@ use crate::tree::PerLevel;
 use crate::write::Output;
 
 /// Options that have no effect on the mesh, but for `ungraded`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// How to divide the work among ranks.
     pub division: Division,
@@ -37,6 +37,10 @@ pub struct Mesh {
     pub ownership: Ownership,
     /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
+    /// Level-19 codes at which base leaves begin; none if they are all octants of that level.
+    pub base_starts: Vec<u64>,
+    /// The partitioner that was used; none for a single rank.
+    pub partitioner: Option<Partitioner>,
     /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
     pub split: PerLevel,
     /// Crossing leaves of T0.

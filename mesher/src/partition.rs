@@ -23,16 +23,18 @@ pub mod repartition;
 use crate::octant::Level;
 
 /// The method that assigns base leaves to ranks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Partitioner {
     /// METIS on the graph of base leaves that share a face (the paper's choice)
     Metis,
     /// Intervals of the Morton curve with equal weight
+    #[default]
     Morton,
 }
 
 /// The weight of a part of T0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Weights {
     /// 1 for each base leaf (the paper's choice)
     Unit,
@@ -40,11 +42,12 @@ pub enum Weights {
     Area,
     /// As `area`, then repartitioned by the work on T0 after refinement and by the number of leaves after gradation; the same as
     /// `area` with METIS or with a given --level-base
+    #[default]
     Rebalance,
 }
 
 /// How to divide the work among ranks. Without effect on the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Division {
     /// The method that assigns base leaves to ranks.
     pub partitioner: Partitioner,

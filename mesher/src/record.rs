@@ -2,6 +2,7 @@
 
 use crate::comm::{Comm, Traffic};
 use cpu_time::ThreadTime;
+use files::interrupt::stop_at;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -48,6 +49,7 @@ impl Recorder {
     pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
         self.report_status(name);
         comm.enter(name);
+        stop_at(format_args!("{name}:{}", comm.rank()));
         let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = work();

@@ -1,4 +1,10 @@
 //! The report of a run: a table for people, JSON for programs, and warnings.
+//!
+//! Invariants of a report, which [`Report::check_invariants`] executes before it is returned:
+//! - leaves by level, by side and by rank add up to all leaves, and a rank's heaviest base leaf has no more than the rank;
+//! - components by side add up to all; there are no more enclosed ones than outside, and an example where there is one to show;
+//! - every quantity by rank has an entry for each rank; times are finite and not negative;
+//! - the wall time is that of the slowest rank.
 
 mod text;
 mod warnings;
@@ -11,6 +17,7 @@ use crate::leaves::Totals;
 use crate::manifest::Geometry;
 use crate::mesh::Mesh;
 use crate::octant::{LEVEL_MAX, Level};
+use crate::partition::Partitioner;
 use crate::record::{Phase, Recorder, peak_rss_bytes};
 use crate::sides::Summary;
 use crate::{grade, voxelise};
@@ -128,6 +135,8 @@ pub struct Report {
     pub level_surface: Level,
     /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
+    /// The partitioner that was used: METIS leaves few base leaves to the curve. None for a single rank.
+    pub partitioner: Option<Partitioner>,
     /// Components of non-crossing leaves of the base tree.
     pub components: u64,
     /// Those that are outside, enclosed ones included.
@@ -200,7 +209,7 @@ impl Report {
         let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
         let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
         let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
-        Self {
+        let report = Self {
             schema: "octree-mesher-run/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
             facets: mesh.facets.total,
@@ -215,6 +224,7 @@ impl Report {
             root_edge: rules.root.edge,
             level_surface: rules.level_surface,
             level_base: mesh.level_base,
+            partitioner: mesh.partitioner,
             components: outside + inside,
             components_outside: outside,
             components_inside: inside,
@@ -234,11 +244,101 @@ impl Report {
                 .map(|(i, (name, _))| (name, column(i)))
                 .collect(),
             message_matrix: None,
+        };
+        report.check_invariants();
+        report
+    }
+
+    /// # Panics
+    /// If an invariant at the head of this file is violated.
+    pub fn check_invariants(&self) {
+        let all = self.cells;
+        let sums = [
+            ("level", self.cells_by_level.iter().sum::<u64>()),
+            ("side", self.cells_by_side.iter().sum()),
+            ("rank", self.counters["leaves"].iter().sum()),
+        ];
+        for (by, sum) in sums {
+            assert_eq!(sum, all, "leaves by {by} must add up to all leaves");
         }
+        let heaviest = self.counters["base_leaf_cells_max"].iter().zip(&self.counters["leaves"]);
+        for (rank, (heaviest, leaves)) in heaviest.enumerate() {
+            assert!(
+                heaviest <= leaves,
+                "rank {rank}: a base leaf of {heaviest} of {leaves} leaves"
+            );
+        }
+        let [outside, inside] = [self.components_outside, self.components_inside];
+        assert_eq!(self.components, outside + inside, "components must be outside or inside");
+        let [enclosed, ambiguous] = [self.components_enclosed, self.components_ambiguous];
+        assert!(enclosed <= outside, "{enclosed} of {outside} outside components are enclosed");
+        assert!(ambiguous <= self.components, "{ambiguous} of {} are ambiguous", self.components);
+        assert!(self.enclosed_leaves >= enclosed, "each of {enclosed} components must have a leaf");
+        let examples = [(enclosed, self.enclosed_example), (ambiguous, self.ambiguous_example)];
+        for (count, example) in examples {
+            assert_eq!(count > 0, example.is_some(), "an example of {count} components");
+        }
+        assert!(self.counters.values().all(|c| c.len() == self.ranks), "a counter for each rank");
+        assert_eq!(self.peak_rss_bytes.len(), self.ranks, "a peak for each rank");
+        let mut walls = vec![0.0; self.ranks];
+        for p in &self.phases {
+            let times = [&p.time_wall_s, &p.time_cpu_s, &p.time_comm_wall_s, &p.time_comm_cpu_s];
+            for times in times {
+                let is_time = |t: &f64| t.is_finite() && *t >= 0.0;
+                let are_times = times.len() == self.ranks && times.iter().all(is_time);
+                assert!(are_times, "{}: {times:?} must be a time for each rank", p.name);
+            }
+            for counts in [&p.messages, &p.message_bytes] {
+                assert_eq!(counts.len(), self.ranks, "{}: a count for each rank", p.name);
+            }
+            walls.iter_mut().zip(&p.time_wall_s).for_each(|(wall, t)| *wall += t);
+        }
+        let slowest = walls.into_iter().fold(0.0, f64::max);
+        assert_eq!(self.time_wall_s, slowest, "the wall time must be that of the slowest rank");
     }
 
     /// Adds the message matrix of the run to the report of rank 0. Collective.
     pub fn with_message_matrix(self, comm: &dyn Comm) -> Self {
         Self { message_matrix: Some(matrix::gather(comm)), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::{Comm, sim};
+
+    fn report() -> Report {
+        let of_rank = |comm: &dyn Comm| {
+            let mut record = Recorder::default();
+            crate::mesh(&crate::tests::case(), &crate::tests::options(), comm, &mut record)
+        };
+        sim::run(2, 1, |comm| of_rank(comm)).swap_remove(0).expect("a good case")
+    }
+
+    #[test]
+    fn a_wrong_report_is_not_returned() {
+        let sound = report();
+        sound.check_invariants();
+        let corruptions: [&dyn Fn(&mut Report); 12] = [
+            &|r| r.cells += 1,
+            &|r| r.cells_by_level[3] += 1,
+            &|r| r.cells_by_side[1] += 1,
+            &|r| r.counters.get_mut("leaves").expect("a counter")[1] += 1,
+            &|r| r.counters.get_mut("base_leaf_cells_max").expect("a counter")[0] = r.cells,
+            &|r| r.components_inside += 1,
+            &|r| r.components_enclosed = r.components_outside + 1,
+            &|r| r.components_ambiguous += 1,
+            &|r| _ = r.peak_rss_bytes.pop(),
+            &|r| r.phases[2].time_cpu_s[1] = f64::NAN,
+            &|r| _ = r.phases[1].messages.pop(),
+            &|r| r.time_wall_s *= 1.01,
+        ];
+        for (number, corrupt) in corruptions.into_iter().enumerate() {
+            let mut report = sound.clone();
+            corrupt(&mut report);
+            let check = std::panic::AssertUnwindSafe(|| report.check_invariants());
+            assert!(std::panic::catch_unwind(check).is_err(), "corruption {number}");
+        }
     }
 }

@@ -3,18 +3,16 @@
 //! Invariants (with `exists(l)` the children of `split[l - 1]`, and the root alone for `l = 0`):
 //! - `split[l]` is a subset of `exists(l)`: every octant that exists has a split parent;
 //! - `crossing[l]` is a subset of `exists(l)` without `split[l]`: only leaves are marked;
-//! - no leaf is shallower than its rule: crossing leaves are at the surface level or deeper, and the
-//!   leaves whose interior meets an extent box are at the box's level or deeper;
-//! - nothing is split at the deepest level that the rules ask for, or below it.
+//! - an octant that exists is split if and only if a facet crosses it and it is shallower than the surface level, or its interior meets
+//!   that of an extent box of a deeper level; it is crossing if and only if a facet crosses it and it is not split.
 //!
 //! On several ranks, each rank stores the bricks that it holds. A rank that holds a brick holds all
-//! its ancestors, so [`Tree::check_invariants`] needs no communication.
+//! its ancestors, so [`Tree::check_structure`] needs no communication; [`check::base`](crate::check::base) executes the last invariant.
 
 use crate::brick::{self, Brick};
 use crate::brickset::{BrickSet, ones};
-use crate::lattice::{Rules, box_mask};
 use crate::octant::{LEVEL_MAX, Level, path};
-use crate::partition::ownership::{Ownership, Placement};
+use crate::partition::ownership::Ownership;
 
 /// Number of levels that sets are stored for: voxelisation looks one level below the deepest leaf.
 pub const LEVELS: usize = LEVEL_MAX as usize + 2;
@@ -70,39 +68,10 @@ impl Tree {
         top
     }
 
-    /// Checks all invariants on the bricks that this rank holds. Replicas must be synchronised.
+    /// Checks the first two invariants on the bricks that this rank holds.
     ///
     /// # Panics
-    /// If an invariant is violated; the message names it, the level and an octant.
-    pub fn check_invariants(&self, rules: &Rules, ownership: &Ownership) {
-        self.check_structure();
-        for l in 0..LEVELS as Level {
-            let held = |key| !matches!(ownership.placement(l, key), Placement::Remote(_));
-            if l < rules.level_surface {
-                for b in self.crossing[l as usize].bricks() {
-                    assert_none(l, b.key, b.bits, "is a crossing leaf above the surface level");
-                }
-            }
-            if l >= rules.level_deepest() {
-                for b in self.split[l as usize].bricks() {
-                    assert_none(l, b.key, b.bits, "is split, though no rule asks for its children");
-                }
-            }
-            let finer = || rules.boxes.iter().filter(|b| b.level > l);
-            let mut split = self.split[l as usize].cursor();
-            for b in Self::exists(&self.split, l).filter(|b| finer().count() > 0 && held(b.key)) {
-                let corner = brick::min_corner(l, b.key);
-                let asked = finer().fold(0, |mask, extent| mask | box_mask(extent, corner, l));
-                let wrong = b.bits & asked & !split.get(b.key);
-                assert_none(l, b.key, wrong, "is a leaf coarser than an extent box that it meets");
-            }
-        }
-    }
-
-    /// Checks the invariants that no rule enters into: the first two.
-    ///
-    /// # Panics
-    /// As [`check_invariants`](Self::check_invariants).
+    /// If one is violated; the message names it, the level and an octant.
     pub fn check_structure(&self) {
         check_split(&self.split);
         self.check_leaves(&self.crossing, "is crossing, but no leaf");
@@ -172,7 +141,7 @@ pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
 pub(crate) mod tests {
     use super::*;
     use crate::brickset::tests::set;
-    use crate::lattice::{Enclosed, ExtentBox, Keep, Root};
+    use crate::lattice::{Enclosed, Keep, Root, Rules};
 
     /// Rules with surface level 3 that keep everything.
     pub fn rules() -> Rules {
@@ -195,7 +164,7 @@ pub(crate) mod tests {
             tree.split[l] = set(&[0]);
         }
         tree.crossing[3] = set(&[0, 1]);
-        tree.check_invariants(&rules(), &Ownership::solo());
+        tree.check_structure();
         tree
     }
 
@@ -213,30 +182,6 @@ pub(crate) mod tests {
         let mut tree = small();
         tree.crossing[2] = set(&[0]);
         tree.check_structure();
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 0.1 of level 2 is a crossing leaf above the surface level")]
-    fn a_shallow_crossing_leaf_is_found() {
-        let mut tree = small();
-        tree.crossing[2] = set(&[1]);
-        tree.check_invariants(&rules(), &Ownership::solo());
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 7 of level 1 is a leaf coarser than an extent box")]
-    fn a_leaf_that_is_too_coarse_for_its_box_is_found() {
-        let far = crate::octant::ROOT_EDGE;
-        let extent = ExtentBox { min: [far - 5; 3], max: [far; 3], level: 2 };
-        small().check_invariants(&Rules { boxes: vec![extent], ..rules() }, &Ownership::solo());
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 0.0.0 of level 3 is split, though no rule")]
-    fn a_split_below_the_deepest_level_is_found() {
-        let mut tree = small();
-        (tree.split[3], tree.crossing[3]) = (set(&[0]), set(&[1]));
-        tree.check_invariants(&rules(), &Ownership::solo());
     }
 
     #[test]

@@ -72,7 +72,7 @@ fn main() -> ExitCode {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             // The exit code remains if the standard error is full.
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = complain(&format_args!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
         // The panic handler has already printed the message.
@@ -88,12 +88,14 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
             .map_err(|source| Error::Write { path: path.clone(), source })?;
     }
     let claim = arguments.out.as_deref().map(write::claim).transpose()?;
+    interrupt::stop_at(format_args!("start"));
     let case = case_file::read(&arguments.case)?;
     let (which, mesh) = if arguments.ungraded {
         (Which::Base, base_tree(&case)?)
     } else {
         (Which::Final, mesh(&case)?)
     };
+    interrupt::stop_at(format_args!("write"));
     if let Some((claim, directory)) = claim.zip(arguments.out.as_deref()) {
         write::leaf_set(claim, directory, which, &case, &mesh)?;
     }
@@ -112,6 +114,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         time_wall_s: start.elapsed().as_secs_f64(),
         peak_rss_bytes: peak_rss_bytes().into_iter().collect(),
     };
+    interrupt::stop_at(format_args!("report"));
     if let Some(path) = &arguments.json {
         write::json(path, &record)?;
     }
@@ -147,7 +150,7 @@ fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
 
 /// Prints a line on the standard error.
 fn complain(line: &dyn Display) -> Result<(), Error> {
-    writeln!(std::io::stderr(), "{line}")
+    writeln!(std::io::stderr(), "{}", files::message(line))
         .map_err(|source| Error::Write { path: "standard error".into(), source })
 }
 

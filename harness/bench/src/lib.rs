@@ -7,6 +7,7 @@
 
 pub mod experiments;
 pub mod gate;
+pub mod origin;
 pub mod shrink;
 pub mod statistics;
 pub mod targets;

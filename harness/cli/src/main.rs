@@ -8,9 +8,10 @@ mod commands;
 
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
-use files::{BUG, Heap};
+use files::{BUG, Heap, message};
 use run::engine::interrupt;
-use run::verify::report::{EXIT_HOLDS, EXIT_INTERRUPTED};
+use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_OUTPUT};
+use std::io::ErrorKind;
 use std::panic::{catch_unwind, set_hook, take_hook};
 use std::process::{ExitCode, exit};
 use std::sync::Once;
@@ -22,8 +23,12 @@ static HEAP: Heap = Heap {
 };
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    // Before the outputs are checked, which begins them.
     interrupt::install();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refuse(&error),
+    };
     files::ends_with(interrupt::out_of_memory);
     report_a_panic_once();
     let Ok(code) = catch_unwind(|| dispatch(arguments)) else {
@@ -35,6 +40,20 @@ fn main() -> ExitCode {
     // A command that fails because its programs were ended has been interrupted.
     let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
     ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
+}
+
+/// Prints what is wrong with the command line, or the help that it asks for.
+fn refuse(error: &clap::Error) -> ExitCode {
+    interrupt::uninstall();
+    let text = error.render().to_string();
+    if error.use_stderr() && message(&text) != text {
+        eprintln!("{text}");
+        return ExitCode::from(EXIT_INPUT);
+    }
+    match error.print() {
+        Err(why) if why.kind() != ErrorKind::BrokenPipe => ExitCode::from(EXIT_OUTPUT),
+        _ => ExitCode::from(if error.use_stderr() { EXIT_INPUT } else { EXIT_HOLDS }),
+    }
 }
 
 /// Makes the first panic of any thread print one message. Threads that wait for that thread panic after it.
@@ -62,7 +81,6 @@ fn dispatch(arguments: Arguments) -> u8 {
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Leak(arguments) => commands::leak::run(&arguments),
-        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::NearBody(arguments) => commands::near_body::run(&arguments),
         Command::Picture(arguments) => commands::picture::run(&arguments),
@@ -72,6 +90,7 @@ fn dispatch(arguments: Arguments) -> u8 {
         Command::Completions(arguments) => {
             commands::completions::run(&arguments, &mut Arguments::command())
         }
+        Command::Planted(arguments) => commands::planted::run(&arguments),
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     }
 }

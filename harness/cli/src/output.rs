@@ -1,8 +1,9 @@
-//! Printing that never panics. The macros here replace those of the standard library in the whole program: a closed pipe, as in
+//! Printing that never panics, and shows control characters of other programs as signs. The macros here replace those of the standard library in the whole program: a closed pipe, as in
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
+use files::{Plain, message};
 use run::verify::report::{EXIT_HOLDS, EXIT_OUTPUT};
-use std::fmt::Arguments;
+use std::fmt::{self, Arguments};
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::sync::OnceLock;
 
@@ -18,17 +19,20 @@ macro_rules! println {
 }
 
 macro_rules! eprintln {
-    ($($text:tt)*) => { $crate::output::write_error(format_args!("{}\n", format_args!($($text)*))) };
+    ($($text:tt)*) => { $crate::output::write_error(format_args!($($text)*)) };
 }
 
 /// Writes to standard output.
 pub fn write(text: Arguments) {
-    note(stdout().lock().write_fmt(text));
+    let mut plain = Plain(String::new());
+    // Only the text itself can fail.
+    let _ = fmt::Write::write_fmt(&mut plain, text);
+    note(stdout().lock().write_all(plain.0.as_bytes()));
 }
 
-/// Writes to standard error. If that fails, there is no place left to report it.
+/// Writes a message to standard error, at most a screen. If that fails, there is no place left to report it.
 pub fn write_error(text: Arguments) {
-    let _ = stderr().lock().write_fmt(text);
+    let _ = writeln!(stderr().lock(), "{}", message(&text));
 }
 
 fn note(written: io::Result<()>) {

@@ -28,7 +28,7 @@ fn a_surface_is_measured_and_written_or_refused_in_one_sentence() {
         "spacing_min = 8.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n[generator]\nshape = \"sphere\"\nfacets = 20\n"
     })
     .unwrap();
-    let files = ["--stl", "a.stl", "--vtp", "a.vtp", "--json", "a.json"];
+    let files = ["-o", "a.stl", "-o", "a.vtp", "--json", "a.json"];
     let (code, output, error) = near_body(place.path(), &[&["mesh"], &files[..]].concat());
     assert_eq!((code, error.as_str()), (0, ""));
     assert!(output.contains("24 faces of area 24.000000, closed"), "{output}");
@@ -76,7 +76,7 @@ fn a_surface_is_measured_and_written_or_refused_in_one_sentence() {
     };
     refused(&["mesh", "--side", "inside"], "no selected cell borders a crossing cell");
     refused(&["absent"], "mesh.json");
-    refused(&["mesh", "--stl", "absent/a.stl"], "absent/a.stl");
+    refused(&["mesh", "-o", "absent/a.stl"], "absent/a.stl");
     refused(&["mesh", "--case", "absent.toml"], "absent.toml");
     let other = fs::read_to_string(place.path().join("case.toml")).unwrap().replace("8.0", "4.0");
     fs::write(place.path().join("other.toml"), other).unwrap();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use tempfile::TempDir;
 
-pub use ::files::{read, read_text, write_atomically};
+pub use ::files::{append_log, read, read_log, read_text, write_atomically};
 
 /// An error that names the file.
 pub fn named(path: &Path, error: &io::Error) -> io::Error {
@@ -90,6 +90,7 @@ impl Staging {
         fs::metadata(directory)?;
         let dir = builder.tempdir_in(directory).map_err(|error| error.kind())?;
         staged.push(dir.path().to_owned());
+        ::files::interrupt::stop_at(format_args!("staged"));
         Ok(Self(dir))
     }
 

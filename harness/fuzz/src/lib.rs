@@ -2,7 +2,7 @@
 //!
 //! A target is a function of some bytes. It panics if it has found a fault: programs that read a file differently, or a mesh that is not
 //! that of the definition. A reader's own panic, an allocation beyond the limit of `ci/fuzz`, and an input that takes seconds are faults, too.
-//! `ci/fuzz` generates inputs with libFuzzer; the inputs in `corpus/TARGET` are tried by an ordinary test.
+//! `ci/fuzz` generates inputs with libFuzzer; the inputs in `corpus` are tried by an ordinary test.
 
 pub mod drawn;
 mod repair;
@@ -12,12 +12,10 @@ mod targets;
 pub use scratch::Scratch;
 pub use targets::TARGETS;
 
-use std::path::{Path, PathBuf};
-
 /// A fuzz target.
 #[derive(Clone, Copy)]
 pub struct Target {
-    /// Its name, which is that of its directory in the corpus.
+    /// Its name, which is that of its file in the corpus.
     pub name: &'static str,
     /// Tries an input; returns whether it was accepted. Panics if it has found a fault.
     pub run: fn(&mut Scratch, &[u8]) -> bool,
@@ -34,11 +32,6 @@ impl Target {
             at += 1;
         }
         TARGETS[at]
-    }
-
-    /// The directory with its committed inputs.
-    pub fn corpus(&self) -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(self.name)
     }
 }
 

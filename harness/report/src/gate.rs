@@ -2,7 +2,7 @@
 
 use crate::markdown::{escaped, table};
 use crate::verification::junit::to_text;
-use bench::gate::report::{Finding, Layer, Report, Verdict};
+use bench::gate::report::{End, Finding, Layer, Report, Verdict};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -82,6 +82,11 @@ fn test(finding: &Finding) -> TestCase {
             status.set_message(line(finding)).set_description(finding.note.as_str());
             status
         }
+        Verdict::Missing => {
+            let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+            status.set_message(format!("not compared: {}", finding.note));
+            status
+        }
         Verdict::Inconclusive => {
             let mut status = TestCaseStatus::skipped();
             status.set_message(format!("inconclusive: {}", finding.note));
@@ -108,18 +113,18 @@ fn heading(report: &Report) -> String {
 
 /// The verdict on the candidate, with the time of the gate.
 fn verdict(report: &Report) -> String {
-    let bad: Vec<String> = report
-        .layers
-        .iter()
-        .filter(|layer| layer.verdict() == Verdict::Regression)
-        .map(|layer| layer.name.to_string())
-        .collect();
-    let nothing = report.layers.iter().all(|layer| layer.left_out.is_some());
-    let end = match (report.interrupted, bad.is_empty()) {
-        (false, true) if nothing => "nothing was compared".to_owned(),
-        (true, _) => "interrupted".to_owned(),
-        (_, true) => "nothing got worse".to_owned(),
-        (_, false) => format!("REGRESSION in {}", bad.join(", ")),
+    let end = match report.end() {
+        End::Holds(total) if report.baseline.is_some() => {
+            format!("nothing got worse in {total} comparisons")
+        }
+        End::Holds(total) => format!("{total} quantities were measured, and no baseline was given"),
+        End::Interrupted => "interrupted".to_owned(),
+        End::Incomplete(why) => format!("INCOMPLETE: {why}"),
+        End::Regression => {
+            let is_bad = |layer: &&Layer| layer.verdict() == Verdict::Regression;
+            let bad = report.layers.iter().filter(is_bad).map(|layer| layer.name.to_string());
+            format!("REGRESSION in {}", bad.collect::<Vec<_>>().join(", "))
+        }
     };
     format!("{end} ({:.1} s)", report.time_s)
 }
@@ -132,10 +137,12 @@ fn summary(layer: &Layer) -> String {
         |verdict| layer.findings.iter().filter(|finding| finding.verdict == verdict).count();
     let all = [
         Verdict::Regression,
+        Verdict::Missing,
         Verdict::Inconclusive,
         Verdict::Changed,
         Verdict::Improvement,
         Verdict::Unchanged,
+        Verdict::Measured,
         Verdict::LeftOut,
     ];
     let counts = all.map(|verdict| (count(verdict), verdict));
@@ -173,28 +180,36 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::gate::measures::Measured;
+    use bench::gate::measures::{Measured, Measures};
     use bench::gate::report::LayerName;
 
     fn sample() -> Report {
-        let measured = |named: &str| Measured { named: named.into(), revision: None };
-        let mut report = Report::new(Some(measured("main")), measured("."));
-        let mut counters = Layer::new(LayerName::Counters);
+        let measured = |named: &str| Measured { named: named.into(), ..Measured::default() };
+        let mut report = Report::new(Some(measured("main")), Measures::of_program(measured(".")));
+        let cases = || vec!["cube".to_owned()];
+        let mut counters = Layer::new(LayerName::Counters, cases());
         counters.findings = vec![
-            Finding::exact("cube", "rays", 6, 7, 0.0),
-            Finding::exact("cube", "messages", 6, 6, 0.0),
-            Finding::without_numbers(
-                "cube",
-                "time",
-                Verdict::Inconclusive,
-                "a <busy> machine | or so",
-            ),
+            Finding::exact("cube", "rays", [6, 7], 0.0, Verdict::Changed),
+            Finding::exact("cube", "messages", [6, 6], 0.0, Verdict::Changed),
+            Finding::noted("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
         ];
-        report.layers = vec![
-            counters,
-            Layer { left_out: Some("no valgrind".into()), ..Layer::new(LayerName::Instructions) },
-        ];
+        let left_out = Some("no valgrind".into());
+        report.layers =
+            vec![counters, Layer { left_out, ..Layer::new(LayerName::Instructions, cases()) }];
         report
+    }
+
+    #[test]
+    fn a_gate_that_compared_nothing_says_so_in_every_form() {
+        let mut report = sample();
+        let note = "the record does not contain this case";
+        report.layers[0].findings =
+            vec![Finding::noted("cube", "baseline", Verdict::Missing, note)];
+        let expected = format!("INCOMPLETE: counters of cube: nothing was compared: {note}");
+        assert!(text(&report).contains(&expected), "{}", text(&report));
+        assert!(markdown(&report).contains(&expected));
+        let back = quick_junit::Report::deserialize_from_str(&junit(&report)).unwrap();
+        assert_eq!(back.errors, 1);
     }
 
     #[test]

@@ -76,6 +76,8 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             warm_up: false,
             oversubscribed: comm == Comm::Mpi && ranks > 2,
             command: "mesher uav.toml".into(),
+            program: String::new(),
+            geometry: None,
             facets: 1000,
             cells,
             digest: "0".repeat(32),

@@ -1,9 +1,10 @@
 //! Data for the tests of this crate and of those that depend on it.
 
 use crate::engine::layout::{Layout, Ranks};
+use crate::verify::case::{RUNS, ended_well};
 use crate::verify::options::Options;
 use crate::verify::outcome::{Check, Outcome};
-use crate::verify::report::{CaseReport, Missing, Report, Run, SCHEMA};
+use crate::verify::report::{Asked, CaseReport, Missing, Report, Run, SCHEMA};
 use contract::catalogue::Size;
 use std::time::Duration;
 
@@ -18,12 +19,13 @@ pub fn report() -> Report {
         program: "mesher".into(),
         layout: None,
         cells: 7600,
+        digest: "0".repeat(32),
         time_wall_s: 0.1,
         time_process_s: 0.2,
         peak_rss_bytes: 76_000,
     };
     let on_ranks = Run { layout: Some(layout.clone()), time_wall_s: 0.05, ..run.clone() };
-    let mut sides = Check::new("serial", "oracles", Outcome::Pass);
+    let mut sides = Check::new("serial", "oracles", Outcome::held(7600));
     sides.notes.push("open3d was wrong at 1 point".into());
     let case = CaseReport {
         name: "cube_small".into(),
@@ -33,12 +35,9 @@ pub fn report() -> Report {
         runs: vec![run, on_ranks],
         checks: vec![
             sides,
-            Check::of_layout(
-                &layout,
-                "same leaves",
-                Outcome::Fail("first difference <at> root".into()),
-            ),
-            Check::new("p4est", "balance", Outcome::LeftOut("the engine is not built".into())),
+            Check::of_layout(&layout, RUNS, ended_well()),
+            Check::of_layout(&layout, "same leaves", Outcome::fail("first difference <at> root")),
+            Check::new("p4est", "balance", Outcome::left_out("the engine is not built")),
         ],
         kept: Some("out/cube_small".into()),
         repeat_with: Some("harness verify cube_small --ranks 4".into()),
@@ -51,6 +50,12 @@ pub fn report() -> Report {
         schema: SCHEMA.into(),
         program: "harness 0".into(),
         cores: 2,
+        asked: Asked {
+            cases: vec!["cube_small".into()],
+            ranks: vec![4],
+            subjects: vec!["p4est".into()],
+            ..Asked::default()
+        },
         missing: vec![missing],
         cases: vec![case],
         interrupted: false,
@@ -64,6 +69,7 @@ pub fn options() -> Options {
         cases: vec![],
         sizes: vec![Size::Small],
         ranks: vec![2],
+        ranks_given: false,
         partitioners: vec!["morton".into()],
         level_bases: vec!["auto".into()],
         out: None,

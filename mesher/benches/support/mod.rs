@@ -52,14 +52,7 @@ pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Cas
 pub fn options() -> Options {
     let (partitioner, weights) = (Partitioner::Morton, Weights::Area);
     let division = Division { partitioner, weights, level_base: None };
-    Options {
-        division,
-        ungraded: false,
-        out: None,
-        check: false,
-        weight_exposed: None,
-        force: true,
-    }
+    Options { division, force: true, ..Options::default() }
 }
 
 /// Results of all phases for the aircraft.
@@ -236,5 +229,5 @@ fn leaves_of(tree: &Tree) -> u64 {
 }
 
 fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
-    decide(tree, ownership, facets, rules, false, &Solo).expect("a case without seeds")
+    decide(tree, ownership, facets, rules, &options(), &Solo).expect("a case without seeds")
 }

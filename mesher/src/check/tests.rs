@@ -1,11 +1,10 @@
 use super::*;
-use crate::case::{Case, RootSpec};
+use crate::case::{BoxSpec, Case, RootSpec};
 use crate::comm::{Solo, sim};
 use crate::ingest::{self, Source};
-use crate::lattice::Bounds;
-use crate::lattice::{Enclosed, Keep};
+use crate::lattice::{Bounds, Enclosed, ExtentBox, Keep, Seed};
 use crate::octant::Side;
-use crate::partition::{Division, Partitioner, Weights};
+use crate::partition::ownership::Placement;
 use crate::record::Recorder;
 use crate::report::Counters;
 use crate::{leaves as finished, octant, refine};
@@ -28,9 +27,7 @@ fn case() -> Case {
 }
 
 fn options(ungraded: bool) -> Options {
-    let (partitioner, weights) = (Partitioner::Morton, Weights::Rebalance);
-    let division = Division { partitioner, weights, level_base: None };
-    Options { division, ungraded, out: None, check: true, weight_exposed: None, force: true }
+    Options { ungraded, force: true, ..Options::default() }
 }
 
 fn mesh(ungraded: bool, comm: &dyn Comm) -> Mesh {
@@ -50,17 +47,33 @@ fn run(ungraded: bool, corrupt: impl Fn(&mut Mesh) + Sync, check: impl Fn(Mesh, 
 }
 
 fn check_base_tree(mesh: Mesh, comm: &dyn Comm) {
+    let facets = base::all_facets(&local_facets(&mesh, comm), comm);
     let Mesh { split, crossing, ownership, rules, .. } = mesh;
-    base_tree(&Tree { split, crossing }, &rules, &ownership, comm);
+    base_tree(&Tree { split, crossing }, &facets, &rules, &ownership, comm);
 }
 
 fn check_sides(mesh: Mesh, comm: &dyn Comm) {
-    let Mesh { split, crossing, sides: s, ownership, .. } = mesh;
-    sides(&s, &Tree { split, crossing }, &ownership, comm);
+    let Mesh { split, crossing, sides: s, ownership, rules, .. } = mesh;
+    sides(&s, &Tree { split, crossing }, &rules, &ownership, comm);
 }
 
 fn check_graded(mesh: Mesh, comm: &dyn Comm) {
-    graded(&mesh, None, comm);
+    graded(&mesh, comm);
+    graded::gradation(&mesh, &base_split(comm), comm);
+}
+
+/// The splits of T0, with the partition of the graded tree.
+fn base_split(comm: &dyn Comm) -> PerLevel {
+    let (mut base, graded) = (mesh(true, comm), mesh(false, comm));
+    graded.ownership.synchronise_replicas(&mut [&mut base.split], comm);
+    base.split
+}
+
+/// This rank's slice of the facets on the lattice.
+fn local_facets(mesh: &Mesh, comm: &dyn Comm) -> Vec<Facet> {
+    let slice = ingest::read(&case().source, comm).expect("a good case");
+    let bounds = Bounds::of(&slice.facets);
+    mesh.rules.root.facets(slice.facets, &bounds, 0).expect("near the root")
 }
 
 /// The deepest level with octants in a set.
@@ -70,7 +83,8 @@ fn deepest(sets: &PerLevel) -> usize {
 
 /// Adds one octant to a set.
 fn add(set: &mut BrickSet, code: u64) {
-    *set = std::mem::take(set).union(BrickSet::from_unsorted(vec![as_brick(code)]));
+    let one = Brick { key: code >> 6, bits: 1 << (code & 63) };
+    *set = std::mem::take(set).union(BrickSet::from_unsorted(vec![one]));
 }
 
 /// Removes all octants of a set in its bricks for which `is_removed` is true.
@@ -117,27 +131,86 @@ fn different_partitions_are_found() {
 fn check_facets(corrupt: impl Fn(&mut Vec<Facet>) + Sync) {
     sim::run(RANKS, 1, |comm| {
         let mesh = mesh(true, comm);
-        let slice = ingest::read(&case().source, comm).expect("a good case");
-        let bounds = Bounds::of(&slice.facets);
-        let local = mesh.rules.root.facets(slice.facets, &bounds, 0).expect("near the root");
+        let local = local_facets(&mesh, comm);
         let mut routed = refine::route(&local, &mesh.ownership, comm);
         if comm.rank() == 1 {
             corrupt(&mut routed);
         }
-        facets(&local, &routed, &mesh.ownership, comm);
+        base::routed(&routed, &base::all_facets(&local, comm), &mesh.ownership);
     });
 }
 
 #[test]
-#[should_panic(expected = "facets must be on all ranks whose octants they reach")]
+#[should_panic(expected = "a rank must have the facets that reach its octants, each once")]
 fn a_facet_that_a_rank_misses_is_found() {
     check_facets(|routed| _ = routed.pop());
 }
 
 #[test]
-#[should_panic(expected = "a rank's facets must reach its octants")]
+#[should_panic(expected = "a rank must have the facets that reach its octants, each once")]
 fn a_facet_on_the_wrong_rank_is_found() {
     check_facets(|routed| routed.push(Facet { v: [[1; 3], [2, 1, 1], [1, 2, 1]] }));
+}
+
+/// Checks the quantised case after a change.
+fn check_lattice(corrupt: impl Fn(&mut Quantised)) {
+    let box_spec = BoxSpec { min: [-9.0, 0.0, 0.0], max: [0.1; 3], spacing: 0.04 };
+    let case = Case { boxes: vec![box_spec], seeds: vec![[0.7, 0.0, 0.0]], ..case() };
+    let slice = ingest::read(&case.source, &Solo).expect("a good case");
+    let given = slice.facets.clone();
+    let mut quantised = crate::quantise::quantise(&case, slice, &Solo).expect("a good case");
+    corrupt(&mut quantised);
+    lattice(&given, &case, &quantised);
+}
+
+#[test]
+fn whatever_is_not_at_the_nearest_lattice_point_is_found() {
+    check_lattice(|_| ());
+    let corruptions: [&dyn Fn(&mut Quantised); 6] = [
+        &|q| q.facets[7].v[1][2] += 1,
+        &|q| q.rules.level_surface += 1,
+        &|q| q.rules.seeds[0].lattice[1] -= 1,
+        &|q| q.rules.boxes[0].max[2] += 1,
+        &|q| q.rules.boxes[0].min[0] += 1,
+        &|q| q.rules.boxes[0].level -= 1,
+    ];
+    for (number, corrupt) in corruptions.into_iter().enumerate() {
+        let check = std::panic::AssertUnwindSafe(|| check_lattice(corrupt));
+        assert!(std::panic::catch_unwind(check).is_err(), "corruption {number}");
+    }
+}
+
+/// Each of them leaves a tree whose structure is right.
+#[test]
+#[should_panic(expected = "split and crossing by the definition")]
+fn a_crossing_leaf_that_no_facet_crosses_is_found() {
+    let corrupt = |m: &mut Mesh| {
+        let l = deepest(&m.split) + 1;
+        let is_mine = |code: &u64| m.ownership.owns(l as Level, code >> 6);
+        let exists = Tree::exists(&m.split, l as Level).map(|b| Brick { bits: b.bits, ..b });
+        let all = BrickSet::from_unsorted(exists.collect()).without(&m.crossing[l]);
+        let code = all.codes().find(is_mine).expect("a leaf that does not cross");
+        add(&mut m.crossing[l], code);
+    };
+    let check = |m: Mesh, comm: &dyn Comm| {
+        let facets = base::all_facets(&local_facets(&m, comm), comm);
+        let tree = Tree { split: m.split, crossing: m.crossing };
+        tree.check_structure();
+        base::tree(&tree, &facets, &m.rules, &m.ownership);
+    };
+    run(true, corrupt, check);
+}
+
+#[test]
+#[should_panic(expected = "split and crossing by the definition")]
+fn an_octant_that_an_extent_box_does_not_split_is_found() {
+    let mesh = mesh(true, &Solo);
+    let facets = local_facets(&mesh, &Solo);
+    let far = octant::ROOT_EDGE;
+    let extent = ExtentBox { min: [far - 5; 3], max: [far; 3], level: 4 };
+    let rules = Rules { boxes: vec![extent], ..mesh.rules };
+    let tree = Tree { split: mesh.split, crossing: mesh.crossing };
+    base::tree(&tree, &facets, &rules, &mesh.ownership);
 }
 
 #[test]
@@ -191,8 +264,19 @@ fn a_missing_replica_is_found() {
 #[should_panic(expected = "a rank must hold the bricks that it has")]
 fn a_brick_of_another_rank_is_found() {
     let check = |m: Mesh, comm: &dyn Comm| {
-        let view = if comm.rank() == 1 { m.ownership.non_owning_view() } else { m.ownership };
-        replicas(&[&m.crossing], &view, comm);
+        let boundaries: Vec<_> = m.ownership.boundaries().collect();
+        // Rank 1 takes itself for rank 2.
+        let rank = if comm.rank() == 1 { 2 } else { comm.rank() };
+        let crossing = if comm.rank() == 1 {
+            let l = deepest(&m.crossing);
+            let mut other = crate::tree::per_level();
+            let (start, _) = boundaries[2];
+            add(&mut other[l], start >> (3 * (LEVEL_MAX - l as Level)) | 0o777);
+            other
+        } else {
+            m.crossing
+        };
+        replicas(&[&crossing], &Ownership::along(rank, RANKS, boundaries), comm);
     };
     run(true, |_| (), check);
 }
@@ -236,15 +320,75 @@ fn a_deleted_leaf_that_is_split_is_found() {
     run(false, corrupt, check_graded);
 }
 
+/// Checks gradation on one rank after a change of an octant: no longer split, or split if it was not.
+fn check_gradation(layer_cells_min: u32, choose: impl Fn(&Mesh, &PerLevel) -> (usize, u64)) {
+    let (mut mesh, base) = (mesh(false, &Solo), base_split(&Solo));
+    mesh.rules.layer_cells_min = layer_cells_min;
+    let (l, code) = choose(&mesh, &base);
+    toggle(&mut mesh.split[l], code);
+    graded::gradation(&mesh, &base, &Solo);
+}
+
+fn toggle(set: &mut BrickSet, code: u64) {
+    if !set.contains(code) {
+        return add(set, code);
+    }
+    set.retain(|b| if b.key == code >> 6 { b.bits & !(1 << (code & 63)) } else { b.bits });
+}
+
+/// An octant that only gradation has split, without split children.
+fn graded_split(mesh: &Mesh, base: &PerLevel) -> (usize, u64) {
+    let l = deepest(&mesh.split);
+    let found = mesh.split[l].clone().without(&base[l]).codes().next();
+    (l, found.expect("a split by gradation"))
+}
+
 #[test]
-#[should_panic(expected = "octants split in T0 must be split in the graded tree")]
-fn a_split_that_gradation_has_lost_is_found() {
-    let mesh = mesh(false, &Solo);
-    let mut base = mesh.split.clone();
-    let l = deepest(&base);
-    let code = base[l].codes().next().expect("a split octant") << 3;
-    add(&mut base[l + 1], code);
-    graded(&mesh, Some(&base), &Solo);
+#[should_panic(expected = "must be split for a layer or balance")]
+fn a_layer_that_lacks_an_octant_is_found() {
+    check_gradation(4, graded_split);
+}
+
+#[test]
+#[should_panic(expected = "must be split for a layer or balance")]
+fn a_layer_that_is_too_thin_is_found() {
+    check_gradation(7, |_, _| (0, 0));
+}
+
+#[test]
+#[should_panic(expected = "is split without need")]
+fn a_layer_that_is_too_thick_is_found() {
+    check_gradation(2, graded_split);
+}
+
+#[test]
+#[should_panic(expected = "no rule asks for level")]
+fn a_leaf_deeper_than_all_rules_is_found() {
+    check_gradation(4, |mesh, _| {
+        let l = deepest(&mesh.split);
+        (l + 1, mesh.split[l].codes().next().expect("an octant") << 3)
+    });
+}
+
+#[test]
+fn every_corruption_of_one_graded_octant_is_found() {
+    let (mut mesh, base) = (mesh(false, &Solo), base_split(&Solo));
+    graded::gradation(&mesh, &base, &Solo);
+    let mut corrupted = 0;
+    for l in 1..=deepest(&mesh.split) {
+        let leaves = BrickSet::from_unsorted(Tree::exists(&mesh.split, l as Level).collect());
+        let kept = leaves.without(&mesh.split[l]).without(&mesh.sides.deleted[l]);
+        let fresh = mesh.split[l].clone().without(&base[l]);
+        for code in kept.codes().step_by(997).chain(fresh.codes().step_by(97)) {
+            toggle(&mut mesh.split[l], code);
+            let check = || graded::gradation(&mesh, &base, &Solo);
+            let check = std::panic::AssertUnwindSafe(check);
+            assert!(std::panic::catch_unwind(check).is_err(), "octant {code} of level {l}");
+            toggle(&mut mesh.split[l], code);
+            corrupted += 1;
+        }
+    }
+    assert!(corrupted > 9, "{corrupted} octants");
 }
 
 #[test]
@@ -259,52 +403,52 @@ fn a_graded_octant_without_a_parent_is_found() {
 }
 
 #[test]
-#[should_panic(expected = "must be split: a leaf two levels deeper touches it")]
+#[should_panic(expected = "must be split for a layer or balance")]
 fn a_tree_without_gradation_is_not_balanced() {
-    run(true, |_| (), |m, comm| is_balanced(&m.split, &m.sides.deleted, &m.ownership, comm));
+    let check = |m: Mesh, comm: &dyn Comm| graded::gradation(&m, &m.split, comm);
+    run(true, |m| m.rules.layer_cells_min = 1, check);
 }
 
-/// Octant 63 of level 2 is deep, octant 7 of level 1 touches it at one corner only: over a corner, balance is violated too.
 #[test]
-fn imbalance_is_found_over_corners_and_not_in_deleted_leaves() {
-    let set = |codes: &[u64]| BrickSet::from_unsorted(codes.iter().map(|c| as_brick(*c)).collect());
-    let mut split = crate::tree::per_level();
-    // From the root down along the minimum corner's diagonal to the root's centre.
-    split[0] = set(&[0]);
-    split[1] = set(&[0]);
-    split[2] = set(&[7]);
-    let none = crate::tree::per_level();
-    let touching = |deleted: &PerLevel| {
-        let view = Ownership::solo();
-        std::panic::catch_unwind(|| is_balanced(&split, deleted, &view, &Solo)).is_err()
-    };
-    assert!(touching(&none));
-    let mut deleted = crate::tree::per_level();
-    deleted[1] = set(&[1, 2, 3, 4, 5, 6]);
-    assert!(touching(&deleted), "octant 7 touches over a corner");
-    deleted[1] = set(&[1, 2, 3, 4, 5, 6, 7]);
-    assert!(!touching(&deleted));
-}
-
-/// For each octant of level 2, and two levels deeper each octant in it, and all of them.
-#[test]
-fn octants_touched_are_those_with_a_common_point() {
-    for code in 0..64 {
-        let p = position(code);
-        for inner in (0..64).map(|bit| 1 << bit).chain([0, u64::MAX]) {
-            let touch = |q: u64| {
-                let q = position(q);
-                crate::brickset::ones(inner).any(|bit| {
-                    let fine = position(u64::from(bit));
-                    let at: [u32; 3] = std::array::from_fn(|a| 4 * p[a] + fine[a]);
-                    (0..3).all(|a| at[a] <= 4 * q[a] + 4 && at[a] + 1 >= 4 * q[a])
-                })
-            };
-            let want: BTreeSet<u64> = (0..64).filter(|&q| q != code && touch(q)).collect();
-            let got: BTreeSet<u64> = octants_touched(2, code, inner).collect();
-            assert_eq!(got, want, "octant {code}, inner {inner:#x}");
+#[should_panic(expected = "is on another side than a leaf across a face")]
+fn a_side_that_differs_between_ranks_is_found() {
+    let corrupt = |m: &mut Mesh| {
+        // All that rank 1 owns changes sides; replicas agree.
+        for l in 0..m.sides.inside.len() {
+            let all = Tree::exists(&m.split, l as Level).collect();
+            let open = BrickSet::from_unsorted(all).without(&m.split[l]).without(&m.crossing[l]);
+            let mut flipped = open.without(&m.sides.inside[l]);
+            let local = |b: &Brick| m.ownership.placement(l as Level, b.key) == Placement::Local;
+            flipped.retain(|b| if local(&b) { b.bits } else { 0 });
+            m.sides.inside[l].retain(|b| if local(&b) { 0 } else { b.bits });
+            m.sides.inside[l] = std::mem::take(&mut m.sides.inside[l]).union(flipped);
         }
-    }
+    };
+    run(true, corrupt, check_sides);
+}
+
+#[test]
+#[should_panic(expected = "has a seed, but is no flow")]
+fn a_seed_that_is_no_flow_is_found() {
+    let mut mesh = mesh(true, &Solo);
+    let at_corner = Seed { given: [0.0; 3], lattice: [1; 3] };
+    mesh.rules.seeds = vec![at_corner];
+    let tree = Tree { split: mesh.split, crossing: mesh.crossing };
+    sides::seeds(&mesh.sides, &tree, &mesh.rules, &Ownership::solo());
+    mesh.rules.keep = Keep::Inside;
+    sides::seeds(&mesh.sides, &tree, &mesh.rules, &Ownership::solo());
+}
+
+#[test]
+fn a_fingerprint_depends_on_the_mesh_alone() {
+    let of = |ranks| sim::run(ranks, 1, |comm| fingerprint(&mesh(false, comm), comm));
+    let one = of(1)[0];
+    assert!(of(RANKS).iter().all(|f| *f == one));
+    let mut other = mesh(false, &Solo);
+    let l = deepest(&other.crossing);
+    let key = other.crossing[l].brick(0).key;
+    remove(&mut other.crossing[l], |k| k == key);
+    assert_ne!(fingerprint(&other, &Solo), one);
 }
 
 #[test]
@@ -316,7 +460,7 @@ fn overlapping_leaves_are_found() {
 /// Checks the leaves after rank 1 has changed the mesh.
 fn check_leaves(corrupt: impl Fn(&mut Mesh) + Sync, miscount: u64) {
     run(false, corrupt, |m, comm| {
-        let (mut counts, written) = finished::emit(&m, None, comm).expect("no interrupt");
+        let (mut counts, written, _) = finished::emit(&m, None, comm).expect("no interrupt");
         counts.by_level[0][0] += miscount;
         leaves(&m, &counts, &written, comm);
     });
@@ -348,7 +492,7 @@ fn a_deleted_octant_that_is_no_leaf_is_found() {
 #[should_panic(expected = "leaves by level and by rank must add up")]
 fn totals_that_differ_are_found() {
     let m = mesh(false, &Solo);
-    let (counts, written) = finished::emit(&m, None, &Solo).expect("no interrupt");
+    let (counts, written, _) = finished::emit(&m, None, &Solo).expect("no interrupt");
     let mut all = finished::finish(&m, &counts, &written, None, &Solo).expect("no output");
     totals(&all, &written, &Solo);
     all.parts[0][0] += 1;

@@ -5,7 +5,7 @@
 
 mod heaviest;
 
-pub use heaviest::cells_heaviest;
+pub use heaviest::Heaviest;
 
 use crate::brick::{self, Brick};
 use crate::comm::{Comm, agree, all_gather_reduced};
@@ -112,7 +112,8 @@ fn span(level: Level, code: u64) -> Range<u64> {
     start57(level, code)..start57(level, code + 1)
 }
 
-/// The base leaves, in order, with their owners; the same on all ranks. No base leaf is deeper than `level`; `marked` are the
+/// The base leaves, in order, with their owners, and the partitioner that chose them: METIS is not used where there are too few
+/// base leaves for it. The same on all ranks. No base leaf is deeper than `level`; `marked` are the
 /// octants above that level that this rank's facets split. Collective.
 pub fn partition(
     facets: &[Facet],
@@ -121,7 +122,7 @@ pub fn partition(
     division: &Division,
     level: Level,
     comm: &dyn Comm,
-) -> Result<Vec<BaseLeaf>, Error> {
+) -> Result<(Vec<BaseLeaf>, Partitioner), Error> {
     let survey = Survey::gather(facets, marked, rules, level, division.weights, comm);
     let ranks = comm.size() as u64;
     let root = Subtree::root(&survey);
@@ -140,9 +141,13 @@ pub fn partition(
         Weights::Unit => vec![1; subtrees.len()],
         Weights::Area | Weights::Rebalance => subtrees.iter().map(|s| s.weight).collect(),
     };
-    let owners = assign(&subtrees, &weights, division.partitioner, comm)?;
+    let partitioner = match division.partitioner {
+        Partitioner::Metis if !metis_has_enough(&weights, comm.size()) => Partitioner::Morton,
+        chosen => chosen,
+    };
+    let owners = assign(&subtrees, &weights, partitioner, comm)?;
     let leaf = |(s, owner): (Subtree, usize)| BaseLeaf { level: s.level, code: s.code, owner };
-    Ok(subtrees.into_iter().zip(owners).map(leaf).collect())
+    Ok((subtrees.into_iter().zip(owners).map(leaf).collect(), partitioner))
 }
 
 /// Splits subtrees whose root is split in T0, down to the survey's level at most, as long as `wanted` is true for any.
@@ -188,6 +193,15 @@ fn assign(
 }
 
 #[cfg(feature = "metis")]
+use metis::has_enough as metis_has_enough;
+
+/// True, so that METIS is asked for and reported as missing.
+#[cfg(not(feature = "metis"))]
+fn metis_has_enough(_: &[u64], _: usize) -> bool {
+    true
+}
+
+#[cfg(feature = "metis")]
 fn assign_metis(leaves: &[Subtree], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
     let octants: Vec<(Level, u64)> = leaves.iter().map(|s| (s.level, s.code)).collect();
     metis::assign(&octants, weights, ranks)
@@ -218,7 +232,7 @@ mod tests {
         let marked = refine_top(&facets, &rules, LEVEL).0.split;
         let leaves = |weights, level_base| {
             let division = Division { partitioner: Partitioner::Morton, weights, level_base };
-            partition(&facets, &marked, &rules, &division, LEVEL, &Solo).expect("no METIS")
+            partition(&facets, &marked, &rules, &division, LEVEL, &Solo).expect("no METIS").0
         };
         let survey = Survey::gather(&facets, &marked, &rules, LEVEL, Weights::Area, &Solo);
         let is_split = |b: &BaseLeaf| marked[b.level as usize].contains(b.code);

@@ -11,11 +11,11 @@ use crate::comm::{Comm, MessageBuffer, all_gather_reduced};
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::{LEVEL_MAX, Level, edge};
+use crate::octant::{LEVEL_MAX, Level, edge, start57};
 use crate::partition::area::{self, FRACTIONS};
 use crate::partition::curve::{self, Bin};
-use crate::partition::ownership::{BaseLeaf, Ownership};
-use crate::partition::{Division, base_leaves};
+use crate::partition::ownership::Ownership;
+use crate::partition::{Division, Partitioner, base_leaves};
 use crate::tree::PerLevel;
 
 /// Fine octants per rank, about: boundaries of the curve lie between them.
@@ -29,16 +29,23 @@ const LEVEL_BASE_AUTO_MAX: Level = 12;
 pub struct Partition {
     /// The owner of every octant.
     pub ownership: Ownership,
-    /// This rank's base leaves, in order; empty where boundaries may be anywhere on the curve.
-    pub base_leaves: Vec<BaseLeaf>,
+    /// Level-19 codes at which the base leaves begin, in order; none where boundaries may be anywhere on the curve.
+    pub base_starts: Vec<u64>,
     /// Level of the deepest base leaves, or of the octants between which the boundaries of the curve lie.
     pub level_base: Level,
+    /// The partitioner that was used; none for a single rank.
+    pub partitioner: Option<Partitioner>,
 }
 
 impl Partition {
     /// The partition of a single rank.
     pub fn solo() -> Self {
-        Self { ownership: Ownership::solo(), base_leaves: vec![BaseLeaf::ROOT], level_base: 0 }
+        Self {
+            ownership: Ownership::solo(),
+            base_starts: Vec::new(),
+            level_base: 0,
+            partitioner: None,
+        }
     }
 }
 
@@ -54,7 +61,9 @@ pub fn partition(
     if division.is_of_curve() {
         let levels = levels(facets, rules, [COARSE_PER_RANK, FINE_PER_RANK as f64], comm);
         let ownership = by_area(facets, rules, levels, comm);
-        return Ok(Partition { ownership, base_leaves: Vec::new(), level_base: levels[1] });
+        let partitioner = Some(Partitioner::Morton);
+        let level_base = levels[1];
+        return Ok(Partition { ownership, base_starts: Vec::new(), level_base, partitioner });
     }
     let level = match division.level_base {
         Some(level) => level.min(level_last(rules)),
@@ -63,11 +72,12 @@ pub fn partition(
             levels(facets, rules, [per_rank], comm)[0].min(LEVEL_BASE_AUTO_MAX)
         }
     };
-    let mut leaves = base_leaves::partition(facets, &mark(level), rules, division, level, comm)?;
+    let (leaves, partitioner) =
+        base_leaves::partition(facets, &mark(level), rules, division, level, comm)?;
     let ownership = Ownership::new(comm.rank(), comm.size(), &leaves);
     let level_base = leaves.iter().map(|b| b.level).max().unwrap_or(0);
-    leaves.retain(|b| b.owner == comm.rank());
-    Ok(Partition { ownership, base_leaves: leaves, level_base })
+    let base_starts = leaves.iter().map(|b| start57(b.level, b.code)).collect();
+    Ok(Partition { ownership, base_starts, level_base, partitioner: Some(partitioner) })
 }
 
 /// Deepest level that base leaves may have.

@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// Number of intervals in a brick from which on it is fully replicated. With fewer, each owner is sent the brick, which costs
 /// messages; with more, all ranks gather it, which costs every rank time.
-const OWNERS_MANY: usize = 9;
+pub const OWNERS_MANY: usize = 9;
 
 /// A leaf of the base tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

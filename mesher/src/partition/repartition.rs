@@ -112,11 +112,6 @@ impl LeafCounts {
         self.0 = sum.bins();
     }
 
-    /// The greatest number of leaves in one octant.
-    pub fn max(&self) -> u64 {
-        self.0.iter().map(|b| b.1).max().unwrap_or(0)
-    }
-
     /// Moves the boundaries until ranks have nearly the same number of leaves, and sends the bricks of `sets` to the ranks that hold
     /// them then. Returns the new partition. Collective.
     pub fn after_gradation(self, sets: Sets, ownership: &Ownership, comm: &dyn Comm) -> Ownership {

@@ -16,12 +16,14 @@ use crate::plan::volumes::Volumes;
 use crate::record::Recorder;
 use crate::report::Counters;
 use crate::tree::{PerLevel, Tree};
+use bytemuck::{Pod, Zeroable};
 
 /// Number of quantities in [`Amounts`].
 pub const AMOUNTS: usize = 10;
 
 /// What one rank needs for a mesh, or all ranks together.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Amounts {
     /// Leaves.
     pub cells: f64,
@@ -39,50 +41,20 @@ pub struct Amounts {
     pub time_refine_s: f64,
     /// CPU time of sides.
     pub time_sides_s: f64,
-    /// CPU time of gradation and leaves.
+    /// CPU time of gradation, leaves and what moves them.
     pub time_leaves_s: f64,
-    /// CPU time of the other phases, most of which is spent on facets or on waiting for other ranks.
+    /// CPU time of the other phases, most of which is spent on facets.
     pub time_fixed_s: f64,
 }
 
 impl Amounts {
-    /// The quantities in the order of the fields.
-    pub fn to_array(self) -> [f64; AMOUNTS] {
-        let Self {
-            cells, cells_boxed_deleted, tests, components, bytes_sides, bytes_graded, ..
-        } = self;
-        let [refine, sides] = [self.time_refine_s, self.time_sides_s];
-        let [leaves, fixed] = [self.time_leaves_s, self.time_fixed_s];
-        let [first, second, third] =
-            [[cells, cells_boxed_deleted], [tests, components], [bytes_sides, bytes_graded]];
-        let times = [[refine, sides], [leaves, fixed]];
-        let all = [first, second, third, times[0], times[1]];
-        std::array::from_fn(|i| all[i / 2][i % 2])
-    }
-
-    /// Inverse of [`to_array`](Self::to_array).
-    pub fn from_array(v: [f64; AMOUNTS]) -> Self {
-        Self {
-            cells: v[0],
-            cells_boxed_deleted: v[1],
-            tests: v[2],
-            components: v[3],
-            bytes_sides: v[4],
-            bytes_graded: v[5],
-            time_refine_s: v[6],
-            time_sides_s: v[7],
-            time_leaves_s: v[8],
-            time_fixed_s: v[9],
-        }
-    }
-
     /// The sums of several ranks' amounts.
     pub fn sum(of: impl Iterator<Item = Self>) -> Self {
         let add = |a: [f64; AMOUNTS], b: Self| {
-            let b = b.to_array();
+            let b: [f64; AMOUNTS] = bytemuck::cast(b);
             std::array::from_fn(|i| a[i] + b[i])
         };
-        Self::from_array(of.fold([0.0; AMOUNTS], add))
+        bytemuck::cast(of.fold([0.0; AMOUNTS], add))
     }
 
     /// CPU time of all phases, in seconds.
@@ -158,7 +130,7 @@ impl Collector {
         };
         let all: f64 = record.phases().iter().map(|p| p.time_cpu_s).sum();
         let [refine, sides] = [time(&["refine"]), time(&["sides"])];
-        let leaves = time(&["grade", "leaves"]);
+        let leaves = time(&["grade", "rebalance", "share top", "leaves"]);
         Amounts {
             cells: cells as f64,
             cells_boxed_deleted: deleted_in(volumes, mesh),
@@ -206,6 +178,8 @@ pub struct Pilots {
 
 /// Cells of a box that one brick holds, about: the bytes of a region of uniform cells are those of its bricks and their ancestors.
 const BYTES_PER_CELL_BOXED: [f64; 2] = [0.36, 0.05];
+/// A visit of each brick of 64 cells.
+const TESTS_PER_CELL_BOXED: f64 = 1.0 / (64.0 * VISITS_PER_TEST);
 
 impl Pilots {
     /// The amounts of a mesh that is coarser than the case by `shift` levels.
@@ -230,7 +204,7 @@ impl Pilots {
         let cells = grown(|a| a.cells, 1.0);
         let [per_cell_sides, per_cell_graded] = BYTES_PER_CELL_BOXED;
         let components = grown(|a| a.components, 2.0 / 56.0);
-        let tests = self.tests_at(further, components / fine.components.max(1.0));
+        let tests = grown(|a| a.tests, TESTS_PER_CELL_BOXED);
         Amounts {
             cells,
             cells_boxed_deleted: fine.cells_boxed_deleted,
@@ -239,34 +213,10 @@ impl Pilots {
             bytes_sides: grown(|a| a.bytes_sides, per_cell_sides),
             bytes_graded: grown(|a| a.bytes_graded, per_cell_graded),
             time_refine_s: fine.time_refine_s * tests / fine.tests.max(1.0),
-            time_sides_s: self.time_sides_at(components),
+            time_sides_s: fine.time_sides_s * components / fine.components.max(1.0),
             time_leaves_s: fine.time_leaves_s * cells / fine.cells.max(1.0),
             time_fixed_s: fine.time_fixed_s,
         }
-    }
-
-    /// Tests: one for each brick that a facet crosses, which grow by `growth`, and those of facets that cross several bricks, which
-    /// double with every level.
-    fn tests_at(&self, further: f64, growth: f64) -> f64 {
-        let (shift_fine, fine) = self.fine;
-        let Some((shift, coarse)) = self.coarse else { return fine.tests * growth };
-        let per_brick = |a: &Amounts| (a.tests - a.components / 3.0).max(0.0);
-        let (now, before) = (per_brick(&fine), per_brick(&coarse));
-        let gap = f64::from(shift - shift_fine);
-        let slope = (now - before).max(0.0) / (1.0 - 0.5f64.powf(gap));
-        now + slope * (2f64.powf(further) - 1.0) + growth * fine.components / 3.0
-    }
-
-    /// Time of sides: a constant, for the rays of components, and a time per brick and component.
-    fn time_sides_at(&self, components: f64) -> f64 {
-        let fine = self.fine.1;
-        let all_per_component = fine.time_sides_s / fine.components.max(1.0);
-        let per_component = self.coarse.map_or(all_per_component, |(_, coarse)| {
-            let slope = (fine.time_sides_s - coarse.time_sides_s)
-                / (fine.components - coarse.components).max(1.0);
-            slope.clamp(0.0, all_per_component)
-        });
-        (fine.time_sides_s + per_component * (components - fine.components)).max(0.0)
     }
 }
 
@@ -304,39 +254,38 @@ mod tests {
         }
     }
 
-    #[test]
-    fn arrays_hold_all_amounts() {
-        let all = std::array::from_fn(|i| i as f64);
-        assert_eq!(Amounts::from_array(all).to_array(), all);
-        let sum = Amounts::sum([Amounts::from_array(all); 2].into_iter());
-        assert_eq!(sum.to_array(), all.map(|v| 2.0 * v));
+    fn amounts(all: [f64; AMOUNTS]) -> Amounts {
+        bytemuck::cast(all)
+    }
+
+    fn as_array(amounts: Amounts) -> [f64; AMOUNTS] {
+        bytemuck::cast(amounts)
     }
 
     /// The expected numbers are those of another program for the same formulas.
     #[test]
     fn every_amount_is_extrapolated_by_its_own_law() {
-        let fine = Amounts::from_array([9e6, 2e6, 3e5, 4e5, 8e6, 9e6, 2.0, 3.0, 5.0, 7.0]);
-        let coarse =
-            Amounts::from_array([1.5e6, 3e6, 1.2e5, 9e4, 1.6e6, 1.7e6, 0.5, 1.0, 1.25, 6.0]);
+        let fine = amounts([9e6, 2e6, 3e5, 4e5, 8e6, 9e6, 2.0, 3.0, 5.0, 7.0]);
+        let coarse = amounts([1.5e6, 3e6, 1.2e5, 9e4, 1.6e6, 1.7e6, 0.5, 1.0, 1.25, 6.0]);
         // Fewer tests than components, and more time for sides than the finer one.
-        let odd = Amounts::from_array([5e5, 0.0, 5e4, 6e5, 3e4, 1e4, 1.0, 9.0, 2.0, 3.0]);
-        let tiny = Amounts::from_array([0.5, 0.0, 0.25, 0.5, 40.0, 50.0, 1.0, 1.0, 1.0, 1.0]);
+        let odd = amounts([5e5, 0.0, 5e4, 6e5, 3e4, 1e4, 1.0, 9.0, 2.0, 3.0]);
+        let tiny = amounts([0.5, 0.0, 0.25, 0.5, 40.0, 50.0, 1.0, 1.0, 1.0, 1.0]);
         #[rustfmt::skip]
         let expected = [
-            ((2, fine), Some((4, coarse)), 6e7, 0, [133836269.53125, 2e6, 1910363.92299107, 4311091.76897321, 82586557.03125, 83769188.4765625, 12.7357594866071, 28.2328501224078, 74.3534830729167, 7.0]),
-            ((2, fine), Some((4, coarse)), 6e7, 2, fine.to_array()),
-            ((2, fine), Some((4, coarse)), 6e7, 3, [3376352.16346154, 2e6, 175587.424005393, 180095.605349512, 3370016.69337607, 3685911.62526709, 1.17058282670262, 1.58126196999685, 1.87575120192308, 7.0]),
-            ((2, fine), None, 6e7, 0, [187500000.0, 2e6, 5965178.57142857, 7953571.42857143, 143660000.0, 146175000.0, 39.7678571428571, 59.6517857142857, 104.166666666667, 7.0]),
-            ((2, fine), None, 6e7, 3, [2136718.75, 2e6, 71965.6808035714, 95954.2410714286, 1959218.75, 2244335.9375, 0.479771205357143, 0.719656808035714, 1.18706597222222, 7.0]),
-            ((3, fine), Some((4, odd)), 1e6, 0, [923351375.0, 2e6, 3344216.66666667, 2532650.0, 903018405.0, 1020609760.0, 22.2947777777778, 3.0, 512.972986111111, 7.0]),
-            ((1, tiny), None, 0.0, 0, [2.0, 0.0, 0.5, 2.0, 160.0, 200.0, 0.5, 2.5, 2.0, 1.0]),
-            ((1, coarse), Some((2, fine)), 4e6, 0, [3543750.0, 3e6, 154651.785714286, 193955.357142857, 3236750.0, 3183437.5, 0.64438244047619, 1.0, 2.953125, 6.0]),
-            ((1, coarse), Some((2, fine)), 4e6, 4, [217407.980871382, 3e6, 94506.0007857096, 13518.0023571288, 245680.451776363, 267518.573880203, 0.39377500327379, 1.0, 0.181173317392819, 6.0]),
-            ((2, fine), Some((4, coarse)), 6e9, 0, [6002633125.0, 2e6, 71900911.9047619, 214282735.714286, 2160649000.0, 314664878.90625, 479.339412698413, 1382.88861751152, 3334.79618055556, 7.0]),
-            ((2, fine), Some((4, coarse)), 6e9, 3, [11886638.6217949, 2e6, 258621.584754397, 429198.087596525, 4433559.96621622, 2917667.86317568, 1.72414389836265, 3.18837475868726, 6.60368812321937, 7.0]),
+            ((2, fine), Some((4, coarse)), 6e7, 0, [133836269.53125, 2000000.0, 1198307.37304688, 4311091.76897321, 82586557.03125, 83769188.4765625, 7.9887158203125, 32.3331882672991, 74.3534830729167, 7.0]),
+            ((2, fine), Some((4, coarse)), 6e7, 2, as_array(fine)),
+            ((2, fine), Some((4, coarse)), 6e7, 3, [3376352.16346154, 2000000.0, 160985.338365709, 180095.605349512, 3370016.69337607, 3685911.62526709, 1.07323558910473, 1.35071704012134, 1.87575120192308, 7.0]),
+            ((2, fine), None, 6e7, 0, [187500000.0, 2000000.0, 4935937.5, 7953571.42857143, 143660000.0, 146175000.0, 32.90625, 59.6517857142857, 104.166666666667, 7.0]),
+            ((2, fine), None, 6e7, 3, [2136718.75, 2000000.0, 74645.99609375, 95954.2410714286, 1959218.75, 2244335.9375, 0.497639973958333, 0.719656808035714, 1.18706597222222, 7.0]),
+            ((3, fine), Some((4, odd)), 1e6, 0, [923351375.0, 2000000.0, 24162162.5, 2532650.0, 903018405.0, 1020609760.0, 161.081083333333, 18.994875, 512.972986111111, 7.0]),
+            ((1, tiny), None, 0.0, 0, [2.0, 0.0, 1.0, 2.0, 160.0, 200.0, 1.0, 2.0, 2.0, 1.0]),
+            ((1, coarse), Some((2, fine)), 4e6, 0, [3543750.0, 3000000.0, 224402.34375, 193955.357142857, 3236750.0, 3183437.5, 0.935009765625, 2.15505952380952, 2.953125, 6.0]),
+            ((1, coarse), Some((2, fine)), 4e6, 4, [217407.980871382, 3000000.0, 18891.5492699765, 13518.0023571288, 245680.451776363, 267518.573880203, 0.078714788624902, 0.15020002619032, 0.181173317392819, 6.0]),
+            ((2, fine), Some((4, coarse)), 6e9, 0, [6002633125.0, 2000000.0, 18795087.5, 214282735.714286, 2160649000.0, 314664878.90625, 125.300583333333, 1607.12051785714, 3334.79618055556, 7.0]),
+            ((2, fine), Some((4, coarse)), 6e9, 3, [11886638.6217949, 2000000.0, 44716.9948268581, 429198.087596525, 4433559.96621622, 2917667.86317568, 0.298113298845721, 3.21898565697394, 6.60368812321937, 7.0]),
         ];
         for (fine, coarse, cells_boxed, shift, want) in expected {
-            let got = Pilots { fine, coarse, cells_boxed }.at(shift).to_array();
+            let got = as_array(Pilots { fine, coarse, cells_boxed }.at(shift));
             let near = |(got, want): (&f64, &f64)| (got - want).abs() <= 1e-12 * want;
             assert!(got.iter().zip(&want).all(near), "{got:?} for {want:?}");
         }
@@ -344,7 +293,7 @@ mod tests {
 
     #[test]
     fn times_are_added_and_the_greater_bytes_count() {
-        let all = Amounts::from_array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0]);
+        let all = amounts([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0]);
         assert_eq!((all.time_cpu_s(), all.bytes()), (960.0, 32.0));
     }
 }

@@ -34,7 +34,8 @@ impl Rank {
     fn to_words(&self) -> Vec<u64> {
         let Room { resident, address_space, control_group, machine, node } = self.room;
         let room = [resident, address_space, control_group, machine, self.peak, self.facets];
-        let numbers = self.amounts.to_array().into_iter().chain(room);
+        let amounts: [f64; AMOUNTS] = bytemuck::cast(self.amounts);
+        let numbers = amounts.into_iter().chain(room);
         numbers.map(f64::to_bits).chain([node]).collect()
     }
 
@@ -42,7 +43,7 @@ impl Rank {
         let (amounts, room) = words.split_at(AMOUNTS);
         let number = |i: usize| f64::from_bits(room[i]);
         Self {
-            amounts: Amounts::from_array(std::array::from_fn(|i| f64::from_bits(amounts[i]))),
+            amounts: bytemuck::cast::<[u64; AMOUNTS], _>(std::array::from_fn(|i| amounts[i])),
             room: Room {
                 resident: number(0),
                 address_space: number(1),
@@ -191,7 +192,8 @@ mod tests {
             machine: part(2),
             node: u64::MAX - number,
         };
-        let amounts = Amounts::from_array(std::array::from_fn(|i| part(10 + i as u64)));
+        let amounts: [f64; AMOUNTS] = std::array::from_fn(|i| part(10 + i as u64));
+        let amounts = bytemuck::cast(amounts);
         Rank { amounts, facets: part(3), room, peak: part(4) }
     }
 
@@ -201,8 +203,8 @@ mod tests {
             let ranks = Ranks::gather_each(comm, &different(comm.rank() as u64));
             assert_eq!((ranks.count(), ranks.in_process), (3, 3.0));
             assert_eq!(ranks.all, [different(0), different(1), different(2)]);
-            let total = std::array::from_fn(|i| 300.0 + 3.0 * (10 + i) as f64);
-            assert_eq!(ranks.total().to_array(), total);
+            let total: [f64; AMOUNTS] = std::array::from_fn(|i| 300.0 + 3.0 * (10 + i) as f64);
+            assert_eq!(ranks.total(), bytemuck::cast(total));
         });
     }
 

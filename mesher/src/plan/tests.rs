@@ -26,6 +26,7 @@ fn with_problem<T>(
         spacing_min: 0.5,
         volumes: &Volumes::new(boxes),
         time_cpu_s: 2.0,
+        output: None,
         comm: &Solo,
     })
 }
@@ -68,6 +69,30 @@ fn the_finer_pilot_has_a_64th_of_the_cells() {
     let words = ROUGH as u64 * 8 + WORDS_HEADER;
     assert!(plan.words_bytes[0].abs_diff(words) <= 8, "{:?}", plan.words_bytes);
     assert!(plan.tree_bytes.abs_diff((ROUGH * TREE_BYTES_PER_CELL) as u64) <= 1);
+    plan.check_invariants();
+    let corruptions: [&dyn Fn(&mut Plan); 7] = [
+        &|p| p.fits = false,
+        &|p| p.spacing_factor_fits = Some(2.0),
+        &|p| _ = p.memory_peak_bytes.pop(),
+        &|p| p.words_bytes[0] /= 3,
+        &|p| p.time_cpu_s = Some(f64::NAN),
+        &|p| p.pilots.reverse(),
+        &|p| p.source = Source::Mesh,
+    ];
+    for (number, corrupt) in corruptions.into_iter().enumerate() {
+        let mut wrong = plan.clone();
+        corrupt(&mut wrong);
+        let check = std::panic::catch_unwind(|| wrong.check_invariants());
+        assert!(check.is_err(), "corruption {number}");
+    }
+    // What is written takes time.
+    let output = Output { directory: "m".into(), words: true, tree: true, cell_ranks: false };
+    let pilot = &mut |shift| Ok(amounts(ROUGH, 1.0, shift));
+    let written = with_problem(13, &[], |problem| {
+        of_case(&Problem { output: Some(&output), ..copy(problem) }, pilot)
+    });
+    let more = written.unwrap().time_cpu_s.unwrap() - plan.time_cpu_s.unwrap();
+    assert!((more - 6.5e-9 * ROUGH).abs() < 1e-6, "{more}");
     // Fewer cells than the areas suggest: the next pilots are finer, and the mesh itself if it is small.
     assert_eq!(planned(ROUGH / 16.0, 1.0).1, [4, 2, 1]);
     let (plan, asked) = planned(ROUGH / 64.0, 1.0);
@@ -157,7 +182,7 @@ fn extents_and_boxes_decide_whether_a_run_is_small() {
 
 #[test]
 fn pilots_of_runs_that_cannot_fit_are_short() {
-    assert_eq!(cells_max(6.4e9, 100.0, 0.0), 67e6);
+    assert_eq!(cells_max(6.4e11, 100.0, 0.0), 1e9);
     assert_eq!(cells_max(6.4e9, 101.0, 0.0), 2.1e6);
     assert_eq!(cells_max(6.4e8, 1.0, 0.0), 1e7);
     assert_eq!(cells_max(6.4e8, 1.0, 2e7), 2e7);

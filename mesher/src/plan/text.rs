@@ -91,7 +91,7 @@ impl fmt::Display for Plan {
         )?;
         match self.tightest {
             None => write!(f, "limit          none is known"),
-            Some(_) if !self.fits => write!(f, "fits           no: {}", self.refusal()),
+            Some(_) if !self.fits => write!(f, "fits           no"),
             Some(t) => {
                 let what = match t.limit {
                     Limit::AddressSpace => "address space of a process",
@@ -223,7 +223,7 @@ mod tests {
                        multiply all spacings by 4, which fits (spacing_min = 0.125), use more machines, or try with --force";
         assert_eq!(plan.refusal(), Error::memory(refused));
         let last = plan.to_string().lines().last().map(str::to_owned);
-        assert_eq!(last, Some(format!("fits           no: {}", plan.refusal())));
+        assert_eq!(last.as_deref(), Some("fits           no"));
         plan.spacing_factor_fits = None;
         for (limit, phrase) in [
             (

@@ -1,6 +1,7 @@
 //! The report as a table for people.
 
 use super::Report;
+use crate::partition::Partitioner;
 use std::fmt;
 
 /// The greatest value divided by the mean: 1 is perfect balance.
@@ -41,10 +42,15 @@ impl fmt::Display for Report {
         let by_rank = |counts: &Vec<u64>| counts.iter().map(|n| *n as f64).collect::<Vec<f64>>();
         writeln!(
             f,
-            "ranks          {}, cells max/mean {:.3}, base level {}",
+            "ranks          {}, cells max/mean {:.3}, base level {}{}",
             self.ranks,
             imbalance(&by_rank(&self.counters["leaves"])),
-            self.level_base
+            self.level_base,
+            match self.partitioner {
+                None => "",
+                Some(Partitioner::Metis) => ", partitioned by METIS",
+                Some(Partitioner::Morton) => ", partitioned along the curve",
+            }
         )?;
         if let Some(faces) = self.counters.get(super::EXPOSED_FACES) {
             writeln!(
@@ -164,6 +170,7 @@ mod tests {
             enclosed_example: None,
             components_ambiguous: 0,
             ambiguous_example: None,
+            partitioner: None,
             warnings: vec![],
             ranks: 2,
             time_wall_s: 0.5,

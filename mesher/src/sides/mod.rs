@@ -22,11 +22,13 @@ pub mod rays;
 pub mod seeds;
 pub mod vote;
 
-use crate::brick::{self, Brick};
+use crate::brick::Brick;
+use crate::check::{self, debug_check};
 use crate::comm::Comm;
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::lattice::{Keep, Rules};
+use crate::mesh::Options;
 use crate::octant::Level;
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, PerLevel, Tree, assert_none, per_level};
@@ -107,7 +109,7 @@ enum Class {
 }
 
 /// Decides the sides of all leaves. `facets` are this rank's slice of the geometry: each facet is on exactly
-/// one rank. If `is_base`, nothing is deleted. Collective.
+/// one rank. Nothing is deleted if the options ask for T0. Collective.
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf; the same on all ranks.
@@ -116,11 +118,11 @@ pub fn decide(
     ownership: &Ownership,
     facets: &[Facet],
     rules: &Rules,
-    is_base: bool,
+    options: &Options,
     comm: &dyn Comm,
 ) -> Result<Sides, Error> {
     let mut nodes = nodes::Nodes::new(tree, ownership);
-    if cfg!(debug_assertions) {
+    if check::is_on(options) {
         nodes.check_invariants();
     }
     let mut local = components::merge(&nodes, ownership);
@@ -151,7 +153,7 @@ pub fn decide(
     of_local.extend(merged.of.iter().map(|&c| classes[c as usize]));
     drop(merged);
     let mut sides = Sides {
-        keep: if is_base { Keep::All } else { rules.keep },
+        keep: if options.ungraded { Keep::All } else { rules.keep },
         inside: per_level(),
         deleted: per_level(),
         summary: Summary {
@@ -166,6 +168,10 @@ pub fn decide(
     };
     let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership);
     sides.summary.enclosed = region.summary(&components, leaves_enclosed, comm);
+    debug_check(options, comm, || {
+        let decided = (&verdict, &region);
+        check::sides::components(&components, decided, &sides, (rules, facets), ownership, comm);
+    });
     Ok(sides)
 }
 
@@ -206,16 +212,26 @@ impl Sides {
         leaves_enclosed
     }
 
-    /// Checks the invariants on the bricks that this rank holds; one side per component as far as a
-    /// component lies within a brick.
+    /// The set that is stored, and the one that is empty.
+    fn sets(&self) -> [&PerLevel; 2] {
+        match self.keep {
+            Keep::All => [&self.inside, &self.deleted],
+            Keep::Outside | Keep::Inside => [&self.deleted, &self.inside],
+        }
+    }
+
+    /// The inside leaves if everything is kept, and otherwise the deleted ones.
+    pub fn stored(&self) -> &PerLevel {
+        self.sets()[0]
+    }
+
+    /// Checks the first two invariants on the bricks that this rank holds;
+    /// [`check::sides`] executes the last.
     ///
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
-    pub fn check_invariants(&self, tree: &Tree, ownership: &Ownership) {
-        let (stored, empty) = match self.keep {
-            Keep::All => (&self.inside, &self.deleted),
-            Keep::Outside | Keep::Inside => (&self.deleted, &self.inside),
-        };
+    pub fn check_invariants(&self, tree: &Tree) {
+        let [stored, empty] = self.sets();
         tree.check_open_leaves(stored, "has a side, but is no leaf off the surface");
         for l in 0..LEVELS as Level {
             for b in empty[l as usize].bricks() {
@@ -225,12 +241,6 @@ impl Sides {
                     b.bits,
                     "is in the set that this choice of sides leaves empty",
                 );
-            }
-            let mut stored = stored[l as usize].cursor();
-            for b in nodes::open_bricks(tree, ownership, l) {
-                let side = stored.get(b.key);
-                let wrong = brick::spread_faces(side) & b.open & !side;
-                assert_none(l, b.key, wrong, "is on another side than a leaf across a face");
             }
         }
     }
@@ -247,8 +257,9 @@ mod tests {
     fn decided(keep: Keep) -> (Tree, Sides) {
         let tree = small();
         let rules = Rules { keep, ..rules() };
-        let sides = decide(&tree, &Ownership::solo(), &[], &rules, false, &Solo).unwrap();
-        sides.check_invariants(&tree, &Ownership::solo());
+        let options = crate::tests::options();
+        let sides = decide(&tree, &Ownership::solo(), &[], &rules, &options, &Solo).unwrap();
+        sides.check_invariants(&tree);
         (tree, sides)
     }
 
@@ -257,7 +268,7 @@ mod tests {
     fn a_side_of_a_crossing_leaf_is_found() {
         let (tree, mut sides) = decided(Keep::Outside);
         sides.deleted[3] = set(&[0]);
-        sides.check_invariants(&tree, &Ownership::solo());
+        sides.check_invariants(&tree);
     }
 
     #[test]
@@ -265,14 +276,14 @@ mod tests {
     fn an_inside_leaf_of_a_mesh_that_keeps_the_outside_is_found() {
         let (tree, mut sides) = decided(Keep::Outside);
         sides.inside[1] = set(&[2]);
-        sides.check_invariants(&tree, &Ownership::solo());
+        sides.check_invariants(&tree);
     }
 
     #[test]
-    #[should_panic(expected = "octant 3 of level 1 is on another side than a leaf across a face")]
+    #[should_panic(expected = "level 1 is on another side than a leaf across a face")]
     fn a_component_with_two_sides_is_found() {
         let (tree, mut sides) = decided(Keep::All);
         sides.inside[1] = set(&[1]);
-        sides.check_invariants(&tree, &Ownership::solo());
+        check::sides::agree_over_faces(&sides, &tree, &Ownership::solo(), &Solo);
     }
 }

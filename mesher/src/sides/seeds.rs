@@ -12,7 +12,7 @@ use crate::lattice::{Keep, Rules, Seed};
 use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
 use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, Tree};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
 const CROSSING: Label = Label::MAX;
@@ -42,16 +42,17 @@ pub fn flow(
         mine.extend([number, found]);
     }
     let all = comm.all_gather(&mine);
-    let found: Vec<[u64; 2]> = all.words().as_chunks().0.to_vec();
+    let found: HashMap<u64, Label> =
+        all.words().as_chunks().0.iter().map(|&[n, label]| (n, label)).collect();
     for (number, seed) in (0..).zip(&rules.seeds) {
-        let problem = match found.iter().find(|f| f[0] == number) {
+        let problem = match found.get(&number) {
             None => "lies outside the root",
-            Some([_, CROSSING]) => "lies in a leaf that the geometry crosses",
+            Some(&CROSSING) => "lies in a leaf that the geometry crosses",
             Some(_) => continue,
         };
         return Err(unusable(number, seed, problem, rules, tree, ownership, comm));
     }
-    Ok(found.into_iter().map(|[_, label]| label).collect())
+    Ok(found.into_values().collect())
 }
 
 /// The sides of all components: the flow is on the side that is kept, outside if everything is.

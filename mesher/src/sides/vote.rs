@@ -27,10 +27,15 @@ impl Candidate {
         Self(u64::from(l) << 57 | code)
     }
 
+    /// Its level and Morton code.
+    pub fn leaf(self) -> (Level, u64) {
+        ((self.0 >> 57) as Level, self.0 & ((1 << 57) - 1))
+    }
+
     /// The leaf's centroid, a lattice point.
     pub fn centroid(self) -> [i64; 3] {
-        let l = (self.0 >> 57) as Level;
-        corner(l, self.0 & ((1 << 57) - 1)).map(|c| c + edge(l) / 2)
+        let (l, code) = self.leaf();
+        corner(l, code).map(|c| c + edge(l) / 2)
     }
 }
 

@@ -2,7 +2,8 @@
 //! on several.
 
 use crate::process::{
-    COMMS, Finished, INPUT, MESHER, OUTPUT, Workspace, refused, run, skip, start, tetrahedron,
+    COMMS, Finished, INPUT, MESHER, OUTPUT, Workspace, refused, run, signal, skip, start,
+    tetrahedron,
 };
 use std::process::Command;
 
@@ -111,25 +112,20 @@ fn full_and_read_only_disks_are_refused() {
     }
 }
 
-/// A mesh that takes some seconds.
-const LONG: &str = "spacing_min = 0.002\nroot_scale = 2.0\nkeep = \"all\"\n
-[generator]\nshape = \"sphere\"\nfacets = 5120\n";
-
 #[test]
 fn a_second_run_into_a_directory_is_refused_and_changes_nothing() {
     for comm in COMMS {
         let workspace = Workspace::new();
         workspace.write("body.stl", tetrahedron());
-        workspace.write("case.toml", LONG);
-        let first = start(workspace.mesher(&["case.toml", "--out", "mesh", "--quiet", comm]));
-        while !workspace.path().join("mesh/mesh.json.draft").exists() {
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
+        let body = ["body.stl", "--spacing-min=0.1", "--out", "mesh", "--quiet", comm];
+        let mut first = workspace.mesher(&body);
+        first.env("STOP_AT", "grade:0");
+        let mut first = start(first);
+        let stopped = first.stopped();
         let second = ["body.stl", "--spacing-min=0.5", "--out", "mesh", comm];
         let claimed = run(workspace.mesher(&second));
-        let is_early = !workspace.path().join("mesh/mesh.json").exists();
-        assert!(is_early, "the first run has to take longer");
         claimed.refuses(INPUT, &["mesh: another run is writing", "--out"]);
+        signal(&[], stopped);
         first.finish().succeeds();
         let complete = workspace.contents();
         run(workspace.mesher(&second)).refuses(INPUT, &["mesh", "not empty", "--out"]);

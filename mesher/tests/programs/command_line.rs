@@ -78,6 +78,20 @@ fn ranks_of_mpi_print_help_and_command_line_errors_once() {
         .refuses_under_launcher(2, &["'none-such'", "--weights"]);
 }
 
+/// With the launcher of another MPI, each process is a job of one rank. `ci/mpich` tries both pairs of launcher and library.
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_launcher_that_started_more_ranks_than_mpi_sees_is_refused() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    let args = ["body.stl", "--spacing-min", "0.5", "--quiet", "--out", "mesh"];
+    run_as_rank(&workspace, &args, "OMPI_COMM_WORLD", 0)
+        .refuses(2, &["Open MPI's mpirun has started 3 ranks", "sees 1"]);
+    let second = run_as_rank(&workspace, &args, "OMPI_COMM_WORLD", 1);
+    assert_eq!((second.code, second.stderr.as_str()), (Some(2), ""));
+    assert!(!workspace.path().join("mesh").exists());
+}
+
 #[test]
 fn the_version_has_the_commit_of_the_work_tree() {
     let workspace = Workspace::new();

@@ -1,62 +1,43 @@
-//! Interrupted runs end at once with exit code 130 and leave no files, in whichever phase they are, on one rank and on several. A run
-//! that was about to end is complete.
+//! Interrupted runs end with exit code 130 and leave no files, at whichever point they are, on one rank and on several. A run whose mesh
+//! is complete ends as if nothing had happened.
+//!
+//! No outcome depends on time: a run stops itself at a point (`STOP_AT`), and continues when its signals are pending.
 
-use crate::process::{Finished, Running, Workspace, run, start};
-use std::path::Path;
+use crate::process::{Finished, MESHER, Workspace, children, run, signal, start, wait_for_end};
 use std::process::Command;
-use std::time::{Duration, Instant};
 
-/// A mesh that takes many seconds on a slow machine, in all phases.
-const LONG: &str = "spacing_min = 0.0012\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
-[generator]\nshape = \"sphere\"\nfacets = 5120\n";
-/// One with four times as many cells, for several ranks, which must not have ended when they are interrupted.
-const LONG_ON_RANKS: &str =
-    "spacing_min = 0.0009\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
-[generator]\nshape = \"sphere\"\nfacets = 5120\n";
-/// One that takes a fraction of a second.
-const SHORT: &str = "spacing_min = 0.01\nroot_scale = 2.0\n
+/// A mesh with all phases.
+const CASE: &str = "spacing_min = 0.02\nroot_scale = 2.0\n
 [generator]\nshape = \"sphere\"\nfacets = 1280\n";
-const OUTPUT: [&str; 5] = ["case.toml", "--out", "mesh", "--json", "run.json"];
-const SIGNALS: [&str; 3] = ["INT", "TERM", "HUP"];
+const OUTPUT: [&str; 6] = ["case.toml", "--out", "mesh", "--json", "run.json", "--quiet"];
+const SIGNALS: [&str; 10] =
+    ["INT", "TERM", "HUP", "QUIT", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU"];
+/// Points after the phases: before the manifest, when the mesh is complete, before the report, and at the end.
+const LAST: [&str; 4] = ["manifest", "complete", "report", "end"];
 
-/// Time within which a process ends, on a busy machine. Phases of the long mesh take longer.
-const AT_ONCE: Duration = Duration::from_secs(2);
-/// OpenMPI's `mpirun` waits for a second between an interrupt and the signal to its ranks, and another process must get its turn.
-const AT_ONCE_MPI: Duration = Duration::from_secs(4);
-
-/// splitmix64.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) % end
-    }
-
-    fn signal(&mut self) -> &'static str {
-        SIGNALS[self.below(3) as usize]
-    }
+fn workspace() -> Workspace {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
+    workspace
 }
 
-/// Sends a signal to a process, which may have ended.
-fn signal(name: &str, id: u32) {
-    let sent = Command::new("kill").args(["-s", name, &id.to_string()]).output();
-    sent.expect("kill is installed");
+/// The mesher with these options, which stops at a point.
+fn stopping(workspace: &Workspace, point: &str, options: &[&str]) -> Command {
+    let mut command = workspace.mesher(&[&OUTPUT[..], options].concat());
+    command.env("STOP_AT", point);
+    command
 }
 
-/// Waits until the run has claimed its directory: from then on it handles signals.
-fn wait_for_claim(run: &mut Running, workspace: &Workspace) {
-    while !workspace.path().join("mesh/mesh.json.draft").exists() {
-        if run.is_over() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
+/// The names of the phases, in order.
+fn phases(comm: &str) -> Vec<String> {
+    let workspace = workspace();
+    run(workspace.mesher(&[&OUTPUT[..], &["--comm", comm]].concat())).succeeds();
+    let report = workspace.json("run.json");
+    let phases = report["phases"].as_array().expect("phases");
+    phases.iter().map(|phase| phase["name"].as_str().expect("a name").to_owned()).collect()
 }
 
-/// Asserts that a run left nothing, or a complete mesh and its report. `allowed` are files that were there before.
+/// Asserts that a run left nothing, or a complete mesh. `before` are files that were there before.
 #[track_caller]
 fn assert_all_or_nothing(workspace: &Workspace, before: &[&str], finished: &Finished) {
     let contents = workspace.contents();
@@ -80,158 +61,123 @@ fn assert_all_or_nothing(workspace: &Workspace, before: &[&str], finished: &Fini
     assert!(left.len() - parts.len() <= 3, "mesh, its manifest and the report: {left:?}");
 }
 
-/// A run of one process, interrupted once or twice at a random time within `window`.
-fn interrupt(case: &str, comm: &str, window: Duration, random: &mut Random) {
-    let workspace = Workspace::new();
-    workspace.write("case.toml", case);
-    let mut before = vec!["case.toml"];
-    if random.below(2) == 0 {
-        std::fs::create_dir(workspace.path().join("mesh")).expect("a directory");
-        before.push("mesh");
-    }
-    let mut run = start(workspace.mesher(&[&OUTPUT[..], &["--quiet", "--comm", comm]].concat()));
-    wait_for_claim(&mut run, &workspace);
-    std::thread::sleep(Duration::from_micros(random.below(window.as_micros() as u64)));
-    let since = Instant::now();
-    let is_late = run.is_over();
-    signal(random.signal(), run.id());
-    if random.below(3) == 0 {
-        signal(random.signal(), run.id());
-    }
-    let finished = run.finish();
-    assert!(is_late || since.elapsed() < AT_ONCE || finished.code == Some(0), "{finished:?}");
-    match finished.code {
-        Some(0) => assert!(workspace.path().join("run.json").exists(), "{finished:?}"),
-        // The second of two signals may find a complete mesh.
-        Some(130) => assert!(finished.stderr.contains("mesher: interrupted"), "{finished:?}"),
-        _ => panic!("{finished:?}"),
-    }
-    assert_all_or_nothing(&workspace, &before, &finished);
-}
-
 #[test]
-fn an_interrupt_in_any_phase_leaves_no_files() {
-    let mut random = Random(1);
-    for _ in 0..6 {
-        for comm in ["solo", "sim:3:2"] {
-            interrupt(LONG, comm, Duration::from_secs(4), &mut random);
+fn a_signal_at_any_point_leaves_no_files_or_a_complete_mesh() {
+    let mut next = SIGNALS.iter().cycle();
+    for (comm, rank) in [("solo", 0), ("sim:3:2", 2)] {
+        let phases = phases(comm);
+        assert!(phases.len() > 6, "{phases:?}");
+        let points = phases.iter().map(|name| (name.as_str(), rank));
+        for (i, (name, rank)) in points.chain(LAST.map(|name| (name, 0))).enumerate() {
+            // Every third time a second signal, which ends the run in any case.
+            let signals: Vec<&str> =
+                next.by_ref().take(1 + usize::from(i % 3 == 0)).copied().collect();
+            let is_complete = LAST[1..].contains(&name);
+            let workspace = workspace();
+            let mut before = vec!["case.toml"];
+            if i % 2 == 0 {
+                std::fs::create_dir(workspace.path().join("mesh")).expect("a directory");
+                before.push("mesh");
+            }
+            let mut run = start(stopping(&workspace, &format!("{name}:{rank}"), &["--comm", comm]));
+            signal(&signals, run.stopped());
+            let finished = run.finish();
+            let what = format!("{comm} {name} {signals:?} {finished:?}");
+            let goes_on = is_complete && signals.len() == 1;
+            assert_eq!(finished.code, Some(if goes_on { 0 } else { 130 }), "{what}");
+            assert_eq!(finished.stderr.contains("mesher: interrupted"), !goes_on, "{what}");
+            assert_eq!(workspace.path().join("mesh/mesh.json").exists(), is_complete, "{what}");
+            assert!(!goes_on || workspace.path().join("run.json").exists(), "{what}");
+            assert_all_or_nothing(&workspace, &before, &finished);
         }
     }
 }
 
+/// A closed pipe and the limit on file sizes fail where a program writes; sent by another process, these signals change nothing.
 #[test]
-fn an_interrupt_near_the_end_leaves_no_files_or_a_complete_mesh() {
-    let mut random = Random(2);
-    for _ in 0..100 {
-        interrupt(SHORT, "solo", Duration::from_millis(250), &mut random);
-    }
-}
-
-#[test]
-fn a_run_that_is_started_to_survive_a_hangup_survives_it() {
-    let workspace = Workspace::new();
-    workspace.write("case.toml", SHORT);
-    let script =
-        format!("trap '' HUP; exec '{}' {} --quiet", crate::process::MESHER, OUTPUT.join(" "));
-    let mut command = Command::new("sh");
-    command.args(["-c", &script]);
-    let mut run = start(workspace.enter(command));
-    wait_for_claim(&mut run, &workspace);
-    signal("HUP", run.id());
+fn signals_of_writing_do_not_end_a_run() {
+    let workspace = workspace();
+    let mut run = start(stopping(&workspace, "leaves:0", &[]));
+    signal(&["PIPE", "XFSZ"], run.stopped());
     run.finish().succeeds();
     assert!(workspace.path().join("run.json").exists());
 }
 
-/// The processes that a process has started.
-fn children(id: u32) -> Vec<u32> {
-    let text =
-        std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap_or_default();
-    text.split_whitespace().filter_map(|id| id.parse().ok()).collect()
+#[test]
+fn a_run_that_is_started_to_survive_a_hangup_survives_it() {
+    let workspace = workspace();
+    let script = format!("trap '' HUP; exec '{MESHER}' {}", OUTPUT.join(" "));
+    let mut command = Command::new("sh");
+    command.args(["-c", &script]).env("STOP_AT", "sides:0");
+    let mut run = start(workspace.enter(command));
+    signal(&["HUP"], run.stopped());
+    run.finish().succeeds();
+    assert!(workspace.path().join("run.json").exists());
 }
 
-/// Whether a process runs; it may be a zombie.
-fn is_alive(id: u32) -> bool {
-    Path::new(&format!("/proc/{id}/exe")).read_link().is_ok()
+/// A job on MPI ranks of which one stops itself, and what is then sent to the launcher or to that rank.
+fn job(
+    ranks: usize,
+    point: &str,
+    options: &[&str],
+    to_launcher: Option<bool>,
+    signals: &[&str],
+) -> (Workspace, Finished) {
+    let workspace = workspace();
+    let mut command = workspace.mpirun(ranks, &[&OUTPUT[..], options].concat());
+    command.env("STOP_AT", point);
+    let mut job = start(command);
+    let stopped = job.stopped();
+    let processes = children(job.id());
+    if let Some(to_launcher) = to_launcher {
+        signal(signals, if to_launcher { job.id() } else { stopped });
+        signal(&[], stopped);
+    }
+    let finished = job.finish();
+    wait_for_end(&processes);
+    (workspace, finished)
 }
 
-/// A job on MPI ranks, interrupted once or twice at a random time: the launcher or one rank.
+/// A job is interrupted once or twice, or killed: its launcher, or one rank.
 #[test]
 #[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
-fn an_interrupted_job_leaves_no_files_and_no_ranks() {
-    let mut random = Random(3);
-    for round in 0..12 {
-        let workspace = Workspace::new();
-        workspace.write("case.toml", LONG_ON_RANKS);
-        let ranks = 2 + random.below(3) as usize;
-        let mut job = start(workspace.mpirun(ranks, &[&OUTPUT[..], &["--quiet"]].concat()));
-        wait_for_claim(&mut job, &workspace);
-        std::thread::sleep(Duration::from_micros(random.below(2_000_000)));
-        let processes = children(job.id());
-        let is_of_rank = round % 4 == 3;
-        let target = processes.last().copied().filter(|_| is_of_rank).unwrap_or(job.id());
-        let since = Instant::now();
-        let signals: Vec<_> = (0..1 + round % 2).map(|_| random.signal()).collect();
-        let is_late = job.is_over();
-        signals.iter().for_each(|name| signal(name, target));
-        let finished = job.finish();
-        let what = format!("round {round}, {ranks} ranks, {signals:?}: {finished:?}");
-        assert!(is_late || since.elapsed() < AT_ONCE_MPI, "{:?} {what}", since.elapsed());
-        assert!(is_late || finished.code != Some(0), "{what}");
-        let since = Instant::now();
-        while processes.iter().any(|&id| is_alive(id)) {
-            assert!(since.elapsed() < AT_ONCE_MPI, "a rank runs on: {what}");
-            std::thread::sleep(Duration::from_millis(5));
+fn a_job_that_is_interrupted_or_killed_leaves_no_files_and_no_ranks() {
+    for (i, phase) in ["read", "refine", "sides", "grade", "leaves", "finish"].iter().enumerate() {
+        for (to_launcher, signals) in [
+            (true, &["INT", "TERM"][..1 + i % 2]),
+            (false, &SIGNALS[i..=i]),
+            (i % 2 == 0, &["KILL"]),
+        ] {
+            let (ranks, rank) = (2 + i % 2, i % 2);
+            let point = format!("{phase}:{rank}");
+            let (workspace, finished) = job(ranks, &point, &[], Some(to_launcher), signals);
+            assert_ne!(finished.code, Some(0), "{point} {signals:?} {finished:?}");
+            assert!(!workspace.path().join("mesh/mesh.json").exists(), "{point} {signals:?}");
+            assert_all_or_nothing(&workspace, &["case.toml"], &finished);
         }
-        assert_all_or_nothing(&workspace, &["case.toml"], &finished);
     }
 }
 
-/// Whoever gives up a job, whoever is killed.
-#[test]
-#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
-fn a_job_whose_launcher_or_rank_is_killed_leaves_no_mesh() {
-    for victim in 0..3 {
-        let workspace = Workspace::new();
-        workspace.write("case.toml", LONG_ON_RANKS);
-        let mut job = start(workspace.mpirun(3, &["case.toml", "--out", "mesh", "--quiet"]));
-        wait_for_claim(&mut job, &workspace);
-        std::thread::sleep(Duration::from_millis(500));
-        let processes = children(job.id());
-        signal("KILL", if victim == 0 { job.id() } else { processes[victim - 1] });
-        let finished = job.finish();
-        let since = Instant::now();
-        while processes.iter().any(|&id| is_alive(id)) {
-            assert!(since.elapsed() < AT_ONCE_MPI, "a rank runs on: {finished:?}");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        assert_all_or_nothing(&workspace, &["case.toml"], &finished);
-    }
-}
-
-/// A rank that is stopped keeps the others waiting, in calls of MPI.
+/// A rank that stops keeps the others waiting, in calls of MPI, up to its end.
 #[test]
 #[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
 fn a_rank_that_keeps_the_others_waiting_is_named() {
-    let mut random = Random(4);
-    for round in 0..6 {
-        let workspace = Workspace::new();
-        workspace.write("case.toml", LONG_ON_RANKS);
-        let ranks = 2 + round % 3;
-        let limit = ["--stall-limit", "2", "--quiet"];
-        let mut job = start(workspace.mpirun(ranks, &[&OUTPUT[..], &limit].concat()));
-        wait_for_claim(&mut job, &workspace);
-        std::thread::sleep(Duration::from_micros(200_000 + random.below(1_000_000)));
-        let processes = children(job.id());
-        let stopped = random.below(processes.len() as u64) as usize;
-        signal("STOP", processes[stopped]);
-        let finished = job.finish();
-        signal("CONT", processes[stopped]);
-        let what = format!("round {round}, {ranks} ranks, rank {stopped} stopped: {finished:?}");
-        assert_eq!(finished.code, Some(75), "{what}");
-        let named = format!("rank {stopped} does not answer");
-        assert!(finished.stderr.contains(&named) && finished.stderr.contains("phase "), "{what}");
-        while processes.iter().any(|&id| is_alive(id)) {
-            std::thread::sleep(Duration::from_millis(5));
+    for (i, name) in
+        ["grade", "leaves", "finish", "manifest", "complete", "report", "end"].iter().enumerate()
+    {
+        let rank = if *name == "manifest" { 0 } else { i % 3 };
+        let point = format!("{name}:{rank}");
+        let (workspace, finished) = job(3, &point, &["--stall-limit", "3"], None, &[]);
+        assert_eq!(finished.code, Some(75), "{point}: {finished:?}");
+        match *name {
+            "end" => assert!(finished.stderr.contains("has not ended"), "{finished:?}"),
+            _ => {
+                // A rank that the machine does not run for seconds is named as well.
+                let (_, named) = finished.stderr.split_once(", and rank ").expect("a name");
+                let (named, _) = named.split_once(" does not answer").expect("a name");
+                let is_named = named.split(", ").any(|other| other == rank.to_string());
+                assert!(is_named && finished.stderr.contains("in phase "), "{point}: {finished:?}");
+            }
         }
         assert_all_or_nothing(&workspace, &["case.toml"], &finished);
     }
@@ -241,24 +187,12 @@ fn a_rank_that_keeps_the_others_waiting_is_named() {
 #[test]
 #[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
 fn a_job_within_its_limit_is_as_without_one() {
-    let workspace = Workspace::new();
-    workspace.write("case.toml", SHORT);
+    let workspace = workspace();
     let report = |options: &[&str]| {
         let args = ["case.toml", "--quiet", "--json", "run.json"];
         run(workspace.mpirun(3, &[&args[..], options].concat())).succeeds();
         let report = workspace.json("run.json");
         (report["digest"].clone(), report["counters"].clone())
     };
-    assert_eq!(report(&["--stall-limit", "60"]), report(&[]));
-}
-
-#[test]
-fn a_time_limit_ends_a_run() {
-    let workspace = Workspace::new();
-    workspace.write("case.toml", LONG);
-    let mut command = Command::new("timeout");
-    command.args(["--preserve-status", "0.8", crate::process::MESHER]).args(OUTPUT);
-    let finished = run(workspace.enter(command));
-    finished.refuses(130, &["interrupted"]);
-    assert_all_or_nothing(&workspace, &["case.toml"], &finished);
+    assert_eq!(report(&["--stall-limit", "600"]), report(&[]));
 }

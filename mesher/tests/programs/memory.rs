@@ -68,7 +68,7 @@ fn what_a_refusal_recommends_fits() {
     refused.refuses(MEMORY, &["address space", "multiply all spacings"]);
     assert!(!workspace.path().join("mesh").exists());
     let args = ["case.toml", "--plan", "--quiet", "--json", "plan.json"];
-    run(workspace.enter(limited(limit, &args))).succeeds();
+    run(workspace.enter(limited(limit, &args))).refuses(MEMORY, &["multiply all spacings"]);
     let plan = workspace.json("plan.json");
     assert_eq!((&plan["fits"], &plan["source"]), (&false.into(), &"pilots".into()));
     assert_eq!(plan["tightest"]["limit"], "address_space");

@@ -214,7 +214,7 @@ pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {
-    Options { division, ungraded, out: None, check: false, weight_exposed: None, force: true }
+    Options { division, ungraded, force: true, ..Options::default() }
 }
 
 /// Describes the first leaf that differs.

@@ -6,9 +6,41 @@ use super::pop::{self, Efficiency, messages_s};
 /// Losses below this fraction are not explained.
 const LOSS_MIN: f64 = 0.03;
 
-/// Returns the sentence for a run relative to its reference run.
+/// Returns the sentence for a run relative to its reference run. It states the reason for an efficiency above 1.
 pub fn sentence(run: &Run, reference: &Run, network: &Network) -> String {
     let e = pop::efficiency(run, reference, network);
+    match above_one(&e, run, reference) {
+        Some(why) => format!("{}, {why}", loss(&e, run, reference, network)),
+        None => loss(&e, run, reference, network),
+    }
+}
+
+/// Returns the reason for an efficiency above 1; `None` if there is none.
+///
+/// # Panics
+/// If no factor can be the reason: then a factor is wrong.
+pub fn above_one(e: &Efficiency, run: &Run, reference: &Run) -> Option<String> {
+    if !e.is_above_one() {
+        return None;
+    }
+    assert!(
+        e.transfer.max(e.computation_scaling) > 1.0,
+        "an efficiency above 1 has a reason: {e:?}"
+    );
+    let (ranks, of) = (run.setup.ranks, reference.setup.ranks);
+    Some(match e.transfer > e.computation_scaling {
+        true => format!(
+            "above 1 because ranks do not wait at the end of every phase: phase by phase, the slowest ranks take {:.2} times the run",
+            e.transfer
+        ),
+        false => format!(
+            "above 1 because {ranks} compute {:.2} times as much per cell as {of}",
+            1.0 / e.computation_scaling
+        ),
+    })
+}
+
+fn loss(e: &Efficiency, run: &Run, reference: &Run, network: &Network) -> String {
     let ranks = run.setup.ranks;
     let head = format!(
         "{} at {ranks} {}: ",
@@ -18,7 +50,7 @@ pub fn sentence(run: &Run, reference: &Run, network: &Network) -> String {
     let losses = [
         (e.load_balance, imbalance(run)),
         (e.serialisation, serial(run)),
-        (e.transfer, transfer(run, network, &e)),
+        (e.transfer, transfer(run, network, e)),
         (e.computation_scaling, more_work(run, reference)),
     ];
     let worst = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
@@ -141,6 +173,30 @@ mod tests {
 
     fn why(run_: &Run, one: &Run, network: &Network) -> String {
         sentence(run_, one, network)
+    }
+
+    #[test]
+    fn an_efficiency_above_1_has_a_reason() {
+        let one = run(Comm::Sim, 100, &[("grade", &[6.0])]);
+        let less = run(Comm::Sim, 100, &[("grade", &[2.0, 2.0])]);
+        let text = why(&less, &one, &FREE);
+        assert!(
+            text.contains("above 1 because 2 compute 0.67 times as much per cell as 1"),
+            "{text}"
+        );
+        let mut overlapping = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0]), ("b", &[1.0, 3.0])]);
+        overlapping.time_wall_s = 3.9;
+        let text = why(&overlapping, &run(Comm::Mpi, 100, &[("a", &[8.0])]), &FREE);
+        assert!(text.contains("above 1 because ranks do not wait"), "{text}");
+        assert!(!why(&one, &one.clone(), &FREE).contains("above 1"));
+    }
+
+    #[test]
+    #[should_panic(expected = "an efficiency above 1 has a reason")]
+    fn an_efficiency_above_1_without_a_reason_is_noticed() {
+        let one = run(Comm::Sim, 100, &[("grade", &[4.0])]);
+        let wrong = Efficiency { load_balance: 2.0, ..pop::efficiency(&one, &one, &FREE) };
+        above_one(&wrong, &one, &one);
     }
 
     #[test]

@@ -135,6 +135,19 @@ impl Spread {
         Self { by_rank: Vec::new(), ..Self::of(values) }
     }
 
+    /// Sum and maximum are those of the values rank by rank, as far as these are stored, to their rounding.
+    pub(crate) fn check_invariants(&self) {
+        let Self { sum, max, at, by_rank } = self;
+        if !by_rank.is_empty() {
+            let total: f64 = by_rank.iter().sum();
+            let off = 1e-6 * (1 + by_rank.len()) as f64 + 1e-9 * sum.abs();
+            let is_right = (sum - total).abs() <= off && by_rank.get(*at) == Some(max);
+            let most = by_rank.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            assert!(is_right && *max == most, "sum and maximum are those of the ranks: {self:?}");
+        }
+        assert!(max <= &(sum + 1e-6) || *sum < 0.0, "no rank has more than all together: {self:?}");
+    }
+
     /// Maximum over mean: 1 if all values are equal, also if all are 0.
     pub fn lambda(&self, ranks: usize) -> f64 {
         if self.sum > 0.0 { self.max * ranks as f64 / self.sum } else { 1.0 }
@@ -197,8 +210,14 @@ pub struct Run {
     pub oversubscribed: bool,
     /// The command line.
     pub command: String,
+    /// Digest of the program's file; empty in old records.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub program: String,
     /// Facets of the geometry.
     pub facets: u64,
+    /// Digest of the facets as the program read them, if it reports one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<String>,
     /// Leaves of the mesh.
     pub cells: u64,
     /// The mesh's digest.
@@ -290,7 +309,7 @@ pub struct Judged {
     pub how: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// Why it was left out or failed.
+    /// Why it was left out or failed, or why an efficiency is above 1.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
 }

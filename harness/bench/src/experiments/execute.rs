@@ -21,6 +21,9 @@ use std::time::Duration;
 /// The greatest number of ranks with a message matrix, which has an entry for every pair of ranks that communicate.
 pub const MATRIX_RANKS_MAX: usize = 64;
 
+/// The partitioner that is not used where it has too few base leaves.
+const METIS: &str = "metis";
+
 /// Seed of the schedule of simulated ranks.
 const SEED: u64 = 1;
 
@@ -95,7 +98,15 @@ impl Runner<'_> {
                 "its run report has no phases, without which simulated ranks cannot be projected";
             return Err(Failed::Reason(why.to_owned()));
         }
+        if setup.partitioner == METIS
+            && report.partitioner.as_deref().is_some_and(|used| used != METIS)
+        {
+            let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use \
+                       fewer ranks or more cells";
+            return Err(Failed::Reason(why.to_owned()));
+        }
         Ok(Run {
+            program: machine::digest_of_file(engine.program()),
             repeat,
             warm_up,
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
@@ -207,7 +218,9 @@ fn measurements(setup: Setup, report: RunReport) -> Run {
         warm_up: false,
         oversubscribed: false,
         command: String::new(),
+        program: String::new(),
         facets: report.facets,
+        geometry: report.geometry.as_ref().map(|geometry| geometry.digest.clone()),
         cells: report.cells,
         time_wall_s,
         time_launch_s: 0.0,

@@ -1,8 +1,16 @@
 //! Repetitions of the same setup, and the statistics of each such group.
+//!
+//! Only runs of one machine, one build of the program and one geometry are repetitions of each other. Those of a second
+//! machine or build are runs of another program, `mesher [2]`, and those of a second geometry are runs on another case, `cube [2]`.
+//!
+//! Invariants, executed by [`Groups::check_invariants`] before anything is computed from them: a group has runs, all of its
+//! setup and with its number of cells if the mesh is the same; its time lies in its interval, and that in the range of the
+//! repetitions extended to it; sums and maxima over ranks agree with the values rank by rank.
 
 use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Phase, Run, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
+use crate::origin::Origins;
 use crate::statistics::{Median, median};
 use std::collections::BTreeMap;
 
@@ -141,16 +149,19 @@ pub struct Groups {
     pub lacks: BTreeMap<String, Vec<String>>,
     /// The network of the last line that has one.
     pub network: Network,
+    /// A sentence for every program and case of which there are several series.
+    pub origins: Vec<String>,
 }
 
 impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
+        let (lines, origins) = apart(lines);
         let mut network = ASSUMED;
         let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
         let mut matrices: Vec<Run> = Vec::new();
         let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
-        for line in lines {
+        for line in &lines {
             match &line.entry {
                 Entry::Network(n) => network = *n,
                 Entry::Session(session) => lacks.extend(session.lacks.clone()),
@@ -178,7 +189,28 @@ impl Groups {
         }
         let group = |(setup, runs): (Setup, Vec<Run>)| Group::of(setup, runs, &network);
         let all = by_setup.into_iter().filter_map(group).collect();
-        Self { all, matrices, left_out, lacks, network }
+        let groups = Self { all, matrices, left_out, lacks, network, origins };
+        groups.check_invariants();
+        groups
+    }
+
+    /// Executes the invariants at the head of this file.
+    pub fn check_invariants(&self) {
+        for Group { setup, runs, time_s: t, typical, .. } in &self.all {
+            let name = || format!("{} on {} at {} ranks", setup.engine, setup.case, setup.ranks);
+            assert!(
+                !runs.is_empty() && t.count == runs.len(),
+                "{} has {} runs",
+                name(),
+                runs.len()
+            );
+            assert!(runs.iter().all(|run| run.setup == *setup), "{} pools other setups", name());
+            assert!(t.low <= t.value && t.value <= t.high, "{}: {t:?} is in its interval", name());
+            assert!((0.0..=1.0).contains(&t.coverage), "{}: {t:?} is a coverage", name());
+            for spread in typical.phases.iter().map(|p| &p.useful_s).chain([&typical.useful_s]) {
+                spread.check_invariants();
+            }
+        }
     }
 
     /// Returns the groups whose setup satisfies `predicate`, in ascending order of `key`.
@@ -235,6 +267,46 @@ impl Groups {
     }
 }
 
+/// Returns the lines with the runs of every further machine, build or geometry as those of another program or case, and a
+/// sentence for each program and case of which there are several.
+fn apart(lines: &[Line]) -> (Vec<Line>, Vec<String>) {
+    let mut machines: BTreeMap<&str, String> = BTreeMap::new();
+    let (mut programs, mut geometries) = (Origins::default(), Origins::default());
+    let mut apart = lines.to_vec();
+    for (line, of) in apart.iter_mut().zip(lines) {
+        match &mut line.entry {
+            Entry::Session(session) => {
+                let machine = &session.machine;
+                machines
+                    .insert(&of.session, format!("{}; commit {}", machine.label(), machine.commit));
+            }
+            Entry::Run(run) => {
+                let machine = machines.get(of.session.as_str()).map_or("", String::as_str);
+                // Old records have no digest of the program: the commit stands for it.
+                let origin = match run.program.as_str() {
+                    "" => machine.to_owned(),
+                    program => {
+                        let machine = machine.split("; commit").next().unwrap_or_default();
+                        format!("{machine}; program {program}")
+                    }
+                };
+                let s = &mut run.setup;
+                if let Some(digest) = &run.geometry {
+                    let mesh = format!(
+                        "{} at spacing {:e}, n {}",
+                        s.case, s.spacing_min, s.layer_cells_min
+                    );
+                    s.case += &geometries.suffix(&mesh, digest);
+                }
+                s.engine += &programs.suffix(&s.engine, &origin);
+            }
+            _ => {}
+        }
+    }
+    let sentences = programs.described().into_iter().chain(geometries.described());
+    (apart, sentences.collect())
+}
+
 /// A projected time and the measured one.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection<'a> {
@@ -258,9 +330,11 @@ impl Projection<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::entry::{Machine, Session};
     use super::*;
     use crate::testing::line;
     use crate::testing::run;
+    use proptest::prelude::*;
 
     fn line_of(run: Run) -> Line {
         line(Entry::Run(Box::new(run)))
@@ -272,6 +346,89 @@ mod tests {
             bandwidth_bytes_per_s: 1e30,
             measured: true,
         }))
+    }
+
+    fn of_machine(session: &str, cpu: &str) -> Line {
+        let machine = Machine { cpu: cpu.into(), ..Machine::default() };
+        let (command, lacks) = (Vec::new(), BTreeMap::new());
+        let entry = Session { command, machine, load_average: 0.0, lacks };
+        Line { session: session.into(), ..line(Entry::Session(Box::new(entry))) }
+    }
+
+    #[test]
+    fn runs_of_another_machine_program_or_geometry_are_not_pooled() {
+        let of = |session: &str, time_s: f64, program: &str, geometry: &str| {
+            let mut run = run(Comm::Mpi, 9, &[("a", &[time_s])]);
+            (run.program, run.geometry) = (program.into(), Some(geometry.into()));
+            Line { session: session.into(), ..line_of(run) }
+        };
+        let lines = [
+            of_machine("s", "fast"),
+            of_machine("t", "slow"),
+            of("s", 0.130, "p", "g"),
+            of("t", 0.605, "p", "g"),
+            of("s", 0.132, "p", "g"),
+            of("s", 0.5, "q", "g"),
+            of("s", 0.7, "p", "h"),
+        ];
+        let groups = Groups::of(&lines);
+        let found: Vec<_> = groups
+            .all
+            .iter()
+            .map(|g| {
+                (g.setup.engine.as_str(), g.setup.case.as_str(), g.time_s.value, g.time_s.count)
+            })
+            .collect();
+        let expected = [
+            ("mesher", "cube", 0.131, 2),
+            ("mesher [2]", "cube", 0.605, 1),
+            ("mesher [3]", "cube", 0.5, 1),
+            ("mesher", "cube [2]", 0.7, 1),
+        ];
+        assert_eq!(found, expected);
+        assert_eq!(groups.origins.len(), 2);
+        assert!(groups.origins[0].contains("[2]: slow"), "{:?}", groups.origins);
+    }
+
+    proptest! {
+        #[test]
+        fn drawn_records_satisfy_the_invariants(
+            drawn in prop::collection::vec((0..3u8, prop::collection::vec(0.0..9.0f64, 1..4)), 1..12),
+        ) {
+            let comms = [Comm::Solo, Comm::Mpi, Comm::Sim];
+            let of = |(comm, times): &(u8, Vec<f64>)| {
+                line_of(run(comms[usize::from(*comm)], 9, &[("a", times), ("b", times)]))
+            };
+            let lines: Vec<Line> = drawn.iter().map(of).collect();
+            let groups = Groups::of(&lines);
+            let total: usize = groups.all.iter().map(|group| group.runs.len()).sum();
+            prop_assert_eq!(total, lines.len());
+        }
+    }
+
+    fn planted(fault: impl Fn(&mut Group)) {
+        let lines = [line_of(run(Comm::Mpi, 9, &[("a", &[1.0, 2.0])]))];
+        let mut groups = Groups::of(&lines);
+        fault(&mut groups.all[0]);
+        groups.check_invariants();
+    }
+
+    #[test]
+    #[should_panic(expected = "is in its interval")]
+    fn a_median_outside_its_interval_is_noticed() {
+        planted(|group| group.time_s.value *= 2.0);
+    }
+
+    #[test]
+    #[should_panic(expected = "pools other setups")]
+    fn a_run_of_another_setup_is_noticed() {
+        planted(|group| group.runs[0].setup.case = "ball".into());
+    }
+
+    #[test]
+    #[should_panic(expected = "sum and maximum are those of the ranks")]
+    fn a_sum_that_is_not_that_of_the_ranks_is_noticed() {
+        planted(|group| group.typical.phases[0].useful_s.sum += 1.0);
     }
 
     #[test]

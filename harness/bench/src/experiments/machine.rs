@@ -1,6 +1,7 @@
 //! The description of the machine that runs the measurements.
 
 use super::entry::Machine;
+use contract::digest::mix;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -17,6 +18,22 @@ pub fn describe(mpirun: &Path, place: &Path) -> Machine {
         compiler: first_line(Command::new("rustc").arg("--version")),
         commit: commit(place),
     }
+}
+
+impl Machine {
+    /// Returns what measurements depend on, which is neither compiler nor commit: programs have digests.
+    pub fn label(&self) -> String {
+        let Self { cpu, cores, memory_bytes, kernel, mpi, .. } = self;
+        format!("{cpu}, {cores} cores, {} MiB, {kernel}, {mpi}", memory_bytes >> 20)
+    }
+}
+
+/// Returns the digest of a program's file, which names a build of it; empty if it cannot be read.
+pub fn digest_of_file(program: &Path) -> String {
+    let Ok(bytes) = fs::read(program) else { return String::new() };
+    let word = |chunk: &[u8]| chunk.iter().fold(1, |word, byte| word << 8 | u64::from(*byte));
+    let step = |state: u128, chunk: &[u8]| mix(word(chunk) ^ state as u64) ^ state.rotate_left(64);
+    format!("{:032x}", bytes.chunks(7).fold(bytes.len() as u128, step))
 }
 
 /// Returns the number of cores that this process may use.
@@ -88,6 +105,22 @@ mod tests {
         assert_eq!(cpu(text), "A Chip @ 2 GHz (family 6, model 85)");
         assert_eq!(cpu(&text.replace("A Chip @ 2 GHz", "unknown")), "unnamed (family 6, model 85)");
         assert_eq!(memory_bytes("MemTotal:       16 kB\nMemFree: 1 kB\n"), 16_384);
+    }
+
+    #[test]
+    fn a_program_that_differs_in_a_byte_or_in_its_order_has_another_digest() {
+        let place = tempfile::tempdir().unwrap();
+        let of = |bytes: &[u8]| {
+            std::fs::write(place.path().join("p"), bytes).unwrap();
+            digest_of_file(&place.path().join("p"))
+        };
+        let some = [7u8; 40];
+        let mut others = [some; 3];
+        (others[1][33], others[2][1]) = (8, 8);
+        let all = [&some[..], &others[1], &others[2], &some[..39], b""].map(of);
+        assert_eq!(of(&some), all[0]);
+        assert!((1..5).all(|i| !all[..i].contains(&all[i])), "{all:?}");
+        assert_eq!(digest_of_file(Path::new("no/such/program")), "");
     }
 
     #[test]

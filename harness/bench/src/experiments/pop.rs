@@ -54,7 +54,35 @@ impl Efficiency {
     pub fn global(&self) -> f64 {
         self.parallel() * self.computation_scaling
     }
+
+    /// Whether an efficiency needs an explanation: it is above 1, beyond what rounding to percents shows.
+    pub fn is_above_one(&self) -> bool {
+        self.global().max(self.parallel()) > ABOVE_ONE
+    }
+
+    /// Ranks wait for each other at the end of phases, so neither their balance nor their waiting can gain time.
+    fn check_invariants(&self) {
+        let Self { load_balance, serialisation, transfer, computation_scaling, lambda, .. } = *self;
+        assert!(
+            load_balance <= 1.0 + ROUNDING && lambda >= 1.0 - ROUNDING,
+            "load balance of at most 1: {self:?}"
+        );
+        assert!(serialisation <= 1.0 + ROUNDING, "serialisation of at most 1: {self:?}");
+        assert!(
+            transfer >= 0.0 && computation_scaling >= 0.0,
+            "efficiencies of at least 0: {self:?}"
+        );
+        assert!(
+            (load_balance * lambda - 1.0).abs() < ROUNDING,
+            "load balance is 1 / lambda: {self:?}"
+        );
+    }
 }
+
+/// Efficiencies up to this are 1.
+const ABOVE_ONE: f64 = 1.005;
+/// Relative error of times that are stored to the microsecond.
+const ROUNDING: f64 = 1e-3;
 
 /// Returns the modelled time of a phase's messages on one rank, in seconds.
 pub fn messages_s(phase: &Phase, network: &Network) -> f64 {
@@ -89,14 +117,16 @@ pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     let path_s = path_s(run);
     let per_cell = |r: &Run| r.useful_s.sum / r.cells.max(1) as f64;
     let lambda = run.useful_s.lambda(run.setup.ranks);
-    Efficiency {
+    let efficiency = Efficiency {
         load_balance: 1.0 / lambda,
         serialisation: ratio(run.useful_s.max, path_s),
         transfer: ratio(path_s, time_s),
         computation_scaling: ratio(per_cell(reference), per_cell(run)),
         lambda,
         time_s,
-    }
+    };
+    efficiency.check_invariants();
+    efficiency
 }
 
 /// Returns the efficiencies of one phase relative to the same phase of the reference run, if it exists.
@@ -134,6 +164,7 @@ mod tests {
     use super::super::entry::Spread;
     use super::*;
     use crate::testing::run;
+    use proptest::prelude::*;
 
     const FREE: Network = Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: false };
 
@@ -170,6 +201,27 @@ mod tests {
         close(e.load_balance, 2.0 / 3.0);
         close(e.lambda, 1.5);
         close(e.global(), 4.0 / 3.0 / 2.0);
+    }
+
+    proptest! {
+        #[test]
+        fn efficiencies_of_drawn_runs_satisfy_the_invariants(
+            times in prop::collection::vec(prop::collection::vec(0.0..9.0f64, 3), 1..5), wall_s in 0.1..9.0f64, one in 0.0..9.0f64,
+        ) {
+            let phases: Vec<(&str, &[f64])> = times.iter().map(|times| ("a", &times[..])).collect();
+            let mut many = run(Comm::Mpi, 100, &phases);
+            many.time_wall_s = wall_s;
+            let one = run(Comm::Solo, 90, &[("a", &[one])]);
+            efficiency(&many, &one, &FREE);
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "load balance of at most 1")]
+    fn ranks_that_are_balanced_better_than_evenly_are_noticed() {
+        let mut two = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0])]);
+        two.useful_s.max = 1.5;
+        efficiency(&two, &two.clone(), &FREE);
     }
 
     #[test]

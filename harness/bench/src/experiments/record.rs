@@ -5,8 +5,9 @@
 //! skip. Lines are never rewritten.
 
 use super::entry::{Entry, Line, SCHEMA};
+use contract::files::{append_log, read_log};
 use jiff::Timestamp;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -27,7 +28,7 @@ impl Record {
         if let Some(directory) = path.parent() {
             std::fs::create_dir_all(directory)?;
         }
-        let file = OpenOptions::new().create(true).append(true).read(true).open(path)?;
+        let file = append_log(path)?;
         let session = format!("{}-{}", now_utc(), std::process::id());
         Ok(Self { file, path: path.to_owned(), session })
     }
@@ -91,7 +92,7 @@ pub struct Content {
 /// If the file cannot be read.
 pub fn read(path: &Path) -> io::Result<Content> {
     let mut content = Content::default();
-    for (i, text) in contract::files::read_text(path)?.lines().enumerate() {
+    for (i, text) in String::from_utf8_lossy(&read_log(path)?).lines().enumerate() {
         match serde_json::from_str::<Line>(text) {
             _ if text.trim().is_empty() => {}
             Ok(line) if line.schema == SCHEMA => content.lines.push(line),

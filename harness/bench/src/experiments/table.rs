@@ -18,6 +18,9 @@ pub fn tables(groups: &Groups) -> String {
         n.bandwidth_bytes_per_s / 1e9,
         if n.measured { "measured by ping-pong" } else { "given" }
     );
+    for sentence in &groups.origins {
+        let _ = writeln!(out, "{sentence}");
+    }
     let mut experiments: Vec<&str> =
         groups.all.iter().map(|g| g.setup.experiment.as_str()).collect();
     experiments.dedup();
@@ -61,10 +64,13 @@ fn experiment_table(out: &mut String, groups: &Groups, experiment: &str) {
     for group in groups.all.iter().filter(of) {
         row(out, groups, group);
     }
-    let last: Vec<&Group> = groups.all.iter().filter(of).filter(|g| g.setup.ranks > 1).collect();
-    for group in last {
-        let (run, reference) = (&group.typical, groups.reference(group));
-        let cause = sentence(run, &reference.typical, &groups.network);
+    for group in groups.all.iter().filter(of) {
+        let (run, reference) = (&group.typical, &groups.reference(group).typical);
+        let is_above_one = pop::efficiency(run, reference, &groups.network).is_above_one();
+        if group.setup.ranks == 1 && !is_above_one {
+            continue;
+        }
+        let cause = sentence(run, reference, &groups.network);
         let _ = writeln!(
             out,
             "  {}, {}, {}: {cause}",

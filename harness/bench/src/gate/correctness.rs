@@ -1,19 +1,21 @@
-//! The layer of correctness: `harness verify` on the candidate and the gate's cases. Where the candidate fails checks, it is
-//! compared with the baseline: see [`super::known`].
+//! The layer of correctness: `harness verify` on the candidate and the gate's cases, serially and on the ranks of the rules. Where the
+//! candidate fails checks, it is compared with the baseline: see [`super::known`].
 
 use super::known::{Known, against, known};
 use super::measures::Measures;
-use super::report::{Finding, Layer, LayerName, Verdict};
+use super::report::{CHECKS, Finding, Layer, LayerName, Verdict};
+use super::rules::Selected;
 use super::subject::Baseline;
 use super::{Bench, GateError};
+use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::options::Options;
-use run::verify::report::{CaseReport, Outcome, Report};
+use run::verify::report::{CaseReport, Check, Outcome, Tally};
 use run::verify::{VerifyError, verify};
 
-/// Verifies the candidate serially on the cases of this layer: every check of what it promises.
-/// Ranks, oracles and p4est are left to `harness verify`.
+/// Verifies the candidate on the cases of this layer: every check of what it promises. Oracles and p4est are left to
+/// `harness verify`.
 ///
 /// # Errors
 /// If verification cannot start.
@@ -21,79 +23,100 @@ pub fn layer(
     bench: &Bench,
     baseline: &Baseline,
     measures: &mut Measures,
-) -> Result<Layer, GateError> {
-    let mut layer = Layer::new(LayerName::Correctness);
-    let (mut cases, mut names) = (Vec::new(), Vec::new());
+    layer: &mut Layer,
+) -> Result<(), GateError> {
     for case in bench.cases_of(LayerName::Correctness) {
-        if let Ok(path) = &case.path {
-            cases.push(path.to_string_lossy().into_owned());
-            names.push(case.rule.name.as_str());
+        if interrupt::requested() {
+            break;
         }
+        let name = &case.rule.name;
+        let report = verified(bench, &bench.candidate, case)?;
+        measures.case(name).findings = known(&report);
+        let known = match report.failed() {
+            true => findings_of(bench, baseline, case)?,
+            false => None,
+        };
+        match known {
+            Some(known) => layer.findings.push(against(name, &report, &known)),
+            None => layer.findings.extend(findings(bench, case, &report)),
+        }
+        layer.findings.extend(bench.ranks_left_out(case));
     }
-    if cases.is_empty() {
-        return Ok(layer);
-    }
-    let report = verified(bench, &bench.candidate, cases.clone())?;
-    for ((case, path), name) in report.cases.iter().zip(cases).zip(names) {
-        measures.case(name).findings = known(case);
-        layer.findings.push(match case.failed() {
-            false => finding(case),
-            true => match findings_of(bench, baseline, name, path)? {
-                Some(known) => against(case, &known),
-                None => finding(case),
-            },
-        });
-    }
-    Ok(layer)
+    Ok(())
 }
 
 /// Returns the failed checks of the baseline; `None` without a baseline.
 fn findings_of(
     bench: &Bench,
     baseline: &Baseline,
-    name: &str,
-    path: String,
+    case: &Selected,
 ) -> Result<Option<Known>, GateError> {
     Ok(match baseline {
         Baseline::None => None,
-        Baseline::Record(_, record) => record.cases.get(name).map(|case| case.findings.clone()),
-        Baseline::Program(subject) => {
-            let report = verified(bench, &subject.engine, vec![path])?;
-            report.cases.first().map(known)
+        Baseline::Record(_, record) => {
+            record.cases.get(&case.rule.name).map(|case| case.findings.clone())
         }
+        Baseline::Program(subject) => Some(known(&verified(bench, &subject.engine, case)?)),
     })
 }
 
-/// Verifies a program.
-fn verified(bench: &Bench, engine: &Engine, cases: Vec<String>) -> Result<Report, GateError> {
+/// Verifies a program on a case.
+fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseReport, GateError> {
     let programs = Programs { engine: engine.clone(), ..bench.programs.clone() };
-    // The files of a case that fails end with the gate.
-    let out = Some(bench.place.join("correctness"));
-    let options = Options { limit: bench.options.limit, out, ..Options::of_leaves_alone(cases) };
-    verify(&options, &programs).map_err(|error| match error {
+    let path = case.path.clone().map_err(GateError::Input)?;
+    let ranks = bench.ranks_on_mpi(case);
+    let options = Options {
+        limit: bench.options.limit,
+        // The files of a case that fails end with the gate.
+        out: Some(bench.place.join("correctness")),
+        mpi: !ranks.is_empty(),
+        ranks,
+        ..Options::of_leaves_alone(vec![path.to_string_lossy().into_owned()])
+    };
+    let report = verify(&options, &programs).map_err(|error| match error {
         VerifyError::Input(why) => GateError::Input(why),
         VerifyError::Missing(why) => GateError::Missing(why),
-    })
+    })?;
+    let mut cases = report.cases.into_iter();
+    cases.next().ok_or_else(|| GateError::Input(format!("{} was not verified", case.rule.name)))
 }
 
-fn finding(case: &CaseReport) -> Finding {
-    let tally = case.tally();
-    let failure = case.checks.iter().find_map(|check| match &check.outcome {
-        Outcome::Fail(why) => {
+/// A finding for the serial mesh, and one for each number of ranks.
+fn findings(bench: &Bench, case: &Selected, report: &CaseReport) -> Vec<Finding> {
+    let name = &case.rule.name;
+    if let Some(why) = &report.input_error {
+        return vec![Finding::noted(name, CHECKS, Verdict::Regression, why)];
+    }
+    let ranks = std::iter::once(None).chain(bench.ranks_on_mpi(case).into_iter().map(Some));
+    let of_ranks = |ranks: Option<usize>| {
+        let checks: Vec<&Check> =
+            report.checks.iter().filter(|check| check.ranks == ranks).collect();
+        let metric = ranks.map_or(CHECKS.to_owned(), |ranks| format!("{ranks} MPI ranks/{CHECKS}"));
+        finding(name, &metric, &checks)
+    };
+    ranks.map(of_ranks).collect()
+}
+
+fn finding(case: &str, metric: &str, checks: &[&Check]) -> Finding {
+    let tally: Tally = checks.iter().copied().collect();
+    let failure = checks.iter().find_map(|check| match &check.outcome {
+        Outcome::Fail { why } => {
             let first = why.lines().next().unwrap_or_default();
             Some(format!("{}: {}: {first}", check.subject, check.name))
         }
         _ => None,
     });
-    let failure = failure.or(case.input_error.clone());
-    let left_out = case.checks.iter().find_map(|check| match &check.outcome {
-        Outcome::LeftOut(why) => Some(why.clone()),
+    let left_out = checks.iter().find_map(|check| match &check.outcome {
+        Outcome::LeftOut { why } => Some(why.clone()),
         _ => None,
     });
+    let compared = (tally.pass + tally.fail) as u64;
     let (verdict, note) = match failure {
-        None if tally.pass == 0 => (Verdict::LeftOut, left_out.unwrap_or_default()),
+        None if compared == 0 => {
+            (Verdict::Missing, left_out.unwrap_or_else(|| "no check was run".to_owned()))
+        }
         Some(why) => (Verdict::Regression, format!("{} checks fail, the first: {why}", tally.fail)),
         None => (Verdict::Unchanged, format!("{} checks hold", tally.pass)),
     };
-    Finding::without_numbers(&case.name, "checks", verdict, note)
+    Finding { compared, ..Finding::noted(case, metric, verdict, note) }
 }

@@ -1,7 +1,7 @@
 //! Known findings: a mesher whose baseline fails checks passes if it fails none that the baseline holds, and none with more
 //! findings.
 
-use super::report::{Finding, Verdict};
+use super::report::{CHECKS, Finding, Verdict};
 use run::verify::case::RUNS;
 use run::verify::report::{CaseReport, Check, Outcome};
 use std::collections::BTreeMap;
@@ -20,13 +20,13 @@ pub fn known(case: &CaseReport) -> Known {
 }
 
 /// Compares a case that fails checks with the failed checks of the baseline.
-pub fn against(case: &CaseReport, baseline: &Known) -> Finding {
+pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> Finding {
     let candidate = known(case);
     let is_worse = |check: &&Check| {
         check.failed() && baseline.get(&key(check)).is_none_or(|old| candidate[&key(check)] > *old)
     };
     let first = |check: &Check| match &check.outcome {
-        Outcome::Fail(why) => why.lines().next().unwrap_or_default().to_owned(),
+        Outcome::Fail { why } => why.lines().next().unwrap_or_default().to_owned(),
         _ => String::new(),
     };
     let total = |known: &Known| known.values().sum::<u64>();
@@ -40,20 +40,17 @@ pub fn against(case: &CaseReport, baseline: &Known) -> Finding {
     let without_mesh = case.checks.iter().find(|check| check.failed() && check.name == RUNS);
     let (verdict, note) = match (case.checks.iter().find(is_worse), without_mesh) {
         (Some(worse), _) => {
-            let (name, why) = (key(worse), first(worse));
-            (Verdict::Regression, format!("{counts}; worse than the baseline: {name}: {why}"))
+            let (check, why) = (key(worse), first(worse));
+            (Verdict::Regression, format!("{counts}; worse than the baseline: {check}: {why}"))
         }
         (None, Some(check)) => {
-            (Verdict::Inconclusive, format!("neither program makes a mesh: {}", first(check)))
+            (Verdict::Missing, format!("neither program makes a mesh: {}", first(check)))
         }
         (None, None) if candidate == *baseline => (Verdict::Unchanged, counts),
         (None, None) => (Verdict::Improvement, counts),
     };
-    Finding {
-        baseline: Some(total(baseline) as f64),
-        candidate: Some(total(&candidate) as f64),
-        ..Finding::without_numbers(&case.name, "checks", verdict, note)
-    }
+    let numbers = [total(baseline), total(&candidate)].map(|count| count as f64);
+    Finding::of_values(name, CHECKS, verdict, numbers, note)
 }
 
 #[cfg(test)]
@@ -63,30 +60,31 @@ mod tests {
     fn case(failed: &[(&str, u64)]) -> CaseReport {
         let check = |(name, findings): &(&str, u64)| {
             let counts = [("findings".to_owned(), *findings)].into();
-            Check { counts, ..Check::new("serial", *name, Outcome::Fail("here\nthere".into())) }
+            Check { counts, ..Check::new("serial", *name, Outcome::fail("here\nthere")) }
         };
         let mut checks: Vec<Check> = failed.iter().map(check).collect();
-        checks.push(Check::new("serial", "balance", Outcome::Pass));
+        checks.push(Check::new("serial", "balance", Outcome::held(1)));
         CaseReport { name: "c".into(), checks, ..CaseReport::default() }
     }
 
     #[test]
     fn only_new_and_more_findings_are_a_regression() {
         let baseline = known(&case(&[("layer", 7), ("spacing", 2)]));
-        let of = |failed: &[(&str, u64)]| against(&case(failed), &baseline).verdict;
+        let of = |failed: &[(&str, u64)]| against("c", &case(failed), &baseline).verdict;
         assert_eq!(of(&[("layer", 7), ("spacing", 2)]), Verdict::Unchanged);
         assert_eq!(of(&[("layer", 6), ("spacing", 2)]), Verdict::Improvement);
         assert_eq!(of(&[("layer", 7)]), Verdict::Improvement);
         assert_eq!(of(&[("layer", 8), ("spacing", 1)]), Verdict::Regression);
         assert_eq!(of(&[("layer", 1), ("sides", 1)]), Verdict::Regression);
-        let note = against(&case(&[("sides", 1)]), &baseline).note;
+        let note = against("c", &case(&[("sides", 1)]), &baseline).note;
         assert!(note.contains("worse than the baseline: serial: sides: here"), "{note}");
     }
 
     #[test]
     fn two_programs_without_a_mesh_cannot_be_compared() {
         let baseline = known(&case(&[(RUNS, 1)]));
-        assert_eq!(against(&case(&[(RUNS, 1)]), &baseline).verdict, Verdict::Inconclusive);
-        assert_eq!(against(&case(&[(RUNS, 1)]), &Known::new()).verdict, Verdict::Regression);
+        let verdict = |known: &Known| against("c", &case(&[(RUNS, 1)]), known).verdict;
+        assert_eq!(verdict(&baseline), Verdict::Missing);
+        assert_eq!(verdict(&Known::new()), Verdict::Regression);
     }
 }

@@ -1,6 +1,7 @@
-//! The exact measures of one program: counters, digests, instructions. Recorded, they are a baseline that needs no build,
+//! The measures of one program: counters, digests, memory, instructions. Recorded, they are a baseline that needs no build,
 //! and a point in the history of `harness track`.
 
+use super::report::LayerName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,6 +16,9 @@ pub struct Measures {
     pub schema: String,
     /// The program.
     pub of: Measured,
+    /// The machine; empty in old records.
+    #[serde(default)]
+    pub machine: String,
     /// By case.
     pub cases: BTreeMap<String, CaseMeasures>,
 }
@@ -26,6 +30,9 @@ pub struct Measured {
     pub named: String,
     /// The revision it was built from.
     pub revision: Option<String>,
+    /// Digest of the program file; empty in old records.
+    #[serde(default)]
+    pub program: String,
 }
 
 impl fmt::Display for Measured {
@@ -39,24 +46,44 @@ impl fmt::Display for Measured {
     }
 }
 
+/// Numbers by metric.
+pub type Numbers = BTreeMap<String, u64>;
+
 /// The measures of one case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CaseMeasures {
     /// The mesh's digest.
     pub digest: Option<String>,
+    /// Digest of the facets as the program read them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<String>,
     /// Deterministic counters by name.
-    pub exact: BTreeMap<String, u64>,
+    pub exact: Numbers,
+    /// Peak memory of all ranks together, in bytes.
+    #[serde(default)]
+    pub memory: Numbers,
     /// Counts by valgrind; deterministic except for hash seeds and addresses.
-    pub counted: BTreeMap<String, u64>,
+    pub counted: Numbers,
     /// Number of findings by failed check.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub findings: BTreeMap<String, u64>,
+    pub findings: Numbers,
+}
+
+impl CaseMeasures {
+    /// The numbers that a layer compares.
+    pub fn of_layer(&mut self, layer: LayerName) -> &mut Numbers {
+        match layer {
+            LayerName::Memory => &mut self.memory,
+            LayerName::Instructions => &mut self.counted,
+            _ => &mut self.exact,
+        }
+    }
 }
 
 impl Measures {
     /// Returns empty measures.
     pub fn of_program(of: Measured) -> Self {
-        Self { schema: SCHEMA.to_owned(), of, cases: BTreeMap::new() }
+        Self { schema: SCHEMA.to_owned(), of, ..Self::default() }
     }
 
     /// Returns the entry of a case.

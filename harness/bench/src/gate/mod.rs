@@ -1,37 +1,43 @@
-//! `harness gate`: compares a candidate with a baseline in four layers, from deterministic to noisy: correctness, counters,
-//! instructions, time.
+//! `harness gate`: compares a candidate with a baseline in five layers, from deterministic to noisy: correctness, counters,
+//! memory, instructions, time.
 //!
-//! [`rules`] defines cases and tolerances; [`subject`] finds or builds the two programs; [`measures`] holds the exact measures
-//! of one; [`counters`], [`instructions`] and [`time`] compare, the last with [`crate::statistics::comparison`]; [`report`] is
-//! the result. [`power`] measures which slow-downs the gate finds, with the program [`planted`].
+//! [`rules`] defines cases, ranks and tolerances; [`subject`] finds or builds the two programs; [`measures`] holds the exact
+//! measures of one; [`correctness`], [`numbers`] and [`time`] compare, the last with [`crate::statistics::comparison`];
+//! [`report`] is the result, which cannot hold without a comparison of every case.
 //!
 //! Invariant: times of different sessions are never compared.
 
 pub mod build;
 pub mod callgrind;
 pub mod correctness;
-pub mod counters;
-pub mod instructions;
 pub mod known;
 pub mod measures;
+pub mod numbers;
 pub mod phases;
-pub mod planted;
-pub mod power;
-pub mod quantity;
 pub mod report;
 pub mod rules;
 pub mod subject;
 pub mod time;
 
+use crate::experiments::machine;
 use measures::Measures;
+use numbers::Measurement;
 use report::{Finding, Layer, LayerName, Report, Verdict};
 use rules::{Rules, Selected};
+use run::engine::failure::Failure;
 use run::engine::interrupt;
+use run::engine::launcher::Launcher;
+use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use subject::{Baseline, Subject};
+
+/// Seed of the schedule of simulated ranks: counters must not depend on it.
+const SEED: u64 = 1;
 
 /// The options of a gate.
 #[derive(Clone, Debug)]
@@ -46,6 +52,8 @@ pub struct Options {
     pub cases: Vec<String>,
     /// Only these layers.
     pub layers: Vec<LayerName>,
+    /// Whether layers and cases must not be left out.
+    pub require_layers: bool,
     /// Seed of the order of runs and of the permutations.
     pub seed: u64,
     /// Time limit of every single run.
@@ -72,18 +80,17 @@ pub enum GateError {
 /// The input of every layer.
 #[derive(Debug)]
 pub struct Bench<'a> {
-    /// The options.
-    pub options: &'a Options,
-    /// Cases and tolerances.
-    pub rules: &'a Rules,
-    /// The selected cases.
-    pub cases: Vec<Selected>,
-    /// The programs.
-    pub programs: &'a Programs,
-    /// The candidate.
-    pub candidate: Engine,
+    options: &'a Options,
+    rules: &'a Rules,
+    cases: Vec<Selected>,
+    programs: &'a Programs,
+    candidate: Engine,
     /// Directory for the files of runs.
-    pub place: &'a std::path::Path,
+    place: &'a std::path::Path,
+    /// Why there are no ranks on MPI.
+    no_mpi: Option<String>,
+    /// Counters and memory, of which each layer takes its own, by program and case.
+    counted: RefCell<HashMap<(PathBuf, String), Result<Measurement, Failure>>>,
 }
 
 /// Runs all requested layers and returns the report.
@@ -105,23 +112,40 @@ pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError>
         rules: &rules,
         cases,
         programs,
+        no_mpi: no_mpi(&candidate.engine, programs),
         candidate: candidate.engine.clone(),
         place: place.path(),
+        counted: RefCell::default(),
     };
-    let mut report = Report::new(baseline.measured(), candidate.measured.clone());
-    report.candidate_measures = Measures::of_program(candidate.measured);
+    let mpirun = &programs.paths.mpirun;
+    let measures = Measures {
+        machine: machine::describe(mpirun, &options.repository).label(),
+        ..Measures::of_program(candidate.measured)
+    };
+    let mut report = Report::new(baseline.measured(), measures);
+    report.require_layers = options.require_layers;
     run_layers(&bench, &baseline, &mut report)?;
     report.interrupted = interrupt::requested();
     report.time_s = start.elapsed().as_secs_f64();
+    report.check_invariants();
     Ok(report)
+}
+
+/// Returns why an engine cannot be run on MPI.
+fn no_mpi(engine: &Engine, programs: &Programs) -> Option<String> {
+    let mpirun = &programs.paths.mpirun;
+    if !Launcher::mpirun(mpirun).is_found() {
+        return Some("mpirun is not on the PATH (ci/setup installs it)".to_owned());
+    }
+    let description = engine.description();
+    let why = || format!("the description of {} has no command for ranks on MPI", description.name);
+    description.run.parallel.is_none().then(why)
 }
 
 fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result<(), GateError> {
     // Without a choice of layers, those are requested for which the rules have a case.
-    let has_case =
-        |name: &LayerName| bench.cases.iter().any(|case| case.rule.layers.contains(name));
     let requested = |name: &LayerName| match bench.options.layers.is_empty() {
-        true => has_case(name),
+        true => bench.asked(*name).next().is_some(),
         false => bench.options.layers.contains(name),
     };
     for name in LayerName::ALL.into_iter().filter(requested) {
@@ -130,18 +154,15 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
         }
         let start = Instant::now();
         crate::announce(&format!("harness gate: {name}"));
-        let mut layer = match name {
-            LayerName::Correctness => {
-                correctness::layer(bench, baseline, &mut report.candidate_measures)?
-            }
-            LayerName::Counters => counters::layer(bench, baseline, &mut report.candidate_measures),
-            LayerName::Instructions => {
-                instructions::layer(bench, baseline, &mut report.candidate_measures)
-            }
-            LayerName::Time => time::layer(bench, baseline),
-        };
-        layer.findings.extend(bench.left_out_of(name));
-        layer.note_nothing_examined();
+        let cases = bench.asked(name).map(|case| case.rule.name.clone()).collect();
+        let mut layer = Layer::new(name, cases);
+        let measures = &mut report.candidate_measures;
+        match name {
+            LayerName::Correctness => correctness::layer(bench, baseline, measures, &mut layer)?,
+            LayerName::Time => time::layer(bench, baseline, &mut layer),
+            _ => numbers::layer(bench, baseline, measures, &mut layer),
+        }
+        layer.findings.extend(bench.cases_left_out(name));
         layer.time_s = start.elapsed().as_secs_f64();
         report.layers.push(layer);
     }
@@ -149,19 +170,69 @@ fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result
 }
 
 impl Bench<'_> {
+    /// Returns the cases for which the rules ask a layer.
+    fn asked(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
+        self.cases.iter().filter(move |case| case.rule.layers.contains(&layer))
+    }
+
     /// Returns the cases of a layer that can be run.
     fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
-        let of_layer = self.cases.iter().filter(move |case| case.rule.layers.contains(&layer));
-        of_layer.filter(|case| case.path.is_ok())
+        self.asked(layer).filter(|case| case.path.is_ok())
     }
 
     /// Returns the other cases of a layer as findings with their reasons.
-    fn left_out_of(&self, layer: LayerName) -> impl Iterator<Item = Finding> {
-        let of_layer = self.cases.iter().filter(move |case| case.rule.layers.contains(&layer));
-        of_layer.filter_map(|case| {
+    fn cases_left_out(&self, layer: LayerName) -> impl Iterator<Item = Finding> {
+        self.asked(layer).filter_map(|case| {
             let why = case.path.as_ref().err()?;
-            Some(Finding::without_numbers(&case.rule.name, "runs", Verdict::LeftOut, why))
+            Some(Finding::noted(&case.rule.name, "runs", Verdict::LeftOut, why))
         })
+    }
+
+    /// Returns the real ranks of a case: those of the rules, and those that the engine cannot simulate.
+    fn ranks_on_mpi(&self, case: &Selected) -> Vec<usize> {
+        if self.no_mpi.is_some() {
+            return Vec::new();
+        }
+        let simulates = self.candidate.description().run.simulated.is_some();
+        let instead =
+            case.rule.ranks.iter().filter(|ranks| !simulates && !case.rule.mpi.contains(ranks));
+        case.rule.mpi.iter().chain(instead).copied().collect()
+    }
+
+    /// Returns the reason for which a case is not run on its real ranks, as a finding.
+    fn ranks_left_out(&self, case: &Selected) -> Option<Finding> {
+        let simulates = self.candidate.description().run.simulated.is_some();
+        let asks = !case.rule.mpi.is_empty() || !case.rule.ranks.is_empty() && !simulates;
+        let why = self.no_mpi.as_ref().filter(|_| asks)?;
+        Some(Finding::noted(&case.rule.name, "ranks on MPI", Verdict::LeftOut, why))
+    }
+
+    /// Returns the ranks on which a case is counted.
+    fn layouts(&self, case: &Selected) -> Vec<Ranks> {
+        let simulates = self.candidate.description().run.simulated.is_some();
+        let simulated = case.rule.ranks.iter().filter(|_| simulates);
+        let simulated = simulated.map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
+        let real = self.ranks_on_mpi(case).into_iter().map(Ranks::Mpi);
+        std::iter::once(Ranks::Serial).chain(simulated).chain(real).collect()
+    }
+
+    /// Returns what a layer measures of a program on a case; counters and memory are of the same runs.
+    fn measured(
+        &self,
+        engine: &Engine,
+        case: &Selected,
+        layer: LayerName,
+    ) -> Result<Measurement, Failure> {
+        if layer == LayerName::Instructions {
+            return numbers::instructions(self, engine, case);
+        }
+        let key = (engine.program().to_owned(), case.rule.name.clone());
+        if let Some(known) = self.counted.borrow().get(&key) {
+            return known.clone();
+        }
+        let counted = numbers::count(self, engine, case);
+        self.counted.borrow_mut().insert(key, counted.clone());
+        counted
     }
 
     /// Creates an empty directory for one run.
@@ -171,9 +242,4 @@ impl Bench<'_> {
         std::fs::create_dir_all(&place).map_err(|error| error.to_string())?;
         Ok(place)
     }
-}
-
-/// Returns a skipped layer with the reason.
-pub(crate) fn left_out(name: LayerName, why: impl Into<String>) -> Layer {
-    Layer { left_out: Some(why.into()), ..Layer::new(name) }
 }

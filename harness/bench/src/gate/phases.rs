@@ -1,48 +1,93 @@
-//! The phases that changed. A change that is too small for the whole process is often clear in its phase.
+//! Times over all rounds of a case, and the phases that changed. A change that is too small for the whole process is often
+//! clear in its phase.
 //!
 //! Invariant: a phase that became slower is a regression only if the other phases do not save that time, because
 //! work may move from one phase to another.
 
-use super::quantity::{OUTSIDE, Quantity, certainty, size};
 use super::report::{Finding, Verdict};
 use super::rules::TimeRules;
+use crate::statistics::comparison::{Comparison, Round};
+use crate::statistics::trimmed_mean;
+
+/// CPU time of the whole process.
+pub const CPU: &str = "CPU time";
+/// Wall time of the whole process.
+pub const WALL: &str = "wall time";
+
+/// CPU time of the process outside all phases that it reports: before the first, between them, after the last.
+pub const OUTSIDE: &str = "outside the phases";
+
+/// A time that the gate compares, over all rounds of a case.
+#[derive(Debug)]
+pub(super) struct Quantity {
+    /// [`CPU`], [`WALL`], [`OUTSIDE`], or the name of a phase.
+    pub name: String,
+    /// Logarithms of its times.
+    pub rounds: Vec<Round>,
+    /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
+    pub found: Option<Comparison>,
+}
+
+impl Quantity {
+    /// A quantity without rounds.
+    pub fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), rounds: Vec::new(), found: None }
+    }
+
+    /// Times of baseline and candidate, in seconds. That of the candidate follows from the effect: means of their own would
+    /// discard other rounds at their ends than the mean of the differences does, and could have a ratio of the other sign.
+    pub fn times(&self) -> [f64; 2] {
+        let baseline: Vec<f64> = self.rounds.iter().map(|r| (r.a + r.a_again) / 2.0).collect();
+        let baseline = trimmed_mean(&baseline).exp();
+        [baseline, baseline * (1.0 + self.found.map_or(0.0, |found| found.effect))]
+    }
+}
+
+/// The certainty of an effect, as text.
+pub(super) fn certainty(found: &Comparison) -> String {
+    let percent = |ratio: f64| ratio * 100.0;
+    format!(
+        "99 % interval {:+.1} to {:+.1} %, p = {:.5} among all times; noise floor {:.1} %",
+        percent(found.low),
+        percent(found.high),
+        found.p,
+        percent(found.floor)
+    )
+}
+
+/// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
+pub(super) fn size(effect: f64) -> f64 {
+    if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect }
+}
 
 /// Returns a finding for every phase that changed; `whole` is the CPU time of the process.
 pub(super) fn findings(
     case: &str,
+    prefix: &str,
     whole: &Quantity,
     phases: &[Quantity],
     rules: &TimeRules,
 ) -> Vec<Finding> {
-    let whole_s = whole.means().0;
+    let least_s = rules.phase_min / 100.0 * whole.times()[0];
+    let change_s = |phase: &Quantity| phase.times()[1] - phase.times()[0];
     let is_changed = |phase: &&Quantity| {
-        let (before, after) = phase.means();
         phase.found.is_some_and(|found| {
             let least = found.floor.max(rules.effect_min / 100.0);
-            found.p <= rules.alpha
-                && size(found.effect) > least
-                && (after - before).abs() > rules.phase_min / 100.0 * whole_s
+            found.p <= rules.alpha && size(found.effect) > least && change_s(phase).abs() > least_s
         })
     };
     let changed: Vec<&Quantity> = phases.iter().filter(is_changed).collect();
-    let change_s = |phase: &&Quantity| phase.means().1 - phase.means().0;
-    let net_s: f64 = changed.iter().map(change_s).sum();
+    let net_s: f64 = changed.iter().map(|phase| change_s(phase)).sum();
     let finding = |phase: &&Quantity| {
-        let (before, after) = phase.means();
-        let (verdict, why) = match (after > before, net_s > rules.phase_min / 100.0 * whole_s) {
+        let (verdict, why) = match (change_s(phase) > 0.0, net_s > least_s) {
             (true, true) => (Verdict::Regression, ""),
             (true, false) => (Verdict::Changed, "; other phases save as much"),
             (false, _) => (Verdict::Improvement, ""),
         };
-        let found = phase.found?;
-        let part = 100.0 * change_s(phase) / whole_s;
-        let note = format!("{part:+.1} % of the whole{why}; {}", certainty(&found));
-        Some(Finding {
-            baseline: Some(before),
-            candidate: Some(after),
-            change_percent: Some(100.0 * found.effect),
-            ..Finding::without_numbers(case, &metric(&phase.name), verdict, note)
-        })
+        let part = 100.0 * change_s(phase) / whole.times()[0];
+        let note = format!("{part:+.1} % of the whole{why}; {}", certainty(&phase.found?));
+        let metric = format!("{prefix}{}", metric(&phase.name));
+        Some(Finding::of_values(case, &metric, verdict, phase.times(), note))
     };
     changed.iter().filter_map(finding).collect()
 }
@@ -55,7 +100,8 @@ pub fn metric(phase: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::comparison::{Comparison, Round};
+    use crate::statistics::comparison::compare;
+    use proptest::prelude::*;
 
     /// A quantity with a certain change of its time.
     fn quantity(name: &str, before: f64, after: f64) -> Quantity {
@@ -68,7 +114,7 @@ mod tests {
 
     fn verdicts(phases: &[Quantity]) -> Vec<(String, Verdict)> {
         let whole = quantity("CPU time", 1.0, 1.01);
-        let found = findings("c", &whole, phases, &TimeRules::default());
+        let found = findings("c", "", &whole, phases, &TimeRules::default());
         found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
     }
 
@@ -93,5 +139,17 @@ mod tests {
     #[test]
     fn a_change_that_hardly_matters_for_the_whole_is_ignored() {
         assert!(verdicts(&[quantity("read", 0.01, 0.014)]).is_empty());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        /// Of rounds of which half are disturbed, the means of both programs may have the other order than the effect.
+        #[test]
+        fn the_times_have_the_ratio_of_the_effect(drawn in prop::collection::vec(prop::array::uniform3(0.0..2.0f64), 8..20)) {
+            let rounds: Vec<Round> = drawn.iter().map(|&[a, a_again, b]| Round { a, a_again, b }).collect();
+            let found = Some(compare(&rounds, 0.01, 1));
+            let times = Quantity { found, rounds, ..Quantity::new(CPU) }.times();
+            prop_assert!((times[1] / times[0] - 1.0 - found.unwrap().effect).abs() < 1e-9);
+        }
     }
 }

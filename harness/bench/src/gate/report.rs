@@ -1,8 +1,18 @@
 //! The report of a gate, which every output form prints.
+//!
+//! Invariants, executed by [`Report::check_invariants`] before it is printed:
+//! - every case that a layer was asked for has a finding in it, unless the layer was left out or interrupted, and no other case has one;
+//! - a change is that of the two values beside it, and a verdict for the worse or better has the sign of its change;
+//! - a finding that was left out or is missing compared nothing.
+//!
+//! [`End::Holds`] carries the number of comparisons, which is not 0: a report that compared nothing of a case that it was asked for
+//! cannot hold.
 
 use super::measures::{Measured, Measures};
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::fmt;
+use std::num::NonZeroU64;
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "octree-gate/1";
@@ -15,6 +25,8 @@ pub enum LayerName {
     Correctness,
     /// Deterministic counters.
     Counters,
+    /// Peak memory.
+    Memory,
     /// Instructions and allocations, counted by valgrind.
     Instructions,
     /// Run times of baseline and candidate in one session.
@@ -23,7 +35,8 @@ pub enum LayerName {
 
 impl LayerName {
     /// All layers.
-    pub const ALL: [Self; 4] = [Self::Correctness, Self::Counters, Self::Instructions, Self::Time];
+    pub const ALL: [Self; 5] =
+        [Self::Correctness, Self::Counters, Self::Memory, Self::Instructions, Self::Time];
 }
 
 impl fmt::Display for LayerName {
@@ -31,19 +44,21 @@ impl fmt::Display for LayerName {
         f.pad(match self {
             Self::Correctness => "correctness",
             Self::Counters => "counters",
+            Self::Memory => "memory",
             Self::Instructions => "instructions",
             Self::Time => "time",
         })
     }
 }
 
-/// The assessment of a finding, best first after those that were left out.
+/// The assessment of a finding, best first after those without a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Not examined, for the reason in the note.
-    #[serde(rename = "left_out")]
+    /// Not examined, because a prerequisite is missing, for the reason in the note.
     LeftOut,
+    /// Measured, and nothing was given to compare with.
+    Measured,
     /// Better than the baseline.
     Improvement,
     /// Equal to the baseline.
@@ -52,6 +67,8 @@ pub enum Verdict {
     Changed,
     /// The measurement was not sensitive enough.
     Inconclusive,
+    /// Asked for, and not there to be compared.
+    Missing,
     /// Worse than the tolerance, or incorrect.
     Regression,
 }
@@ -60,10 +77,12 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.pad(match self {
             Self::LeftOut => "left out",
+            Self::Measured => "measured",
             Self::Improvement => "improvement",
             Self::Unchanged => "unchanged",
             Self::Changed => "changed",
             Self::Inconclusive => "inconclusive",
+            Self::Missing => "missing",
             Self::Regression => "regression",
         })
     }
@@ -78,6 +97,8 @@ pub struct Finding {
     pub metric: String,
     /// The assessment.
     pub verdict: Verdict,
+    /// Number of quantities or checks that were compared, or measured if there is no baseline.
+    pub compared: u64,
     /// Value of the baseline.
     pub baseline: Option<f64>,
     /// Value of the candidate.
@@ -89,17 +110,13 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Returns a finding without numbers.
-    pub fn without_numbers(
-        case: &str,
-        metric: &str,
-        verdict: Verdict,
-        note: impl Into<String>,
-    ) -> Self {
+    /// Returns a finding without numbers, which compared nothing.
+    pub fn noted(case: &str, metric: &str, verdict: Verdict, note: impl Into<String>) -> Self {
         Self {
             case: case.to_owned(),
             metric: metric.to_owned(),
             verdict,
+            compared: 0,
             baseline: None,
             candidate: None,
             change_percent: None,
@@ -107,31 +124,77 @@ impl Finding {
         }
     }
 
-    /// Returns the finding for a deterministic number with a tolerance in percent.
-    pub fn exact(case: &str, metric: &str, baseline: u64, candidate: u64, tolerance: f64) -> Self {
-        let change = match baseline {
-            0 if candidate == 0 => 0.0,
-            0 => f64::INFINITY,
-            _ => (candidate as f64 / baseline as f64 - 1.0) * 100.0,
-        };
-        let verdict = match candidate.cmp(&baseline) {
-            std::cmp::Ordering::Equal => Verdict::Unchanged,
-            std::cmp::Ordering::Less => Verdict::Improvement,
+    /// Returns a finding about two values.
+    pub fn of_values(
+        case: &str,
+        metric: &str,
+        verdict: Verdict,
+        [baseline, candidate]: [f64; 2],
+        note: String,
+    ) -> Self {
+        Self {
+            compared: 1,
+            baseline: Some(baseline),
+            candidate: Some(candidate),
+            change_percent: change_percent(baseline, candidate),
+            ..Self::noted(case, metric, verdict, note)
+        }
+    }
+
+    /// Returns the finding for a number with a tolerance in percent, below which `less` is the verdict on growth.
+    pub fn exact(
+        case: &str,
+        metric: &str,
+        values: [u64; 2],
+        tolerance: f64,
+        less: Verdict,
+    ) -> Self {
+        let [baseline, candidate] = values.map(|value| value as f64);
+        let change = change_percent(baseline, candidate);
+        let verdict = match values[1].cmp(&values[0]) {
+            Ordering::Equal => Verdict::Unchanged,
             // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
-            std::cmp::Ordering::Greater if change <= tolerance + 1e-9 => Verdict::Changed,
-            std::cmp::Ordering::Greater => Verdict::Regression,
+            _ if change.is_some_and(|by| by.abs() <= tolerance + 1e-9) => less,
+            Ordering::Less => Verdict::Improvement,
+            Ordering::Greater => Verdict::Regression,
         };
         let note = match verdict {
             Verdict::Regression => format!("exceeds the tolerance of {tolerance} %"),
             Verdict::Changed => format!("within the tolerance of {tolerance} %"),
             _ => String::new(),
         };
-        Self {
-            baseline: Some(baseline as f64),
-            candidate: Some(candidate as f64),
-            change_percent: Some(change).filter(|change| change.is_finite()),
-            ..Self::without_numbers(case, metric, verdict, note)
+        Self::of_values(case, metric, verdict, [baseline, candidate], note)
+    }
+
+    fn check_invariants(&self) {
+        if let (Some(baseline), Some(candidate)) = (self.baseline, self.candidate) {
+            let expected = change_percent(baseline, candidate);
+            assert_eq!(expected, self.change_percent, "the change is that of the values: {self:?}");
+            let expected = match self.verdict {
+                Verdict::Regression => Some(Ordering::Greater),
+                Verdict::Improvement => Some(Ordering::Less),
+                _ => None,
+            };
+            let is_right =
+                expected.is_none_or(|sign| candidate.partial_cmp(&baseline) == Some(sign));
+            assert!(
+                is_right || self.metric == CHECKS,
+                "the verdict has the sign of the change: {self:?}"
+            );
         }
+        let is_empty = matches!(self.verdict, Verdict::LeftOut | Verdict::Missing);
+        assert!(!is_empty || self.compared == 0, "nothing was compared: {self:?}");
+    }
+}
+
+/// Metric of the checks, of which one may fail that did not although fewer fail.
+pub const CHECKS: &str = "checks";
+
+fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
+    match (baseline == candidate, baseline == 0.0) {
+        (true, _) => Some(0.0),
+        (_, true) => None,
+        _ => Some((candidate / baseline - 1.0) * 100.0),
     }
 }
 
@@ -140,7 +203,9 @@ impl Finding {
 pub struct Layer {
     /// Its name.
     pub name: LayerName,
-    /// Why it was skipped.
+    /// The cases for which it was asked.
+    pub cases: Vec<String>,
+    /// Why it was skipped as a whole: a prerequisite is missing.
     pub left_out: Option<String>,
     /// The findings.
     pub findings: Vec<Finding>,
@@ -150,8 +215,8 @@ pub struct Layer {
 
 impl Layer {
     /// Returns an empty value.
-    pub fn new(name: LayerName) -> Self {
-        Self { name, left_out: None, findings: Vec::new(), time_s: 0.0 }
+    pub fn new(name: LayerName, cases: Vec<String>) -> Self {
+        Self { name, cases, left_out: None, findings: Vec::new(), time_s: 0.0 }
     }
 
     /// Returns the worst verdict of the findings.
@@ -160,13 +225,34 @@ impl Layer {
         worst.unwrap_or(Verdict::LeftOut)
     }
 
-    /// Marks a layer that examined nothing as left out.
-    pub fn note_nothing_examined(&mut self) {
-        if self.left_out.is_none() && self.verdict() == Verdict::LeftOut {
-            let first = self.findings.first().map(|finding| finding.note.clone());
-            self.left_out = Some(first.unwrap_or_else(|| "nothing was compared".to_owned()));
-        }
+    /// Returns the number of comparisons of a case.
+    fn compared(&self, case: &str) -> Option<NonZeroU64> {
+        let of_case = self.findings.iter().filter(|finding| finding.case == case);
+        NonZeroU64::new(of_case.map(|finding| finding.compared).sum())
     }
+
+    /// Returns why nothing of a case was compared, and whether a missing prerequisite excuses that.
+    fn reason(&self, case: &str) -> (bool, String) {
+        let of_case = || self.findings.iter().filter(|finding| finding.case == case);
+        let excused = self.left_out.is_some()
+            || of_case().next().is_some() && of_case().all(|f| f.verdict == Verdict::LeftOut);
+        let note = of_case().map(|finding| finding.note.clone()).find(|note| !note.is_empty());
+        let why = self.left_out.clone().or(note).unwrap_or_else(|| "it has no quantity".to_owned());
+        (excused, format!("{} of {case}: nothing was compared: {why}", self.name))
+    }
+}
+
+/// How a gate ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Nothing got worse in this number of comparisons, at least one for every case of every layer that was not left out.
+    Holds(NonZeroU64),
+    /// The user interrupted it.
+    Interrupted,
+    /// Something got worse.
+    Regression,
+    /// Something that was asked for was not compared; the reason.
+    Incomplete(String),
 }
 
 /// The whole comparison.
@@ -182,6 +268,8 @@ pub struct Report {
     pub candidate: Measured,
     /// The requested layers.
     pub layers: Vec<Layer>,
+    /// Whether layers and cases must not be left out.
+    pub require_layers: bool,
     /// The exact measures of the candidate, which can serve as a baseline.
     pub candidate_measures: Measures,
     /// Whether the user interrupted it.
@@ -191,82 +279,70 @@ pub struct Report {
 }
 
 impl Report {
-    /// Returns an empty value.
-    pub fn new(baseline: Option<Measured>, candidate: Measured) -> Self {
+    /// Returns a report without layers.
+    pub fn new(baseline: Option<Measured>, candidate_measures: Measures) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
             program: format!("harness {}", env!("CARGO_PKG_VERSION")),
             baseline,
-            candidate,
+            candidate: candidate_measures.of.clone(),
             layers: Vec::new(),
-            candidate_measures: Measures::default(),
+            require_layers: false,
+            candidate_measures,
             interrupted: false,
             time_s: 0.0,
         }
     }
 
-    /// Whether no layer has a regression.
-    pub fn holds(&self) -> bool {
-        self.layers.iter().all(|layer| layer.verdict() < Verdict::Regression)
+    /// Returns how the gate ends.
+    pub fn end(&self) -> End {
+        if self.interrupted {
+            return End::Interrupted;
+        }
+        if self.layers.iter().any(|layer| layer.verdict() == Verdict::Regression) {
+            return End::Regression;
+        }
+        let mut total = None;
+        for layer in &self.layers {
+            for case in &layer.cases {
+                match layer.compared(case) {
+                    Some(some) => {
+                        total = Some(some.saturating_add(total.map_or(0, NonZeroU64::get)))
+                    }
+                    None => match layer.reason(case) {
+                        (true, _) if !self.require_layers => {}
+                        (_, why) => return End::Incomplete(why),
+                    },
+                }
+            }
+            let mut missing = layer.findings.iter().filter(|f| f.verdict == Verdict::Missing);
+            if let Some(Finding { case, metric, note, .. }) = missing.next() {
+                return End::Incomplete(format!("{} of {case}: {metric}: {note}", layer.name));
+            }
+            if layer.cases.is_empty() {
+                return End::Incomplete(format!("the rules have no case for {}", layer.name));
+            }
+        }
+        match total {
+            Some(total) => End::Holds(total),
+            None => End::Incomplete("nothing was compared".to_owned()),
+        }
+    }
+
+    /// Executes the invariants at the head of this file.
+    pub fn check_invariants(&self) {
+        for layer in &self.layers {
+            for finding in &layer.findings {
+                finding.check_invariants();
+                assert!(layer.cases.contains(&finding.case), "a case of the rules: {finding:?}");
+            }
+            let found = |case: &String| layer.findings.iter().any(|f| f.case == *case);
+            let silent = layer.cases.iter().find(|case| !found(case));
+            let excused = self.interrupted || layer.left_out.is_some();
+            assert!(excused || silent.is_none(), "{} has no finding on {silent:?}", layer.name);
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_growth_beyond_the_tolerance_is_a_regression() {
-        let verdict = |baseline, candidate, tolerance| {
-            Finding::exact("c", "m", baseline, candidate, tolerance).verdict
-        };
-        assert_eq!(verdict(100, 100, 0.0), Verdict::Unchanged);
-        assert_eq!(verdict(100, 101, 0.0), Verdict::Regression);
-        assert_eq!(verdict(100, 101, 1.5), Verdict::Changed);
-        assert_eq!(verdict(100, 99, 0.0), Verdict::Improvement);
-        assert_eq!(verdict(0, 0, 0.0), Verdict::Unchanged);
-        assert_eq!(verdict(0, 1, 50.0), Verdict::Regression);
-    }
-
-    #[test]
-    fn a_layer_has_the_worst_verdict_of_its_findings() {
-        let mut layer = Layer::new(LayerName::Time);
-        assert_eq!(layer.verdict(), Verdict::LeftOut);
-        for verdict in
-            [Verdict::LeftOut, Verdict::Improvement, Verdict::Inconclusive, Verdict::Changed]
-        {
-            layer.findings.push(Finding::without_numbers("c", "m", verdict, ""));
-        }
-        assert_eq!(layer.verdict(), Verdict::Inconclusive);
-    }
-
-    #[test]
-    fn a_layer_without_an_examined_finding_is_left_out() {
-        let of = |verdicts: &[Verdict]| {
-            let mut layer = Layer::new(LayerName::Time);
-            let finding = |&verdict| Finding::without_numbers("c", "m", verdict, "too deep");
-            layer.findings = verdicts.iter().map(finding).collect();
-            layer.note_nothing_examined();
-            layer.left_out
-        };
-        assert_eq!(of(&[]).as_deref(), Some("nothing was compared"));
-        assert_eq!(of(&[Verdict::LeftOut; 2]).as_deref(), Some("too deep"));
-        assert_eq!(of(&[Verdict::LeftOut, Verdict::Unchanged]), None);
-    }
-
-    #[test]
-    fn a_record_and_a_report_read_back() {
-        let mut measures = Measures::of_program(Measured { named: "m".into(), revision: None });
-        measures.case("cube").exact.insert("rays".into(), u64::MAX);
-        assert_eq!(Measures::parse(measures.json().as_bytes()).unwrap(), measures);
-        let report = Report {
-            candidate_measures: measures.clone(),
-            ..Report::new(None, Measured::default())
-        };
-        let text = serde_json::to_vec(&report).unwrap();
-        assert_eq!(Measures::parse(&text).unwrap(), measures);
-        assert!(Measures::parse(b"{\"cells\": 1}").is_err());
-        let other = measures.json().replace("measures/1", "measures/9");
-        assert!(Measures::parse(other.as_bytes()).unwrap_err().contains("measures/9"));
-    }
-}
+mod tests;

@@ -34,13 +34,15 @@ pub struct Tolerance {
     pub counters: f64,
     /// Default for instructions.
     pub instructions: f64,
+    /// Default for peak memory.
+    pub memory: f64,
     /// By metric; tolerances of a case take precedence.
     pub of: BTreeMap<String, f64>,
 }
 
 impl Default for Tolerance {
     fn default() -> Self {
-        Self { counters: 0.0, instructions: 1.0, of: BTreeMap::new() }
+        Self { counters: 0.0, instructions: 1.0, memory: 10.0, of: BTreeMap::new() }
     }
 }
 
@@ -86,9 +88,12 @@ pub struct CaseRule {
     pub name: String,
     /// Layers that include the case.
     pub layers: Vec<LayerName>,
-    /// Numbers of simulated ranks on which counters are also compared.
+    /// Numbers of simulated ranks on which counters and memory are also compared; ranks on MPI for an engine without them.
     #[serde(default)]
     pub ranks: Vec<usize>,
+    /// Numbers of ranks on MPI on which correctness, counters, memory and time are also compared.
+    #[serde(default)]
+    pub mpi: Vec<usize>,
     /// Tolerated growth in percent by counter, as named in the report, or `instructions`.
     #[serde(default)]
     pub tolerance: BTreeMap<String, f64>,
@@ -124,6 +129,7 @@ impl Rules {
                 "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into(),
             ));
         }
+        rules.check_cases().map_err(wrong)?;
         let least = rounds_min(time.alpha);
         if time.rounds_min < least || time.rounds_max < time.rounds_min {
             return Err(wrong(format!(
@@ -131,6 +137,27 @@ impl Rules {
             )));
         }
         Ok(rules)
+    }
+
+    /// Checks that there are cases, each with a name of its own and something to compare.
+    fn check_cases(&self) -> Result<(), String> {
+        if self.cases.is_empty() {
+            return Err("it has no [[case]], so there is nothing to compare".to_owned());
+        }
+        for (i, case) in self.cases.iter().enumerate() {
+            let why = match case {
+                _ if case.layers.is_empty() => "has no layers",
+                _ if self.cases[..i].iter().any(|other| other.name == case.name) => {
+                    "is there twice"
+                }
+                _ if case.ranks.iter().chain(&case.mpi).any(|ranks| *ranks < 2) => {
+                    "has ranks below 2: the serial run is always there"
+                }
+                _ => continue,
+            };
+            return Err(format!("case {} {why}", case.name));
+        }
+        Ok(())
     }
 
     /// Returns the named cases, or all if no name is given.
@@ -176,14 +203,18 @@ impl Rules {
 }
 
 impl Tolerance {
-    /// Returns the tolerated growth of a metric in percent: that of the case, else of the metric, else `kind`.
-    pub fn of_metric(&self, case: &CaseRule, metric: &str, kind: f64) -> f64 {
+    /// Returns the tolerated growth of a metric in percent: that of the case, else of the metric, else of the layer.
+    pub fn of_metric(&self, case: &CaseRule, metric: &str, layer: LayerName) -> f64 {
         // "4 ranks/messages" is also known as "messages".
         let plain = metric.rsplit('/').next().unwrap_or(metric);
         let tables = [&case.tolerance, &self.of];
         let own =
             tables.into_iter().find_map(|table| table.get(metric).or_else(|| table.get(plain)));
-        own.copied().unwrap_or(kind)
+        own.copied().unwrap_or(match layer {
+            LayerName::Memory => self.memory,
+            LayerName::Instructions => self.instructions,
+            _ => self.counters,
+        })
     }
 }
 
@@ -210,15 +241,21 @@ mod tests {
         let text = "[tolerance.of]\nmessages = 9.0\nhalo = 8.0\n[[case]]\nname = 'a'\nlayers = ['counters']\n\
                     tolerance = { messages = 5.0, '2 ranks/rays' = 1.0 }";
         let rules = read(text).unwrap();
-        let of = |metric| rules.tolerance.of_metric(&rules.cases[0], metric, 0.5);
-        assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 0.5]);
+        let of = |metric| rules.tolerance.of_metric(&rules.cases[0], metric, LayerName::Memory);
+        assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 10.0]);
         assert_eq!(of("3 ranks/halo"), 8.0);
     }
 
     #[test]
     fn invalid_rules_are_rejected() {
-        assert!(read("[time]\nrounds_min = 3").unwrap_err().contains("rounds_min"));
-        assert!(read("[time]\nalpha = 0.0").unwrap_err().contains("alpha"));
+        let case = "[[case]]\nname = 'a'\nlayers = ['time']\n";
+        let wrong = |text: &str| read(&format!("{text}\n{case}")).unwrap_err();
+        assert!(wrong("[time]\nrounds_min = 3").contains("rounds_min"));
+        assert!(wrong("[time]\nalpha = 0.0").contains("alpha"));
+        assert!(wrong(case).contains("case a is there twice"));
+        assert!(wrong(&format!("{}ranks = [1]", case.replace("'a'", "'b'"))).contains("below 2"));
+        assert!(wrong("[[case]]\nname = 'b'\nlayers = []").contains("case b has no layers"));
+        assert!(read("").unwrap_err().contains("no [[case]]"));
         assert!(read("[[case]]\nname = 'a'\nlayers = ['luck']").unwrap_err().contains("luck"));
     }
 }

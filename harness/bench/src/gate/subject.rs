@@ -3,6 +3,7 @@
 use super::build::{self, revision_of};
 use super::measures::{Measured, Measures};
 use super::{GateError, Options};
+use crate::experiments::machine::digest_of_file;
 use run::engine::runner::Engine;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -37,13 +38,12 @@ impl Baseline {
         let Some(named) = &options.baseline else { return Ok(Self::None) };
         let path = Path::new(named);
         if path.is_file() {
-            let start =
-                fs::read(path).map_err(|error| GateError::Input(format!("{named}: {error}")))?;
+            let start = contract::files::read(path)
+                .map_err(|error| GateError::Input(format!("{named}: {error}")))?;
             if start.first() == Some(&b'{') {
                 let measures = Measures::parse(&start)
                     .map_err(|why| GateError::Input(format!("{named}: {why}")))?;
-                let measured =
-                    Measured { named: named.clone(), revision: measures.of.revision.clone() };
+                let measured = Measured { named: named.clone(), ..measures.of.clone() };
                 return Ok(Self::Record(measured, measures));
             }
         }
@@ -61,6 +61,11 @@ impl Baseline {
 }
 
 impl Subject {
+    fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
+        let program = digest_of_file(engine.program());
+        Self { engine, measured: Measured { named, revision, program } }
+    }
+
     /// The candidate that the options name. By default it is the working tree, built in the same way, if the baseline
     /// is a revision, and else the engine's own program.
     ///
@@ -84,9 +89,8 @@ impl Subject {
                         "{program} is missing: build it, or give its path"
                     )));
                 }
-                let revision = revision_of("HEAD", &options.repository).ok();
-                let measured = Measured { named: program.to_string_lossy().into_owned(), revision };
-                Ok(Self { engine: engine.clone(), measured })
+                let named = program.to_string_lossy().into_owned();
+                Ok(Self::new(engine.clone(), named, None))
             }
         }
     }
@@ -101,8 +105,7 @@ impl Subject {
             }
             let program =
                 fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
-            let measured = Measured { named: named.to_owned(), revision: None };
-            return Ok(Self { engine: engine.with_program(program), measured });
+            return Ok(Self::new(engine.with_program(program), named.to_owned(), None));
         }
         let name = &engine.description().name;
         let build = engine.description().build.as_ref().ok_or_else(|| {
@@ -118,7 +121,6 @@ impl Subject {
             "." => build::working_tree(build, options)?,
             _ => build::revision(build, &revision, options)?,
         };
-        let measured = Measured { named: named.to_owned(), revision: Some(revision) };
-        Ok(Self { engine: engine.with_program(program), measured })
+        Ok(Self::new(engine.with_program(program), named.to_owned(), Some(revision)))
     }
 }

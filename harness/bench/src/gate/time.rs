@@ -1,57 +1,68 @@
-//! The layer of time: baseline and candidate run interleaved, so that the load of the machine affects both equally.
+//! The layer of time: baseline and candidate run interleaved, so that the load of the machine affects both equally, serially and
+//! on the real ranks of the rules.
 //!
 //! Three kinds of quantities are compared: the CPU time and the wall time of the whole process, seen from outside, and the
 //! CPU time of every phase that the program reports, with what lies outside all phases. All of them are tested together:
 //! [`adjusted`] controls the rate of false discoveries.
 
-use super::phases;
-use super::quantity::{CPU, OUTSIDE, Quantity, WALL, certainty, size};
+use super::Bench;
+use super::numbers::prefix;
+use super::phases::{self, CPU, OUTSIDE, Quantity, WALL, certainty, size};
 use super::report::{Finding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
-use super::{Bench, left_out};
 use crate::statistics::comparison::{Comparison, Round, compare};
 use crate::statistics::false_discovery::adjusted;
 use crate::statistics::random::Random;
 use run::engine::failure::Failure;
 use run::engine::interrupt;
-use run::engine::layout::SERIAL;
+use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
 use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine};
 use std::path::Path;
 
+/// The times of a case on some ranks.
+struct Timed<'a> {
+    case: &'a str,
+    ranks: Ranks,
+    quantities: Vec<Quantity>,
+}
+
 /// Compares the times of candidate and baseline.
-pub fn layer(bench: &Bench, baseline: &Baseline) -> Layer {
-    let subject = match baseline {
-        Baseline::Program(subject) => subject,
+pub fn layer(bench: &Bench, baseline: &Baseline, layer: &mut Layer) {
+    let why = match baseline {
+        Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
         Baseline::Record(..) => {
-            return left_out(
-                LayerName::Time,
-                "a record cannot be run, and times of different sessions are not comparable",
-            );
+            "a record cannot be run, and times of different sessions are not comparable"
         }
-        Baseline::None => return left_out(LayerName::Time, "no baseline was given"),
+        Baseline::None => "no baseline was given",
     };
-    let mut layer = Layer::new(LayerName::Time);
+    layer.left_out = Some(why.to_owned());
+}
+
+fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
     let mut measured = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
-        if interrupt::requested() {
-            break;
+        let name = &case.rule.name;
+        let real = bench.ranks_on_mpi(case).into_iter().map(Ranks::Mpi);
+        for ranks in std::iter::once(Ranks::Serial).chain(real) {
+            if interrupt::requested() {
+                break;
+            }
+            match rounds(bench, baseline, case, ranks) {
+                Ok(quantities) => measured.push(Timed { case: name, ranks, quantities }),
+                Err(failure) if failure.is_interrupt() => break,
+                Err(why) => {
+                    let metric = format!("{}time", prefix(ranks));
+                    let finding = Finding::noted(name, &metric, Verdict::Missing, why.to_string());
+                    layer.findings.push(finding);
+                }
+            }
         }
-        match rounds(bench, &subject.engine, case) {
-            Ok(quantities) => measured.push((case.rule.name.clone(), quantities)),
-            Err(failure) if failure.is_interrupt() => break,
-            Err(why) => layer.findings.push(Finding::without_numbers(
-                &case.rule.name,
-                "time",
-                Verdict::Inconclusive,
-                why.to_string(),
-            )),
-        }
+        layer.findings.extend(bench.ranks_left_out(case));
     }
     layer.findings.extend(judged(bench, &mut measured));
-    layer
 }
 
 /// The three runs of a round.
@@ -60,15 +71,20 @@ const AGAIN: usize = 1;
 const CANDIDATE: usize = 2;
 
 /// Runs all rounds of a case: the two times of the process, then the phases that both programs report.
-fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Vec<Quantity>, Failure> {
+fn rounds(
+    bench: &Bench,
+    baseline: &Engine,
+    case: &Selected,
+    ranks: Ranks,
+) -> Result<Vec<Quantity>, Failure> {
     let unusable = |why: String| baseline.unusable(why);
     let path = case.path.clone().map_err(unusable)?;
     let place = bench.enter("time").map_err(unusable)?;
     let path = baseline.prepare(&path, &place.join("case")).map_err(unusable)?;
     let engines = [baseline, baseline, &bench.candidate];
     // The first run reads program and geometry from disk and is not counted.
-    let first = run(bench, baseline, &path)?;
-    let also = run(bench, &bench.candidate, &path)?;
+    let first = run(bench, baseline, &path, ranks)?;
+    let also = run(bench, &bench.candidate, &path, ranks)?;
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget_s.unwrap_or(rules.budget_s);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
@@ -86,7 +102,7 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Vec<Quant
         random.shuffle(&mut order);
         let mut runs = [const { None }; 3];
         for index in order {
-            runs[index] = Some(run(bench, engines[index], &path)?);
+            runs[index] = Some(run(bench, engines[index], &path, ranks)?);
         }
         let [Some(a), Some(a_again), Some(b)] = runs else { unreachable!("each was run") };
         for quantity in &mut quantities {
@@ -98,9 +114,9 @@ fn rounds(bench: &Bench, baseline: &Engine, case: &Selected) -> Result<Vec<Quant
     Ok(quantities)
 }
 
-fn run(bench: &Bench, engine: &Engine, case: &Path) -> Result<Completed, Failure> {
+fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
     let place = bench.enter("time/run").map_err(|why| engine.unusable(why))?;
-    engine.run(case, &SERIAL, &RunOptions::new(&place, bench.options.limit))
+    engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit))
 }
 
 /// A quantity of one run, in seconds.
@@ -117,43 +133,46 @@ fn seconds(run: &Completed, name: &str) -> f64 {
 }
 
 /// Tests all quantities of all cases together.
-fn judged(bench: &Bench, measured: &mut [(String, Vec<Quantity>)]) -> Vec<Finding> {
+fn judged(bench: &Bench, measured: &mut [Timed]) -> Vec<Finding> {
     let rules = &bench.rules.time;
-    let quantities = || measured.iter().flat_map(|(_, quantities)| quantities);
+    let quantities = || measured.iter().flat_map(|timed| &timed.quantities);
     let compared: Vec<Comparison> = quantities()
         .map(|quantity| compare(&quantity.rounds, rules.alpha, bench.options.seed))
         .collect();
     let p_values: Vec<f64> = compared.iter().map(|found| found.p).collect();
-    let all = measured.iter_mut().flat_map(|(_, quantities)| quantities);
+    let all = measured.iter_mut().flat_map(|timed| &mut timed.quantities);
     for ((quantity, found), p) in all.zip(compared).zip(adjusted(&p_values)) {
         quantity.found = Some(Comparison { p, ..found });
     }
-    let of_case = |(case, quantities): &(String, Vec<Quantity>)| {
+    let of_case = |Timed { case, ranks, quantities }: &Timed| {
         let (whole, phases) = quantities.split_at(2);
-        let mut findings: Vec<Finding> =
-            whole.iter().filter_map(|quantity| whole_finding(case, quantity, rules)).collect();
-        findings.extend(phases::findings(case, &whole[0], phases, rules));
+        let prefix = prefix(*ranks);
+        let mut findings: Vec<Finding> = whole
+            .iter()
+            .filter_map(|quantity| whole_finding(case, &prefix, quantity, rules))
+            .collect();
+        findings.extend(phases::findings(case, &prefix, &whole[0], phases, rules));
         findings
     };
     measured.iter().flat_map(of_case).collect()
 }
 
 /// The finding for a time of the whole process.
-fn whole_finding(case: &str, quantity: &Quantity, rules: &TimeRules) -> Option<Finding> {
+fn whole_finding(
+    case: &str,
+    prefix: &str,
+    quantity: &Quantity,
+    rules: &TimeRules,
+) -> Option<Finding> {
     let found = quantity.found?;
-    let (baseline, candidate) = quantity.means();
     let note = format!(
         "{} rounds; {}, minimum detectable effect {:.1} %",
         quantity.rounds.len(),
         certainty(&found),
         100.0 * found.visible.max(rules.effect_min / 100.0)
     );
-    Some(Finding {
-        baseline: Some(baseline),
-        candidate: Some(candidate),
-        change_percent: Some(100.0 * found.effect),
-        ..Finding::without_numbers(case, &quantity.name, verdict(&found, rules), note)
-    })
+    let metric = format!("{prefix}{}", quantity.name);
+    Some(Finding::of_values(case, &metric, verdict(&found, rules), quantity.times(), note))
 }
 
 /// An effect with a p-value below this is not reported as unchanged.

@@ -11,7 +11,7 @@ pub mod probe;
 pub mod reduce;
 
 use contract::plain::PlainCase;
-use probe::{Failure, Probe, Trial, Unknown};
+use probe::{Failure, Judged, Probe, Trial, Unknown};
 use run::engine::interrupt;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -40,20 +40,59 @@ pub struct Shrunk {
     pub minimal: bool,
 }
 
-/// How a case fails the check of this name, or else the check that it fails first; `None` if it does not fail it.
-///
-/// # Errors
-/// If the engine declines the case, or no program can be run on it.
-pub fn failure(
-    trial: &Trial,
-    probe: &Probe,
-    check: Option<&str>,
-) -> Result<Option<Failure>, Unknown> {
-    let failures = probe.failures(trial)?;
-    Ok(failures.into_iter().find(|failure| check.is_none_or(|name| failure.check == name)))
+impl Shrunk {
+    /// What the reduced case has in common with the given one, and where it is smaller.
+    ///
+    /// # Panics
+    /// If it fails otherwise, or is larger in any respect, which is a bug.
+    fn check_invariants(&self, given: &Trial, first: &Failure, budget: &Budget) {
+        assert!(self.failure.is_same_as(first), "{} in place of {first}", self.failure);
+        assert!(self.trials <= budget.trials.max(1), "{} of {} trials", self.trials, budget.trials);
+        let measures = |trial: &Trial| {
+            let count =
+                |key| trial.case.table.get(key).and_then(|v| v.as_array()).map_or(0, Vec::len);
+            [trial.case.facets.len(), count("box"), count("seeds"), trial.ranks.count()]
+        };
+        let (reduced, before) = (measures(&self.trial), measures(given));
+        let smaller = reduced.iter().zip(before).all(|(reduced, before)| *reduced <= before);
+        assert!(smaller, "facets, boxes, seeds, ranks: {reduced:?} reduced from {before:?}");
+        assert_eq!(self.facets_before, before[0], "facets before");
+    }
 }
 
-/// Reduces a case that fails the check of this name, or else the check that it fails first; `None` if it does not fail it.
+/// What a trial shows about a check, or about all.
+#[derive(Clone, Debug)]
+pub enum Verdict {
+    /// It fails.
+    Fails(Failure),
+    /// It holds, with all others that were run: their number, at least 1.
+    Holds(usize),
+}
+
+/// How a case fails the check of this name, or else the check that it fails first.
+///
+/// # Errors
+/// If the engine declines the case, no program can be run on it, or the check is not among those that were run.
+pub fn verdict(trial: &Trial, probe: &Probe, check: Option<&str>) -> Result<Verdict, Unknown> {
+    verdict_of(probe.judge(trial, check)?, check)
+}
+
+fn verdict_of(mut judged: Vec<Judged>, check: Option<&str>) -> Result<Verdict, Unknown> {
+    let ran: Vec<&str> = judged.iter().map(|one| one.check).collect();
+    let ran = ran.join(", ");
+    judged.retain(|one| check.is_none_or(|name| one.check == name));
+    let count = judged.len();
+    match (judged.into_iter().find_map(|one| one.failure), check) {
+        (Some(failure), _) => Ok(Verdict::Fails(failure)),
+        (None, Some(name)) if count == 0 => {
+            Err(Unknown::LeftOut(format!("the check {name} was not run; those that were: {ran}")))
+        }
+        _ => Ok(Verdict::Holds(count)),
+    }
+}
+
+/// Reduces a case that fails the check of this name, or else the check that it fails first; returns the number of checks that hold
+/// if it does not fail.
 ///
 /// # Errors
 /// If the case cannot be read, the engine declines it, or no program can be run on it.
@@ -62,11 +101,14 @@ pub fn shrink(
     probe: &Probe,
     check: Option<&str>,
     budget: &Budget,
-) -> Result<Option<Shrunk>, Unknown> {
+) -> Result<Result<Shrunk, usize>, Unknown> {
     let start = Instant::now();
     let case = PlainCase::read(case).map_err(Unknown::Error)?;
     let given = Trial { case, ranks: probe.ranks() };
-    let Some(first) = failure(&given, probe, check)? else { return Ok(None) };
+    let first = match verdict(&given, probe, check)? {
+        Verdict::Fails(failure) => failure,
+        Verdict::Holds(count) => return Ok(Err(count)),
+    };
     crate::announce(&format!("harness shrink: the case fails {first}"));
     let facets_before = given.case.facets.len();
     let mut trials = 1;
@@ -74,8 +116,9 @@ pub fn shrink(
         trials >= budget.trials || start.elapsed() >= budget.time || interrupt::requested()
     };
     let same = |trial: &Trial| -> Result<Option<Failure>, Unknown> {
-        let failures = probe.failures(trial)?;
-        Ok(failures.into_iter().find(|failure| failure.is_same_as(&first)))
+        let judged = probe.judge(trial, None)?;
+        let mut failures = judged.into_iter().filter_map(|one| one.failure);
+        Ok(failures.find(|failure| failure.is_same_as(&first)))
     };
     let mut fails = |trial: &Trial| {
         if spent(trials) {
@@ -85,7 +128,7 @@ pub fn shrink(
         // A trial that cannot be run does not count as the same failure.
         same(trial).is_ok_and(|failure| failure.is_some())
     };
-    let trial = reduce::reduce(given, &mut fails, &mut |text| {
+    let trial = reduce::reduce(given.clone(), &mut fails, &mut |text| {
         crate::announce(&format!("harness shrink: {text}"))
     });
     let minimal = !spent(trials);
@@ -93,5 +136,55 @@ pub fn shrink(
         let why = "the failure does not repeat: it depends on more than the case";
         Unknown::Error(why.to_owned())
     })?;
-    Ok(Some(Shrunk { trial, failure, facets_before, trials, minimal }))
+    let shrunk = Shrunk { trial, failure, facets_before, trials, minimal };
+    shrunk.check_invariants(&given, &first, budget);
+    Ok(Ok(shrunk))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use run::engine::layout::Ranks;
+
+    fn judged() -> Vec<Judged> {
+        vec![
+            Judged { check: "runs", failure: None },
+            Judged { check: "balance", failure: Some(Failure::of("balance", "7 findings")) },
+        ]
+    }
+
+    #[test]
+    fn a_check_that_was_not_run_is_not_green() {
+        let verdict = |check| verdict_of(judged(), check);
+        assert!(matches!(verdict(None), Ok(Verdict::Fails(failure)) if failure.check == "balance"));
+        assert!(matches!(verdict(Some("runs")), Ok(Verdict::Holds(1))));
+        let Err(Unknown::LeftOut(why)) = verdict(Some("balnce")) else { panic!("a verdict") };
+        assert_eq!(why, "the check balnce was not run; those that were: runs, balance");
+    }
+
+    #[test]
+    fn every_planted_wrong_answer_is_refused() {
+        let table = toml::toml! { seeds = [[0.0, 0.0, 0.0]] };
+        let facets = vec![[[0.0; 3]; 3]; 2];
+        let given = Trial { case: PlainCase { table, facets }, ranks: Ranks::Mpi(3) };
+        let first = Failure::of("balance", "7 findings");
+        let budget = Budget { trials: 5, time: Duration::ZERO };
+        let right = Shrunk {
+            trial: given.clone(),
+            failure: Failure::of("balance", "2 findings"),
+            facets_before: 2,
+            trials: 5,
+            minimal: true,
+        };
+        right.check_invariants(&given, &first, &budget);
+        let refused = |change: fn(&mut Shrunk)| {
+            let mut wrong = right.clone();
+            change(&mut wrong);
+            let check = || wrong.check_invariants(&given, &first, &budget);
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
+        };
+        assert!(refused(|s| s.failure.check = "sides".into()) && refused(|s| s.trials = 6));
+        assert!(refused(|s| s.facets_before = 3) && refused(|s| s.trial.ranks = Ranks::Mpi(4)));
+        assert!(refused(|s| s.trial.case.facets.push([[1.0; 3]; 3])));
+    }
 }

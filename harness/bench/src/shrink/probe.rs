@@ -1,7 +1,7 @@
 //! Which checks a case fails: those of the definition or of the engine's promises on a serial run, and the comparison
 //! with the serial run on several ranks.
 
-use check::checks::{self, CheckResult, Subject, identical};
+use check::checks::{self, CheckResult, Outcome, Subject, identical};
 use check::promises::Independence;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -10,6 +10,7 @@ use run::engine::failure::{End, Failure as RunFailure};
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
 use run::engine::runner::Engine;
+use run::verify::case::RUNS;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -35,7 +36,24 @@ pub struct Failure {
     sentence: String,
 }
 
+/// A check that was run on a trial.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// Its name.
+    pub check: &'static str,
+    /// How it fails; `None` if it holds.
+    pub failure: Option<Failure>,
+}
+
+/// The checks that are run on a mesh that equals that of the reference.
+const OF_EQUAL: [&str; 4] = [RUNS, "manifest", "linear", identical::NAME];
+
 impl Failure {
+    #[cfg(test)]
+    pub(super) fn of(check: &str, sentence: &str) -> Self {
+        Self { check: check.to_owned(), end: None, sentence: sentence.to_owned() }
+    }
+
     /// Whether this is the same failure of, perhaps, another case.
     pub fn is_same_as(&self, other: &Self) -> bool {
         self.check == other.check && self.end == other.end
@@ -92,11 +110,12 @@ impl Probe {
         self.ranks
     }
 
-    /// The checks that a trial fails, the first one first. A case that both programs refuse fails none.
+    /// The checks of a trial, in order, with the failures of those that fail; among them the one of this name, if it can be run at
+    /// all. A case that both programs refuse fails none.
     ///
     /// # Errors
-    /// If the engine declines the case or cannot be run, or no mesh exists to compare with.
-    pub fn failures(&self, trial: &Trial) -> Result<Vec<Failure>, Unknown> {
+    /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
+    pub fn judge(&self, trial: &Trial, check: Option<&str>) -> Result<Vec<Judged>, Unknown> {
         let path = self.write(&trial.case)?;
         let case = Case::read(&path).map_err(|error| Unknown::Error(error.to_string()))?;
         if let Some(why) = self.engine.description().declines(&case) {
@@ -105,15 +124,24 @@ impl Probe {
         let truth = self.truth(&path)?;
         let mesh = match self.run(&self.engine, &path, trial.ranks, "engine", false) {
             Ok(mesh) => mesh,
-            Err(failure) => return Ok(vec![failed_run(failure, trial.ranks)?]),
+            Err(failure) => {
+                let failure = Some(failed_run(failure, trial.ranks)?);
+                return Ok(vec![Judged { check: RUNS, failure }]);
+            }
         };
         let subject = Subject::new(&case, &mesh);
         let results = match truth {
             Some(truth) if self.ranks != Ranks::Serial => {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
-            Some(truth) if truth.words == mesh.words => {
-                checks::only(&subject, &["manifest", "linear"])
+            // The other checks hold as well if they do of the reference.
+            Some(truth)
+                if truth.words == mesh.words && check.is_none_or(|c| OF_EQUAL.contains(&c)) =>
+            {
+                let compared = identical::compare(&mesh.words, &truth.words, &case.root);
+                let mut results = checks::only(&subject, &["manifest", "linear"]);
+                results.push(compared);
+                results
             }
             Some(truth) => {
                 let base = self
@@ -123,11 +151,19 @@ impl Probe {
             }
             None => self.promised(&path, trial, subject)?,
         };
-        if results.iter().all(|result| !result.was_run()) {
-            return Err(Unknown::LeftOut("no check had anything to check".to_owned()));
+        let mut judged = vec![Judged { check: RUNS, failure: None }];
+        for result in &results {
+            let failure = match result.outcome() {
+                Outcome::LeftOut { .. } => continue,
+                Outcome::Pass { .. } => None,
+                Outcome::Fail { .. } => Some(failed_check(result, trial.ranks)),
+            };
+            judged.push(Judged { check: result.name, failure });
         }
-        let failed = results.iter().filter(|result| !result.holds());
-        Ok(failed.map(|result| failed_check(result, trial.ranks)).collect())
+        match judged.len() {
+            1 => Err(Unknown::LeftOut("no check had anything to check".to_owned())),
+            _ => Ok(judged),
+        }
     }
 
     /// The checks of the engine's promises, and a second run if it is promised to be the same.
@@ -229,7 +265,7 @@ fn failed_run(failure: RunFailure, ranks: Ranks) -> Result<Failure, Unknown> {
         End::Unusable(_) => "unusable output".to_owned(),
     };
     let sentence = format!("{ranks}: {failure}");
-    Ok(Failure { check: "runs".to_owned(), end: Some(end), sentence })
+    Ok(Failure { check: RUNS.to_owned(), end: Some(end), sentence })
 }
 
 /// The place in a source file that an error names first, such as `tree.rs:12`; empty if it names none. A program that

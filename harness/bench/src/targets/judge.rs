@@ -1,23 +1,52 @@
 //! Judges rows from the declaration and the lines of a record alone.
+//!
+//! Invariants of a judged row, executed by [`check_invariants`] before it is printed or recorded: it has a value if and only if it is
+//! met, missed or for comparison, and then states how that was measured; met is within the bounds, missed is not, and for comparison
+//! has none; a row without a value, and an efficiency above 1, states the reason.
 
 use super::declare::{OneOrMany, Row, Targets};
-use super::measure::{Kind, Sample};
+use super::measure::{Kind, Measure, Sample};
+use crate::experiments::cause::above_one;
 use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
 use crate::experiments::group::{Group, Groups};
 
-/// Judges every row by the runs in these lines.
+/// Judges every row by the runs in these lines: those of the last machine and program, if there are several.
 pub fn judged(targets: &Targets, lines: &[Line]) -> Vec<Judged> {
-    targets.row.iter().map(|row| judge(targets, row, lines)).collect()
+    let lines = of_last_origin(lines);
+    targets.row.iter().map(|row| judge(targets, row, &lines)).collect()
+}
+
+/// Returns the lines without the runs, audits and failures of sessions on other machines or commits than the last one, and
+/// without those of other builds of the program than the last run's.
+fn of_last_origin(lines: &[Line]) -> Vec<Line> {
+    let machine = |line: &Line| match &line.entry {
+        Entry::Session(session) => Some((session.machine.label(), session.machine.commit.clone())),
+        _ => None,
+    };
+    let last = lines.iter().rev().find_map(machine);
+    let of_last = |line: &&Line| machine(line).is_some() && machine(line) == last;
+    let sessions: Vec<&str> =
+        lines.iter().filter(of_last).map(|line| line.session.as_str()).collect();
+    let program = |line: &Line| match &line.entry {
+        Entry::Run(run) => Some(run.program.clone()),
+        _ => None,
+    };
+    let built = lines.iter().rev().find_map(program);
+    let is_of = |line: &&Line| {
+        let same_build = program(line).is_none() || program(line) == built;
+        same_build && (last.is_none() || sessions.contains(&line.session.as_str()))
+    };
+    lines.iter().filter(is_of).cloned().collect()
 }
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
-    match measured(targets, row, lines) {
-        Ok((value, how)) => Judged {
+    let judged = match measured(targets, row, lines) {
+        Ok((value, how, why)) => Judged {
             measured: Some(value),
             how,
             verdict: verdict(row, value),
-            ..unjudged(row, Verdict::ForComparison, String::new())
+            ..unjudged(row, Verdict::ForComparison, why)
         },
         Err(why) => {
             let failed = targets.runs_of(row).into_iter().find_map(|n| failure(targets, n, lines));
@@ -26,8 +55,36 @@ pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
                 None => unjudged(row, Verdict::LeftOut, why),
             }
         }
-    }
+    };
+    check_invariants(&judged, row.measure);
+    judged
 }
+
+/// Executes the invariants at the head of this file.
+fn check_invariants(row: &Judged, measure: Measure) {
+    use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
+    let Judged { name, at_least, at_most, measured, how, verdict, why, .. } = row;
+    let has_value = matches!(verdict, Met | Missed | ForComparison);
+    assert!(
+        has_value == measured.is_some() && has_value != how.is_empty(),
+        "{name}: a value is measured: {row:?}"
+    );
+    assert!(has_value || !why.is_empty(), "{name}: a row without a value has a reason: {row:?}");
+    let Some(value) = *measured else { return assert!(matches!(verdict, Failed | LeftOut)) };
+    let is_within =
+        at_least.is_none_or(|least| value >= least) && at_most.is_none_or(|most| value <= most);
+    let expected = match (at_least.is_some() || at_most.is_some(), is_within) {
+        (false, _) => ForComparison,
+        (true, true) => Met,
+        (true, false) => Missed,
+    };
+    assert_eq!(*verdict, expected, "{name}: the verdict is that of value and bounds: {row:?}");
+    let explained = !measure.is_efficiency() || value <= EXPLAINED || !why.is_empty();
+    assert!(explained, "{name}: an efficiency above 1 has a reason: {row:?}");
+}
+
+/// Efficiencies up to this need no explanation.
+const EXPLAINED: f64 = 1.01;
 
 /// Returns a row without a measured value.
 pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
@@ -55,8 +112,8 @@ fn verdict(row: &Row, value: f64) -> Verdict {
     if above && below { Verdict::Met } else { Verdict::Missed }
 }
 
-/// Returns the row's value and how it was measured.
-fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String), String> {
+/// Returns the row's value, how it was measured, and the reason for an efficiency above 1.
+fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String, String), String> {
     if row.measure.kind() == Kind::Audit {
         let name = &row.run.all()[0];
         let audits: Vec<&Audited> =
@@ -64,7 +121,7 @@ fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String
         if audits.is_empty() {
             return Err(absent(name));
         }
-        return Ok((row.measure.of_audits(&audits)?, "audited".to_owned()));
+        return Ok((row.measure.of_audits(&audits)?, "audited".to_owned(), String::new()));
     }
     let groups = Groups::of(lines);
     let find = |name: &String| {
@@ -75,7 +132,13 @@ fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String
     let against = row.against.as_ref().map(find).transpose()?;
     let phases = row.phase.as_ref().map(OneOrMany::all).unwrap_or_default();
     let sample = Sample { runs: &runs, against, phases, network: &groups.network };
-    Ok((row.measure.of(&sample)?, worst_how(&runs).to_owned()))
+    let reference = against.unwrap_or(runs[0]);
+    let above_one = |run: &&Group| {
+        let e = run.efficiency(reference, &groups.network);
+        above_one(&e, &run.typical, &reference.typical).filter(|_| row.measure.is_efficiency())
+    };
+    let why = runs.iter().find_map(above_one).unwrap_or_default();
+    Ok((row.measure.of(&sample)?, worst_how(&runs).to_owned(), why))
 }
 
 fn absent(name: &str) -> String {
@@ -110,10 +173,11 @@ fn failure(targets: &Targets, name: &str, lines: &[Line]) -> Option<String> {
 mod tests {
     use super::super::declare::EXPERIMENT;
     use super::*;
-    use crate::experiments::entry::{Comm, Failure, Setup};
+    use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::targets as read;
+    use proptest::prelude::*;
 
     const FILE: &str = r#"
         mesh.cube.case = "cube-small"
@@ -191,6 +255,62 @@ mod tests {
         );
         assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, ForComparison, LeftOut]);
         assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed, LeftOut]);
+    }
+
+    #[test]
+    fn runs_of_another_machine_do_not_move_a_median() {
+        let targets = read(FILE).unwrap();
+        let session = |name: &str, cpu: &str| {
+            let machine = Machine { cpu: cpu.into(), ..Machine::default() };
+            let (command, lacks) = (Vec::new(), Default::default());
+            let session = Session { command, machine, load_average: 0.0, lacks };
+            Line { session: name.into(), ..line(Entry::Session(Box::new(session))) }
+        };
+        let of = |name: &str, run: Line| Line { session: name.into(), ..run };
+        let lines = [
+            session("a", "slow"),
+            of("a", ran(1, 90.0)),
+            of("a", ran(1, 91.0)),
+            session("b", "fast"),
+            of("b", ran(1, 9.0)),
+        ];
+        assert_eq!(judged(&targets, &lines)[0].measured, Some(100.0));
+    }
+
+    proptest! {
+        #[test]
+        fn rows_of_drawn_times_satisfy_the_invariants(one in 0.1..9.0f64, two in 0.1..9.0f64) {
+            let targets = read(&FILE.replace("speed_up", "efficiency")).unwrap();
+            judged(&targets, &[ran(1, one), ran(2, two)]);
+        }
+    }
+
+    fn planted(fault: impl Fn(&mut Judged), measure: Measure) {
+        let targets = read(FILE).unwrap();
+        let mut row = judge(&targets, &targets.row[0], &[ran(1, 9.0)]);
+        fault(&mut row);
+        check_invariants(&row, measure);
+    }
+
+    #[test]
+    #[should_panic(expected = "the verdict is that of value and bounds")]
+    fn a_row_that_is_met_outside_its_bounds_is_noticed() {
+        planted(|row| row.at_most = Some(1.0), Measure::Seconds);
+    }
+
+    #[test]
+    #[should_panic(expected = "a row without a value has a reason")]
+    fn a_row_that_is_left_out_without_a_reason_is_noticed() {
+        let left_out = |row: &mut Judged| {
+            (row.measured, row.verdict, row.how) = (None, Verdict::LeftOut, String::new());
+        };
+        planted(left_out, Measure::Seconds);
+    }
+
+    #[test]
+    #[should_panic(expected = "an efficiency above 1 has a reason")]
+    fn an_efficiency_above_1_without_a_reason_is_noticed() {
+        planted(|_| {}, Measure::Efficiency);
     }
 
     #[test]

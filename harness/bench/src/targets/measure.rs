@@ -116,6 +116,11 @@ impl Measure {
         }
     }
 
+    /// Whether it is an efficiency, which is 1 if nothing is lost.
+    pub fn is_efficiency(self) -> bool {
+        matches!(self, Self::Efficiency | Self::ParallelEfficiency)
+    }
+
     /// Formats a value with its unit.
     pub fn show(self, value: f64) -> String {
         match self {

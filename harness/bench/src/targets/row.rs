@@ -20,10 +20,14 @@ pub fn fields(targets: &Targets, row: &Judged) -> [String; 5] {
     let bounds = [("at least ", row.at_least), ("at most ", row.at_most)];
     let bounds = bounds.into_iter().filter_map(|(word, b)| Some(format!("{word}{}", show(b?))));
     let target = bounds.collect::<Vec<_>>().join(", ");
+    let noted = |verdict: &str| match row.why.as_str() {
+        "" => verdict.to_owned(),
+        why => format!("{verdict}: {why}"),
+    };
     let verdict = match row.verdict {
-        Verdict::Met => "met".to_owned(),
-        Verdict::Missed => "MISSED".to_owned(),
-        Verdict::ForComparison => "for comparison".to_owned(),
+        Verdict::Met => noted("met"),
+        Verdict::Missed => noted("MISSED"),
+        Verdict::ForComparison => noted("for comparison"),
         Verdict::Failed => format!("FAILED: {}", row.why),
         Verdict::LeftOut => format!("left out: {}", row.why),
     };

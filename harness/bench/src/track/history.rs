@@ -1,20 +1,26 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
-//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts.
+//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. An
+//! unfinished last line, which an interruption leaves, costs that line: readers report it, and the next record ends it.
+//!
+//! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`.
 //!
 //! A record with `accepted` states that the user has accepted the values from that commit on.
 //!
 //! A record: `{"schema": "octree-track/1", "commit": "full name", "time": "2026-01-31T12:00:00Z" (of the commit),
-//! "subject": "first line of its message", "metrics": {"CASE/METRIC": number}, "accepted": true (absent if false)}`.
+//! "subject": "first line of its message", "machine": "its processor, ...", "metrics": {"CASE/METRIC": number}, "accepted": true (absent
+//! if false)}`.
 
-use crate::gate::measures::Measures;
-use crate::gate::quantity::{CPU, WALL};
+use super::unit;
+use crate::gate::measures::{CaseMeasures, Measures};
+use crate::gate::numbers::MEMORY;
+use crate::gate::phases::{CPU, WALL};
 use crate::gate::report::{LayerName, Report};
+use crate::origin::Origins;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{self, Write};
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::process::Command;
 
@@ -22,7 +28,7 @@ use std::process::Command;
 pub const SCHEMA: &str = "octree-track/1";
 
 /// One commit's numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// [`SCHEMA`].
@@ -35,6 +41,9 @@ pub struct Record {
     /// First line of its message.
     #[serde(default)]
     pub subject: String,
+    /// The machine; empty if it is unknown, as in old records.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub machine: String,
     /// Numbers by `CASE/METRIC`.
     pub metrics: BTreeMap<String, f64>,
     /// Whether the changes at this commit are accepted.
@@ -45,9 +54,7 @@ pub struct Record {
 impl Record {
     /// Returns a record without metrics.
     pub fn new(commit: String) -> Self {
-        let (time, subject) = (String::new(), String::new());
-        let metrics = BTreeMap::new();
-        Self { schema: SCHEMA.to_owned(), commit, time, subject, metrics, accepted: false }
+        Self { schema: SCHEMA.to_owned(), commit, ..Self::default() }
     }
 
     /// Returns a record with the time and subject of a commit.
@@ -80,19 +87,32 @@ impl Record {
     /// # Errors
     /// One sentence, if it is neither.
     pub fn add(&mut self, text: &[u8]) -> Result<(), String> {
-        for (case, measures) in &Measures::parse(text)?.cases {
-            for (metric, value) in measures.exact.iter().chain(&measures.counted) {
+        let measures = Measures::parse(text)?;
+        if !self.machine.is_empty() && self.machine != measures.machine {
+            return Err(format!(
+                "it is of another machine ({}) than the values before it: append it by a command of its own",
+                measures.machine
+            ));
+        }
+        self.machine.clone_from(&measures.machine);
+        for (case, measures) in &measures.cases {
+            let CaseMeasures { exact, memory, counted, .. } = measures;
+            for (metric, value) in exact.iter().chain(memory).chain(counted) {
                 self.metrics.insert(format!("{case}/{metric}"), *value as f64);
             }
         }
         if let Ok(report) = serde_json::from_slice::<Report>(text) {
             let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
             for finding in times.flat_map(|layer| &layer.findings) {
-                let name = match finding.metric.as_str() {
+                let (ranks, time) =
+                    finding.metric.rsplit_once('/').unwrap_or(("", &finding.metric));
+                let name = match time {
                     CPU => "seconds",
                     WALL => "wall_seconds",
                     _ => continue,
                 };
+                let name =
+                    if ranks.is_empty() { name.to_owned() } else { format!("{ranks}/{name}") };
                 if let Some(seconds) = finding.candidate {
                     self.metrics.insert(format!("{}/{name}", finding.case), seconds);
                 }
@@ -102,41 +122,75 @@ impl Record {
     }
 }
 
+/// A history as read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    /// One record per commit.
+    pub records: Vec<Record>,
+    /// What the user should know: an unfinished last line, several machines.
+    pub warnings: Vec<String>,
+}
+
 /// Reads a history; a missing file is an empty history.
 ///
 /// # Errors
 /// One sentence with the number of the invalid line.
-pub fn read(path: &Path) -> Result<Vec<Record>, String> {
+pub fn read(path: &Path) -> Result<History, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let text = match contract::files::read_text(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+    let bytes = match contract::files::read_log(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         other => other.map_err(|error| wrong(error.to_string()))?,
     };
-    parse(&text).map_err(wrong)
+    parse(&bytes).map_err(wrong)
 }
 
-fn parse(text: &str) -> Result<Vec<Record>, String> {
-    let mut records: Vec<Record> = Vec::new();
+/// Whether a metric depends on the machine, besides the program and the case.
+fn is_of_machine(name: &str) -> bool {
+    let plain = name.rsplit('/').next().unwrap_or(name);
+    unit(name) == "s" || [MEMORY, "instructions", "allocations"].contains(&plain)
+}
+
+fn parse(bytes: &[u8]) -> Result<History, String> {
+    let mut history = History::default();
     let mut index: HashMap<String, usize> = HashMap::new();
-    for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+    let mut machines = Origins::default();
+    // A line is written with its end, so a line without one is unfinished, if it cannot be read.
+    let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').enumerate().peekable();
+    while let Some((i, line)) = lines.next() {
+        if line.trim_ascii().is_empty() {
+            continue;
+        }
         let wrong = |why: String| format!("line {}: {why}", i + 1);
-        let record: Record =
-            serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
+        let mut record: Record = match serde_json::from_slice(line) {
+            Ok(record) => record,
+            Err(error) if lines.peek().is_none() && !line.ends_with(b"\n") => {
+                history.warnings.push(wrong(format!("unfinished, and left out: {error}")));
+                continue;
+            }
+            Err(error) => return Err(wrong(error.to_string())),
+        };
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
+        let suffix = machines.suffix("", &record.machine);
+        let named = |(name, value): (String, f64)| match is_of_machine(&name) {
+            true => (name + &suffix, value),
+            false => (name, value),
+        };
+        record.metrics = record.metrics.into_iter().map(named).collect();
         match index.get(&record.commit) {
             Some(&same) => {
-                records[same].metrics.extend(record.metrics);
-                records[same].accepted |= record.accepted;
+                history.records[same].metrics.extend(record.metrics);
+                history.records[same].accepted |= record.accepted;
             }
             None => {
-                index.insert(record.commit.clone(), records.len());
-                records.push(record);
+                index.insert(record.commit.clone(), history.records.len());
+                history.records.push(record);
             }
         }
     }
-    Ok(records)
+    history.warnings.extend(machines.described());
+    Ok(history)
 }
 
 /// Accepts the changes of all metrics at a commit of the history, given by its hash or the beginning of it.
@@ -145,7 +199,7 @@ fn parse(text: &str) -> Result<Vec<Record>, String> {
 /// One sentence, if the history does not have exactly one such commit, or cannot be written.
 pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
     let wrong = |why: &str| format!("{}: {why}", path.display());
-    let records = read(path)?;
+    let records = read(path)?.records;
     let matching: Vec<&Record> =
         records.iter().filter(|record| record.commit.starts_with(commit)).collect();
     let [record] = matching[..] else {
@@ -161,8 +215,8 @@ pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
     append(path, &record).map_err(|error| wrong(&error.to_string()))
 }
 
-/// Appends a record on a line of its own, under a lock that other processes respect. If the record cannot be written as a
-/// whole, the file is left as it was.
+/// Appends a record on a line of its own, under a lock that other processes respect. An unfinished last line is removed. If
+/// the record cannot be written as a whole, the file is left as it was.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -173,14 +227,18 @@ pub fn append(path: &Path, record: &Record) -> io::Result<()> {
     // Strings and finite numbers only.
     let mut line = serde_json::to_string(record).expect("a record is representable in JSON");
     line.push('\n');
-    let mut file = OpenOptions::new().create(true).read(true).append(true).open(path)?;
+    let mut file = contract::files::append_log(path)?;
     file.lock()?;
-    let length = file.metadata()?.len();
-    if length > 0 {
-        let mut last = [0];
-        file.read_exact_at(&mut last, length - 1)?;
-        if last != *b"\n" {
-            line.insert(0, '\n');
+    let bytes = fs::read(path)?;
+    let mut length = bytes.len() as u64;
+    let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
+    if !last.is_empty() {
+        match serde_json::from_slice::<Record>(last) {
+            Ok(_) => line.insert(0, '\n'),
+            Err(_) => {
+                length -= last.len() as u64;
+                file.set_len(length)?;
+            }
         }
     }
     file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).inspect_err(|_| {
@@ -203,7 +261,7 @@ mod tests {
     fn the_last_record_of_a_commit_counts() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("deep/history.jsonl");
-        assert_eq!(read(&path).unwrap(), []);
+        assert_eq!(read(&path).unwrap(), History::default());
         for one in [
             record("a", &[("x", 1.0)]),
             record("b", &[("x", 2.5)]),
@@ -212,7 +270,7 @@ mod tests {
             append(&path, &one).unwrap();
         }
         let expected = [record("a", &[("x", 3.0), ("y", 4.0)]), record("b", &[("x", 2.5)])];
-        assert_eq!(read(&path).unwrap(), expected);
+        assert_eq!(read(&path).unwrap().records, expected);
     }
 
     #[test]
@@ -223,9 +281,9 @@ mod tests {
             append(&path, &record(commit, &[("x", 1.0)])).unwrap();
         }
         accept(&path, "abc2").unwrap();
-        let accepted: Vec<bool> = read(&path).unwrap().iter().map(|r| r.accepted).collect();
+        let accepted: Vec<bool> = read(&path).unwrap().records.iter().map(|r| r.accepted).collect();
         assert_eq!(accepted, [false, true, false]);
-        assert_eq!(read(&path).unwrap()[1].metrics["x"], 1.0);
+        assert_eq!(read(&path).unwrap().records[1].metrics["x"], 1.0);
         assert!(accept(&path, "abc").unwrap_err().contains("several"));
         assert!(accept(&path, "f00").unwrap_err().contains("no values of commit f00"));
     }
@@ -238,7 +296,51 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.trim_end()).unwrap();
         append(&path, &record("b", &[("x", 2.0)])).unwrap();
-        assert_eq!(read(&path).unwrap().len(), 2);
+        assert_eq!(read(&path).unwrap().records.len(), 2);
+    }
+
+    /// Cut anywhere, a history keeps all its lines but the last, and the next record follows them.
+    #[test]
+    fn a_torn_last_line_costs_that_line() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        for commit in ["a", "b"] {
+            append(&path, &record(commit, &[("x", 1.0)])).unwrap();
+        }
+        let whole = fs::read(&path).unwrap();
+        let first = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+        for length in first + 1..whole.len() - 1 {
+            fs::write(&path, &whole[..length]).unwrap();
+            let torn = read(&path).unwrap();
+            assert_eq!((torn.records.len(), torn.warnings.len()), (1, 1), "{length}");
+            assert!(torn.warnings[0].starts_with("line 2: unfinished"), "{:?}", torn.warnings);
+            append(&path, &record("c", &[("x", 2.0)])).unwrap();
+            let mended = read(&path).unwrap();
+            assert_eq!((mended.records.len(), mended.warnings), (2, vec![]), "{length}");
+        }
+        // A byte that is no UTF-8 is as torn as any other.
+        fs::write(&path, [&whole[..first], b"{\"schema\": \"\xff"].concat()).unwrap();
+        assert_eq!(read(&path).unwrap().records.len(), 1);
+    }
+
+    #[test]
+    fn times_of_another_machine_are_a_series_of_their_own_and_counters_are_not() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        for (commit, machine, seconds) in
+            [("a", "fast", 0.13), ("b", "slow", 0.605), ("b", "fast", 0.14)]
+        {
+            let one = record(commit, &[("uav/seconds", seconds), ("uav/rays", 6.0)]);
+            append(&path, &Record { machine: machine.into(), ..one }).unwrap();
+        }
+        let History { records, warnings } = read(&path).unwrap();
+        assert_eq!(
+            records[0].metrics,
+            record("a", &[("uav/rays", 6.0), ("uav/seconds", 0.13)]).metrics
+        );
+        let both = [("uav/rays", 6.0), ("uav/seconds", 0.14), ("uav/seconds [2]", 0.605)];
+        assert_eq!(records[1].metrics, record("b", &both).metrics);
+        assert!(warnings[0].contains("[2]: slow"), "{warnings:?}");
     }
 
     #[test]
@@ -255,14 +357,15 @@ mod tests {
                 });
             }
         });
-        assert_eq!(read(&path).unwrap().len(), 200);
+        assert_eq!(read(&path).unwrap().records.len(), 200);
     }
 
     #[test]
     fn an_invalid_line_is_reported_by_number() {
         let line = serde_json::to_string(&record("a", &[])).unwrap();
-        assert!(parse(&format!("{line}\n\nx")).unwrap_err().starts_with("line 3"));
-        assert!(parse(&line.replace("track/1", "track/2")).unwrap_err().contains("track/2"));
+        assert!(parse(format!("{line}\n\nx\n").as_bytes()).unwrap_err().starts_with("line 3"));
+        let other = line.replace("track/1", "track/2");
+        assert!(parse(other.as_bytes()).unwrap_err().contains("track/2"));
     }
 
     #[test]
@@ -273,6 +376,12 @@ mod tests {
         let mut one = record("a", &[]);
         one.add(measures.json().as_bytes()).unwrap();
         assert_eq!(one, record("a", &[("cube/rays", 6.0), ("cube/instructions", 7.0)]));
+        let elsewhere = Measures { machine: "other".into(), ..measures };
+        assert!(
+            Record { machine: "this".into(), ..one.clone() }
+                .add(elsewhere.json().as_bytes())
+                .is_err()
+        );
         assert!(one.add(b"{}").is_err());
     }
 }

@@ -4,6 +4,10 @@
 //! [`crate::statistics::false_discovery`] controls how many of all of them are false.
 //!
 //! Invariant: the same history and options give the same result on every machine.
+//!
+//! Invariants of the answer, executed by [`Series::check_invariants`] before it is printed: steps and drifts are in order and
+//! within the series; both values beside a change lie among the values of their segments, and its percentage is theirs; its
+//! commits are those of the history; p is a probability.
 
 pub mod history;
 pub mod link;
@@ -81,6 +85,52 @@ pub struct Drift {
 }
 
 impl Series {
+    /// Executes the invariants at the head of this file.
+    fn check_invariants(&self, records: &[Record]) {
+        let Self { name, points, changes, drifts, .. } = self;
+        let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
+        let is_within = |value: f64, part: &[f64]| {
+            let least = part.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = part.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            (least..=most).contains(&value)
+        };
+        let commit = |at: usize| &records[points[at].0].commit;
+        for (i, change) in changes.iter().enumerate() {
+            let from = if i == 0 { 0 } else { changes[i - 1].at };
+            let until = changes.get(i + 1).map_or(values.len(), |next| next.at);
+            assert!(from < change.at && change.at < until, "{name}: steps in order: {change:?}");
+            let (old, new) = (&values[from..change.at], &values[change.at..until]);
+            let beside = is_within(change.before, old) && is_within(change.after, new);
+            assert!(beside, "{name}: values beside a step are of their segments: {change:?}");
+            let commits = [&change.last_old, &change.first_new];
+            assert_eq!(
+                commits,
+                [commit(change.at - 1), commit(change.at)],
+                "{name}: commits of a step"
+            );
+        }
+        for drift in drifts {
+            assert!(drift.from < drift.until && drift.until <= values.len(), "{name}: {drift:?}");
+            let commits = [&drift.first, &drift.last];
+            assert_eq!(
+                commits,
+                [commit(drift.from), commit(drift.until - 1)],
+                "{name}: commits of a drift"
+            );
+        }
+        let steps = changes.iter().map(|c| (c.before, c.after, c.percent, c.p));
+        for (before, after, by, p) in
+            steps.chain(drifts.iter().map(|d| (d.before, d.after, d.percent, d.p)))
+        {
+            assert_eq!(
+                by,
+                percent(before, after),
+                "{name}: the percentage is that of {before} and {after}"
+            );
+            assert!(p > 0.0 && p <= 1.0, "{name}: {p} is a probability");
+        }
+    }
+
     /// Whether an increase is worse.
     pub fn is_cost(&self) -> bool {
         !NEUTRAL.contains(&plain(&self.name))
@@ -95,9 +145,10 @@ impl Series {
     }
 }
 
-/// A metric's name without its case and ranks.
+/// A metric's name without its case, ranks and origin.
 fn plain(name: &str) -> &str {
-    name.rsplit('/').next().unwrap_or(name)
+    let plain = name.rsplit('/').next().unwrap_or(name);
+    plain.split_once(" [").map_or(plain, |(plain, _)| plain)
 }
 
 /// Returns the unit of a metric.
@@ -123,7 +174,10 @@ pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
         all.iter().map(|points| change_points(&values(points), rules)).collect();
     control(&mut found, rules.alpha);
     let both = names.into_iter().zip(all).zip(found);
-    both.map(|((name, points), found)| series(name, points, &found, records)).collect()
+    let all: Vec<Series> =
+        both.map(|((name, points), found)| series(name, points, &found, records)).collect();
+    all.iter().for_each(|series| series.check_invariants(records));
+    all
 }
 
 /// Removes the changes of all metrics that are not discoveries among all metrics. A metric is one test for steps and one
@@ -154,7 +208,6 @@ fn points(name: &str, records: &[Record]) -> Vec<(usize, f64)> {
 fn series(name: &str, points: Vec<(usize, f64)>, found: &Changes, records: &[Record]) -> Series {
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
     let commit = |at: usize| records[points[at].0].commit.clone();
-    let percent = |before: f64, after: f64| (before != 0.0).then(|| (after / before - 1.0) * 100.0);
     let changes = (0..found.steps.len()).map(|i| {
         let Step { at, p } = found.steps[i];
         let from = if i == 0 { 0 } else { found.steps[i - 1].at };
@@ -186,6 +239,11 @@ fn series(name: &str, points: Vec<(usize, f64)>, found: &Changes, records: &[Rec
     Series { name: name.to_owned(), unit: unit(name), changes, drifts, points }
 }
 
+/// The change relative to a value that is not 0, in percent.
+fn percent(before: f64, after: f64) -> Option<f64> {
+    (before != 0.0).then(|| (after / before - 1.0) * 100.0)
+}
+
 /// Whether a commit near a step was accepted.
 fn is_accepted(at: usize, points: &[(usize, f64)], records: &[Record]) -> bool {
     let from = points[(at - 1).saturating_sub(ACCEPTED_WITHIN)].0 + 1;
@@ -197,6 +255,7 @@ fn is_accepted(at: usize, points: &[(usize, f64)], records: &[Record]) -> bool {
 mod tests {
     use super::*;
     use crate::testing::history as sample;
+    use proptest::prelude::*;
 
     #[test]
     fn a_change_point_has_its_commits_and_size() {
@@ -245,9 +304,53 @@ mod tests {
         assert!(summary(&all).contains("drifts from"), "{}", summary(&all));
     }
 
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        /// Levels, slopes and noise of any size, with values missing from commits.
+        #[test]
+        fn drawn_histories_satisfy_the_invariants(
+            drawn in prop::collection::vec((0.0..1.0f64, 0..10u8), 4..60), step in -50.0..50.0f64, slope in -2.0..2.0f64,
+        ) {
+            let record = |(i, &(noise, present)): (usize, &(f64, u8))| {
+                let shift = if 2 * i > drawn.len() { step } else { 0.0 };
+                let value = 10.0 + noise + shift + slope * i as f64;
+                let metrics = (present > 0).then(|| ("c/seconds".to_owned(), value));
+                Record { metrics: metrics.into_iter().collect(), ..Record::new(format!("{i:040x}")) }
+            };
+            let records: Vec<Record> = drawn.iter().enumerate().map(record).collect();
+            analyse(&records, &Rules::default());
+        }
+    }
+
+    fn planted(fault: impl Fn(&mut Change)) {
+        let records = sample();
+        let mut wrong = analyse(&records, &Rules::default()).remove(1);
+        fault(&mut wrong.changes[0]);
+        wrong.check_invariants(&records);
+    }
+
+    #[test]
+    #[should_panic(expected = "values beside a step are of their segments")]
+    fn a_value_of_the_other_segment_is_noticed() {
+        planted(|change| change.before = change.after);
+    }
+
+    #[test]
+    #[should_panic(expected = "the percentage is that of")]
+    fn a_percentage_of_other_values_is_noticed() {
+        planted(|change| change.percent = change.percent.map(|by| -by));
+    }
+
+    #[test]
+    #[should_panic(expected = "commits of a step")]
+    fn a_commit_beside_the_step_is_noticed() {
+        planted(|change| change.first_new = change.last_old.clone());
+    }
+
     #[test]
     fn units_follow_from_the_names() {
-        let names = ["a/seconds", "a/4 ranks/message_bytes", "a/cells", "a/rays", "a/time_wall_s"];
+        let names =
+            ["a/seconds [2]", "a/4 ranks/message_bytes", "a/cells", "a/rays", "a/time_wall_s"];
         assert_eq!(names.map(unit), ["s", "bytes", "cells", "count", "s"]);
     }
 }

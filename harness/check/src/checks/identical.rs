@@ -8,7 +8,8 @@ use super::{Check, CheckResult, nothing};
 use contract::lattice::Root;
 use contract::word::{self, Leaf};
 
-const NAME: &str = "identical";
+/// Name of the check.
+pub const NAME: &str = "identical";
 
 pub(super) const CHECK: Check = Check {
     name: NAME,

@@ -19,6 +19,7 @@ pub mod layer;
 pub mod linear;
 pub mod manifest;
 mod needless;
+mod outcome;
 mod pass;
 mod region;
 mod result;
@@ -30,6 +31,7 @@ mod terms;
 pub mod trail;
 pub mod truth;
 
+pub use outcome::Outcome;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub(crate) use subject::valid_leaves;
 pub use subject::{CAPACITY, Subject};

@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use super::Outcome;
 use contract::leafset::ReadError;
 
 /// Findings that are listed in full; further ones are counted only.
@@ -99,6 +100,20 @@ impl CheckResult {
     /// Whether the check examined something.
     pub fn was_run(&self) -> bool {
         self.nothing_to_check.is_none()
+    }
+
+    /// The outcome: a check without findings that examined nothing was left out.
+    pub fn outcome(&self) -> Outcome {
+        if let Some(why) = &self.nothing_to_check {
+            return Outcome::left_out(format!("there is nothing to check: {why}"));
+        }
+        if self.holds() {
+            return Outcome::held(self.examined);
+        }
+        let listed = self.findings.iter().map(|finding| finding.detail.clone());
+        let unlisted = self.findings_total - self.findings.len() as u64;
+        let more = (unlisted > 0).then(|| format!("and {unlisted} more"));
+        Outcome::fail(listed.chain(more).collect::<Vec<_>>().join("\n"))
     }
 
     /// Adds a finding.

@@ -29,6 +29,27 @@ pub struct Ballot<'a> {
     pub seeds: bool,
 }
 
+impl Ballot<'_> {
+    /// Why no vote can fail the mesh; `None` if one can.
+    pub fn advisory(&self) -> Option<&'static str> {
+        match (self.seeds, self.watertight) {
+            (true, _) => Some("seeds determine the sides"),
+            (false, false) => Some(
+                "the body is not watertight, and another leaf determines the side of the component",
+            ),
+            (false, true) => None,
+        }
+    }
+
+    /// Number of points where a vote can fail the mesh.
+    pub fn decisive(&self) -> u64 {
+        match self.oracles.len() >= MAJORITY {
+            true => self.mesh.len() as u64,
+            false => self.exact.iter().flatten().count() as u64,
+        }
+    }
+}
+
 /// The contradictions between one oracle and the mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Dissent {
@@ -90,7 +111,7 @@ const MAJORITY: usize = 3;
 impl Tally {
     /// The reason why the mesh fails; `None` if it does not. `points` are the coordinates of the points.
     pub fn failure(&self, ballot: &Ballot, points: &[[f64; 3]]) -> Option<String> {
-        if ballot.seeds || !ballot.watertight {
+        if ballot.advisory().is_some() {
             return None;
         }
         let sentence = |subject: &str, against: &[usize]| {
@@ -124,13 +145,7 @@ impl Tally {
         };
         let mut notes: Vec<String> =
             self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
-        let why = match (ballot.seeds, ballot.watertight) {
-            (true, _) => "seeds determine the sides",
-            (false, false) => {
-                "the body is not watertight, and another leaf determines the side of the component"
-            }
-            (false, true) => return notes,
-        };
+        let Some(why) = ballot.advisory() else { return notes };
         if !self.exact_against.is_empty() {
             let count = self.exact_against.len();
             notes.push(format!("at {count} points all six exact rays contradict the mesh: {why}"));

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod kept;
+mod many_parts;
 mod no_false_alarms;
 mod promises;
 mod selftest;

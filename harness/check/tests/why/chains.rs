@@ -126,7 +126,7 @@ fn an_answer_that_contradicts_itself_is_a_bug() {
         &|a| a.base_leaf = Some(a.splits[at].links[0].leaf.clone()),
         &|a| drop(a.splits.pop()),
         &|a| a.splits.swap(0, 1),
-        &|a| a.splits[at].links[0].rule = "balance",
+        &|a| a.splits[at].links[0].leaf = a.leaf.clone().unwrap(),
         &|a| a.splits[at].links[0].distance_cells += 1,
         &|a| a.splits[at].links.swap(0, 1),
         &|a| drop(a.splits[at].links.pop()),

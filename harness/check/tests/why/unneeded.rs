@@ -211,14 +211,3 @@ fn without_crossing_leaves_the_case_is_required() {
     let why = with_mesh(&correct.mesh, None, |mesh| mesh.unneeded(1).unwrap_err());
     assert!(why.contains("--case"), "{why}");
 }
-
-#[test]
-fn a_word_that_is_no_leaf_is_refused() {
-    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
-    let correct = support::selftest_case(name, text);
-    let mut words = correct.mesh.words.clone();
-    words[0] |= 3;
-    let mutated = correct.mesh.with_parts(vec![words.clone()]);
-    let why = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap_err());
-    assert!(why.contains(&format!("the invalid word {:#018x}", words[0])), "{why}");
-}

@@ -1,6 +1,7 @@
 //! `harness audit`: checks a mesh by itself, or against its case, or against promises on a case.
 
 use super::import::{Failure, Imported, Source};
+use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use check::promises::Promises;
@@ -10,7 +11,7 @@ use contract::manifest;
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tempfile::TempDir;
 
 /// `harness audit`.
@@ -26,7 +27,7 @@ Exit codes: 0 all checks hold; 1 a check has findings; 2 invalid input; 3 nothin
 Python or VTK is missing.")]
 pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
-    mesh: PathBuf,
+    mesh: Input,
     /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines or path of a file
     /// with a table of promises
     #[arg(long, value_name = "ENGINE")]
@@ -39,7 +40,7 @@ pub struct Arguments {
     nodes_max: Option<usize>,
     /// Write verdict, times and memory as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// How to read a mesh without a manifest.
     #[command(flatten)]
     source: Source,
@@ -62,8 +63,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
-        println!("left out: {why}");
-        return Ok(EXIT_MISSING);
+        return Err((EXIT_MISSING, format!("left out: {why}")));
     }
     // The temporary directory of an imported mesh lives as long as this value.
     let imported = match mesh.join(manifest::FILE).exists() {
@@ -74,7 +74,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
         true => None,
         false => Some(imported(mesh, source, case.as_ref())?),
     };
-    let directory = imported.as_ref().map_or(mesh.as_path(), TempDir::path);
+    let directory = imported.as_ref().map_or(&**mesh, TempDir::path);
     let default = AuditOptions::default();
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let definition = Promises::of_definition();

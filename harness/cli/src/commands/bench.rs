@@ -72,6 +72,7 @@ pub fn run(arguments: Arguments) -> u8 {
 }
 
 fn measure(arguments: &Arguments) -> Result<u8, u8> {
+    arguments.session.prepare()?;
     let programs = programs(arguments)?;
     let options = options(arguments, &programs);
     let outcome = bench(&options, &programs, &mut progress()).map_err(|error| refuse(&error))?;
@@ -151,7 +152,12 @@ fn engines<'a>(arguments: &Arguments, programs: &'a Programs) -> Vec<&'a Engine>
 fn show(arguments: &Arguments) -> u8 {
     match arguments.session.read_record() {
         Ok(content) => {
-            print!("{}", table::tables(&Groups::of(&content.lines)));
+            let groups = Groups::of(&content.lines);
+            print!("{}", table::tables(&groups));
+            if groups.all.is_empty() {
+                eprintln!("harness: the record has no runs");
+                return EXIT_MISSING;
+            }
             EXIT_HOLDS
         }
         Err(code) => code,

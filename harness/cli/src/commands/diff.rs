@@ -1,10 +1,10 @@
 //! `harness diff`: prints the first difference between two leaf-set directories.
 
+use super::values::Input;
 use check::diff::{self, Trust};
 use clap::Args;
 use contract::case::Case;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::path::PathBuf;
 
 /// `harness diff`.
 #[derive(Args, Debug)]
@@ -15,12 +15,12 @@ which mesh is right.
 Exit codes: 0 the meshes are the same; 1 their leaves or their roots differ; 2 invalid input.")]
 pub struct Arguments {
     /// A leaf-set directory
-    a: PathBuf,
+    a: Input,
     /// The leaf-set directory to compare with
-    b: PathBuf,
+    b: Input,
     /// The case of both meshes: its facets help to find the deciding rule
     #[arg(long)]
-    case: Option<PathBuf>,
+    case: Option<Input>,
     /// Compare the counts and digests in the manifests instead of reading all leaves
     #[arg(long)]
     trust_manifests: bool,

@@ -2,6 +2,7 @@
 
 use super::foam::FoamArguments;
 use super::selection::SelectionArguments;
+use super::values::Input;
 use clap::Args;
 use export::error::ExportError;
 use export::format::{self, FORMATS};
@@ -20,7 +21,7 @@ use std::time::Duration;
 #[command(after_help = after_help())]
 pub struct Arguments {
     /// The mesh: a leaf-set directory of any size
-    mesh: PathBuf,
+    mesh: Input,
     /// The file to write; its name decides the format. An existing file is replaced, an existing polyMesh is not
     file: PathBuf,
     /// Number of threads [default: all cores]

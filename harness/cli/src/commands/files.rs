@@ -4,6 +4,23 @@ use contract::files::{named, write_atomically};
 use std::path::Path;
 use std::{fs, io};
 
+/// Creates the missing parent directories of a file, and refuses one that could not be written after a long run.
+///
+/// # Errors
+/// The file's name and the reason.
+pub fn prepare(path: &Path) -> io::Result<()> {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let directory = directory.unwrap_or(Path::new("."));
+    let writable = || {
+        if path.is_dir() {
+            return Err(io::Error::other("it is a directory: give a file"));
+        }
+        fs::create_dir_all(directory)?;
+        tempfile::NamedTempFile::new_in(directory).map(drop)
+    };
+    writable().map_err(|error| named(path, &error))
+}
+
 /// Writes a file and creates its missing parent directories.
 ///
 /// # Errors

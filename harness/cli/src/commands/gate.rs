@@ -1,15 +1,13 @@
 //! `harness gate`: compares a candidate with a baseline and reports.
 
-use super::files::put;
+use super::files::{prepare, put};
 use super::programs::ProgramArguments;
-use super::session::progress;
-use super::values::{percentage, seconds};
+use super::values::{Input, Output, seconds};
 use bench::gate::build::top_level;
-use bench::gate::report::{LayerName, Report};
-use bench::gate::{GateError, Options, gate, power};
+use bench::gate::report::{End, LayerName, Report};
+use bench::gate::{GateError, Options, gate};
 use clap::Args;
 use report::gate::{json, junit, markdown, text};
-use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::verify::report::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
@@ -32,7 +30,7 @@ pub struct Arguments {
     engine: String,
     /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
     #[arg(long, value_name = "FILE")]
-    rules: Option<PathBuf>,
+    rules: Option<Input>,
     /// Only these cases of the rules
     #[arg(long, value_delimiter = ',')]
     case: Vec<String>,
@@ -50,29 +48,22 @@ pub struct Arguments {
     timeout: u64,
     /// Write the exact measures of the candidate: a baseline for later and input of `harness track`
     #[arg(long, value_name = "FILE")]
-    record: Option<PathBuf>,
+    record: Option<Output>,
     /// Write the report as JUnit XML
     #[arg(long, value_name = "FILE")]
-    junit: Option<PathBuf>,
+    junit: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Write the report as Markdown
     #[arg(long, value_name = "FILE")]
-    markdown: Option<PathBuf>,
-    /// Exit code 3 if a requested layer was left out
+    markdown: Option<Output>,
+    /// Exit code 3 if a layer or a case of it was left out
     #[arg(long)]
     require_layers: bool,
     /// The repository of the revisions and of the working tree [default: that of the current directory]
     #[arg(long, value_name = "DIR")]
     repository: Option<PathBuf>,
-    /// Measure the gate itself: which planted slow-downs each layer finds, for these sizes in percent [default: 0,0.1,0.3,1,3,10]
-    #[arg(long, value_name = "PERCENT", value_delimiter = ',', num_args = 0..=1, value_parser = percentage,
-          default_missing_value = "0,0.1,0.3,1,3,10", conflicts_with_all = ["baseline", "candidate", "record", "junit", "json", "markdown", "require_layers"])]
-    selftest: Option<Vec<f64>>,
-    /// Gates per slow-down in --selftest
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
-    trials: u16,
     /// Where revisions are built and kept [default: target/gate in the repository]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
@@ -90,22 +81,27 @@ pub fn run(arguments: Arguments) -> u8 {
             return EXIT_INPUT;
         }
     };
+    let Arguments { record, junit, json, markdown, .. } = &arguments;
+    for file in [record, junit, json, markdown].into_iter().flatten() {
+        if let Err(error) = prepare(file) {
+            eprintln!("harness: {error}");
+            return EXIT_INPUT;
+        }
+    }
     let repository = top_level(arguments.repository.as_deref().unwrap_or(Path::new(".")));
     let options = Options {
         baseline: arguments.baseline.clone(),
         candidate: arguments.candidate.clone(),
-        rules: arguments.rules.clone(),
+        rules: arguments.rules.as_deref().map(Path::to_owned),
         cases: arguments.case.clone(),
         layers: arguments.layers.clone(),
+        require_layers: arguments.require_layers,
         seed: arguments.seed,
         limit: Duration::from_secs(arguments.timeout),
         budget_s: arguments.budget,
         cache: arguments.cache.clone().unwrap_or_else(|| repository.join("target/gate")),
         repository,
     };
-    if let Some(sizes) = &arguments.selftest {
-        return selftest(sizes, usize::from(arguments.trials), &options, &programs);
-    }
     let report = match gate(&options, &programs) {
         Ok(report) => report,
         Err(error) => return refuse(&error),
@@ -113,9 +109,9 @@ pub fn run(arguments: Arguments) -> u8 {
     print!("{}", text(&report));
     if let Err(error) = write(&report, &arguments) {
         eprintln!("harness: a report could not be written: {error}");
-        return exit_first(exit_code(&report, &arguments), EXIT_INPUT);
+        return exit_first(exit_code(&report), EXIT_INPUT);
     }
-    exit_code(&report, &arguments)
+    exit_code(&report)
 }
 
 fn refuse(error: &GateError) -> u8 {
@@ -126,30 +122,17 @@ fn refuse(error: &GateError) -> u8 {
     }
 }
 
-/// Prints the power of the gate; returns the exit code.
-fn selftest(sizes: &[f64], trials: usize, options: &Options, programs: &Programs) -> u8 {
-    match power::power(sizes, trials, options, &programs.paths.harness, &mut progress()) {
-        Ok(rows) => {
-            print!("{}", power::table(&rows));
-            if interrupt::requested() { EXIT_INTERRUPTED } else { EXIT_HOLDS }
-        }
-        Err(error) => refuse(&error),
-    }
-}
-
-fn exit_code(report: &Report, arguments: &Arguments) -> u8 {
-    let layers = &report.layers;
-    let incomplete = layers.is_empty() || layers.iter().any(|layer| layer.left_out.is_some());
-    match (report.interrupted, report.holds()) {
-        (true, _) => EXIT_INTERRUPTED,
-        (_, false) => EXIT_FAILED,
-        _ if arguments.require_layers && incomplete => EXIT_MISSING,
-        _ => EXIT_HOLDS,
+fn exit_code(report: &Report) -> u8 {
+    match report.end() {
+        End::Holds(_) => EXIT_HOLDS,
+        End::Interrupted => EXIT_INTERRUPTED,
+        End::Regression => EXIT_FAILED,
+        End::Incomplete(_) => EXIT_MISSING,
     }
 }
 
 fn write(report: &Report, arguments: &Arguments) -> io::Result<()> {
-    let forms: [(&Option<PathBuf>, &dyn Fn() -> String); 4] = [
+    let forms: [(&Option<Output>, &dyn Fn() -> String); 4] = [
         (&arguments.record, &|| report.candidate_measures.json()),
         (&arguments.junit, &|| junit(report)),
         (&arguments.json, &|| json(report)),

@@ -1,10 +1,10 @@
 //! `harness geometry`: prints the defects of an STL file or a case, and their effect on the mesh.
 
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::files::put;
-use super::values::root;
+use super::values::{self, Output, root};
 use check::geometry::input::{Input, Requested};
 use check::geometry::{Options, diagnose};
 use clap::Args;
@@ -19,7 +19,7 @@ use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
 )]
 pub struct Arguments {
     /// An STL file, or a case file (.toml), which provides root and spacing
-    file: PathBuf,
+    file: values::Input,
     /// Upper bound on the edge length of the cells at the surface, in the units of the file
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     spacing_min: Option<f64>,
@@ -31,7 +31,7 @@ pub struct Arguments {
     root_scale: Option<f64>,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Do not search for self-intersections, which takes about half of the time
     #[arg(long)]
     no_intersections: bool,

@@ -1,6 +1,6 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
-use super::values::root;
+use super::values::{Input, root};
 use clap::Args;
 use contract::case::Case;
 use contract::import::htg::ImportedTree;
@@ -30,7 +30,7 @@ file is not such a mesh, which is explained in one sentence, or cannot be writte
 formats only).")]
 pub struct Arguments {
     /// The mesh: a file, or an OpenFOAM case or polyMesh
-    mesh: PathBuf,
+    mesh: Input,
     /// The directory to make
     #[arg(long, value_name = "DIR")]
     out: PathBuf,

@@ -1,6 +1,7 @@
 //! A mesh on disk, or one that is made from a case first.
 
 use super::programs::ProgramArguments;
+use super::values::Input;
 use clap::Args;
 use contract::case::Case;
 use run::engine::failure::End;
@@ -25,7 +26,7 @@ pub struct MeshArguments {
     pub mesh: String,
     /// The case file of a leaf-set directory, which provides the geometry
     #[arg(long, value_name = "CASE")]
-    pub case: Option<PathBuf>,
+    pub case: Option<Input>,
     /// How a case is meshed.
     #[command(flatten)]
     pub engine: EngineArguments,

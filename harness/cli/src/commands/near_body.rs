@@ -1,6 +1,7 @@
 //! `harness near-body`: the surface that a mesh hands over to a near-body mesher, and its gap to the wall.
 
 use super::selection::SelectionArguments;
+use super::values::{Input, Output, with_extension};
 use clap::Args;
 use contract::case::Case;
 use contract::files::{Content, write_together};
@@ -14,7 +15,7 @@ use export::near_body::report::Report;
 use run::engine::interrupt;
 use run::engine::paths::Paths;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// `harness near-body`.
 #[derive(Args, Debug)]
@@ -24,25 +25,22 @@ away from the body. It is closed unless it reaches the root's boundary or a sele
 
 Examples:
   harness near-body mesh --case body.toml                       size, gap to the wall, distribution to ranks
-  harness near-body mesh --case body.toml --vtp front.vtp       the same, and the surface with the gap of every face
-  harness near-body mesh --stl front.stl                        the surface as triangles
+  harness near-body mesh --case body.toml -o front.vtp          the same, and the surface with the gap of every face
+  harness near-body mesh -o front.stl                           the surface as triangles
 
 Exit codes: 0 success; 2 invalid input, or a mesh without such faces; 130 interrupted, after which no file remains.")]
 pub struct Arguments {
     /// The mesh: a leaf-set directory
-    mesh: PathBuf,
+    mesh: Input,
     /// The case that was meshed, for the gap to the wall: name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]
     case: Option<String>,
-    /// Write the surface as triangles, in binary STL
-    #[arg(long, value_name = "FILE.stl")]
-    stl: Option<PathBuf>,
-    /// Write the surface as polygons for VTK, with level, side, rank, spacing and gap of every face
-    #[arg(long, value_name = "FILE.vtp")]
-    vtp: Option<PathBuf>,
+    /// Write the surface: triangles in binary STL (.stl), or polygons for VTK with level, side, rank, spacing and gap of every face (.vtp); may be repeated
+    #[arg(short, long, value_name = "FILE.stl|FILE.vtp", value_parser = with_extension(&["stl", "vtp"]))]
+    out: Vec<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Which cells' faces are considered.
     #[command(flatten)]
     selection: SelectionArguments,
@@ -77,7 +75,8 @@ fn found(arguments: &Arguments) -> Result<Report, ExportError> {
     }
     let gaps = case.map(|case| gaps(&case, &faces, &check)).transpose()?;
     let polygons = Polygons::new(&faces);
-    let report = Report::new(&mesh, &faces, &polygons, gaps.as_deref(), selection == Default::default())?;
+    let report =
+        Report::new(&mesh, &faces, &polygons, gaps.as_deref(), selection == Default::default())?;
     write(arguments, &mesh, &faces, &polygons, gaps.as_deref(), &report)?;
     Ok(report)
 }
@@ -106,7 +105,9 @@ fn write(
         serde_json::to_writer_pretty(&mut *out, report)?;
         out.write_all(b"\n")
     };
-    let all = [(&arguments.stl, stl), (&arguments.vtp, vtp), (&arguments.json, json)];
-    let requested = all.iter().filter_map(|(path, fill)| Some((path.as_deref()?, *fill)));
-    write_together(&requested.collect::<Vec<_>>(), ExportError::write)
+    let surface =
+        |path: &Path| if path.extension().is_some_and(|e| e == "stl") { stl } else { vtp };
+    let surfaces = arguments.out.iter().map(|path| (&**path, surface(path)));
+    let report = arguments.json.iter().map(|path| (&**path, json));
+    write_together(&surfaces.chain(report).collect::<Vec<_>>(), ExportError::write)
 }

@@ -1,32 +1,16 @@
-//! `harness planted`: the program that `harness gate --selftest` compares with itself.
+//! `harness planted`: ends with a fault of the harness itself, for the tests of its exit codes.
 
-use bench::gate::planted::{self, Kind, PHASES, SlowDown};
 use clap::{Args, ValueEnum};
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use run::verify::report::EXIT_HOLDS;
 use std::hint::black_box;
-use std::path::PathBuf;
 use std::thread;
 
 /// `harness planted`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// A case file, which is not read
-    case: PathBuf,
-    /// How the program is slowed down
-    #[arg(long, default_value = "counted")]
-    kind: Kind,
-    /// The phase that is slowed down, from 0
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..PHASES.len() as i64))]
-    phase: u8,
-    /// Additional time in percent
-    #[arg(long, default_value_t = 0.0)]
-    percent: f64,
-    /// Write the run report
+    /// The fault
     #[arg(long)]
-    json: Option<PathBuf>,
-    /// End with a fault of the harness itself instead
-    #[arg(long)]
-    fault: Option<Fault>,
+    fault: Fault,
 }
 
 /// A fault of the harness.
@@ -40,32 +24,15 @@ enum Fault {
     Memory,
 }
 
-impl Fault {
-    fn occur(self) {
-        match self {
-            Self::Panic => panic!("planted"),
-            Self::Thread => thread::scope(|scope| _ = scope.spawn(|| panic!("planted"))),
-            Self::Memory => drop(black_box(vec![0_u8; 1 << 62])),
-        }
-    }
-}
-
-/// Does the work; returns the exit code.
+/// Lets the fault occur.
 pub fn run(arguments: &Arguments) -> u8 {
-    if let Some(fault) = arguments.fault {
-        let _place = tempfile::tempdir();
-        fault.occur();
-    }
-    let slow = SlowDown {
-        kind: arguments.kind,
-        phase: usize::from(arguments.phase),
-        percent: arguments.percent,
-    };
-    match planted::run(arguments.json.as_deref(), slow) {
-        Ok(()) => EXIT_HOLDS,
-        Err(error) => {
-            eprintln!("harness: the run report could not be written: {error}");
-            EXIT_INPUT
+    let _place = tempfile::tempdir();
+    match arguments.fault {
+        Fault::Panic => panic!("a fault that was asked for"),
+        Fault::Thread => {
+            thread::scope(|scope| _ = scope.spawn(|| panic!("a fault that was asked for")))
         }
+        Fault::Memory => drop(black_box(vec![0_u8; 1 << 62])),
     }
+    EXIT_HOLDS
 }

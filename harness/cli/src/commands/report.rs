@@ -1,7 +1,7 @@
 //! `harness report`: draws figures and a page from records.
 
 use bench::experiments::record;
-use bench::track::history::{self, Record};
+use bench::track::history::{self, History, Record};
 use clap::Args;
 use report::benchmark::report;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
@@ -55,6 +55,10 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
         ));
     }
     let written = report(directory, &lines, &history).map_err(|error| error.to_string())?;
+    if written.figures == 0 {
+        let page = written.page.display();
+        return Err(format!("no figure could be drawn from these results; {page} lists them"));
+    }
     for finding in &written.broken {
         println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
     }
@@ -73,7 +77,11 @@ fn history_of(path: &Path) -> Result<Vec<Record>, String> {
             path.display()
         ));
     }
-    history::read(path)
+    let History { records, warnings } = history::read(path)?;
+    for warning in warnings {
+        eprintln!("harness: {}: {warning}", path.display());
+    }
+    Ok(records)
 }
 
 fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {

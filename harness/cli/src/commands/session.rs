@@ -1,5 +1,6 @@
 //! A session of measurements: the options that `harness bench` and `harness targets` share, and its end.
 
+use super::files::prepare;
 use super::programs::ProgramArguments;
 use bench::experiments::entry::Network;
 use bench::experiments::network;
@@ -42,6 +43,18 @@ pub struct SessionArguments {
 }
 
 impl SessionArguments {
+    /// Checks that the report can be written, before anything is measured.
+    ///
+    /// # Errors
+    /// The exit code, if its directory cannot be created or written.
+    pub fn prepare(&self) -> Result<(), u8> {
+        let page = self.report.as_ref().map(|directory| directory.join("index.html"));
+        page.iter().try_for_each(|page| prepare(page)).map_err(|error| {
+            eprintln!("harness: {error}");
+            EXIT_INPUT
+        })
+    }
+
     /// Returns the record to append to.
     pub fn record_path(&self) -> PathBuf {
         let in_report = self.report.as_ref().map(|directory| directory.join("record.jsonl"));

@@ -1,6 +1,7 @@
 //! `harness targets`: measures the rows of a table of targets and prints which are met.
 
 use super::session::{SessionArguments, progress, refuse, require};
+use super::values::Input;
 use bench::experiments::entry::{Entry, Judged, Line, Machine, Verdict};
 use bench::experiments::session::BenchError;
 use bench::targets::{self, Overrides, Targets};
@@ -17,7 +18,7 @@ const PAGE: &str = "targets.md";
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// The table of targets, TOML
-    pub file: PathBuf,
+    pub file: Input,
     /// Only these rows
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
@@ -52,6 +53,7 @@ fn read(arguments: &Arguments) -> Result<Targets, String> {
 
 fn measure(targets: &Targets, arguments: &Arguments) -> Result<u8, u8> {
     let session = &arguments.session;
+    session.prepare()?;
     let programs = Programs::find(session.programs.given()).map_err(|why| {
         eprintln!("harness: {why}");
         EXIT_INPUT
@@ -131,8 +133,15 @@ fn machine(lines: &[Line]) -> String {
     format!("{cpu}, {cores} cores, {gib} GiB, {kernel}, {mpi}, {compiler}, commit {commit}")
 }
 
-/// Returns the exit code: 1 if a row was missed or failed.
+/// Returns the exit code: 1 if a row was missed or failed, 3 if none has a value.
 fn code(rows: &[Judged]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict, Verdict::Missed | Verdict::Failed);
-    if rows.iter().any(bad) { EXIT_FAILED } else { EXIT_HOLDS }
+    match rows {
+        _ if rows.iter().any(bad) => EXIT_FAILED,
+        _ if rows.iter().all(|row| row.measured.is_none()) => {
+            eprintln!("harness: no row was measured");
+            EXIT_MISSING
+        }
+        _ => EXIT_HOLDS,
+    }
 }

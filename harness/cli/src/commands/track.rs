@@ -1,9 +1,9 @@
 //! `harness track`: appends metrics to the history and reports change points.
 
-use super::files::put;
-use super::values::{percentage, probability};
+use super::files::{prepare, put};
+use super::values::{Input, Output, percentage, probability};
 use bench::statistics::change_points::Rules;
-use bench::track::history::{self, Record};
+use bench::track::history::{self, History, Record};
 use bench::track::{Series, analyse, link, summary};
 use clap::Args;
 use report::track::{export, page};
@@ -17,7 +17,7 @@ pub struct Arguments {
     history: PathBuf,
     /// Append the numbers of this record or JSON report of `harness gate`; may be repeated
     #[arg(long, value_name = "FILE")]
-    add: Vec<PathBuf>,
+    add: Vec<Input>,
     /// Also append this value; may be repeated
     #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number)]
     value: Vec<(String, f64)>,
@@ -32,25 +32,25 @@ pub struct Arguments {
     repository: Option<PathBuf>,
     /// Write the trend page
     #[arg(long, value_name = "FILE")]
-    page: Option<PathBuf>,
+    page: Option<Output>,
     /// Address of a commit for the links of the page, with {commit} [default: from the remote `origin` of the repository]
     #[arg(long, value_name = "URL")]
     link: Option<String>,
     /// Write the last record in Bencher Metric Format
     #[arg(long, value_name = "FILE")]
-    bencher: Option<PathBuf>,
+    bencher: Option<Output>,
     /// Write the last record for github-action-benchmark (customSmallerIsBetter)
     #[arg(long, value_name = "FILE")]
-    github_benchmark: Option<PathBuf>,
+    github_benchmark: Option<Output>,
     /// Write the whole history as CSV
     #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    csv: Option<Output>,
     /// Write a test per metric as JUnit XML
     #[arg(long, value_name = "FILE")]
-    junit: Option<PathBuf>,
+    junit: Option<Output>,
     /// Write all series with their change points as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Exit code 1 (and a failed test) if the last change of a metric is for the worse and within its last N values
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
@@ -84,6 +84,7 @@ pub fn run(arguments: &Arguments) -> u8 {
 }
 
 fn try_run(arguments: &Arguments) -> Result<u8, String> {
+    arguments.outputs().try_for_each(|file| prepare(file).map_err(|error| error.to_string()))?;
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     } else if !arguments.history.exists() {
@@ -95,7 +96,10 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
     for commit in &arguments.accept {
         history::accept(&arguments.history, commit)?;
     }
-    let records = history::read(&arguments.history)?;
+    let History { records, warnings } = history::read(&arguments.history)?;
+    for warning in &warnings {
+        eprintln!("harness: {}: {warning}", arguments.history.display());
+    }
     let effect_min = arguments.effect_min / 100.0;
     let rules =
         Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
@@ -105,6 +109,14 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
     write(arguments, &records, &all).map_err(|error| error.to_string())?;
     let worse = all.iter().any(|series| series.worse_recently(arguments.fail_recent).is_some());
     Ok(if worse { EXIT_FAILED } else { EXIT_HOLDS })
+}
+
+impl Arguments {
+    /// The files to write.
+    fn outputs(&self) -> impl Iterator<Item = &Output> {
+        let Self { page, bencher, github_benchmark, csv, junit, json, .. } = self;
+        [page, bencher, github_benchmark, csv, junit, json].into_iter().flatten()
+    }
 }
 
 fn append(arguments: &Arguments) -> Result<(), String> {
@@ -129,7 +141,7 @@ fn write(arguments: &Arguments, records: &[Record], all: &[Series]) -> std::io::
     let none = Record::new(String::new());
     let last = records.last().unwrap_or(&none);
     let link = arguments.link.clone().or_else(|| link::of_repository(&repository(arguments)));
-    let forms: [(&Option<PathBuf>, &dyn Fn() -> String); 6] = [
+    let forms: [(&Option<Output>, &dyn Fn() -> String); 6] = [
         (&arguments.page, &|| page::page(records, all, link.as_deref())),
         (&arguments.bencher, &|| export::bencher(last)),
         (&arguments.github_benchmark, &|| export::github(last)),

@@ -1,6 +1,66 @@
 //! Parsers of option values.
 
+use clap::builder::{PathBufValueParser, TypedValueParser, ValueParser, ValueParserFactory};
 use contract::lattice::Root;
+use std::io;
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+
+/// A file that the command writes. It is checked when the command line is parsed, before any work: it can be written, and the
+/// command does not read it.
+#[derive(Clone, Debug)]
+pub struct Output(PathBuf);
+
+/// A file or a directory that the command reads. Files of a directory are inputs when they are opened.
+#[derive(Clone, Debug)]
+pub struct Input(PathBuf);
+
+impl Deref for Output {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Deref for Input {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl ValueParserFactory for Output {
+    type Parser = ValueParser;
+
+    fn value_parser() -> ValueParser {
+        let parse = |path: PathBuf| files::check_writable(&path).map(|()| Self(path));
+        PathBufValueParser::new().try_map(parse).into()
+    }
+}
+
+impl ValueParserFactory for Input {
+    type Parser = ValueParser;
+
+    fn value_parser() -> ValueParser {
+        let parse = |path: PathBuf| files::register_input(&path).map(|()| Self(path));
+        PathBufValueParser::new().try_map(parse).into()
+    }
+}
+
+/// A parser of outputs with one of these extensions.
+pub fn with_extension(
+    extensions: &'static [&'static str],
+) -> impl TypedValueParser<Value = Output> {
+    PathBufValueParser::new().try_map(move |path| {
+        if !path.extension().is_some_and(|e| extensions.iter().any(|wanted| e == *wanted)) {
+            let endings = extensions.join(" or .");
+            return Err(io::Error::other(format!("the file name must end in .{endings}")));
+        }
+        files::check_writable(&path).map(|()| Output(path))
+    })
+}
 
 /// Parses a number of cells, such as `1e9`.
 pub fn cell_count(text: &str) -> Result<u64, String> {

@@ -1,6 +1,7 @@
 //! `harness verify`: verifies the selected cases and reports.
 
 use super::programs::ProgramArguments;
+use super::values::Output;
 use clap::Args;
 use contract::catalogue::Size;
 use contract::files::{named, write_atomically};
@@ -28,8 +29,10 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',', default_value = "small")]
     pub size: Vec<Size>,
     /// Rank counts of the runs on MPI
-    #[arg(long, value_delimiter = ',', default_value = "1,2,3,4,7,8,16,32,64", value_parser = rank_count)]
-    pub ranks: Vec<usize>,
+    ///
+    /// Given, they require MPI: exit code 3 without it [default: 1,2,3,4,7,8,16,32,64]
+    #[arg(long, value_delimiter = ',', value_parser = rank_count)]
+    pub ranks: Option<Vec<usize>>,
     /// Partitioners, each at every rank count
     #[arg(long, value_delimiter = ',', default_value = "metis,morton")]
     pub partitioners: Vec<String>,
@@ -44,10 +47,10 @@ pub struct Arguments {
     pub keep: bool,
     /// Write the report as JUnit XML
     #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
+    pub junit: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    pub json: Option<Output>,
     /// Time limit of every single run
     #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
     pub timeout: u64,
@@ -81,6 +84,20 @@ pub struct Arguments {
     /// Paths of the programs.
     #[command(flatten)]
     pub programs: ProgramArguments,
+}
+
+/// Rank counts without `--ranks`.
+const RANKS: [usize; 9] = [1, 2, 3, 4, 7, 8, 16, 32, 64];
+
+/// Each rank count once: a run has one directory.
+fn distinct(ranks: Vec<usize>) -> Vec<usize> {
+    let mut kept = Vec::new();
+    ranks.into_iter().for_each(|count| {
+        if !kept.contains(&count) {
+            kept.push(count)
+        }
+    });
+    kept
 }
 
 fn rank_count(text: &str) -> Result<usize, String> {
@@ -127,7 +144,8 @@ fn options(arguments: Arguments) -> Options {
     Options {
         cases: arguments.cases,
         sizes: arguments.size,
-        ranks: arguments.ranks,
+        ranks_given: arguments.ranks.is_some(),
+        ranks: distinct(arguments.ranks.unwrap_or_else(|| RANKS.to_vec())),
         partitioners: arguments.partitioners,
         level_bases: arguments.level_bases,
         out: arguments.out,
@@ -148,8 +166,8 @@ fn options(arguments: Arguments) -> Options {
 fn write(
     report: &Report,
     options: &Options,
-    junit_file: Option<PathBuf>,
-    json_file: Option<PathBuf>,
+    junit_file: Option<Output>,
+    json_file: Option<Output>,
 ) -> io::Result<()> {
     let forms = [
         ("table.txt", table(report)),

@@ -1,8 +1,9 @@
 //! `harness why`: explains the leaf at a point, or finds splits that no rule requires.
 
+use super::values::Output;
 use std::fmt::Display;
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::meshed::{Failure, MeshArguments, input};
 use check::why::Mesh;
@@ -40,7 +41,7 @@ pub struct Arguments {
     unneeded: bool,
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Octants to list with --unneeded
     #[arg(long, value_name = "N", default_value = "10")]
     first: NonZero<usize>,

@@ -1,6 +1,6 @@
 //! A wall clock that jumps by a day at every call: durations and limits come from the monotonic clock.
 
-use crate::place::Place;
+use crate::place::{HANGS, Place};
 use crate::programs::inputs;
 use crate::table::{Row, Table};
 use crate::tools::{HARNESS, clock, mpi, mpirun, program, skip};
@@ -10,7 +10,7 @@ use std::process::Command;
 use std::time::Duration;
 
 /// Time for a run, and the greatest duration that it may report.
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = HANGS;
 
 /// Programs that measure times and have limits.
 pub fn family() {

@@ -1,6 +1,6 @@
 //! Engines, oracles and launchers that are missing, hang, flood or lie, under the commands that run them.
 
-use crate::place::{Files, Place, TMP};
+use crate::place::{Files, HANGS, Place, TMP};
 use crate::programs::inputs;
 use crate::table::{Row, Table};
 use crate::tools::{HARNESS, is_full, program, skip};
@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::Duration;
 
 /// Time for a command: several programs may hang until their limit of a second, and are then given time to end.
-const LIMIT: Duration = Duration::from_secs(30);
+const LIMIT: Duration = HANGS;
 
 /// The real program, whose output is `$out` and whose report is `$json` afterwards. It meshes in less than the limit.
 const HONEST: &str = "out=; json=; last=; for word; do case \"$last\" in --out) out=$word;; --json) json=$word;; esac; last=$word; done\n\

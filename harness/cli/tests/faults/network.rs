@@ -1,7 +1,7 @@
 //! Ranks on two hosts with a network between them, which is cut during the run. The hosts are network namespaces, joined by a pair of virtual
 //! interfaces; a script in place of a remote shell starts OpenMPI's daemon in the second one.
 
-use crate::place::Place;
+use crate::place::{HANGS, Place};
 use crate::table::{Row, Table};
 use crate::tools::{is_full, mpi, mpirun, skip};
 use std::fs;
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 const CASE: &str = "spacing_min = 0.0012\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"sphere\"\nfacets = 5120\n";
 /// Time for a job with a network that is cut: until the ranks notice, and then the launcher.
-const LIMIT: Duration = Duration::from_secs(30);
+const LIMIT: Duration = HANGS;
 /// What the launcher prints, on one of its streams.
 const LOST: [&str; 2] = ["lost communication", "unable to complete a TCP connection"];
 /// Addresses that no machine of the internet has.

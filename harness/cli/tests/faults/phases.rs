@@ -1,7 +1,7 @@
 //! Ranks that are killed, crash or stop at the beginning of each phase. A rank names its phase in its status file: that write is the
 //! call that the fault is injected into.
 
-use crate::place::{Ended, Files, Place};
+use crate::place::{Ended, Files, HANGS, Place};
 use crate::table::{Row, Table};
 use crate::tools::{injector, is_full, mpi, mpirun, skip};
 use std::fs;
@@ -11,7 +11,7 @@ use std::time::Duration;
 const CASE: &str = "spacing_min = 0.02\nroot_scale = 2.0\nkeep = \"all\"\n[generator]\nshape = \"sphere\"\nfacets = 1280\n";
 const RANKS: usize = 3;
 /// Time for a job: that of the launcher, of the limit for calls, and of the clean-up.
-const LIMIT: Duration = Duration::from_secs(30);
+const LIMIT: Duration = HANGS;
 const OPTIONS: &str =
     "case.toml --out out --json run.json --write words,htg --status status --stall-limit 2 --quiet";
 /// Phases in which the faults of a sample occur.

@@ -1,6 +1,6 @@
 //! The commands that faults are injected into, their input, and the files that they write.
 
-use crate::place::{Files, Place};
+use crate::place::{Files, HANGS, Place};
 use crate::tools::{HARNESS, mpirun, program};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -51,8 +51,8 @@ enum Kind {
 const FACETS: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 const ROOT: &str = "[root]\norigin = [-1.5, -1.5, -1.5]\nedge = 4.0\n";
 /// Time for a run of one process, and for a job of MPI, on a busy machine.
-const LIMIT: Duration = Duration::from_secs(20);
-const LIMIT_MPI: Duration = Duration::from_secs(40);
+const LIMIT: Duration = HANGS;
+const LIMIT_MPI: Duration = HANGS;
 
 /// A binary STL file with the first facets of the tetrahedron.
 fn stl(facets: usize) -> Vec<u8> {
@@ -261,7 +261,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
         new(
             "near-body",
             Harness,
-            "near-body mesh --case case.toml --stl n.stl --vtp n.vtp --json n.json",
+            "near-body mesh --case case.toml -o n.stl -o n.vtp --json n.json",
             &["n.stl", "n.vtp", "n.json"],
         ),
         Program {

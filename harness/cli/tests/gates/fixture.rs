@@ -94,7 +94,12 @@ impl Fixture {
 
     /// Writes an engine that adds `words` to its counter.
     pub fn engine(&self, name: &str, words: u64) {
-        self.write(name, &ENGINE.replace("EXTRA", &words.to_string()));
+        self.program(name, &ENGINE.replace("EXTRA", &words.to_string()));
+    }
+
+    /// Writes a program.
+    pub fn program(&self, name: &str, text: &str) {
+        self.write(name, text);
         fs::set_permissions(self.path(name), fs::Permissions::from_mode(0o755)).unwrap();
     }
 

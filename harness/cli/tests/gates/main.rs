@@ -194,35 +194,91 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
     assert_eq!(elsewhere.code, 2, "{}", elsewhere.printed);
 }
 
+/// Nothing is compared: no rules, no layers, records without cases, of a renamed case, without counters.
 #[test]
-fn the_exact_layers_find_planted_slow_downs_and_their_phase() {
+fn a_gate_that_compared_nothing_is_not_green() {
     let fixture = Fixture::new();
-    let selftest = "gate --selftest 0,3 --trials 1 --layers counters,instructions";
-    let outcome = fixture.harness(selftest);
-    assert_eq!(outcome.code, 0, "{}", outcome.printed);
-    let row = |name: &str| {
-        let mut rows = outcome.printed.lines().filter(|line| line.starts_with(name));
-        let row = rows.next().unwrap_or_else(|| panic!("{name} is missing in {}", outcome.printed));
-        row[name.len()..].split_whitespace().collect::<Vec<_>>().join(" ")
-    };
-    let found = "1 of 1, 1 named";
-    // Without valgrind there are no instructions.
-    let expected = match row("no slow-down").as_str() {
-        "0 of 1 left out left out" => [
-            format!("{found} left out left out"),
-            "0 of 1, 0 named left out left out".to_owned(),
-            "0 of 1 left out left out".to_owned(),
-        ],
-        other => {
-            assert_eq!(other, "0 of 1 0 of 1 left out", "{}", outcome.printed);
-            [
-                format!("{found} {found} left out"),
-                format!("0 of 1, 0 named {found} left out"),
-                "0 of 1 0 of 1 left out".to_owned(),
-            ]
+    let gate = "gate --engine engine.toml --rules gate.toml --layers counters";
+    let record = fixture.harness(&format!("{gate} --record now.json"));
+    assert_eq!(record.code, 0, "{}", record.printed);
+    assert!(record.printed.contains("no baseline was given"), "{}", record.printed);
+    let now = fs::read_to_string(fixture.path("now.json")).unwrap();
+    let mut measures: serde_json::Value = serde_json::from_str(&now).unwrap();
+    let case = measures["cases"]["case.toml"].clone();
+    let mut empty = case.clone();
+    (empty["exact"], empty["digest"]) = (serde_json::json!({}), serde_json::Value::Null);
+    for (cases, why) in [
+        (serde_json::json!({}), "the record does not contain this case"),
+        (serde_json::json!({"other.toml": case}), "the record does not contain this case"),
+        (serde_json::json!({"case.toml": empty}), "no quantity is in both"),
+    ] {
+        measures["cases"] = cases;
+        fixture.write("old.json", &measures.to_string());
+        for also in ["", " --require-layers"] {
+            let outcome = fixture.harness(&format!("{gate} --baseline old.json{also}"));
+            assert_eq!(outcome.code, 3, "{}", outcome.printed);
+            assert!(
+                outcome.printed.contains("INCOMPLETE: counters of case.toml"),
+                "{}",
+                outcome.printed
+            );
+            assert!(outcome.printed.contains(why), "{}", outcome.printed);
         }
+    }
+    let other = fixture
+        .harness(&format!("{} --baseline now.json", gate.replace("counters", "instructions")));
+    assert_eq!(other.code, 3, "{}", other.printed);
+    assert!(other.printed.contains("the rules have no case for instructions"), "{}", other.printed);
+    fixture.write("gate.toml", "[tolerance]\ncounters = 0.0\n");
+    let none = fixture.harness(&format!("{gate} --baseline now.json"));
+    assert_eq!(none.code, 2, "{}", none.printed);
+    assert!(none.printed.contains("it has no [[case]]"), "{}", none.printed);
+}
+
+#[test]
+fn memory_is_compared_on_the_same_machine_only() {
+    let fixture = Fixture::new();
+    let rules = fs::read_to_string(fixture.path("gate.toml")).unwrap();
+    fixture.write("gate.toml", &rules.replace("[\"counters\"]", "[\"counters\", \"memory\"]"));
+    let engine = fs::read_to_string(fixture.path("engine")).unwrap();
+    let reports = |name: &str, bytes: u64| {
+        let with = format!("\"peak_rss_bytes\": {bytes}, \"counters\"");
+        fixture.program(name, &engine.replace("\"counters\"", &with));
     };
-    let kinds = ["operations, counted", "operations, not counted"];
-    let rows = kinds.map(|kind| row(&format!("3 % more {kind}")));
-    assert_eq!([&rows[0], &rows[1], &row("3 % waiting")], expected.each_ref());
+    reports("small", 50 << 20);
+    reports("large", 82 << 20);
+    let gate = "gate --engine engine.toml --rules gate.toml";
+    let outcome = fixture.harness(&format!("{gate} --baseline small --candidate large"));
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    assert!(outcome.printed.contains("REGRESSION in memory"), "{}", outcome.printed);
+    let back =
+        fixture.harness(&format!("{gate} --baseline large --candidate small --record here.json"));
+    assert_eq!(back.code, 0, "{}", back.printed);
+    let here = fs::read_to_string(fixture.path("here.json")).unwrap();
+    let mut there: serde_json::Value = serde_json::from_str(&here).unwrap();
+    there["machine"] = "another".into();
+    fixture.write("there.json", &there.to_string());
+    let same = fixture.harness(&format!("{gate} --baseline here.json --candidate large"));
+    assert_eq!(same.code, 1, "{}", same.printed);
+    let other = fixture.harness(&format!("{gate} --baseline there.json --candidate large"));
+    assert_eq!(other.code, 0, "{}", other.printed);
+    assert!(
+        other.printed.contains("the record is of another machine (another)"),
+        "{}",
+        other.printed
+    );
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_noticed_before_measuring() {
+    let fixture = Fixture::new();
+    for option in ["--record", "--junit", "--json", "--markdown"] {
+        let gate = format!("gate --engine engine.toml --rules gate.toml {option} case.toml/out");
+        let outcome = fixture.harness(&gate);
+        assert_eq!(outcome.code, 2, "{}", outcome.printed);
+        assert!(!outcome.printed.contains("harness gate: counters"), "{}", outcome.printed);
+    }
+    let track = fixture.harness("track history.jsonl --value a/b=1 --page case.toml/out");
+    assert_eq!(track.code, 2, "{}", track.printed);
+    assert!(!fixture.path("history.jsonl").exists());
 }

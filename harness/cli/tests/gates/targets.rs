@@ -104,6 +104,22 @@ fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
 }
 
 #[test]
+fn rows_that_were_all_left_out_and_a_partition_without_metis_are_not_green() {
+    let fixture = scripted();
+    let none = fixture.harness(&format!("{TARGETS_COMMAND} --only mpi --record r.jsonl --no-mpi"));
+    assert_eq!(none.code, 3, "{}", none.printed);
+    assert!(none.printed.contains("no row was measured"), "{}", none.printed);
+    fixture
+        .write("mesher", &MESHER.replace("\"digest\"", "\"partitioner\": \"morton\", \"digest\""));
+    let sim = "three = { mesh = \"body\", comm = \"sim\", ranks = 3 }";
+    let metis = "three = { mesh = \"body\", comm = \"sim\", ranks = 4, partitioner = \"metis\" }";
+    fixture.write("targets.toml", &TARGETS.replace(sim, metis));
+    let outcome = fixture.harness(&format!("{TARGETS_COMMAND} --only failing --record r.jsonl"));
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    assert!(outcome.printed.contains("METIS was asked for"), "{}", outcome.printed);
+}
+
+#[test]
 fn missing_programs_and_invalid_input_have_different_exit_codes() {
     let fixture = scripted();
     let outcome = fixture.harness(&format!(

@@ -95,6 +95,15 @@ impl Fixture {
         self.script("bin/mpirun", "export FAKE_RANKS=$2; shift 2; exec \"$@\"");
     }
 
+    /// Links the tools that the scripts use into `bin`, for a `PATH` without anything else.
+    pub fn link_tools(&self) {
+        fs::create_dir_all(self.path("bin")).unwrap();
+        for tool in ["dirname", "cp", "cat"] {
+            std::os::unix::fs::symlink(format!("/usr/bin/{tool}"), self.path("bin").join(tool))
+                .unwrap();
+        }
+    }
+
     /// Writes a catalogue of one case, `jet`, with a missing geometry.
     pub fn catalogue_with_absent_geometry(&self) {
         let catalogue = "[[case]]\nname = \"jet\"\nfile = \"jet.toml\"\nsize = \"small\"\n";
@@ -131,6 +140,11 @@ impl Fixture {
 
     /// Runs the harness in the directory.
     pub fn harness(&self, arguments: &[&str]) -> Outcome {
+        self.harness_on(&format!("{}:/usr/bin:/bin", self.path("bin").display()), arguments)
+    }
+
+    /// Runs the harness in the directory with this `PATH`.
+    pub fn harness_on(&self, path: &str, arguments: &[&str]) -> Outcome {
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
         command.args(arguments).current_dir(self.0.path());
         if arguments.contains(&"verify") {
@@ -140,7 +154,6 @@ impl Fixture {
                 .arg("--reference")
                 .arg(self.path("reference"));
         }
-        let path = format!("{}:/usr/bin:/bin", self.path("bin").display());
         command
             .env("PATH", path)
             .env("TMPDIR", self.path("tmp"))

@@ -123,9 +123,9 @@ fn an_unknown_case_is_invalid_input() {
 fn a_hang_is_killed_reported_and_kept() {
     let fixture = Fixture::new();
     fixture.script("mesher", HANGS);
-    let outcome = fixture.verify(&["--no-mpi", "--timeout", "1", "--out", "out"]);
+    let outcome = fixture.verify(&["--no-mpi", "--timeout", "20", "--out", "out"]);
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
-    let why = "did not end within 1 s and was killed; ranks 0, 1 were in: layer 7";
+    let why = "did not end within 20 s and was killed; ranks 0, 1 were in: layer 7";
     assert!(outcome.printed.contains(why), "{}", outcome.printed);
     assert!(
         outcome.printed.contains("repeat with: ") && outcome.printed.contains("--no-mpi --keep"),
@@ -171,14 +171,67 @@ fn a_mesh_that_depends_on_the_rank_count_is_detected() {
     assert!(fixture.path("out/case/ranks-3-morton-auto/mesh/mesh.json").is_file());
 }
 
+/// Each process of another MPI's launcher, or of a mesher without MPI, meshes the whole case.
 #[test]
-fn a_mesher_built_without_mpi_does_not_meet_the_requirement() {
+fn ranks_that_are_fewer_than_were_started_are_a_failure() {
     let fixture = Fixture::new();
     fixture.script_mpirun();
     fixture.script("mesher", &HOLDS.replace("$FAKE_RANKS", ""));
-    let outcome = fixture.verify(&["--require", "mpi"]);
+    let outcome = fixture.verify(&[]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    let why = "bin/mpirun, but reports 1: it was built without MPI, or for another MPI";
+    assert!(outcome.printed.contains("was started on 2 ranks by "), "{}", outcome.printed);
+    assert!(outcome.printed.contains(why), "{}", outcome.printed);
+}
+
+#[test]
+fn an_engine_that_crashes_on_mpi_fails() {
+    let fixture = Fixture::new();
+    fixture.script("bin/mpirun", "echo 'rank 1: segmentation fault' >&2; exit 139");
+    for options in [&["--ranks", "2"][..], &[]] {
+        let case = fixture.path("case.toml");
+        let outcome = fixture.harness(&[&["verify", case.to_str().unwrap()], options].concat());
+        assert_eq!(outcome.code, 1, "{}", outcome.printed);
+        assert!(outcome.printed.contains("ended with code 139: rank 1"), "{}", outcome.printed);
+        assert!(!outcome.printed.contains("all hold"), "{}", outcome.printed);
+    }
+}
+
+#[test]
+fn ranks_that_were_asked_for_or_promised_require_mpirun() {
+    let fixture = Fixture::new();
+    fixture.link_tools();
+    let (bin, case) = (fixture.path("bin"), fixture.path("case.toml"));
+    let arguments = ["verify", case.to_str().unwrap(), "--json", "report.json", "--ranks", "2,3"];
+    // The mesher promises the same mesh on any number of ranks, so even ranks that were not asked for are required.
+    for count in [6, 4] {
+        let outcome = fixture.harness_on(bin.to_str().unwrap(), &arguments[..count]);
+        assert_eq!(outcome.code, 3, "{}", outcome.printed);
+        assert!(outcome.printed.contains("something required is missing"), "{}", outcome.printed);
+        assert!(outcome.printed.contains("mpirun is not on the PATH"), "{}", outcome.printed);
+    }
+    let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
+    let checks = json["cases"][0]["checks"].as_array().unwrap();
+    for ranks in [1, 2, 64] {
+        assert!(checks.iter().any(|check| check["ranks"] == ranks), "{ranks} are not named");
+    }
+    let outcome =
+        fixture.harness_on(bin.to_str().unwrap(), &[&arguments[..2], &["--no-mpi"]].concat());
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+}
+
+/// Of a case that was named, nothing left out is green; of those of a size, not all.
+#[test]
+fn a_case_on_which_nothing_was_checked_is_not_green() {
+    let fixture = Fixture::new();
+    let outcome = fixture.verify(&["--no-mpi", "--cells-max", "0"]);
     assert_eq!(outcome.code, 3, "{}", outcome.printed);
-    assert!(outcome.printed.contains("it was built without MPI"), "{}", outcome.printed);
+    assert!(outcome.printed.contains("no check was run on case"), "{}", outcome.printed);
+    assert!(!outcome.printed.contains("all hold"), "{}", outcome.printed);
+    fixture.catalogue_with_absent_geometry();
+    let outcome = fixture.harness(&["verify", "--size", "large"]);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("no case in "), "{}", outcome.printed);
 }
 
 #[test]
@@ -195,12 +248,12 @@ fn a_run_report_that_contradicts_the_mesh_is_detected() {
 }
 
 #[test]
-fn a_case_whose_geometry_is_absent_is_left_out_unless_required() {
+fn a_case_whose_geometry_is_absent_is_left_out_and_not_green_alone() {
     let fixture = Fixture::new();
     fixture.catalogue_with_absent_geometry();
     let rest = ["--no-mpi", "--no-oracles", "--no-p4est"];
     let outcome = fixture.harness(&[&["verify"], &rest[..]].concat());
-    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    assert_eq!(outcome.code, 3, "{}", outcome.printed);
     assert!(
         outcome
             .printed

@@ -49,11 +49,11 @@ pub(super) fn record(scratch: &mut Scratch, bytes: &[u8]) -> bool {
 /// A history of `harness track`.
 pub(super) fn history(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let records = history::read(scratch.file("history.jsonl", bytes));
-    if let Ok(records) = &records {
-        let series = records.iter().flat_map(|record| record.metrics.keys()).count();
+    if let Ok(history) = &records {
+        let series = history.records.iter().flat_map(|record| record.metrics.keys()).count();
         assert!(series <= bytes.len());
     }
-    records.is_ok_and(|records| !records.is_empty())
+    records.is_ok_and(|history| !history.records.is_empty())
 }
 
 /// The reports of a run, of `harness audit` and of `harness gate`.

@@ -2,7 +2,7 @@
 //! reason.
 
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
-use run::verify::report::{CaseReport, Check, Outcome, Report};
+use run::verify::report::{CaseReport, Check, Outcome, Report, Tally};
 use std::time::Duration;
 
 /// The report as JUnit XML.
@@ -13,7 +13,17 @@ pub fn junit(report: &Report) -> String {
     if report.missing.iter().any(|missing| missing.required) {
         xml.add_test_suite(requirements(report));
     }
+    check_invariants(&xml, report);
     to_text(&xml)
+}
+
+/// Each check is a test, and so is each input that was refused and each requirement that is missing: these are errors.
+fn check_invariants(xml: &quick_junit::Report, report: &Report) {
+    let Tally { pass, fail, left_out } = report.tally();
+    let refused = report.cases.iter().filter(|case| case.input_error.is_some()).count();
+    let errors = refused + report.missing.iter().filter(|missing| missing.required).count();
+    let expected = (pass + fail + left_out + errors, fail, errors);
+    assert_eq!((xml.tests, xml.failures, xml.errors), expected, "tests, failures, errors of JUnit");
 }
 
 /// JUnit XML as text, valid by the schema of Jenkins' xUnit plugin (junit-10.xsd), which does not allow `skipped` on the
@@ -45,15 +55,15 @@ fn suite(case: &CaseReport) -> TestSuite {
 
 fn test(check: &Check) -> TestCase {
     let status = match &check.outcome {
-        Outcome::Pass => TestCaseStatus::success(),
-        Outcome::Fail(why) => {
+        Outcome::Pass { .. } => TestCaseStatus::success(),
+        Outcome::Fail { why } => {
             let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
             status
                 .set_message(why.lines().next().unwrap_or_default())
                 .set_description(why.as_str());
             status
         }
-        Outcome::LeftOut(why) => {
+        Outcome::LeftOut { why } => {
             let mut status = TestCaseStatus::skipped();
             status.set_message(format!("left out: {why}"));
             status
@@ -98,14 +108,21 @@ mod tests {
     }
 
     #[test]
+    #[should_panic(expected = "tests, failures, errors of JUnit")]
+    fn a_test_that_is_missing_is_noticed() {
+        let report = sample();
+        check_invariants(&quick_junit::Report::new("harness verify"), &report);
+    }
+
+    #[test]
     fn a_reader_finds_the_counts_and_reasons() {
         let mut report = sample();
         report.missing[0].required = true;
         let back = quick_junit::Report::deserialize_from_str(&junit(&report)).unwrap();
-        assert_eq!((back.tests, back.failures, back.errors), (4, 1, 1));
+        assert_eq!((back.tests, back.failures, back.errors), (5, 1, 1));
         let case = &back.test_suites[0];
-        assert_eq!((case.name.as_str(), case.tests), ("cube_small", 3));
-        let TestCaseStatus::Skipped { message, .. } = &case.test_cases[2].status else {
+        assert_eq!((case.name.as_str(), case.tests), ("cube_small", 4));
+        let TestCaseStatus::Skipped { message, .. } = &case.test_cases[3].status else {
             panic!("a check that was left out must be skipped");
         };
         assert_eq!(message.as_ref().unwrap().as_str(), "left out: the engine is not built");

@@ -38,11 +38,11 @@ fn outcomes(case: &CaseReport, report: &Report) -> Vec<String> {
     let lines = groups.into_iter().filter_map(|(check, subjects)| {
         let what = format!("{}: {}: {}", case.name, subjects.join("; "), check.name);
         match &check.outcome {
-            Outcome::Pass => None,
-            Outcome::Fail(why) => Some(format!("FAILED: {what}: {why}")),
+            Outcome::Pass { .. } => None,
+            Outcome::Fail { why } => Some(format!("FAILED: {what}: {why}")),
             // The line about the missing program covers it.
-            Outcome::LeftOut(why) if report.missing.iter().any(|one| one.why == *why) => None,
-            Outcome::LeftOut(why) => Some(format!("left out: {what} because {why}")),
+            Outcome::LeftOut { why } if report.missing.iter().any(|one| one.why == *why) => None,
+            Outcome::LeftOut { why } => Some(format!("left out: {what} because {why}")),
         }
     });
     lines.collect()
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn checks_that_fail_for_one_reason_share_a_line() {
         let mut report = sample();
-        let again = Check { subject: "7 ranks".into(), ..report.cases[0].checks[1].clone() };
+        let again = Check { subject: "7 ranks".into(), ..report.cases[0].checks[2].clone() };
         report.cases[0].checks.push(again);
         let failed = "FAILED: cube_small: 4 ranks, metis, base auto; 7 ranks: same leaves: first difference <at> root";
         assert_eq!(remarks(&report)[1], failed);

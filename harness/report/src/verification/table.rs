@@ -1,7 +1,7 @@
 //! A verification as a text table: a line for the serial run of each case and one per rank count, then the remarks.
 
 use super::remarks::remarks;
-use run::verify::report::{CaseReport, Report, Run, Tally};
+use run::verify::report::{CaseReport, Check, Outcome, Report, Run, Tally};
 use std::fmt::Write;
 
 /// Headings of the table's columns.
@@ -28,6 +28,7 @@ pub fn table(report: &Report) -> String {
     let mut rows =
         vec![COLUMNS.iter().chain([&COLUMN_PAPER]).map(|title| (*title).to_owned()).collect()];
     rows.extend(report.cases.iter().flat_map(rows_of));
+    check_invariants(&rows[1..], report);
     let mut text = aligned(&rows);
     for line in remarks(report) {
         // Writing into a string cannot fail.
@@ -40,12 +41,14 @@ pub fn table(report: &Report) -> String {
 /// The rows of one case, each with one field per column.
 pub fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let serial = case.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
-    let of_case = case.checks.iter().filter(|check| check.ranks.is_none()).collect();
+    let counts = rank_counts(case);
+    let of_case = |check: &&Check| check.ranks.is_none_or(|ranks| !counts.contains(&ranks));
+    let of_case = case.checks.iter().filter(of_case).collect();
     let mut first = vec![case.name.clone(), case.facets.to_string(), case.leaves_base.to_string()];
     first.extend([case.cells.to_string(), "serial".to_owned()]);
     first.extend(results(of_case, serial));
     let mut rows = vec![first];
-    for ranks in rank_counts(case) {
+    for ranks in counts {
         let with_ranks =
             |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks.count() == ranks);
         let runs = case.runs.iter().filter(with_ranks);
@@ -60,8 +63,18 @@ pub fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     rows
 }
 
+/// Each check is in one row.
+fn check_invariants(rows: &[Vec<String>], report: &Report) {
+    let sum =
+        |column: usize| rows.iter().map(|row| row[column].parse::<usize>().unwrap_or(0)).sum();
+    let shown = Tally { pass: sum(5), fail: sum(6), left_out: sum(7) };
+    assert_eq!(shown, report.tally(), "checks in the rows of the table, and in the report");
+}
+
+/// The rank counts on which anything was run.
 fn rank_counts(case: &CaseReport) -> Vec<usize> {
-    let mut counts: Vec<usize> = case.checks.iter().filter_map(|check| check.ranks).collect();
+    let run = case.checks.iter().filter(|c| !matches!(c.outcome, Outcome::LeftOut { .. }));
+    let mut counts: Vec<usize> = run.filter_map(|check| check.ranks).collect();
     counts.sort_unstable();
     counts.dedup();
     counts
@@ -117,12 +130,20 @@ mod tests {
             lines[1][..9],
             ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100"]
         );
-        assert_eq!(lines[2], ["4", "0", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
+        assert_eq!(lines[2], ["4", "1", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
+    }
+
+    #[test]
+    #[should_panic(expected = "checks in the rows of the table")]
+    fn a_row_that_is_missing_is_noticed() {
+        let report = sample();
+        let rows: Vec<Vec<String>> = report.cases.iter().flat_map(rows_of).collect();
+        check_invariants(&rows[1..], &report);
     }
 
     #[test]
     fn the_verdict_comes_last() {
-        let verdict = "1 case: 1 check holds, 1 fail, 1 left out, in 2.0 s: FAILED\n";
+        let verdict = "1 case: 2 checks hold, 1 fail, 1 left out, in 2.0 s: FAILED\n";
         assert!(table(&sample()).ends_with(verdict));
     }
 }

@@ -10,7 +10,7 @@
 use super::session;
 use files::OUT_OF_MEMORY;
 use files::interrupt::{self, INTERRUPTED};
-use rustix::process::Signal;
+use rustix::process::{Signal, getpid, set_child_subreaper};
 use signal_hook::low_level::{exit, pipe};
 use std::fs;
 use std::io::{self, Read, Write};
@@ -57,6 +57,8 @@ pub fn install() {
 }
 
 fn watch() -> io::Result<()> {
+    // Processes that an engine detaches become children of this one, which ends them.
+    let _ = set_child_subreaper(Some(getpid()));
     let (mut received, sent) = UnixStream::pair()?;
     let wait = move || {
         let mut byte = [0];
@@ -111,9 +113,14 @@ pub(super) fn note_child(id: u32) {
     leftovers().children.push(id);
 }
 
-/// Forgets a child process that has ended with all its descendants.
+/// Forgets a child process that has ended, and ends its descendants that have left its session.
 pub(super) fn forget_child(id: u32) {
-    leftovers().children.retain(|&child| child != id);
+    let mut leftovers = leftovers();
+    leftovers.children.retain(|&child| child != id);
+    // Those of a run on another thread are ended after that.
+    if leftovers.children.is_empty() {
+        session::end_adopted();
+    }
 }
 
 /// Notes a directory that must not outlive the harness.
@@ -150,6 +157,7 @@ pub fn clean() {
         waited += pause;
     }
     children.iter().for_each(|&child| session::signal(child, Signal::KILL));
+    session::end_adopted();
     // Until the process ends, nothing else is published.
     let staged = contract::files::publications();
     interrupt::abandon_unfinished();

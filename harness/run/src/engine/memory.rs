@@ -51,6 +51,30 @@ fn peak_bytes(status: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
+    use std::process::{Command, Stdio};
+
+    #[test]
+    fn the_memory_of_a_grandchild_is_sampled() {
+        let mut command = Command::new("setsid");
+        // `tail` keeps the last line, which is all 30 MB of it, until its input ends, and then waits to print it.
+        command.args([
+            "sh",
+            "-c",
+            "(head -c 30000000 /dev/zero; echo ready >&2; cat) | tail -n 1 > /dev/null",
+        ]);
+        command.stdin(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut line = [0; 6];
+        child.stderr.take().unwrap().read_exact(&mut line).unwrap();
+        let mut sampler = MemorySampler::new();
+        // The last bytes may still be in the pipe.
+        while sampler.peak_bytes() < 29_000_000 {
+            sampler.sample(child.id());
+        }
+        drop(child.stdin.take());
+        assert!(child.wait().unwrap().success());
+    }
 
     #[test]
     fn the_peak_is_parsed() {

@@ -301,12 +301,10 @@ mod tests {
 
     #[test]
     fn a_hang_is_killed_and_reported_with_the_activity_of_the_ranks() {
-        let start = Instant::now();
         let activity = Some("rank 0 was in: balance; rank 1 was in: layer".to_owned());
         let limit = Duration::from_millis(300);
         let end = end_with_activity("sleep 600", 300, &["balance\n", "layer\n"]);
         assert_eq!(end, End::TimedOut { limit, activity });
-        assert!(start.elapsed() < Duration::from_secs(60));
     }
 
     #[test]
@@ -336,16 +334,5 @@ mod tests {
         assert!(finished.time_cpu_s > 0.005, "{finished:?}");
         let idle = shell("sleep 0.2", &watch).unwrap();
         assert!(idle.time_cpu_s < idle.time_wall_s / 2.0, "{idle:?}");
-    }
-
-    #[test]
-    fn the_memory_of_a_grandchild_is_sampled() {
-        let logs = tempfile::tempdir().unwrap();
-        let watch = Watch::new("child", Duration::from_secs(60), logs.path());
-        // `tail` keeps the last line, which is all 30 MB of it, until its input ends.
-        let script = "(head -c 30000000 /dev/zero; sleep 1) | tail -n 1 > /dev/null";
-        let finished = shell(script, &Watch { sample_memory: true, ..watch }).unwrap();
-        let peak = finished.peak_rss_bytes.unwrap();
-        assert!(peak > 30_000_000, "{peak}");
     }
 }

@@ -1,7 +1,7 @@
 //! The run report: the JSON file in which a program describes its run.
 //!
 //! `cells` and `digest` are required. Everything else may be missing, and then
-//! - `ranks` is 1 and `facets` is 0;
+//! - `ranks` is 1, which fails on several, and `facets` is 0;
 //! - `time_wall_s` is the wall time of the process, and `peak_rss_bytes` is what was sampled from outside, or empty;
 //! - phases, counters and the message matrix are empty, and so is every list that is missing from a phase.
 //!
@@ -19,12 +19,18 @@ pub struct RunReport {
     pub cells: u64,
     /// The digest of the mesh: 32 hexadecimal digits.
     pub digest: String,
-    /// Number of ranks.
+    /// Number of ranks; `None` if the engine writes no run report.
     #[serde(default = "one")]
-    pub ranks: usize,
+    pub ranks: Option<usize>,
     /// Number of facets.
     #[serde(default)]
     pub facets: u64,
+    /// The facets as the program read them.
+    #[serde(default)]
+    pub geometry: Option<Geometry>,
+    /// The partitioner that was used; `None` if it is not reported, or for a single rank.
+    #[serde(default)]
+    pub partitioner: Option<String>,
     /// Wall time by the program's own clock, in seconds.
     #[serde(default)]
     pub time_wall_s: Option<f64>,
@@ -40,6 +46,15 @@ pub struct RunReport {
     /// Sender, receiver, messages and bytes of every pair of ranks that communicated.
     #[serde(default)]
     pub message_matrix: Vec<[u64; 4]>,
+}
+
+/// The facets of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Geometry {
+    /// Their number.
+    pub facets: u64,
+    /// Their digest.
+    pub digest: String,
 }
 
 /// A phase of a run.
@@ -62,8 +77,8 @@ pub struct PhaseReport {
     pub message_bytes: Vec<u64>,
 }
 
-fn one() -> usize {
-    1
+fn one() -> Option<usize> {
+    Some(1)
 }
 
 fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error> {
@@ -93,7 +108,7 @@ impl RunReport {
     /// The report of a run that wrote a mesh and no run report.
     pub fn of_mesh(manifest: &Manifest) -> Self {
         let digest = manifest.digest.to_string();
-        Self { cells: manifest.leaves, digest, ranks: 1, ..Self::default() }
+        Self { cells: manifest.leaves, digest, ..Self::default() }
     }
 
     /// Peak memory of all ranks together.
@@ -137,19 +152,19 @@ mod tests {
                 "peak_rss_bytes": [3, 4], "counters": {"leaves": [3, 5]}, "message_matrix": [[0, 1, 3, 96]],
                 "phases": [{"name": "read", "time_cpu_s": [2.0, 1.0], "time_comm_cpu_s": [0.5, 1.5]}]}"#,
         );
-        assert_eq!((mesher.ranks, mesher.peak_rss_bytes_total()), (2, 7));
+        assert_eq!((mesher.ranks, mesher.peak_rss_bytes_total()), (Some(2), 7));
         assert_eq!((mesher.time_cpu_s(), &mesher.counters["leaves"]), (Some(3.0), &vec![3, 5]));
         assert_eq!(mesher.phases[0].time_useful_s(), [1.5, 0.0]);
         assert_eq!(mesher.message_matrix, [[0, 1, 3, 96]]);
         let reference =
             parse(r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#);
-        assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (1, 9));
+        assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (Some(1), 9));
     }
 
     #[test]
     fn only_cells_and_digest_are_required() {
         let least = parse(r#"{"cells": 8, "digest": "00"}"#);
-        assert_eq!((least.ranks, least.time_wall_s, least.time_cpu_s()), (1, None, None));
+        assert_eq!((least.ranks, least.time_wall_s, least.time_cpu_s()), (Some(1), None, None));
         assert!(least.peak_rss_bytes.is_empty() && least.counters.is_empty());
         let error = serde_json::from_str::<RunReport>(r#"{"cells": 8}"#).unwrap_err();
         assert!(error.to_string().contains("digest"), "{error}");

@@ -7,7 +7,7 @@ use super::launcher::{self, Launcher};
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
 use super::paths::{Paths, on_path};
-use super::placeholders::{Values, fill};
+use super::placeholders::{LAUNCHER, Values, fill};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use contract::case::Case;
@@ -94,6 +94,20 @@ impl Engine {
         &self.program
     }
 
+    /// Why no run on MPI can be started; `None` if one can.
+    pub fn lacks_mpi(&self) -> Option<String> {
+        let Some(parallel) = &self.description.run.parallel else {
+            return Some(format!("the engine file of {} has no command `parallel`", self.label()));
+        };
+        let is_ours = parallel.iter().any(|word| [LAUNCHER, "{mpirun}"].contains(&word.as_str()));
+        (is_ours && !self.launcher.is_found()).then(|| {
+            format!(
+                "{} is not on the PATH (ci/setup installs it)",
+                self.launcher.program().display()
+            )
+        })
+    }
+
     /// Whether the engine writes run reports.
     pub fn writes_report(&self) -> bool {
         self.description.run.json.is_some()
@@ -177,6 +191,20 @@ impl Engine {
         if let Some(mesh) = written.as_ref().filter(|mesh| mesh.len() != report.cells) {
             let (stated, found) = (report.cells, mesh.len());
             return Err(self.unusable(format!("states {stated} cells, and its mesh has {found}")));
+        }
+        let (launched, reported) = (layout.ranks.count(), report.ranks);
+        if let Some(ranks) = reported.filter(|&ranks| ranks != launched) {
+            let why = match layout.ranks {
+                Ranks::Mpi(_) => {
+                    let launcher = self.launcher.program();
+                    format!(
+                        "was started on {launched} ranks by {}, but reports {ranks}: it was built without MPI, or for another MPI",
+                        launcher.display()
+                    )
+                }
+                _ => format!("was to run on {launched} ranks, but reports {ranks}"),
+            };
+            return Err(self.unusable(why));
         }
         let report = completed(report, &finished);
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);

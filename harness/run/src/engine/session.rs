@@ -1,7 +1,12 @@
 //! The processes of a session, read from `/proc`.
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, WaitOptions, getsid, kill_process, waitpid};
 use std::fs;
+use std::thread::sleep;
+use std::time::Duration;
+
+/// How often processes are ended that start others meanwhile.
+const ATTEMPTS: usize = 500;
 
 pub(super) fn pid_of(id: u32) -> Option<Pid> {
     i32::try_from(id).ok().and_then(Pid::from_raw)
@@ -30,6 +35,32 @@ pub(super) fn signal(leader: u32, signal: Signal) {
         // It may have ended since then.
         let _ = kill_process(member, signal);
     }
+}
+
+/// Ends the processes that this one has adopted, and waits for them: children that it has not started itself, which are of other
+/// sessions. Their descendants are adopted in turn, so this repeats until none is found. Not while a child that leads a session runs.
+pub(super) fn end_adopted() {
+    for _ in 0..ATTEMPTS {
+        let adopted = adopted();
+        if adopted.is_empty() {
+            return;
+        }
+        for process in adopted {
+            let _ = kill_process(process, Signal::KILL);
+            let _ = waitpid(Some(process), WaitOptions::NOHANG);
+        }
+        sleep(Duration::from_millis(2));
+    }
+}
+
+fn adopted() -> Vec<Pid> {
+    let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let children = threads.flat_map(|thread| {
+        let text = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
+        text.split_whitespace().filter_map(|id| pid_of(id.parse().ok()?)).collect::<Vec<_>>()
+    });
+    let own = getsid(None).ok();
+    children.filter(|&child| getsid(Some(child)).ok() != own).collect()
 }
 
 /// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.

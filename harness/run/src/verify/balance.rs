@@ -15,15 +15,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-const SUBJECT: &str = "p4est";
-const NAME: &str = "balance";
+/// Its subject.
+pub const SUBJECT: &str = "p4est";
+/// Name of the check.
+pub const NAME: &str = "balance";
 
 impl CaseRun<'_> {
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
     pub fn verify_balance(&mut self, base: &Base) {
         if let Some(why) = self.needs.p4est.clone() {
-            return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
+            return self.add(Check::new(SUBJECT, NAME, Outcome::left_out(why)), None);
         }
         self.progress.step("p4est");
         let plain = match self.mesh_plainly() {
@@ -42,10 +44,10 @@ impl CaseRun<'_> {
         let outcome = match failure.end {
             End::Interrupted => return,
             End::Exited { code: EXIT_TOO_DEEP, .. } => {
-                Outcome::LeftOut("the base tree has leaves of level 19, p4est stops at 18".into())
+                Outcome::left_out("the base tree has leaves of level 19, p4est stops at 18")
             }
             // A failure of p4est shows nothing about the mesh, and it must not count as agreement.
-            _ => Outcome::Fail(failure.to_string()),
+            _ => Outcome::fail(failure.to_string()),
         };
         self.add(Check::new(SUBJECT, NAME, outcome), None);
     }

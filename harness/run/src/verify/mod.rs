@@ -23,7 +23,7 @@ use contract::catalogue::Selected;
 use needs::Needs;
 use options::Options;
 use progress::Progress;
-use report::{CaseReport, Check, Outcome, Report};
+use report::{Asked, CaseReport, Check, Outcome, Report};
 use std::path::Path;
 use std::time::Instant;
 use workplace::Workplace;
@@ -58,6 +58,10 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
         .catalogue
         .select(&options.cases, &options.sizes)
         .map_err(VerifyError::Input)?;
+    if selected.is_empty() {
+        let why = format!("no case in {} has this size", programs.paths.catalogue.path().display());
+        return Err(VerifyError::Input(why));
+    }
     let mut workplace = Workplace::new(options)?;
     let mut needs = Needs::probe(options, programs, workplace.root());
     let progress = Progress::new(&selected);
@@ -71,15 +75,30 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
     progress.finish();
     let interrupted = interrupt::requested();
     workplace.close(interrupted && !options.keep);
-    Ok(Report {
+    let report = Report {
         schema: report::SCHEMA.to_owned(),
         program: format!("harness {}", env!("CARGO_PKG_VERSION")),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
+        asked: asked(&selected, options, programs),
         missing: needs.missing(options, cases.len()),
         cases,
         interrupted,
         time_s: start.elapsed().as_secs_f64(),
-    })
+    };
+    report.check_invariants();
+    Ok(report)
+}
+
+fn asked(selected: &[Selected], options: &Options, programs: &Programs) -> Asked {
+    Asked {
+        cases: selected.iter().map(|case| case.name.clone()).collect(),
+        named: !options.cases.is_empty(),
+        ranks: if options.mpi { options.ranks.clone() } else { Vec::new() },
+        subjects: case::steps(&programs.engine.description().promises)
+            .iter()
+            .map(|(subject, _)| (*subject).to_owned())
+            .collect(),
+    }
 }
 
 fn verify_case(
@@ -95,12 +114,10 @@ fn verify_case(
     if let Some(why) = &selected.absent {
         needs.note_absent_geometry(why);
         needs.note_unchecked(&selected.name);
-        let check = Check::new("case", "geometry", Outcome::LeftOut(why.clone()));
-        return Ok(CaseReport {
-            name: selected.name.clone(),
-            checks: vec![check],
-            ..CaseReport::default()
-        });
+        let mut run = CaseRun::new(selected, options, programs, needs, Path::new(""), progress);
+        run.add(Check::new("case", "geometry", Outcome::left_out(why)), None);
+        run.leave_out_rest();
+        return Ok(run.into_report());
     }
     let place = workplace.enter(&selected.name)?;
     let selected = &plain(selected, programs, &place);
@@ -109,7 +126,7 @@ fn verify_case(
     let silent = std::mem::take(&mut run.oracles_silent);
     let mut report = run.into_report();
     needs.note_silent_oracles(silent);
-    if report.tally().run() == 0 && report.input_error.is_none() {
+    if !report.is_checked() && report.input_error.is_none() && !interrupt::requested() {
         needs.note_unchecked(&selected.name);
     }
     report.time_s = start.elapsed().as_secs_f64();

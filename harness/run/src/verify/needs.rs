@@ -2,14 +2,11 @@
 
 use super::options::{Need, Options};
 use super::report::Missing;
-use crate::engine::failure::{End, Failure};
-use crate::engine::layout::{Layout, Ranks};
-use crate::engine::options::RunOptions;
+use crate::engine::failure::Failure;
 use crate::engine::paths::Paths;
 use crate::engine::programs::Programs;
 use crate::oracle::{ORACLES, Question};
-use contract::case::Case;
-use std::fs;
+use check::promises::Independence;
 use std::path::Path;
 use std::time::Duration;
 
@@ -18,8 +15,8 @@ use std::time::Duration;
 pub struct Needs {
     /// Why MPI is unavailable.
     pub mpi: Option<String>,
-    /// Why it is unknown whether the engine's ranks on MPI communicate.
-    pub mpi_doubt: Option<String>,
+    /// Whether the ranks that were asked for, or a promise about ranks, require MPI.
+    mpi_required: bool,
     /// Why no oracle can be used.
     pub oracles: Option<String>,
     /// Oracles that can be used.
@@ -34,10 +31,6 @@ pub struct Needs {
     unchecked: Vec<String>,
 }
 
-/// A case for trying programs out: eight cells around a cube.
-const PROBE: &str = "spacing_min = 1.0\nroot_scale = 2.0\nkeep = KEEP\n[generator]\n\
-                     shape = \"cube\"\nfacets = 12\n";
-const PROBE_RANKS: usize = 2;
 /// Longest time for a probe.
 const PROBE_LIMIT_MAX: Duration = Duration::from_secs(60);
 
@@ -48,13 +41,16 @@ fn probe_limit(options: &Options) -> Duration {
 impl Needs {
     /// Tries the prerequisites of these options.
     pub fn probe(options: &Options, programs: &Programs, place: &Path) -> Self {
-        let probed = match options.mpi {
-            true => probe_mpi(programs, place, probe_limit(options)),
-            false => Err("--no-mpi was given".to_owned()),
-        };
-        let mut needs = match probed {
-            Ok(mpi_doubt) => Self { mpi_doubt, ..Self::default() },
-            Err(why) => Self { mpi: Some(why), ..Self::default() },
+        let engine = programs.engine.description();
+        let promised = engine.promises.is_independent_of(Independence::Ranks);
+        let mut needs = Self {
+            mpi: match options.mpi {
+                true => programs.engine.lacks_mpi(),
+                false => Some("--no-mpi was given".to_owned()),
+            },
+            mpi_required: options.mpi
+                && (options.ranks_given || promised && engine.run.parallel.is_some()),
+            ..Self::default()
         };
         let p4est = &programs.paths.p4est;
         needs.p4est = match (options.p4est, p4est.is_file()) {
@@ -105,7 +101,7 @@ impl Needs {
         self.geometries.push(why.to_owned());
     }
 
-    /// Everything that is missing, once each. If no case was checked, that counts as required with any requirement.
+    /// Everything that is missing, once each. A check of a case that was named, or of any case at all, is always required.
     pub fn missing(&self, options: &Options, cases: usize) -> Vec<Missing> {
         // The vote needs all oracles, so one that is missing counts as all.
         let one = || self.oracles_missing.first().map(Failure::to_string);
@@ -125,53 +121,16 @@ impl Needs {
             (Need::Geometries, geometries),
             (Need::Checks, unchecked),
         ];
-        let nothing = self.unchecked.len() == cases && !options.require.is_empty();
+        let nothing = self.unchecked.len() == cases || !options.cases.is_empty();
         let missing = all.into_iter().filter_map(|(need, why)| {
-            let required = options.require.contains(&need) || need == Need::Checks && nothing;
+            let required = match need {
+                _ if options.require.contains(&need) => true,
+                Need::Mpi => self.mpi_required,
+                Need::Checks => nothing,
+                _ => false,
+            };
             Some(Missing { what: need.to_string(), why: why?, required })
         });
         missing.collect()
-    }
-}
-
-/// Checks that `mpirun` starts the engine and, if the engine reports the number of its ranks, that they communicate,
-/// which the ranks of a mesher without MPI do not. Returns what remains unknown.
-fn probe_mpi(programs: &Programs, place: &Path, limit: Duration) -> Result<Option<String>, String> {
-    if !programs.paths.mpirun.is_file() {
-        return Err("mpirun is not on the PATH (ci/setup installs it)".to_owned());
-    }
-    let engine = &programs.engine;
-    let probe = tempfile::tempdir_in(place).map_err(|error| error.to_string())?;
-    let case = probe.path().join("probe.toml");
-    let keep = engine.description().takes.keep.first();
-    let keep = format!("{:?}", keep.copied().unwrap_or_default()).to_lowercase();
-    fs::write(&case, PROBE.replace("KEEP", &format!("{keep:?}")))
-        .map_err(|error| error.to_string())?;
-    let read = Case::read(&case).map_err(|error| error.to_string())?;
-    if let Some(why) = engine.description().declines(&read) {
-        return Err(format!("no case tries it out: {why}"));
-    }
-    let case = engine.prepare(&case, &probe.path().join("plain"))?;
-    let layout = Layout {
-        partitioner: Some("morton".into()),
-        level_base: Some("auto".into()),
-        ..Layout::on(Ranks::Mpi(PROBE_RANKS))
-    };
-    let completed = engine.run(&case, &layout, &RunOptions::new(probe.path(), limit));
-    let failed = |failure: Failure| match failure.end {
-        End::Missing(_) => failure.to_string(),
-        _ => format!("on MPI, {failure}"),
-    };
-    let ranks = completed.map_err(failed)?.report.ranks;
-    match (engine.writes_report(), ranks) {
-        (false, _) => {
-            let why =
-                "it is unknown whether the ranks communicate: the engine writes no run report";
-            Ok(Some(why.to_owned()))
-        }
-        (true, PROBE_RANKS) => Ok(None),
-        (true, ranks) => Err(format!(
-            "the mesher runs on {ranks} of {PROBE_RANKS} ranks: it was built without MPI"
-        )),
     }
 }

@@ -44,6 +44,8 @@ pub struct Options {
     pub sizes: Vec<Size>,
     /// Rank counts of the runs on MPI.
     pub ranks: Vec<usize>,
+    /// Whether the user gave them: then MPI must not be missing.
+    pub ranks_given: bool,
     /// Partitioners, each tried at each rank count.
     pub partitioners: Vec<String>,
     /// Levels of the partition, each tried with each partitioner.
@@ -79,6 +81,7 @@ impl Options {
             cases,
             sizes: Vec::new(),
             ranks: Vec::new(),
+            ranks_given: false,
             partitioners: Vec::new(),
             level_bases: Vec::new(),
             out: None,

@@ -16,12 +16,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::time::Instant;
 
-const NAME: &str = "oracles";
-const SUBJECT: &str = "sides";
-
-/// Why no vote counts on a case with seeds.
-const ADVISORY: &str =
-    "seeds determine the sides, so the oracles' votes are reported but decide nothing";
+/// Name of the check.
+pub const NAME: &str = "oracles";
+/// Its subject.
+pub const SUBJECT: &str = "sides";
 
 /// On a small case the oracles classify every leaf, up to this many.
 const POINTS_OF_SMALL: usize = 400_000;
@@ -31,7 +29,7 @@ impl CaseRun<'_> {
     pub fn verify_oracles(&mut self, case: &Case, base: &Base) {
         if let Some(why) = &self.needs.oracles {
             let why = why.clone();
-            return self.add(Check::new(SUBJECT, NAME, Outcome::LeftOut(why)), None);
+            return self.add(Check::new(SUBJECT, NAME, Outcome::left_out(why)), None);
         }
         let start = Instant::now();
         let most = match self.selected.size {
@@ -43,7 +41,7 @@ impl CaseRun<'_> {
             Ok(answered) => answered,
             Err(failure) if failure.is_interrupt() => return,
             Err(failure) => {
-                let outcome = Outcome::LeftOut(failure.to_string());
+                let outcome = Outcome::left_out(failure.to_string());
                 self.oracles_silent.push(failure);
                 return self.add(Check::new(SUBJECT, NAME, outcome), None);
             }
@@ -94,10 +92,14 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
     };
     let count = vote::count(&ballot);
     let outcome = match count.failure(&ballot, &sample.points) {
-        Some(why) => Outcome::Fail(why),
-        // Agreement would show nothing: seeds may well make flow of what oracles call inside.
-        None if ballot.seeds => Outcome::LeftOut(ADVISORY.into()),
-        None => Outcome::Pass,
+        Some(why) => Outcome::fail(why),
+        // Agreement would show nothing where no vote could fail the mesh.
+        None => match ballot.advisory() {
+            Some(why) => Outcome::left_out(format!(
+                "{why}, so the oracles' votes are reported but decide nothing"
+            )),
+            None => Outcome::held(ballot.decisive()),
+        },
     };
     let mut counts = BTreeMap::from([
         ("leaves".to_owned(), sample.candidates),

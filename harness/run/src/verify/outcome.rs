@@ -1,20 +1,9 @@
-//! The outcomes of checks, and their counts.
+//! The checks of a verification with their outcomes, and their counts.
 
 use crate::engine::layout::Layout;
+pub use check::checks::Outcome;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// The outcome of a check.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "outcome", content = "why")]
-pub enum Outcome {
-    /// It holds.
-    Pass,
-    /// It does not hold, for this reason.
-    Fail(String),
-    /// It was left out, for this reason.
-    LeftOut(String),
-}
 
 /// One check of one result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -61,7 +50,7 @@ impl Check {
 
     /// Whether it failed.
     pub fn failed(&self) -> bool {
-        matches!(self.outcome, Outcome::Fail(_))
+        self.outcome.failed()
     }
 }
 
@@ -76,21 +65,14 @@ pub struct Tally {
     pub left_out: usize,
 }
 
-impl Tally {
-    /// Number of checks that were run.
-    pub fn run(&self) -> usize {
-        self.pass + self.fail
-    }
-}
-
 impl<'a> FromIterator<&'a Check> for Tally {
     fn from_iter<I: IntoIterator<Item = &'a Check>>(checks: I) -> Self {
         let mut tally = Self::default();
         for check in checks {
             match check.outcome {
-                Outcome::Pass => tally.pass += 1,
-                Outcome::Fail(_) => tally.fail += 1,
-                Outcome::LeftOut(_) => tally.left_out += 1,
+                Outcome::Pass { .. } => tally.pass += 1,
+                Outcome::Fail { .. } => tally.fail += 1,
+                Outcome::LeftOut { .. } => tally.left_out += 1,
             }
         }
         tally

@@ -1,7 +1,7 @@
 //! Ranks, partitions and threads: every layout gives the mesh of the serial run, leaf by leaf, if the engine promises
 //! that, and else a mesh that keeps the engine's other promises.
 
-use super::case::{CaseRun, RUNS};
+use super::case::{CaseRun, RUNS, ended_well};
 use super::report::{Check, Outcome};
 use super::run::{Program, Request};
 use crate::engine::failure::{End, Failure};
@@ -14,6 +14,9 @@ use std::fs;
 
 /// Numbers of threads that are compared with one.
 const THREADS: [usize; 2] = [2, 4];
+
+/// What remains unknown about the ranks of an engine without a run report.
+const DOUBT: &str = "it is unknown whether the ranks communicate: the engine writes no run report";
 
 /// Hangs after which the remaining layouts of a case are left out: each hang costs the whole time limit.
 const HANGS_MAX: usize = 3;
@@ -30,14 +33,32 @@ impl CaseRun<'_> {
 
     /// Runs every layout on MPI and checks its mesh.
     pub fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
-        if let Some(why) = &self.needs.mpi {
-            let ranks: Vec<String> = self.options.ranks.iter().map(usize::to_string).collect();
-            let subject = format!("ranks {}", ranks.join(", "));
-            let check = Check::new(subject, RUNS, Outcome::LeftOut(why.clone()));
-            return self.add(check, None);
+        match &self.needs.mpi {
+            Some(why) if !self.options.mpi => {
+                self.add(Check::new("ranks", RUNS, Outcome::left_out(why)), None);
+            }
+            Some(why) => self.leave_out_ranks(why),
+            None => self.verify_layouts(case, serial, &self.layouts()),
         }
-        let layouts = self.options.layouts(self.programs.engine.description());
-        self.verify_layouts(case, serial, &layouts);
+    }
+
+    /// The layouts on MPI that were asked for.
+    fn layouts(&self) -> Vec<Layout> {
+        match self.options.mpi {
+            true => self.options.layouts(self.programs.engine.description()),
+            false => Vec::new(),
+        }
+    }
+
+    /// Names every layout on MPI that has no check so far as left out.
+    pub fn leave_out_ranks(&mut self, why: &str) {
+        for layout in self.layouts() {
+            let subject = layout.to_string();
+            if self.report().checks.iter().all(|check| check.subject != subject) {
+                let check = Check::of_layout(&layout, RUNS, Outcome::left_out(why));
+                self.add(check, Some(&layout));
+            }
+        }
     }
 
     fn verify_layouts(&mut self, case: &Case, serial: &LeafSet, layouts: &[Layout]) {
@@ -45,7 +66,7 @@ impl CaseRun<'_> {
         for layout in layouts {
             if hangs >= HANGS_MAX {
                 let why = format!("{HANGS_MAX} runs of this case have hung");
-                let check = Check::of_layout(layout, RUNS, Outcome::LeftOut(why));
+                let check = Check::of_layout(layout, RUNS, Outcome::left_out(why));
                 self.add(check, Some(layout));
                 continue;
             }
@@ -76,11 +97,11 @@ impl CaseRun<'_> {
             write: true,
         })?;
         self.report().runs.push(meshed.run);
-        let mut check = Check::of_layout(layout, RUNS, Outcome::Pass);
+        let mut check = Check::of_layout(layout, RUNS, ended_well());
         let is_first = self.report().checks.iter().all(|check| check.ranks.is_none());
-        check
-            .notes
-            .extend(self.needs.mpi_doubt.clone().filter(|_| is_first && check.ranks.is_some()));
+        if is_first && check.ranks.is_some() && !self.programs.engine.writes_report() {
+            check.notes.push(DOUBT.to_owned());
+        }
         self.add(check, Some(layout));
         let Some(mesh) = meshed.mesh else { return Ok(()) };
         let results = match self.must_equal_serial(layout) {

@@ -1,9 +1,17 @@
 //! The result of a verification: the one model that every output format prints.
 //!
-//! Invariant: every requested check appears in it; a check that was not run is listed as left out, with the reason.
+//! Invariants, which [`Report::check_invariants`] executes before any form of the report is printed:
+//! - the cases are those that were asked for, in order; of an interrupted run, the first of them;
+//! - a case that no program refuses has checks, among them at least one for each rank count and for each outside program asked for; one
+//!   that was not run is left out, with the reason;
+//! - a run on ranks has a digest and exactly one check `runs` that holds, and the other way round;
+//! - a run whose mesh is `identical` to the serial one has its digest and number of cells;
+//! - a green report has a check of a mesh that holds, of every case that was named, and misses nothing required.
 
+use super::case::RUNS;
 pub use super::outcome::{Check, Outcome, Tally};
 use crate::engine::layout::Layout;
+use check::checks::identical;
 use serde::{Deserialize, Serialize};
 
 /// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
@@ -21,6 +29,8 @@ pub struct Run {
     pub layout: Option<Layout>,
     /// Cells of the final mesh.
     pub cells: u64,
+    /// Digest of the final mesh.
+    pub digest: String,
     /// Wall time by the program's own clock, in seconds; without writing files if that is measured separately.
     pub time_wall_s: f64,
     /// Wall time by the harness's clock, in seconds, including the start and end of the processes.
@@ -71,7 +81,68 @@ pub struct CaseReport {
     pub time_s: f64,
 }
 
+/// What was asked for.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Asked {
+    /// Names of the cases.
+    pub cases: Vec<String>,
+    /// Whether the user named them; otherwise they were selected by size.
+    pub named: bool,
+    /// Rank counts on MPI.
+    pub ranks: Vec<usize>,
+    /// Subjects of the checks by outside programs.
+    pub subjects: Vec<String>,
+}
+
 impl CaseReport {
+    /// Whether any check has this subject.
+    pub fn has(&self, subject: &str) -> bool {
+        self.checks.iter().any(|check| check.subject.starts_with(subject))
+    }
+
+    /// Whether a check of a mesh was run: that a program ran shows nothing about its mesh.
+    pub fn is_checked(&self) -> bool {
+        let of_mesh = |check: &Check| check.outcome.holds() && check.name != RUNS;
+        self.checks.iter().any(|check| check.failed() || of_mesh(check))
+    }
+
+    fn check_invariants(&self, asked: &Asked) {
+        let name = &self.name;
+        if self.input_error.is_none() {
+            assert!(!self.checks.is_empty(), "{name} has no check");
+            for ranks in &asked.ranks {
+                let named = self.checks.iter().any(|check| check.ranks == Some(*ranks));
+                assert!(named, "{name}: {ranks} ranks were asked for and are not in the report");
+            }
+            for subject in &asked.subjects {
+                assert!(
+                    self.has(subject),
+                    "{name}: {subject} was asked for and is not in the report"
+                );
+            }
+        }
+        let held = |subject: &str, name: &str| {
+            let of = |c: &&Check| c.subject == subject && c.name == name && c.outcome.holds();
+            self.checks.iter().filter(of).count()
+        };
+        let serial = self.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
+        for run in &self.runs {
+            assert!(!run.digest.is_empty(), "{name}: a run of {} has no digest", run.program);
+            let Some(layout) = &run.layout else { continue };
+            let subject = layout.to_string();
+            assert_eq!(held(&subject, RUNS), 1, "{name}: {subject}: a run without its check");
+            if held(&subject, identical::NAME) > 0 {
+                let of = |run: &Run| (run.cells, run.digest.clone());
+                let expected = serial.map(of);
+                assert_eq!(Some(of(run)), expected, "{name}: {subject} is not identical");
+            }
+        }
+        let on_ranks = self.checks.iter().filter(|c| c.ranks.is_some() && c.name == RUNS);
+        let held = on_ranks.filter(|check| check.outcome.holds()).count();
+        let runs = self.runs.iter().filter(|run| run.layout.is_some()).count();
+        assert_eq!(held, runs, "{name}: checks that a run ended well, and runs");
+    }
+
     /// Numbers of its checks by outcome.
     pub fn tally(&self) -> Tally {
         self.checks.iter().collect()
@@ -103,6 +174,8 @@ pub struct Report {
     pub program: String,
     /// Cores of the machine.
     pub cores: usize,
+    /// What was asked for.
+    pub asked: Asked,
     /// Missing prerequisites, whose checks were left out of every case.
     pub missing: Vec<Missing>,
     /// One report for each case.
@@ -133,6 +206,27 @@ pub fn exit_first(a: u8, b: u8) -> u8 {
 }
 
 impl Report {
+    /// Executes the invariants.
+    ///
+    /// # Panics
+    /// If one does not hold, which is a bug.
+    pub fn check_invariants(&self) {
+        let names: Vec<&String> = self.cases.iter().map(|case| &case.name).collect();
+        let asked: Vec<&String> = self.asked.cases.iter().collect();
+        match self.interrupted {
+            true => assert!(asked.starts_with(&names), "cases {names:?} of {asked:?}"),
+            false => assert_eq!(names, asked, "cases in the report, and asked for"),
+        }
+        if !self.interrupted {
+            self.cases.iter().for_each(|case| case.check_invariants(&self.asked));
+        }
+        if self.exit_code() == EXIT_HOLDS {
+            let checked = self.cases.iter().filter(|case| case.is_checked()).count();
+            let least = if self.asked.named { self.cases.len() } else { 1 };
+            assert!(checked >= least.max(1), "green, but {checked} cases were checked");
+        }
+    }
+
     /// The exit code. An interrupt takes precedence, then a failed check, an input error, a missing prerequisite.
     pub fn exit_code(&self) -> u8 {
         if self.interrupted {
@@ -148,16 +242,19 @@ impl Report {
         }
     }
 
+    /// Numbers of all checks by outcome.
+    pub fn tally(&self) -> Tally {
+        self.cases.iter().flat_map(|case| &case.checks).collect()
+    }
+
     /// A one-line summary.
     pub fn verdict(&self) -> String {
-        let all = self.cases.iter().flat_map(|case| &case.checks);
-        let Tally { pass, fail, left_out } = all.collect();
+        let Tally { pass, fail, left_out } = self.tally();
         let cases = self.cases.len();
         let noun = if cases == 1 { "case" } else { "cases" };
         let checks = if pass == 1 { "check holds" } else { "checks hold" };
         let counts = format!("{cases} {noun}: {pass} {checks}, {fail} fail, {left_out} left out");
         let end = match self.exit_code() {
-            EXIT_HOLDS if pass == 0 => "nothing was checked",
             EXIT_HOLDS => "all hold",
             EXIT_FAILED => "FAILED",
             EXIT_INPUT => "invalid input",
@@ -186,7 +283,7 @@ mod tests {
     fn exit_codes_have_an_order_of_precedence() {
         let mut report = crate::testing::report();
         assert_eq!(report.exit_code(), EXIT_FAILED);
-        report.cases[0].checks.remove(1);
+        report.cases[0].checks.remove(2);
         assert_eq!(report.exit_code(), EXIT_HOLDS);
         report.missing[0].required = true;
         assert_eq!(report.exit_code(), EXIT_MISSING);
@@ -194,6 +291,51 @@ mod tests {
         assert_eq!(report.exit_code(), EXIT_INPUT);
         report.interrupted = true;
         assert_eq!(report.exit_code(), EXIT_INTERRUPTED);
+    }
+
+    /// The message with which the invariants refuse a report that was changed in this way; empty if they hold.
+    fn refusal(change: impl Fn(&mut Report) + std::panic::UnwindSafe) -> String {
+        let checked = std::panic::catch_unwind(move || {
+            let mut report = report();
+            change(&mut report);
+            report.check_invariants();
+        });
+        checked.err().map_or(String::new(), |why| *why.downcast::<String>().unwrap())
+    }
+
+    #[test]
+    fn every_planted_wrong_report_is_refused() {
+        assert_eq!(refusal(|_| ()), "");
+        let green = |report: &mut Report| drop(report.cases[0].checks.remove(2));
+        assert_eq!(refusal(green), "");
+        assert!(refusal(|r| r.asked.cases.push("plate".into())).contains("asked for"));
+        assert!(refusal(|r| r.cases[0].checks.clear()).contains("has no check"));
+        assert!(refusal(|r| r.asked.ranks.push(7)).contains("7 ranks were asked for"));
+        assert!(refusal(|r| drop(r.cases[0].checks.pop())).contains("p4est was asked for"));
+        assert!(refusal(|r| r.cases[0].runs[1].digest.clear()).contains("no digest"));
+        assert!(refusal(|r| drop(r.cases[0].checks.remove(1))).contains("a run without its check"));
+        assert!(refusal(|r| drop(r.cases[0].runs.pop())).contains("ended well, and runs"));
+        let differs = |report: &mut Report| {
+            let of_ranks =
+                Check { name: identical::NAME.into(), ..report.cases[0].checks[1].clone() };
+            report.cases[0].checks.push(of_ranks);
+            report.cases[0].runs[1].digest = "1".repeat(32);
+        };
+        assert!(refusal(differs).contains("is not identical"));
+        let unchecked = move |report: &mut Report| {
+            green(report);
+            report.cases[0].checks.remove(0);
+        };
+        assert!(refusal(unchecked).contains("green, but 0 cases were checked"));
+        let interrupted = |report: &mut Report| {
+            (report.interrupted, report.asked.cases) =
+                (true, vec!["cube_small".into(), "b".into()]);
+        };
+        assert_eq!(refusal(interrupted), "");
+        let stranger = |report: &mut Report| {
+            (report.interrupted, report.asked.cases) = (true, vec!["plate".into()]);
+        };
+        assert!(refusal(stranger).contains("cube_small"));
     }
 
     #[test]

@@ -112,6 +112,7 @@ fn measurements(request: &Request, completed: &Completed) -> Run {
         program: program.to_owned(),
         layout: request.layout.rank_count().map(|_| request.layout.clone()),
         cells: report.cells,
+        digest: report.digest.clone(),
         time_wall_s: report.time_wall_s.unwrap_or(completed.time_process_s),
         time_process_s: completed.time_process_s,
         peak_rss_bytes: report.peak_rss_bytes_total(),

@@ -1,6 +1,6 @@
 //! The serial meshes, with which all others are compared: base tree and final mesh, of mesher and reference.
 
-use super::case::{CaseRun, RUNS};
+use super::case::{CaseRun, RUNS, ended_well};
 use super::report::{Check, Outcome};
 use super::run::{Meshed, Program, Request};
 use crate::engine::failure::{CODE_INPUT, End};
@@ -42,7 +42,7 @@ impl CaseRun<'_> {
         let (cells, limit) = (timed.cells, self.options.cells_max);
         if cells > limit {
             let why = format!("{cells} cells exceed the {limit} that are checked in memory");
-            self.add(Check::new("serial", "checks", Outcome::LeftOut(why)), None);
+            self.add(Check::new("serial", "checks", Outcome::left_out(why)), None);
             return None;
         }
         let mesh = self.make("serial", Program::Mesher, "serial", false)?.mesh?;
@@ -89,8 +89,8 @@ impl CaseRun<'_> {
         }
         let (first, second) = (&timed.digest, mesh.manifest.digest.to_string());
         let outcome = match *first == second {
-            true => Outcome::Pass,
-            false => Outcome::Fail(format!(
+            true => Outcome::held(mesh.words.len() as u64),
+            false => Outcome::fail(format!(
                 "two serial runs differ: {} cells, digest {first}; {} cells, digest {second}",
                 timed.cells,
                 mesh.words.len()
@@ -144,7 +144,7 @@ impl CaseRun<'_> {
         let request = Request { ungraded, ..serial(program, &self.selected.path, name) };
         match self.run(&request) {
             Ok(meshed) => {
-                self.add(Check::new(subject, RUNS, Outcome::Pass), None);
+                self.add(Check::new(subject, RUNS, ended_well()), None);
                 Some(meshed)
             }
             // The harness has read the case without an error, so an input error is this program's opinion only.
@@ -178,7 +178,7 @@ impl CaseRun<'_> {
         let (cells, limit) = (mesh.words.len() as u64, self.options.reference_cells_max);
         if cells > limit {
             let why = format!("{cells} cells exceed the {limit} up to which the reference is run");
-            self.add(Check::new("reference", "identical", Outcome::LeftOut(why)), None);
+            self.add(Check::new("reference", "identical", Outcome::left_out(why)), None);
             return None;
         }
         let meshed = self.make("reference", Program::Reference, "reference", false)?;
@@ -194,7 +194,7 @@ impl CaseRun<'_> {
         match self.run(&serial(Program::Mesher, &self.selected.path, "serial")) {
             Ok(_) => {
                 let why = format!("the mesher accepts an invalid case: {why}");
-                self.add(Check::new("serial", RUNS, Outcome::Fail(why)), None);
+                self.add(Check::new("serial", RUNS, Outcome::fail(why)), None);
             }
             Err(failure) => match failure.end {
                 End::Exited { code: CODE_INPUT, error } => self.report().input_error = Some(error),

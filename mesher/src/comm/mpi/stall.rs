@@ -3,6 +3,7 @@
 //! A rank that has waited for longer than the limit asks all others for a sign, on a communicator of its own. Ranks that wait themselves
 //! answer at once, as they look for questions while they wait. Those that do not answer compute, hang, or have been stopped.
 
+use crate::error::STALLED;
 use files::interrupt;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Destination, Source};
@@ -11,9 +12,7 @@ use std::collections::BTreeSet;
 use std::io::{Write, stderr};
 use std::time::{Duration, Instant};
 
-/// Exit code of a job with a rank that keeps the others waiting.
-const STALLED: i32 = 75;
-/// Time for an answer.
+/// Least time for an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 const QUESTION: i32 = 1;
 const ANSWER: i32 = 2;
@@ -76,6 +75,8 @@ impl Watch {
             answered.iter_mut().for_each(|ranks| _ = ranks.insert(status.source_rank()));
         }
         let waited = self.since.get().elapsed();
+        // A rank that waits answers when the machine runs it.
+        let patience = PATIENCE.max(self.limit / 2);
         match &*answered {
             None if waited > self.limit => {
                 let me = self.side.rank();
@@ -85,12 +86,12 @@ impl Watch {
                 *answered = Some(BTreeSet::from([me]));
                 self.since.set(Instant::now());
             }
-            Some(ranks) if waited > PATIENCE => {
+            Some(ranks) if waited > patience => {
                 if ranks.len() as i32 == self.side.size() {
                     // All ranks wait: the call takes long by itself.
                     drop(answered);
                     self.start();
-                } else if ranks.first() == Some(&self.side.rank()) || waited > 2 * PATIENCE {
+                } else if ranks.first() == Some(&self.side.rank()) || waited > 2 * patience {
                     self.end(ranks);
                 }
             }

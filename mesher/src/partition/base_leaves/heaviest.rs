@@ -1,64 +1,72 @@
 //! The number of leaves in the heaviest base leaf, which bounds the load balance of any partition.
 
-use crate::brickset::{BrickSet, ones};
-use crate::octant::{LEVEL_MAX, Level, start57};
-use crate::partition::ownership::BaseLeaf;
+use crate::octant::{LEVEL_MAX, Level};
 
-/// Leaves of the final mesh in the heaviest of this rank's base leaves, which are in Morton order; `split` is the graded
-/// tree.
-pub fn cells_heaviest(split: &[BrickSet], deleted: &[BrickSet], base_leaves: &[BaseLeaf]) -> u64 {
-    let starts: Vec<u64> = base_leaves.iter().map(|b| start57(b.level, b.code)).collect();
-    // The base leaf that contains an octant of level `l`.
-    let containing = |l: Level, start: u64| {
-        let i = starts.partition_point(|&s| s <= start).checked_sub(1)?;
-        let b = base_leaves[i];
-        (start < start57(b.level, b.code + 1) && b.level <= l).then_some(i)
-    };
-    let mut counts = vec![1i64; base_leaves.len()];
-    let mut add = |l: Level, set: &BrickSet, each: i64| {
-        for b in set.bricks() {
-            if let Some(i) = l.checked_sub(2).and_then(|up| containing(up, start57(up, b.key))) {
-                counts[i] += each * i64::from(b.bits.count_ones());
-                continue;
-            }
-            // The brick spans several base leaves, or is another rank's.
-            for bit in ones(b.bits) {
-                if let Some(i) = containing(l, start57(l, b.key << 6 | u64::from(bit))) {
-                    counts[i] += each;
-                }
-            }
-        }
-    };
-    for l in 0..=LEVEL_MAX {
-        add(l, &split[l as usize], 7);
-        add(l, &deleted[l as usize], -1);
+/// Counts this rank's leaves by base leaf, as they are streamed in Morton order.
+pub struct Heaviest<'a> {
+    /// Level-19 codes at which base leaves begin; none if these are the octants of one level.
+    starts: &'a [u64],
+    /// Bits of a code within an octant of that level.
+    shift: u32,
+    /// The end of the current base leaf, and its leaves so far.
+    end: u64,
+    leaves: u64,
+    max: u64,
+}
+
+impl<'a> Heaviest<'a> {
+    /// Base leaves that begin at `starts` or, if there are none, the octants of `level`.
+    pub fn new(starts: &'a [u64], level: Level) -> Self {
+        Self { starts, shift: 3 * (LEVEL_MAX - level), end: 0, leaves: 0, max: 0 }
     }
-    counts.into_iter().max().unwrap_or(0).max(0) as u64
+
+    /// Counts the next leaves. One that is larger than a base leaf counts for the first in it.
+    pub fn add(&mut self, mut words: &[u64]) {
+        while let Some(code) = words.first().map(|w| w >> 7) {
+            if code >= self.end {
+                self.leaves = 0;
+                self.end = match self.starts.get(self.starts.partition_point(|s| *s <= code)) {
+                    Some(end) => *end,
+                    None if self.starts.is_empty() => ((code >> self.shift) + 1) << self.shift,
+                    None => u64::MAX,
+                };
+            }
+            let is_last = words[words.len() - 1] >> 7 < self.end;
+            let count =
+                if is_last { words.len() } else { words.partition_point(|w| w >> 7 < self.end) };
+            self.leaves += count as u64;
+            self.max = self.max.max(self.leaves);
+            words = &words[count..];
+        }
+    }
+
+    /// Leaves in the heaviest base leaf.
+    pub fn max(&self) -> u64 {
+        self.max
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brick::Brick;
-    use crate::tree::per_level;
+    use crate::octant::{Side, start57, word};
 
     #[test]
-    fn cells_are_counted_by_base_leaf() {
-        let set = |codes: &[u64]| {
-            let bricks = codes.iter().map(|c| Brick { key: c >> 6, bits: 1 << (c & 63) });
-            BrickSet::from_unsorted(bricks.collect())
+    fn leaves_are_counted_by_base_leaf_whatever_the_pieces() {
+        let of = |l, codes: &[u64]| -> Vec<u64> {
+            codes.iter().map(|c| word(l, *c, Side::Outside)).collect()
         };
-        let (mut split, mut deleted) = (per_level(), per_level());
-        // Octant 3 and two of its children are split, octant 5 alone; of the leaves below 3 two are deleted.
-        for (l, codes) in [(0, &[0][..]), (1, &[3, 5]), (2, &[3 << 3, 3 << 3 | 6])] {
-            split[l] = set(codes);
+        let words =
+            [of(2, &[1, 3]), of(1, &[1]), of(3, &[128, 129, 130, 200]), of(2, &[32, 63])].concat();
+        for (starts, level, want) in
+            [(&[0, 2, 5][..], 1, 5), (&[0, 4], 1, 7), (&[], 1, 3), (&[], 0, 9), (&[], 2, 3)]
+        {
+            let starts: Vec<u64> = starts.iter().map(|c| start57(1, *c)).collect();
+            for piece in 1..=words.len() {
+                let mut heaviest = Heaviest::new(&starts, level);
+                words.chunks(piece).for_each(|piece| heaviest.add(piece));
+                assert_eq!(heaviest.max(), want, "{starts:?}, level {level}, pieces of {piece}");
+            }
         }
-        deleted[2] = set(&[3 << 3 | 1]);
-        deleted[3] = set(&[3 << 6 | 7]);
-        let leaves: Vec<BaseLeaf> =
-            (0..8).map(|code| BaseLeaf { level: 1, code, owner: 0 }).collect();
-        assert_eq!(cells_heaviest(&split, &deleted, &leaves[..4]), 1 + 7 + 14 - 2);
-        assert_eq!(cells_heaviest(&split, &deleted, &leaves[4..]), 8);
-        assert_eq!(cells_heaviest(&split, &deleted, &[]), 0);
     }
 }

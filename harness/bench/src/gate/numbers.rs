@@ -1,0 +1,375 @@
+//! The layers of numbers with a tolerance: counters and peak memory of the program, serially and on ranks, and what valgrind
+//! counts. Numbers are compared by name; the program that lacks one that the other has is not compared in it.
+
+use super::Bench;
+use super::callgrind::Profile;
+use super::measures::{CaseMeasures, Measures, Numbers};
+use super::report::{Finding, Layer, LayerName, Verdict};
+use super::rules::Selected;
+use super::subject::Baseline;
+use check::promises::Independence;
+use run::engine::failure::Failure;
+use run::engine::interrupt;
+use run::engine::layout::{Layout, Ranks, SERIAL};
+use run::engine::options::RunOptions;
+use run::engine::process::{self, Watch};
+use run::engine::runner::Engine;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+/// The number of cells, which is known of every program.
+const CELLS: &str = "cells";
+/// Peak memory of all ranks together.
+pub const MEMORY: &str = "peak_rss_bytes";
+/// Growth of the memory that is never reported: addresses and the sharing of pages make that much difference.
+const MEMORY_NOISE_BYTES: u64 = 1 << 20;
+/// Number of functions named if instructions grew.
+const FUNCTIONS_SHOWN: usize = 3;
+
+/// What a program does on a case.
+#[derive(Clone, Debug, Default)]
+pub struct Measurement {
+    measures: CaseMeasures,
+    profile: Profile,
+}
+
+/// Compares the numbers of a layer.
+pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures, layer: &mut Layer) {
+    let name = layer.name;
+    if let Some(why) = left_out(bench, baseline, name, &measures.machine) {
+        layer.left_out = Some(why);
+        return;
+    }
+    for case in bench.cases_of(name) {
+        if interrupt::requested() {
+            break;
+        }
+        let case_name = &case.rule.name;
+        match bench.measured(&bench.candidate, case, name) {
+            Err(why) if why.is_interrupt() => break,
+            Err(why) => {
+                let finding =
+                    Finding::noted(case_name, "runs", Verdict::Regression, why.to_string());
+                layer.findings.push(finding);
+            }
+            Ok(mut candidate) => {
+                let entry = measures.case(case_name);
+                *entry.of_layer(name) = candidate.measures.of_layer(name).clone();
+                if name == LayerName::Counters {
+                    entry.digest.clone_from(&candidate.measures.digest);
+                    entry.geometry.clone_from(&candidate.measures.geometry);
+                }
+                match old(bench, baseline, case, name) {
+                    Err(why) => {
+                        layer.findings.push(Finding::noted(
+                            case_name,
+                            "baseline",
+                            Verdict::Missing,
+                            why,
+                        ));
+                    }
+                    Ok(old) => layer.findings.extend(compare(bench, case, name, old, candidate)),
+                }
+            }
+        }
+        if name != LayerName::Instructions {
+            layer.findings.extend(bench.ranks_left_out(case));
+        }
+    }
+}
+
+/// Why a layer cannot be run at all.
+fn left_out(bench: &Bench, baseline: &Baseline, name: LayerName, machine: &str) -> Option<String> {
+    if name == LayerName::Instructions && run::engine::paths::on_path(VALGRIND).is_none() {
+        return Some("valgrind is not on the PATH".to_owned());
+    }
+    match baseline {
+        Baseline::Record(_, record) if name != LayerName::Counters && record.machine != machine => {
+            let of = if record.machine.is_empty() { "unknown" } else { &record.machine };
+            Some(format!(
+                "the record is of another machine ({of}): {name} would differ without a change"
+            ))
+        }
+        _ => None,
+    }
+    .filter(|_| bench.cases_of(name).next().is_some())
+}
+
+/// The measurement of the baseline; `None` if there is nothing to compare with.
+fn old(
+    bench: &Bench,
+    baseline: &Baseline,
+    case: &Selected,
+    layer: LayerName,
+) -> Result<Option<Measurement>, String> {
+    match baseline {
+        Baseline::None => Ok(None),
+        Baseline::Record(_, record) => {
+            let measures = record.cases.get(&case.rule.name);
+            let measures = measures.ok_or("the record does not contain this case")?.clone();
+            Ok(Some(Measurement { measures, ..Measurement::default() }))
+        }
+        Baseline::Program(subject) => {
+            let measured = bench.measured(&subject.engine, case, layer);
+            measured.map(Some).map_err(|why| format!("the baseline has no result: {why}"))
+        }
+    }
+}
+
+/// Compares two measurements of a case.
+fn compare(
+    bench: &Bench,
+    case: &Selected,
+    layer: LayerName,
+    old: Option<Measurement>,
+    mut new: Measurement,
+) -> Vec<Finding> {
+    let name = &case.rule.name;
+    let numbers = new.measures.of_layer(layer).clone();
+    let Some(mut old) = old else {
+        let note = format!("{} quantities", numbers.len());
+        let verdict = if numbers.is_empty() { Verdict::Missing } else { Verdict::Measured };
+        let compared = numbers.len() as u64;
+        return vec![Finding {
+            compared,
+            ..Finding::noted(name, &layer.to_string(), verdict, note)
+        }];
+    };
+    let geometries = [&old.measures.geometry, &new.measures.geometry];
+    if let [Some(one), Some(other)] = geometries
+        && one != other
+    {
+        let why = format!("other facets were read: their digest is {other}, and was {one}");
+        return vec![Finding::noted(name, "geometry", Verdict::Missing, why)];
+    }
+    let before = old.measures.of_layer(layer).clone();
+    let tolerance = |metric: &str| bench.rules.tolerance.of_metric(&case.rule, metric, layer);
+    let mut findings = compared_numbers(name, layer, &before, &numbers, &tolerance);
+    if layer == LayerName::Counters {
+        findings.insert(0, same_mesh(name, &old.measures.digest, &new.measures.digest));
+    }
+    let instructions = findings.iter_mut().find(|f| f.metric == INSTRUCTIONS);
+    if let Some(finding) = instructions.filter(|f| f.verdict == Verdict::Regression)
+        && old.profile.instructions > 0
+    {
+        let grown = new.profile.grown_since(&old.profile).into_iter().take(FUNCTIONS_SHOWN);
+        let grown: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
+        finding.note.push_str(&format!("; mostly {}", grown.join(", ")));
+    }
+    findings
+}
+
+/// A different digest means a different mesh; the layer of correctness decides whether it is correct.
+fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> Finding {
+    let shown = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
+    let (verdict, note) = match old == new {
+        true => (Verdict::Unchanged, shown(new)),
+        false => (Verdict::Changed, format!("different mesh: {} was {}", shown(new), shown(old))),
+    };
+    Finding::noted(case, "digest", verdict, note)
+}
+
+/// Compares all numbers of both sides. If both sides together have numbers beside the cells, they must share one of them.
+fn compared_numbers(
+    case: &str,
+    layer: LayerName,
+    old: &Numbers,
+    new: &Numbers,
+    tolerance: &dyn Fn(&str) -> f64,
+) -> Vec<Finding> {
+    let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+    let shared = |name: &&&String| old.contains_key(**name) && new.contains_key(**name);
+    let is_counter = |name: &&&String| **name != CELLS;
+    let mut findings = Vec::new();
+    if names.iter().any(|name| is_counter(&name))
+        && !names.iter().filter(is_counter).any(|name| shared(&name))
+    {
+        let why = format!(
+            "no quantity is in both: the baseline has {}, the candidate {}",
+            old.len(),
+            new.len()
+        );
+        findings.push(Finding::noted(case, &layer.to_string(), Verdict::Missing, why));
+    }
+    // Noise within the tolerance is not worth a line.
+    let less = if layer == LayerName::Counters { Verdict::Changed } else { Verdict::Unchanged };
+    findings.extend(names.into_iter().map(|metric| {
+        let finding = match (old.get(metric), new.get(metric)) {
+            (Some(&old), Some(&new)) => {
+                Finding::exact(case, metric, [old, new], tolerance(metric), less)
+            }
+            (None, new) => Finding::noted(
+                case,
+                metric,
+                Verdict::Changed,
+                format!("new, {}", new.unwrap_or(&0)),
+            ),
+            (Some(old), None) => {
+                Finding::noted(case, metric, Verdict::Changed, format!("removed, was {old}"))
+            }
+        };
+        let grown = finding.candidate.unwrap_or(0.0) - finding.baseline.unwrap_or(0.0);
+        let is_result = metric == CELLS || metric.ends_with("leaves");
+        match finding.verdict {
+            // The size of the mesh is a result, not a cost: a change is neither better nor worse.
+            Verdict::Improvement | Verdict::Regression | Verdict::Changed if is_result => {
+                Finding { verdict: Verdict::Changed, note: "different mesh".into(), ..finding }
+            }
+            Verdict::Regression
+                if layer == LayerName::Memory && grown <= MEMORY_NOISE_BYTES as f64 =>
+            {
+                Finding { verdict: Verdict::Unchanged, note: String::new(), ..finding }
+            }
+            _ => finding,
+        }
+    }));
+    findings
+}
+
+/// Counters and memory of a program on a case. Digests of all rank counts must be the same if the engine promises that.
+pub fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Measurement, Failure> {
+    let unusable = |why: String| engine.unusable(why);
+    let path = case.path.clone().map_err(unusable)?;
+    let place = bench.enter("counters").map_err(unusable)?;
+    let path = engine.prepare(&path, &place.join("case")).map_err(unusable)?;
+    let mut measures = CaseMeasures::default();
+    for ranks in bench.layouts(case) {
+        let place = bench.enter("counters/run").map_err(unusable)?;
+        let options =
+            RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit) };
+        let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
+        let independent = engine.description().promises.is_independent_of(Independence::Ranks);
+        let serial = measures.digest.get_or_insert(report.digest.clone());
+        if *serial != report.digest && independent {
+            let digest = report.digest;
+            let why = format!("on {ranks} has digest {digest}, which differs from the serial one");
+            return Err(unusable(why));
+        }
+        let prefix = prefix(ranks);
+        if ranks == Ranks::Serial {
+            measures.exact.insert(CELLS.into(), report.cells);
+            measures.geometry = report.geometry.as_ref().map(|geometry| geometry.digest.clone());
+        }
+        let bytes = report.peak_rss_bytes_total();
+        if bytes > 0 {
+            measures.memory.insert(format!("{prefix}{MEMORY}"), bytes);
+        }
+        let total = |(name, of): (String, Vec<u64>)| (format!("{prefix}{name}"), of.iter().sum());
+        measures.exact.extend(report.counters.into_iter().map(total));
+    }
+    Ok(Measurement { measures, profile: Profile::default() })
+}
+
+/// The beginning of the names of quantities on these ranks.
+pub fn prefix(ranks: Ranks) -> String {
+    match ranks {
+        Ranks::Serial => String::new(),
+        Ranks::Simulated { ranks, .. } => format!("{ranks} ranks/"),
+        Ranks::Mpi(ranks) => format!("{ranks} MPI ranks/"),
+    }
+}
+
+const VALGRIND: &str = "valgrind";
+const INSTRUCTIONS: &str = "instructions";
+/// Beginning of the names of the profiles.
+const PROFILE: &str = "callgrind.out";
+
+/// Instructions and allocations of a serial run under valgrind, of all its processes. They do not depend on the load of
+/// the machine, so a difference of a percent is significant.
+pub fn instructions(
+    bench: &Bench,
+    engine: &Engine,
+    case: &Selected,
+) -> Result<Measurement, Failure> {
+    let unusable = |why: String| engine.unusable(why);
+    let path = case.path.clone().map_err(unusable)?;
+    let place = bench.enter("instructions").map_err(unusable)?;
+    let path = engine.prepare(&path, &place.join("case")).map_err(unusable)?;
+    // Without output files, the count is that of meshing alone.
+    let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit) };
+    let plain = engine.command(&path, &SERIAL, &options)?;
+    let mut command = Command::new(VALGRIND);
+    // The program may be started by a script, and may start others.
+    command.args(["--tool=callgrind", "--compress-pos=no", "--trace-children=yes"]);
+    command.arg(format!("--callgrind-out-file={}.%p", place.join(PROFILE).display()));
+    command.arg(plain.get_program()).args(plain.get_args());
+    command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit, &place))?;
+    let profile = profile_of_all(&place).map_err(unusable)?;
+    let counted = [(INSTRUCTIONS, profile.instructions), ("allocations", profile.allocations())];
+    let counted = counted.map(|(name, count)| (name.to_owned(), count)).into();
+    Ok(Measurement { measures: CaseMeasures { counted, ..CaseMeasures::default() }, profile })
+}
+
+/// The sum of the profiles of all processes.
+fn profile_of_all(place: &Path) -> Result<Profile, String> {
+    let wrong = |error: std::io::Error| format!("left no profile: {}: {error}", place.display());
+    let mut sum = Profile::default();
+    for entry in std::fs::read_dir(place).map_err(wrong)? {
+        let entry = entry.map_err(wrong)?;
+        if entry.file_name().to_string_lossy().starts_with(PROFILE) {
+            sum.add(&Profile::parse(&std::fs::read_to_string(entry.path()).map_err(wrong)?));
+        }
+    }
+    match sum.instructions {
+        0 => Err("has no profile with costs by valgrind".into()),
+        _ => Ok(sum),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(of: &[(&str, u64)]) -> Numbers {
+        of.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect()
+    }
+
+    fn verdicts(layer: LayerName, old: &Numbers, new: &Numbers) -> Vec<(String, Verdict)> {
+        let tolerance = |metric: &str| if metric.ends_with("messages") { 10.0 } else { 0.0 };
+        let found = compared_numbers("c", layer, old, new, &tolerance);
+        found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
+    }
+
+    #[test]
+    fn every_change_is_shown_and_only_growth_fails() {
+        let old = numbers(&[("cells", 8), ("rays", 6), ("4 ranks/messages", 10), ("words", 5)]);
+        let new = numbers(&[("cells", 9), ("rays", 5), ("4 ranks/messages", 11), ("hops", 1)]);
+        let expected = [
+            ("4 ranks/messages", Verdict::Changed),
+            ("cells", Verdict::Changed),
+            ("hops", Verdict::Changed),
+            ("rays", Verdict::Improvement),
+            ("words", Verdict::Changed),
+        ];
+        let found = verdicts(LayerName::Counters, &old, &new);
+        assert_eq!(found, expected.map(|(name, verdict)| (name.to_owned(), verdict)));
+        let grown = verdicts(LayerName::Counters, &old, &numbers(&[("rays", 7)]));
+        assert!(grown.contains(&("rays".to_owned(), Verdict::Regression)));
+    }
+
+    #[test]
+    fn programs_that_share_no_counter_are_not_compared() {
+        let missing = ("counters".to_owned(), Verdict::Missing);
+        let of = |old: &[(&str, u64)], new: &[(&str, u64)]| {
+            verdicts(LayerName::Counters, &numbers(old), &numbers(new)).contains(&missing)
+        };
+        assert!(of(&[], &[("cells", 1), ("rays", 2)]), "a record without counters");
+        assert!(of(&[("cells", 1), ("rays", 2)], &[("cells", 1)]), "counters that are gone");
+        assert!(of(&[("cells", 1), ("rays", 2)], &[("cells", 1), ("hops", 2)]));
+        assert!(!of(&[("cells", 1)], &[("cells", 1)]), "a program that counts nothing else");
+        assert!(!of(&[("rays", 1), ("words", 2)], &[("rays", 1), ("hops", 2)]));
+    }
+
+    #[test]
+    fn memory_may_grow_by_noise_only() {
+        let verdict = |old: u64, new: u64| {
+            let of = |bytes| numbers(&[("2 MPI ranks/peak_rss_bytes", bytes)]);
+            verdicts(LayerName::Memory, &of(old), &of(new))[0].1
+        };
+        assert_eq!(verdict(6 << 20, 7 << 20), Verdict::Unchanged);
+        assert_eq!(verdict(6 << 20, 8 << 20), Verdict::Regression);
+        assert_eq!(verdict(8 << 20, 6 << 20), Verdict::Improvement);
+    }
+}

@@ -1,0 +1,152 @@
+//! T0 by its definition, octant by octant from the root. The test of facets against octants and the descent share no code with
+//! refinement, routing and extent boxes.
+
+use crate::comm::Comm;
+use crate::facet::Facet;
+use crate::lattice::Rules;
+use crate::octant::{Level, corner, edge, path, start57};
+use crate::partition::ownership::Ownership;
+use crate::tree::Tree;
+use bytemuck::allocation::pod_collect_to_vec;
+use std::ops::Range;
+
+/// The facets of all ranks, in their order. Collective.
+pub fn all_facets(slice: &[Facet], comm: &dyn Comm) -> Vec<Facet> {
+    let all = comm.all_gather(&pod_collect_to_vec::<Facet, u64>(slice));
+    let facets = |words: &[u64]| {
+        let mut facets = pod_collect_to_vec::<u64, Facet>(words);
+        facets.truncate(words.len() * size_of::<u64>() / size_of::<Facet>());
+        facets
+    };
+    all.messages().flat_map(|(_, words)| facets(words)).collect()
+}
+
+/// A rank has every facet whose extent reaches an octant that it owns, once, but those that miss the root.
+pub fn routed(facets: &[Facet], all: &[Facet], ownership: &Ownership) {
+    let octants = ownership.octants();
+    let reaches = |f: &&Facet| {
+        let extent: [_; 3] = std::array::from_fn(|a| bounds(f, a));
+        let meets = |&(l, code): &(Level, u64)| {
+            let (min, h) = (corner(l, code), edge(l));
+            (0..3).all(|a| extent[a].start <= min[a] + h && extent[a].end >= min[a])
+        };
+        octants.iter().any(meets) && touches(f, [0; 3], edge(0))
+    };
+    let sorted = |facets: &mut dyn Iterator<Item = &Facet>| {
+        let mut facets: Vec<_> = facets.map(|f| f.v).collect();
+        facets.sort_unstable();
+        facets
+    };
+    assert!(
+        sorted(&mut facets.iter()) == sorted(&mut all.iter().filter(reaches)),
+        "a rank must have the facets that reach its octants, each once"
+    );
+}
+
+/// The tree is T0 wherever this rank owns a part of it.
+pub fn tree(tree: &Tree, facets: &[Facet], rules: &Rules, ownership: &Ownership) {
+    let intervals: Vec<Range<u64>> = ownership.intervals().collect();
+    let numbers: Vec<u32> = (0..facets.len() as u32).collect();
+    Definition { tree, facets, rules, intervals }.octant(0, 0, &numbers);
+}
+
+struct Definition<'a> {
+    tree: &'a Tree,
+    facets: &'a [Facet],
+    rules: &'a Rules,
+    /// This rank's part of the curve.
+    intervals: Vec<Range<u64>>,
+}
+
+impl Definition<'_> {
+    /// Compares an octant of T0 and its descendants, given the facets that cross its parent.
+    fn octant(&self, l: Level, code: u64, near: &[u32]) {
+        let (start, end) = (start57(l, code), start57(l, code + 1));
+        if !self.intervals.iter().any(|own| own.start < end && start < own.end) {
+            return;
+        }
+        let (min, h) = (corner(l, code), edge(l));
+        let crosses = |i: &u32| touches(&self.facets[*i as usize], min, h);
+        let facets: Vec<u32> = near.iter().copied().filter(crosses).collect();
+        let is_boxed = self.rules.boxes.iter().any(|b| {
+            b.level > l
+                && (0..3).all(|a| b.min[a] < b.max[a] && b.min[a] < min[a] + h && b.max[a] > min[a])
+        });
+        let is_split = is_boxed || l < self.rules.level_surface && !facets.is_empty();
+        let is_crossing = !is_split && !facets.is_empty();
+        let of = |set: &[crate::brickset::BrickSet]| set[l as usize].contains(code);
+        assert_eq!(
+            (of(&self.tree.split), of(&self.tree.crossing)),
+            (is_split, is_crossing),
+            "octant {} of level {l}: split and crossing by the definition",
+            path(l, code)
+        );
+        if is_split {
+            (0..8).for_each(|child| self.octant(l + 1, code << 3 | child, &facets));
+        }
+    }
+}
+
+fn bounds(f: &Facet, axis: usize) -> Range<i64> {
+    let c = f.v.map(|v| i64::from(v[axis]));
+    c[0].min(c[1]).min(c[2])..c[0].max(c[1]).max(c[2])
+}
+
+type Vector = [i128; 3];
+
+fn dot(a: Vector, b: Vector) -> i128 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Vector, b: Vector) -> Vector {
+    [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
+}
+
+/// Whether the closed facet and the closed cube with minimum corner `min` and edge `h` share a point: no separating axis exists.
+/// The terms are below 2^93.
+fn touches(f: &Facet, min: [i64; 3], h: i64) -> bool {
+    let apart = |a: usize| {
+        let extent = bounds(f, a);
+        extent.end < min[a] || extent.start > min[a] + h
+    };
+    if (0..3).any(apart) {
+        return false;
+    }
+    let v: [Vector; 3] =
+        f.v.map(|p| std::array::from_fn(|a| i128::from(p[a]) - i128::from(min[a])));
+    let edges: [Vector; 3] =
+        [0, 1, 2].map(|i| std::array::from_fn(|a| v[(i + 1) % 3][a] - v[i][a]));
+    let meet = |axis: Vector| {
+        let at = v.map(|p| dot(axis, p));
+        let reach =
+            |sign: i128| axis.iter().map(|c| (sign * c).max(0)).sum::<i128>() * i128::from(h);
+        at.iter().any(|x| *x <= reach(1)) && at.iter().any(|x| *x >= -reach(-1))
+    };
+    let units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    meet(cross(edges[0], edges[1]))
+        && units.iter().all(|u| edges.iter().all(|e| meet(cross(*u, *e))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facet::crossed;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Two tests of facets against octants: on a coarse grid of vertices, where most facets touch octants exactly.
+        #[test]
+        fn both_tests_of_facets_against_octants_agree(
+            v in prop::array::uniform3(prop::array::uniform3(-6i32..=14)),
+            noise in prop::array::uniform3(prop::array::uniform3(-1i32..=1)),
+        ) {
+            let unit = 1 << 24;
+            let at = |i: usize| std::array::from_fn(|a| v[i][a] * unit / 2 + noise[i][a]);
+            let f = Facet { v: std::array::from_fn(at) };
+            let mask = crossed(&f, [0; 3], 3);
+            for code in 0..64 {
+                prop_assert_eq!(mask >> code & 1 == 1, touches(&f, corner(3, code), edge(3)), "{}", code);
+            }
+        }
+    }
+}
