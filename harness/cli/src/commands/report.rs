@@ -1,5 +1,6 @@
 //! `harness report`: draws figures and a page from records.
 
+use bench::experiments::entry::{Entry, Line};
 use bench::experiments::record;
 use bench::track::history::{self, History, Record};
 use clap::Args;
@@ -55,9 +56,11 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
         ));
     }
     let written = report(directory, &lines, &history).map_err(|error| error.to_string())?;
-    if written.figures == 0 {
-        let page = written.page.display();
-        return Err(format!("no figure could be drawn from these results; {page} lists them"));
+    let shows_nothing = |line: &Line| {
+        matches!(line.entry, Entry::Session(_) | Entry::Failure(_) | Entry::LeftOut(_))
+    };
+    if lines.iter().all(shows_nothing) {
+        return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
     }
     for finding in &written.broken {
         println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
