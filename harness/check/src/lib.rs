@@ -3,8 +3,6 @@
 //!
 //! - [`checks`]: one file per property; [`audit`](mod@audit): all of them on a mesh on disk, of any size;
 //! - [`diff`](mod@diff): where two meshes differ, and which is right;
-//! - [`geometry`]: diagnosis of a geometry before it is meshed;
-//! - [`leak`]: paths through openings, and their free widths;
 //! - [`promises`]: what an engine guarantees, and so what is checked;
 //! - [`oracle`]: the sample points of the oracles, and the evaluation of their answers;
 //! - [`selftest`]: corrupted meshes that the checks must detect;
@@ -17,8 +15,6 @@ extern crate self as check;
 pub mod audit;
 pub mod checks;
 pub mod diff;
-pub mod geometry;
-pub mod leak;
 pub mod oracle;
 pub mod promises;
 pub mod selftest;

@@ -79,7 +79,7 @@ mod tests {
             panic!()
         };
         assert_eq!(
-            (verify.ranks, verify.require),
+            (verify.options.ranks, verify.options.require),
             (Some(vec![1, 7]), vec![Need::Mpi, Need::P4est])
         );
         assert!(Arguments::try_parse_from(["harness", "verify", "--ranks", "0"]).is_err());

@@ -2,7 +2,7 @@
 //!
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
 //!   [`leafset`], [`mesh`] (the reader of meshes of any size), [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
-//! - numbers: [`lattice`], [`octant`], [`word`], [`digest`];
+//! - numbers: [`lattice`], [`octant`], [`word`], [`digest`], [`number`] (for readers);
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
 //!   [`triangle`] (exact facet-octant test).
 
@@ -17,6 +17,7 @@ pub mod leafset;
 pub mod manifest;
 pub mod mesh;
 pub mod npy;
+pub mod number;
 pub mod octant;
 pub mod parity;
 pub mod plain;

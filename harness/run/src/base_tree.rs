@@ -7,6 +7,7 @@ use crate::engine::runner::Engine;
 use contract::case::Case;
 use contract::files::read_text;
 use contract::lattice::Root;
+use contract::leafset::LeafSet;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, absolute};
@@ -22,8 +23,9 @@ const BODY: &str = "body.stl";
 #[derive(Debug)]
 pub struct BaseTrees<'a> {
     engine: &'a Engine,
-    /// The case file with an explicit root.
+    /// The case file with an explicit root and without seeds.
     table: Table,
+    seeds: Option<Value>,
     root: Root,
     place: TempDir,
     limit: Duration,
@@ -47,14 +49,30 @@ impl<'a> BaseTrees<'a> {
             let linked = absolute(geometry).and_then(|stl| symlink(stl, place.path().join(BODY)));
             linked.map_err(|error| format!("{}: {error}", geometry.display()))?;
         }
-        Ok(Self { engine, table: table(path, case)?, root: case.root, place, limit })
+        let mut table = table(path, case)?;
+        // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
+        let seeds = table.remove("seeds");
+        Ok(Self { engine, table, seeds, root: case.root, place, limit })
     }
 
-    /// The sorted leaf words of the base tree whose crossing leaves have at least this level.
+    /// The base tree of the case, with the sides that its seeds give to leaves.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub fn with_seeds(&mut self, level: u8) -> Result<LeafSet, Failure> {
+        if let Some(seeds) = self.seeds.clone() {
+            self.table.insert("seeds".into(), seeds);
+        }
+        let tree = self.at(level);
+        self.table.remove("seeds");
+        tree
+    }
+
+    /// The base tree whose crossing leaves have at least this level.
     ///
     /// # Errors
     /// If the engine fails, or its mesh cannot be read.
-    pub fn at(&mut self, level: u8) -> Result<Vec<u64>, Failure> {
+    pub fn at(&mut self, level: u8) -> Result<LeafSet, Failure> {
         let spacing = self.root.edge / f64::from(1u32 << level);
         self.table.insert("spacing_min".into(), Value::Float(spacing));
         let place = self.place.path();
@@ -75,7 +93,7 @@ impl<'a> BaseTrees<'a> {
         let mesh = read.map_err(|why| {
             self.engine.unusable(format!("wrote a base tree that cannot be read: {why}"))
         })?;
-        Ok(mesh.map(|mesh| mesh.words).unwrap_or_default())
+        mesh.ok_or_else(|| self.engine.unusable("wrote no base tree".to_owned()))
     }
 }
 
@@ -83,8 +101,6 @@ impl<'a> BaseTrees<'a> {
 fn table(path: &Path, case: &Case) -> Result<Table, String> {
     let text = read_text(path).map_err(|error| error.to_string())?;
     let mut table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-    // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
-    table.remove("seeds");
     table.remove("root_scale");
     let Root { origin, edge } = case.root;
     let origin = origin.map(Value::Float).to_vec();

@@ -3,19 +3,17 @@
 
 use crate::engine::failure::{End, Failure};
 use crate::engine::paths::Paths;
-use crate::engine::process::{self, Watch};
+use crate::engine::python;
 use contract::digest::Digest;
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportError, Request};
 use contract::lattice::Root;
 use serde::Deserialize;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use std::time::Duration;
 
-/// Exit code of the script if VTK cannot be imported.
-const CODE_MISSING: i32 = 3;
 /// Exit code of the script for a file that is not such a mesh.
 const CODE_INPUT: i32 = 2;
 /// The field of sides in the table that the script writes.
@@ -61,23 +59,12 @@ fn read_vtk(
     paths: &Paths,
     limit: Duration,
 ) -> Result<Cells, Refusal> {
-    if !paths.python.is_file() {
-        let python = paths.python.display();
-        return Err(Refusal::Missing(format!(
-            "VTK's formats need Python at {python} (ci/setup installs it)"
-        )));
-    }
     let place = tempfile::tempdir().map_err(ImportError::from)?;
     let table = place.path().join("cells.npy");
-    let mut command = Command::new(&paths.python);
-    command
-        .arg("-B")
-        .arg(paths.oracles.join("import_vtk.py"))
-        .arg(path)
-        .arg(&table)
-        .args(&request.sides);
-    let watch = Watch::new("vtk", limit, place.path());
-    let finished = process::run(&mut command, &watch).map_err(|failure| refusal(&failure))?;
+    let files = [path.as_os_str(), table.as_os_str()];
+    let arguments = files.into_iter().chain(request.sides.iter().map(OsStr::new));
+    let finished = python::run("vtk", "import_vtk.py", arguments, paths, limit, place.path())
+        .map_err(|failure| refusal(&failure))?;
     let Stated { root, has_sides, digest } = fs::read(&finished.stdout)
         .ok()
         .and_then(|text| serde_json::from_slice(&text).ok())
@@ -98,10 +85,7 @@ struct Stated {
 fn refusal(failure: &Failure) -> Refusal {
     match &failure.end {
         End::Interrupted => Refusal::Interrupted,
-        End::Missing(why) => Refusal::Missing(why.clone()),
-        End::Exited { code: CODE_MISSING, error } => {
-            Refusal::Missing(format!("VTK's formats need VTK: {error}"))
-        }
+        End::Missing(why) => Refusal::Missing(format!("VTK's formats need VTK, and it {why}")),
         End::Exited { code: CODE_INPUT, error } => Refusal::Input(ImportError::content(error)),
         _ => Refusal::Input(ImportError::content(format!("cannot be read: {failure}"))),
     }

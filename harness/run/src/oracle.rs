@@ -3,21 +3,17 @@
 
 use crate::engine::failure::{End, Failure};
 use crate::engine::paths::Paths;
-use crate::engine::process::{self, Watch};
+use crate::engine::python;
 use check::oracle::vote::Answer;
 use contract::case::Facet;
 use contract::{files, npy};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Duration;
 
 /// The oracles, in the order in which they run.
 pub const ORACLES: [&str; 3] = ["trimesh", "open3d", "pyvista"];
-
-/// Exit code of an oracle whose package is missing.
-const CODE_MISSING: i32 = 3;
 
 /// Points and a body, as files that every oracle reads.
 #[derive(Debug)]
@@ -59,21 +55,10 @@ impl Question {
     /// per point.
     pub fn ask(&self, oracle: &str, paths: &Paths, limit: Duration) -> Result<Answer, Failure> {
         let failure = |end| Failure::new(oracle, end);
-        if !paths.python.is_file() {
-            let why = format!("needs Python at {} (ci/setup installs it)", paths.python.display());
-            return Err(failure(End::Missing(why)));
-        }
         let sides = self.place.join(format!("{oracle}.npy"));
-        let mut command = Command::new(&paths.python);
-        command.arg("-B").arg(paths.oracles.join(format!("{oracle}_sides.py")));
-        command.args([&self.points, &self.body, &sides]);
-        let watch = Watch::new(oracle, limit, &self.place);
-        process::run(&mut command, &watch).map_err(|other| match other.end {
-            End::Exited { code: CODE_MISSING, error } => {
-                failure(End::Missing(format!("is not installed: {error}")))
-            }
-            _ => other,
-        })?;
+        let script = format!("{oracle}_sides.py");
+        let files = [&self.points, &self.body, &sides];
+        python::run(oracle, &script, files, paths, limit, &self.place)?;
         let inside = read_sides(&sides, self.count).map_err(|why| failure(End::Unusable(why)))?;
         Ok(Answer { name: oracle.to_owned(), inside })
     }

@@ -5,8 +5,6 @@ use crate::verify::case::{RUNS, ended_well};
 use crate::verify::options::Options;
 use crate::verify::outcome::{Check, Outcome};
 use crate::verify::report::{Asked, CaseReport, Missing, Report, Run, SCHEMA};
-use contract::catalogue::Size;
-use std::time::Duration;
 
 /// A report with one entry of every kind, also for the tests of the output formats.
 pub fn report() -> Report {
@@ -65,23 +63,5 @@ pub fn report() -> Report {
 
 /// Options of the smallest possible verification.
 pub fn options() -> Options {
-    Options {
-        cases: vec![],
-        sizes: vec![Size::Small],
-        ranks: vec![2],
-        ranks_given: false,
-        partitioners: vec!["morton".into()],
-        level_bases: vec!["auto".into()],
-        out: None,
-        keep: false,
-        limit: Duration::from_secs(60),
-        mpi: false,
-        oracles: false,
-        p4est: false,
-        require: vec![],
-        oracle_points: 100,
-        seed: 0,
-        cells_max: 1_000_000,
-        reference_cells_max: 1_000_000,
-    }
+    Options::of_leaves_alone(Vec::new())
 }

@@ -66,11 +66,14 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
     let path = case.path.clone().map_err(GateError::Input)?;
     let ranks = bench.ranks_on_mpi(case);
     let options = Options {
-        limit: bench.options.limit,
+        timeout: bench.options.limit.as_secs(),
         // The files of a case that fails end with the gate.
         out: Some(bench.place.join("correctness")),
-        mpi: !ranks.is_empty(),
-        ranks,
+        no_mpi: ranks.is_empty(),
+        ranks: Some(ranks),
+        // `harness verify` varies the partition.
+        partitioners: vec!["morton".to_owned()],
+        level_bases: vec!["auto".to_owned()],
         ..Options::of_leaves_alone(vec![path.to_string_lossy().into_owned()])
     };
     let report = verify(&options, &programs).map_err(|error| match error {

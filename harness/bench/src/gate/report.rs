@@ -236,7 +236,8 @@ impl Layer {
         let of_case = || self.findings.iter().filter(|finding| finding.case == case);
         let excused = self.left_out.is_some()
             || of_case().next().is_some() && of_case().all(|f| f.verdict == Verdict::LeftOut);
-        let note = of_case().map(|finding| finding.note.clone()).find(|note| !note.is_empty());
+        let unmet = of_case().find(|f| matches!(f.verdict, Verdict::Missing | Verdict::LeftOut));
+        let note = unmet.map(|finding| finding.note.clone());
         let why = self.left_out.clone().or(note).unwrap_or_else(|| "it has no quantity".to_owned());
         (excused, format!("{} of {case}: nothing was compared: {why}", self.name))
     }

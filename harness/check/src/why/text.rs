@@ -6,7 +6,7 @@ mod tests;
 use std::fmt;
 
 use super::answer::{Answer, CauseRecord, LinkRecord, SideReason, Split, user_place};
-use crate::geometry::meaning::number;
+use contract::number::number;
 
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

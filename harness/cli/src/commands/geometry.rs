@@ -5,10 +5,11 @@ use std::path::Path;
 
 use super::files::put;
 use super::values::{self, Output, root};
-use check::geometry::input::{Input, Requested};
-use check::geometry::{Options, diagnose};
 use clap::Args;
 use contract::lattice::Root;
+use geometry::input::{Input, Requested};
+use geometry::report::Diagnosis;
+use geometry::{Options, diagnose};
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
 
 /// `harness geometry`.
@@ -64,7 +65,7 @@ fn diagnosed(arguments: &Arguments) -> Result<u8, String> {
     Ok(if diagnosis.changes_region { EXIT_FAILED } else { EXIT_HOLDS })
 }
 
-fn write(path: &Path, diagnosis: &check::geometry::report::Diagnosis) -> Result<(), String> {
+fn write(path: &Path, diagnosis: &Diagnosis) -> Result<(), String> {
     let json = serde_json::to_string_pretty(diagnosis).map_err(|error| error.to_string())?;
     put(path, &(json + "\n")).map_err(|error| error.to_string())
 }

@@ -2,16 +2,19 @@
 
 use super::programs::ProgramArguments;
 use super::values::{Output, cell_count, with_extension};
-use check::leak::ends::Target;
-use check::leak::report::Report;
-use check::leak::{Answer, LeakError, Question, Watch, answer};
 use clap::Args;
 use contract::case::Case;
 use contract::files::{Content, named, write_together};
+use contract::leafset::LeafSet;
+use contract::manifest::Keep;
+use geometry::leak::ends::Target;
+use geometry::leak::report::{Answers, Passage};
+use geometry::leak::{LeakError, Leaks, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use report::json::pretty;
 use report::leak::{picture, polyline};
 use run::base_tree::BaseTrees;
+use run::engine::failure::Failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
@@ -25,25 +28,29 @@ use std::time::Duration;
 #[command(after_help = "\
 Two places are joined if a path of leaves of the base tree that no facet touches leads from one to the other, through \
 shared parts of faces. The widest path is the one whose narrowest place is widest. The width of a place is the diameter \
-of the largest ball centred there that no facet enters; the narrowest place is reported with the width of the largest \
-ball that passes it, to within 1 %.
+of the largest ball centred there that no facet enters; the narrowest place is reported with bounds on the width of the \
+largest ball that passes it, at most 5 % apart.
+
+Without --from, every region is examined that is inside at a coarser spacing and outside at the case's, as the mesher \
+reports it.
 
 Examples:
+  harness leak car.toml                                  where does the body leak?
   harness leak car.toml --from 0,0,1                     does the cabin leak?
   harness leak duct.toml --from 0,0,0 --to 9,0,0         are two rooms joined?
   harness leak car.toml --from 0,0,1 --picture leak.svg --vtk leak.vtp
 
 Exit codes: 0 no path at the case's spacing, whatever a finer one would do; 1 a path was found, or with --closed the facets \
-are not proven to be a closed surface between the two places; 2 invalid input; 3 mesher and reference are missing, or one \
+are not proven to be a closed surface between the two places; 2 invalid input, or nothing to examine; 3 mesher and reference are missing, or one \
 that was given; 130 interrupted.")]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
-    /// Start of the path [default: the case's first seed]
+    /// Start of the path [default: a point of every region that leaked between a coarser spacing and the case's]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     from: Option<[f64; 3]>,
     /// End of the path: a point, or `far` for the root's boundary
-    #[arg(long, value_name = "X,Y,Z|far", default_value = "far", value_parser = target, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z|far", default_value = "far", value_parser = target, allow_hyphen_values = true, requires = "from")]
     to: Target,
     /// Require that no spacing joins the two places: exit code 1 unless the facets are proven to be a closed surface between them
     #[arg(long)]
@@ -51,10 +58,10 @@ pub struct Arguments {
     /// Write the answer as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Write the path as a VTK polyline with the free width at each point
+    /// Write the paths as VTK polylines with the free width at each point
     #[arg(long, value_name = "FILE.vtp", value_parser = with_extension(&["vtp"]))]
     vtk: Option<Output>,
-    /// Write a picture of a slice through the narrowest place
+    /// Write a picture of a slice through the narrowest place of the widest path
     #[arg(long, value_name = "FILE.svg", value_parser = with_extension(&["svg"]))]
     picture: Option<Output>,
     /// Refinement in search of an opening ends before a base tree of more leaves
@@ -70,42 +77,82 @@ pub struct Arguments {
 
 /// Searches, prints and writes; returns the exit code.
 pub fn run(arguments: &Arguments) -> u8 {
-    let answered = answered(arguments).and_then(|(case, answer)| {
-        write(arguments, &case, &answer)?;
-        print!("{}", answer.report);
-        let Report { is_leak, is_separated, .. } = answer.report;
-        let holds = !is_leak && (is_separated || !arguments.closed);
-        Ok(if holds { EXIT_HOLDS } else { EXIT_FAILED })
-    });
-    answered.unwrap_or_else(|(code, why)| {
+    answered(arguments).unwrap_or_else(|(code, why)| {
         eprintln!("harness: {why}");
         code
     })
 }
 
-fn answered(arguments: &Arguments) -> Result<(Case, Answer), (u8, String)> {
+fn answered(arguments: &Arguments) -> Result<u8, (u8, String)> {
     let input = |why: String| (EXIT_INPUT, why);
     let programs = Programs::find(arguments.programs.given()).map_err(input)?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new("")).map_err(input)?;
     let case = Case::read(&path).map_err(|error| input(error.to_string()))?;
-    let from = arguments.from.or(case.seeds.first().copied()).ok_or_else(|| {
-        input("the case has no seeds: give a start with --from X,Y,Z, in the space that should be closed".into())
-    })?;
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, &case, limit).map_err(input)?;
-    let question =
-        Question { case: &case, from, to: arguments.to, leaves_max: arguments.leaves_max };
     let progress = Progress::new();
-    let answer = answer(&question, |level| trees.at(level), &progress);
+    let (mut first, ends) = match arguments.from {
+        Some(from) => (None, vec![(from, arguments.to)]),
+        None => {
+            progress.step("meshing the base tree of the case");
+            let tree =
+                trees.with_seeds(case.level_surface).map_err(|e| failed(LeakError::Source(e)))?;
+            let ends = leaked(&case, &tree).map_err(input)?;
+            (Some(tree.words), ends)
+        }
+    };
+    let make = |level| match first.take() {
+        Some(words) => Ok(words),
+        None => trees.at(level).map(|tree| tree.words),
+    };
+    let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress).map_err(failed)?;
+    let answers = leaks.answers(&ends).map_err(failed)?;
     progress.0.finish_and_clear();
-    let answer = answer.map_err(|error| match error {
+    let widest = answers.examined.iter().filter_map(|report| report.passage.as_ref());
+    let widest = widest.max_by(|a, b| a.narrowest.width.total_cmp(&b.narrowest.width));
+    let picture = widest.map(|passage| (passage, leaks.words(passage)));
+    write(arguments, &case, &answers, picture)?;
+    if ends.is_empty() {
+        println!(
+            "no leak: every region that is inside at 2 and 4 times the spacing of {} is inside at this spacing too",
+            case.name
+        );
+    }
+    print!("{answers}");
+    let holds = |report: &geometry::leak::report::Report| {
+        !report.is_leak && (report.is_separated || !arguments.closed)
+    };
+    // With nothing that leaked, nothing was proven to be closed either.
+    let all_hold = answers.examined.iter().all(holds) && !(arguments.closed && ends.is_empty());
+    Ok(if all_hold { EXIT_HOLDS } else { EXIT_FAILED })
+}
+
+/// The ends of the paths for the regions that leaked between coarser spacings and the case's, as the mesher reports them.
+fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<([f64; 3], Target)>, String> {
+    let give = "give a start with --from X,Y,Z, in the space that should be closed";
+    let leaks = tree.manifest.leaks.as_ref();
+    let leaks = leaks.ok_or_else(|| format!("the program does not report leaks: {give}"))?;
+    let sides = tree.manifest.leaves_by_side;
+    // Seeds lie in the flow, and what they do not reach has the other side.
+    let (is_flow_inside, seed) = (case.keep == Keep::Inside, case.seeds.first());
+    let closed = if seed.is_some() && is_flow_inside { sides.outside } else { sides.inside };
+    if leaks.is_empty() && closed == 0 {
+        return Err(format!(
+            "the facets enclose no leaf at this spacing, so there is nothing to examine: {give}"
+        ));
+    }
+    let to = seed.filter(|_| is_flow_inside).map_or(Target::Far, |&seed| Target::Point(seed));
+    Ok(leaks.iter().map(|leak| (leak.point, to)).collect())
+}
+
+fn failed(error: LeakError<Failure>) -> (u8, String) {
+    match error {
         LeakError::Interrupted => interrupted(),
         LeakError::Source(failure) if failure.is_interrupt() => interrupted(),
         LeakError::Source(failure) => (EXIT_INPUT, failure.to_string()),
         LeakError::Input(why) => (EXIT_INPUT, why),
-    })?;
-    Ok((case, answer))
+    }
 }
 
 /// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.
@@ -137,32 +184,37 @@ fn interrupted() -> (u8, String) {
 }
 
 /// Writes the requested files, unless the user interrupts before they are complete. Without a path there is none to draw.
-fn write(arguments: &Arguments, case: &Case, answer: &Answer) -> Result<(), (u8, String)> {
-    let Answer { report, words } = answer;
-    let passage = report.passage.as_ref();
+fn write(
+    arguments: &Arguments,
+    case: &Case,
+    answers: &Answers,
+    widest: Option<(&Passage, &[u64])>,
+) -> Result<(), (u8, String)> {
+    let passages: Vec<&Passage> =
+        answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
     let complete = |written: io::Result<()>| match interrupt::requested() {
         true => Err(ErrorKind::Interrupted.into()),
         false => written,
     };
-    let json: Content<'_> = &|out| complete(out.write_all(pretty(report).as_bytes()));
-    let vtk: Content<'_> = &|out| complete(passage.map_or(Ok(()), |p| polyline::vtp(p, out)));
-    let svg = |passage| picture::svg(case, words, passage);
+    let json: Content<'_> = &|out| complete(out.write_all(pretty(answers).as_bytes()));
+    let vtk: Content<'_> = &|out| complete(polyline::vtp(&passages, out));
+    let svg = |(passage, words)| picture::svg(case, words, passage);
     let picture: Content<'_> =
-        &|out| complete(passage.map_or(Ok(()), |p| out.write_all(svg(p).as_bytes())));
+        &|out| complete(widest.map_or(Ok(()), |p| out.write_all(svg(p).as_bytes())));
     let of_path = [(&arguments.vtk, vtk), (&arguments.picture, picture)];
-    if passage.is_none() && of_path.iter().any(|(file, _)| file.is_some()) {
+    if widest.is_none() && of_path.iter().any(|(file, _)| file.is_some()) {
         eprintln!(
             "harness: there is no path to draw, so --vtk and --picture write nothing: files of these names are from an earlier run"
         );
     }
-    let of_path = of_path.into_iter().filter(|_| passage.is_some());
+    let of_path = of_path.into_iter().filter(|_| widest.is_some());
     let all = [(&arguments.json, json)].into_iter().chain(of_path);
     let files: Vec<_> = all.filter_map(|(file, fill)| Some((file.as_deref()?, fill))).collect();
-    let failed = |path: &Path, error: io::Error| match error.kind() {
+    let unwritten = |path: &Path, error: io::Error| match error.kind() {
         ErrorKind::Interrupted => interrupted(),
         _ => (EXIT_INPUT, named(path, &error).to_string()),
     };
-    write_together(&files, failed)?;
+    write_together(&files, unwritten)?;
     if files.is_empty() && interrupt::requested() { Err(interrupted()) } else { Ok(()) }
 }
 

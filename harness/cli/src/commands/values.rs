@@ -2,6 +2,7 @@
 
 use clap::builder::{PathBufValueParser, TypedValueParser, ValueParser, ValueParserFactory};
 use contract::lattice::Root;
+pub use run::verify::options::whole_seconds;
 use std::io;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -72,13 +73,6 @@ pub fn cell_count(text: &str) -> Result<u64, String> {
 fn positive(text: &str, max: f64) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= max);
     number.ok_or_else(|| format!("give a number greater than 0 and at most {max}"))
-}
-
-/// Parses a whole number of seconds: at least 1, and at most a week.
-pub fn whole_seconds(text: &str) -> Result<u64, String> {
-    const WEEK: u64 = 7 * 86_400;
-    let number = text.trim().parse().ok().filter(|n| (1..=WEEK).contains(n));
-    number.ok_or_else(|| format!("give a whole number of seconds from 1 to {WEEK}"))
 }
 
 /// Parses a probability that is not 0.

@@ -240,7 +240,7 @@ fn a_run_report_that_contradicts_the_mesh_is_detected() {
     fixture.script("mesher", &HOLDS.replace("\"cells\": 1", "\"cells\": 2"));
     let outcome = fixture.verify(&["--no-mpi"]);
     assert_eq!(
-        (outcome.code, outcome.printed.contains("reports 2 cells")),
+        (outcome.code, outcome.printed.contains("states 2 cells, and its mesh has 1")),
         (1, true),
         "{}",
         outcome.printed

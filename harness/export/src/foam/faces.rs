@@ -39,7 +39,7 @@ impl Faces {
     pub fn new(
         leaves: &Leaves,
         points: &Points,
-        patches: &mut Patches,
+        patches: &Patches,
         options: &Options,
     ) -> Result<Self, ExportError> {
         let mut all = Self::default();

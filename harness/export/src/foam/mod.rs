@@ -51,7 +51,7 @@ pub struct Mesh<'a> {
     leaves: Leaves,
     points: Points,
     faces: Faces,
-    patches: Patches<'a>,
+    patches: Patches,
     /// The rank that wrote each cell, if there are several.
     ranks: Option<Vec<u32>>,
     root: Root,
@@ -182,7 +182,7 @@ fn build<'a>(mut leaves: Leaves, mut mesh: Mesh<'a>) -> Result<(Mesh<'a>, Vec<Si
         }
     }
     mesh.points = Points::new(&leaves, mesh.options)?;
-    mesh.faces = Faces::new(&leaves, &mesh.points, &mut mesh.patches, mesh.options)?;
+    mesh.faces = Faces::new(&leaves, &mesh.points, &mesh.patches, mesh.options)?;
     mesh.faces.check_invariants(&leaves, &mesh.points);
     mesh.leaves = leaves;
     Ok((mesh, regions.sizes.into_iter().map(|(_, size)| size).collect()))
@@ -190,7 +190,7 @@ fn build<'a>(mut leaves: Leaves, mut mesh: Mesh<'a>) -> Result<(Mesh<'a>, Vec<Si
 
 impl<'a> Mesh<'a> {
     fn empty(
-        patches: Patches<'a>,
+        patches: Patches,
         ranks: Option<Vec<u32>>,
         root: Root,
         options: &'a Options<'a>,

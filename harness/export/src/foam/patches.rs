@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use check::leak::clearance::Clearance;
 use contract::case::Case;
 use contract::octant::UNITS_PER_CELL;
 use contract::stl;
+use geometry::tree::{FacetTree, Point};
 
 use super::leaves::Content;
 use super::squares::Square;
@@ -19,29 +19,26 @@ pub const CUT: &str = "cut";
 
 /// The patches: [`SIDES`], the solids of the body, and, if leaves were left out, the cut.
 #[derive(Debug)]
-pub struct Patches<'a> {
+pub struct Patches {
     /// The names, unique.
     pub names: Vec<String>,
     has_cut: bool,
     /// Patch of each facet, if there are several.
     of_facet: Vec<usize>,
-    facets: Option<Clearance<'a>>,
-    /// Centre of the last face of the body, and an upper bound on its distance to the facets.
-    last: ([f64; 3], f64),
+    facets: Option<FacetTree>,
 }
 
-impl<'a> Patches<'a> {
+impl Patches {
     /// The patches of a mesh. Without a case, its body is one patch.
     ///
     /// # Errors
     /// If the case's geometry can no longer be read.
-    pub fn new(case: Option<&'a Case>, has_cut: bool) -> Result<Self, String> {
+    pub fn new(case: Option<&Case>, has_cut: bool) -> Result<Self, String> {
         let mut patches = Self {
             names: SIDES.map(str::to_owned).to_vec(),
             has_cut,
             of_facet: Vec::new(),
             facets: None,
-            last: ([0.0; 3], f64::INFINITY),
         };
         if let Some((case, path)) = case.and_then(|case| Some((case, case.geometry.as_ref()?))) {
             patches.add_solids(case, path)?;
@@ -53,7 +50,7 @@ impl<'a> Patches<'a> {
         Ok(patches)
     }
 
-    fn add_solids(&mut self, case: &'a Case, path: &Path) -> Result<(), String> {
+    fn add_solids(&mut self, case: &Case, path: &Path) -> Result<(), String> {
         let body = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
         for solid in body.solids {
             let name = patch_name(solid.name.as_deref().unwrap_or_default());
@@ -65,7 +62,7 @@ impl<'a> Patches<'a> {
             self.of_facet.extend(std::iter::repeat_n(patch, solid.facets));
         }
         if self.names.len() > SIDES.len() + 1 {
-            self.facets = Some(Clearance::new(&case.facets_lattice));
+            self.facets = Some(FacetTree::new(&case.facets_lattice));
         }
         Ok(())
     }
@@ -77,7 +74,7 @@ impl<'a> Patches<'a> {
     }
 
     /// The patch of a face that no cell is across.
-    pub fn of(&mut self, square: &Square) -> usize {
+    pub fn of(&self, square: &Square) -> usize {
         match square.across {
             Content::Outside => 2 * square.axis + usize::from(square.is_high),
             Content::Cut => self.names.len() - 1,
@@ -86,17 +83,14 @@ impl<'a> Patches<'a> {
     }
 
     /// The patch of the solid with the facet nearest to the centre of a face.
-    fn nearest(&mut self, square: &Square) -> usize {
+    fn nearest(&self, square: &Square) -> usize {
         let Some(facets) = &self.facets else { return SIDES.len() };
         let [low, _, high, _] = square.corners();
         let units = UNITS_PER_CELL as f64 / 2.0;
         let centre = [0, 1, 2].map(|a| (f64::from(low[a]) + f64::from(high[a])) * units);
-        let (before, distance) = self.last;
-        let moved = (0..3).map(|a| (centre[a] - before[a]).powi(2)).sum::<f64>().sqrt();
-        let distance = facets.at(centre, distance + moved);
-        self.last = (centre, distance);
+        let centre = Point::from(centre);
         // Half a lattice unit more, for rounding.
-        let nearest = facets.facets_within(centre, distance + 0.5);
+        let nearest = facets.within(centre, facets.distance(centre) + 0.5);
         self.of_facet[nearest[0].0 as usize]
     }
 }

@@ -4,11 +4,11 @@
 use crate::figure::canvas::{Anchor, Canvas, DOTTED, SIZE, WIDTH, document, width};
 use crate::figure::palette::colour;
 use crate::section::{Planar, Window};
-use check::geometry::distance::{cross, dot, sub};
-use check::geometry::meaning::number;
-use check::leak::report::Passage;
 use contract::case::Case;
+use contract::number::number;
 use contract::word::{self, Side};
+use geometry::leak::report::Passage;
+use geometry::tree::Point;
 use plotters::style::colors::BLACK;
 
 /// Half of the window's edge, in widths of the narrowest place and in cells; the larger one counts.
@@ -43,21 +43,14 @@ pub fn svg(case: &Case, words: &[u64], passage: &Passage) -> String {
 /// The square around the narrowest place. Its abscissa is the direction of the path.
 fn window(passage: &Passage) -> Window {
     let narrowest = &passage.narrowest;
-    let along = narrowest.direction;
-    let to_rim = sub(narrowest.touches, narrowest.at);
-    let across = perpendicular(to_rim, along).unwrap_or_else(|| {
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        axes.into_iter().find_map(|axis| perpendicular(axis, along)).expect("two axes differ")
-    });
+    let along = Point::from(narrowest.direction);
+    let to_rim = Point::from(narrowest.touches) - Point::from(narrowest.at);
+    // The part of the vector to the rim that is perpendicular to the path, unless they are nearly parallel.
+    let across = to_rim.reject_from_normalized(along);
+    let is_parallel = across.length() <= 0.1 * to_rim.length();
+    let across = if is_parallel { along.any_orthonormal_vector() } else { across.normalize() };
     let half = (HALF.0 * narrowest.width).max(HALF.1 * passage.spacing.spacing);
-    Window { centre: narrowest.at, axes: [along, across], half: [half; 2] }
-}
-
-/// The unit vector perpendicular to `along` in the plane of both; `None` if they are nearly parallel.
-fn perpendicular(v: [f64; 3], along: [f64; 3]) -> Option<[f64; 3]> {
-    let w = cross(along, cross(v, along));
-    let length = dot(w, w).sqrt();
-    (length > 0.1 * dot(v, v).sqrt()).then(|| w.map(|c| c / length))
+    Window { centre: narrowest.at, axes: [along.to_array(), across.to_array()], half: [half; 2] }
 }
 
 fn on_page(window: &Window, p: Planar) -> (f64, f64) {
@@ -165,10 +158,10 @@ fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Passage, *};
     use crate::figure::palette::hex_of;
-    use check::leak::report::{Narrowest, Point, Spacing};
     use contract::testing::words_with_sides;
+    use geometry::leak::report::{Narrowest, Point, Spacing};
 
     #[test]
     fn the_slice_shows_leaves_facets_path_and_ball() {
@@ -183,6 +176,8 @@ mod tests {
             narrowest: Narrowest {
                 at: [2.0, 4.5, 4.5],
                 width: 1.0,
+                width_min: 0.99,
+                width_max: 1.03,
                 width_cells: 1.0,
                 direction: [1.0, 0.0, 0.0],
                 touches: [2.0, 4.0, 4.5],
@@ -191,6 +186,7 @@ mod tests {
                 is_end: false,
             },
             length: 3.0,
+            inner: (0, 2),
             points: vec![point(1.0), point(2.0), point(4.0)],
         };
         let svg = svg(&case, &words, &passage);

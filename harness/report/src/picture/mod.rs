@@ -17,7 +17,6 @@ mod tests;
 mod tikz;
 
 use crate::section::{Planar, Window};
-use check::geometry::distance::{cross, dot, sub};
 use colour::{Colour, Entry, short};
 use contract::case::Facet;
 use contract::lattice::{Root, UNITS_PER_EDGE};
@@ -26,6 +25,7 @@ use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
 use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
+use geometry::tree::Point;
 use squares::{Detail, Squares, plane_axes};
 
 pub use csv::csv;
@@ -118,9 +118,8 @@ pub fn halfway(root: &Root, body: Option<&[Facet]>, axis: usize) -> Slice {
 /// The median of the facets' centroids along an axis, weighted with their areas; `None` without area.
 fn median(facets: &[Facet], axis: usize) -> Option<f64> {
     let weighed = |facet: &Facet| {
-        let [a, b, c] = facet.map(|v| v.map(f64::from));
-        let normal = cross(sub(b, a), sub(c, a));
-        ((a[axis] + b[axis] + c[axis]) / 3.0, dot(normal, normal).sqrt())
+        let [a, b, c] = facet.map(|v| Point::from_array(v.map(f64::from)));
+        ((a[axis] + b[axis] + c[axis]) / 3.0, (b - a).cross(c - a).length())
     };
     let mut facets: Vec<(f64, f64)> = facets.iter().map(weighed).collect();
     facets.sort_unstable_by(|p, q| p.0.total_cmp(&q.0));

@@ -16,6 +16,7 @@ pub mod paths;
 pub mod placeholders;
 pub mod process;
 pub mod programs;
+pub mod python;
 mod reap;
 pub mod report;
 pub mod runner;

@@ -11,9 +11,10 @@ use crate::engine::p4est::{self, EXIT_TOO_DEEP};
 use crate::engine::process::{self, Watch};
 use check::checks::{CheckResult, identical};
 use contract::npy::PartFile;
+use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::{Path, PathBuf};
-use toml::{Table, Value};
+use toml::Value;
 
 /// Its subject.
 pub const SUBJECT: &str = "p4est";
@@ -68,13 +69,10 @@ impl CaseRun<'_> {
     }
 
     fn plain_case(&self) -> Result<PathBuf, String> {
+        let place = self.place.join("plain-case");
         let wrong = |error: std::io::Error| format!("cannot write a case with n = 1: {error}");
-        let text = fs::read_to_string(&self.selected.path).map_err(wrong)?;
-        let directory = self.selected.path.parent().unwrap_or(Path::new(""));
-        let directory = fs::canonicalize(directory.join(".")).map_err(wrong)?;
-        let path = self.place.join("plain.toml");
-        fs::write(&path, plain(&text, &directory)?).map_err(wrong)?;
-        Ok(path)
+        fs::create_dir_all(&place).map_err(wrong)?;
+        plain(PlainCase::read(&self.selected.path)?).write(&place, StlForm::Any).map_err(wrong)
     }
 
     fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
@@ -82,7 +80,7 @@ impl CaseRun<'_> {
         let out = self.place.join("p4est");
         fs::create_dir_all(&out)
             .map_err(|error| unusable(format!("has no {}: {error}", out.display())))?;
-        let watch = Watch::new("p4est", self.options.limit, &out);
+        let watch = Watch::new("p4est", self.options.limit(), &out);
         process::run(&mut p4est::command(&self.programs.paths.p4est, base, &out), &watch)?;
         let part = PartFile::open(&out.join("leaves-00000.npy"));
         let part = part.map_err(|error| unusable(format!("wrote no leaves: {error}")))?;
@@ -90,16 +88,12 @@ impl CaseRun<'_> {
     }
 }
 
-/// The text of the case file with n = 1, all leaves kept and an absolute path of the geometry.
-fn plain(text: &str, directory: &Path) -> Result<String, String> {
-    let mut case: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-    case.insert("layer_cells_min".into(), Value::Integer(1));
-    case.insert("keep".into(), Value::String("all".into()));
-    case.insert("keep_crossing".into(), Value::Boolean(true));
-    if let Some(Value::String(geometry)) = case.get_mut("geometry") {
-        *geometry = directory.join(&*geometry).to_string_lossy().into_owned();
-    }
-    toml::to_string(&case).map_err(|error| error.to_string())
+/// The case with n = 1 and all leaves kept.
+fn plain(mut case: PlainCase) -> PlainCase {
+    case.table.insert("layer_cells_min".into(), Value::Integer(1));
+    case.table.insert("keep".into(), Value::String("all".into()));
+    case.table.insert("keep_crossing".into(), Value::Boolean(true));
+    case
 }
 
 /// Leaf words with side bits 0. They stay sorted, because no two leaves have the same octant.
@@ -113,16 +107,12 @@ mod tests {
 
     #[test]
     fn a_plain_case_differs_only_in_layer_and_keep() {
-        let text = "geometry = \"../a.stl\"\nspacing_min = 0.1\nkeep = \"inside\"\nkeep_crossing = false\n\
-                    [root]\norigin = [0.1, 0.2, 0.3]\nedge = 1.5\n[[box]]\nmin = [0.0, 0.0, 0.0]\n\
-                    max = [1.0, 1.0, 1.0]\nspacing = 0.25\n";
-        let case: Table = plain(text, Path::new("/cases")).unwrap().parse().unwrap();
-        let mut expected: Table = text.parse().unwrap();
-        expected["geometry"] = "/cases/../a.stl".into();
-        expected["keep"] = "all".into();
-        expected["keep_crossing"] = true.into();
-        expected.insert("layer_cells_min".into(), 1.into());
-        assert_eq!(case, expected);
+        let table = toml::toml! { spacing_min = 0.1 keep = "inside" keep_crossing = false };
+        let facets = vec![[[0.5; 3]; 3]];
+        let case = plain(PlainCase { table, facets: facets.clone() });
+        let expected =
+            toml::toml! { spacing_min = 0.1 keep = "all" keep_crossing = true layer_cells_min = 1 };
+        assert_eq!((case.table, case.facets), (expected, facets));
     }
 
     #[test]

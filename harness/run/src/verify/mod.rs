@@ -56,7 +56,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
     let selected = programs
         .paths
         .catalogue
-        .select(&options.cases, &options.sizes)
+        .select(&options.cases, &options.size)
         .map_err(VerifyError::Input)?;
     if selected.is_empty() {
         let why = format!("no case in {} has this size", programs.paths.catalogue.path().display());
@@ -93,7 +93,7 @@ fn asked(selected: &[Selected], options: &Options, programs: &Programs) -> Asked
     Asked {
         cases: selected.iter().map(|case| case.name.clone()).collect(),
         named: !options.cases.is_empty(),
-        ranks: if options.mpi { options.ranks.clone() } else { Vec::new() },
+        ranks: options.rank_counts(),
         subjects: case::steps(&programs.engine.description().promises)
             .iter()
             .map(|(subject, _)| (*subject).to_owned())

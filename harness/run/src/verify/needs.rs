@@ -35,7 +35,7 @@ pub struct Needs {
 const PROBE_LIMIT_MAX: Duration = Duration::from_secs(60);
 
 fn probe_limit(options: &Options) -> Duration {
-    options.limit.min(PROBE_LIMIT_MAX)
+    options.limit().min(PROBE_LIMIT_MAX)
 }
 
 impl Needs {
@@ -44,23 +44,23 @@ impl Needs {
         let engine = programs.engine.description();
         let promised = engine.promises.is_independent_of(Independence::Ranks);
         let mut needs = Self {
-            mpi: match options.mpi {
-                true => programs.engine.lacks_mpi(),
-                false => Some("--no-mpi was given".to_owned()),
+            mpi: match options.no_mpi {
+                false => programs.engine.lacks_mpi(),
+                true => Some("--no-mpi was given".to_owned()),
             },
-            mpi_required: options.mpi
-                && (options.ranks_given || promised && engine.run.parallel.is_some()),
+            mpi_required: !options.no_mpi
+                && (options.ranks.is_some() || promised && engine.run.parallel.is_some()),
             ..Self::default()
         };
         let p4est = &programs.paths.p4est;
-        needs.p4est = match (options.p4est, p4est.is_file()) {
-            (false, _) => Some("--no-p4est was given".to_owned()),
-            (true, false) => Some(format!("{} is missing (ci/setup compiles it)", p4est.display())),
-            (true, true) => None,
+        needs.p4est = match (options.no_p4est, p4est.is_file()) {
+            (true, _) => Some("--no-p4est was given".to_owned()),
+            (_, false) => Some(format!("{} is missing (ci/setup compiles it)", p4est.display())),
+            (_, true) => None,
         };
-        match options.oracles {
-            true => needs.probe_oracles(&programs.paths, place, probe_limit(options)),
-            false => needs.oracles = Some("--no-oracles was given".to_owned()),
+        match options.no_oracles {
+            false => needs.probe_oracles(&programs.paths, place, probe_limit(options)),
+            true => needs.oracles = Some("--no-oracles was given".to_owned()),
         }
         needs
     }

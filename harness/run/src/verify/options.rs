@@ -3,6 +3,7 @@
 use crate::engine::description::Description;
 use crate::engine::layout::{Layout, Ranks};
 use check::promises::Independence;
+use clap::{Args, Parser};
 use contract::catalogue::Size;
 use std::fmt;
 use std::path::PathBuf;
@@ -35,67 +36,102 @@ impl fmt::Display for Need {
     }
 }
 
-/// The options.
-#[derive(Clone, Debug)]
+/// The options, as on the command line.
+#[derive(Args, Clone, Debug)]
 pub struct Options {
-    /// Names in the catalogue or paths of case files; if empty, all cases of the catalogue that have one of `sizes`.
+    /// Names in geometries/catalogue.toml or paths of case files [default: all of --size]
     pub cases: Vec<String>,
-    /// Sizes of the catalogue's cases, if `cases` is empty.
-    pub sizes: Vec<Size>,
-    /// Rank counts of the runs on MPI.
-    pub ranks: Vec<usize>,
-    /// Whether the user gave them: then MPI must not be missing.
-    pub ranks_given: bool,
-    /// Partitioners, each tried at each rank count.
+    /// Sizes of the catalogue's cases
+    #[arg(long, value_delimiter = ',', default_value = "small")]
+    pub size: Vec<Size>,
+    /// Rank counts of the runs on MPI; given, they require it [default: 1,2,3,4,7,8,16,32,64]
+    #[arg(long, value_delimiter = ',', value_parser = rank_count)]
+    pub ranks: Option<Vec<usize>>,
+    /// Partitioners, each at every rank count
+    #[arg(long, value_delimiter = ',', default_value = "metis,morton")]
     pub partitioners: Vec<String>,
-    /// Levels of the partition, each tried with each partitioner.
+    /// Base depths, each with every partitioner
+    #[arg(long, value_delimiter = ',', default_value = "auto,3")]
     pub level_bases: Vec<String>,
-    /// Directory for results and reports; if `None`, a temporary one that is removed at the end.
+    /// Directory for reports and for results that are kept [default: a temporary one]
+    #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Keep every result, not only those of failing cases.
+    /// Also keep the results of passing cases
+    #[arg(long)]
     pub keep: bool,
-    /// Time limit of every single run.
-    pub limit: Duration,
-    /// Run on MPI.
-    pub mpi: bool,
-    /// Compare with the oracles.
-    pub oracles: bool,
-    /// Compare with p4est.
-    pub p4est: bool,
-    /// Prerequisites that must not be missing.
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
+    pub timeout: u64,
+    /// Leave out the runs on MPI
+    #[arg(long)]
+    pub no_mpi: bool,
+    /// Leave out trimesh, open3d and pyvista
+    #[arg(long)]
+    pub no_oracles: bool,
+    /// Leave out the comparison with p4est
+    #[arg(long)]
+    pub no_p4est: bool,
+    /// Required components: exit code 3 if one is missing
+    #[arg(long, value_delimiter = ',')]
     pub require: Vec<Need>,
-    /// Greatest number of points that the oracles classify on a case that is not small.
+    /// Maximum number of points for the oracles on cases that are not small
+    #[arg(long, value_name = "N", default_value_t = 20_000)]
     pub oracle_points: usize,
-    /// Seed for choosing those points.
+    /// Seed of the choice of points
+    #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Meshes with more cells are only measured, because the checks hold a mesh in memory.
+    /// Maximum number of cells for checks; larger meshes are only measured (see `harness audit`)
+    #[arg(long, value_name = "CELLS", default_value_t = 100_000_000)]
     pub cells_max: u64,
-    /// The greatest number of cells up to which the reference is run; beyond it, a run would take hours.
+    /// Maximum number of cells for the reference
+    #[arg(long, value_name = "CELLS", default_value_t = 3_000_000)]
     pub reference_cells_max: u64,
+}
+
+/// Rank counts without `--ranks`.
+const RANKS: [usize; 9] = [1, 2, 3, 4, 7, 8, 16, 32, 64];
+
+fn rank_count(text: &str) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(0) => Err("a run has at least one rank".to_owned()),
+        Ok(ranks) => Ok(ranks),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Parses a whole number of seconds: at least 1, and at most a week.
+pub fn whole_seconds(text: &str) -> Result<u64, String> {
+    const WEEK: u64 = 7 * 86_400;
+    let number = text.trim().parse().ok().filter(|n| (1..=WEEK).contains(n));
+    number.ok_or_else(|| format!("give a whole number of seconds from 1 to {WEEK}"))
 }
 
 impl Options {
     /// A verification by reference and checks only, without MPI, oracles and p4est.
     pub fn of_leaves_alone(cases: Vec<String>) -> Self {
-        Self {
-            cases,
-            sizes: Vec::new(),
-            ranks: Vec::new(),
-            ranks_given: false,
-            partitioners: Vec::new(),
-            level_bases: Vec::new(),
-            out: None,
-            keep: false,
-            limit: Duration::from_secs(600),
-            mpi: false,
-            oracles: false,
-            p4est: false,
-            require: Vec::new(),
-            oracle_points: 0,
-            seed: 1,
-            cells_max: 100_000_000,
-            reference_cells_max: 3_000_000,
+        #[derive(Parser)]
+        struct Defaults {
+            #[command(flatten)]
+            options: Options,
         }
+        let Defaults { options } = Defaults::parse_from(["verify"]);
+        Self { cases, no_mpi: true, no_oracles: true, no_p4est: true, ..options }
+    }
+
+    /// Time limit of every single run.
+    pub fn limit(&self) -> Duration {
+        Duration::from_secs(self.timeout)
+    }
+
+    /// Rank counts of the runs on MPI, each once: a run has one directory.
+    pub fn rank_counts(&self) -> Vec<usize> {
+        let mut counts = Vec::new();
+        for &count in self.ranks.as_deref().unwrap_or(&RANKS) {
+            if !self.no_mpi && !counts.contains(&count) {
+                counts.push(count);
+            }
+        }
+        counts
     }
 
     /// Every layout of a run on MPI, in the order of rank counts. The partition is varied as far as the engine offers a choice
@@ -110,7 +146,7 @@ impl Options {
         let partitioners = varied(templates.partitioner.is_some(), &self.partitioners);
         let level_bases = varied(templates.level_base.is_some(), &self.level_bases);
         let mut layouts = Vec::new();
-        for &ranks in &self.ranks {
+        for ranks in self.rank_counts() {
             for partitioner in &partitioners {
                 for level_base in &level_bases {
                     layouts.push(Layout {

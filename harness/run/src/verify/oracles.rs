@@ -64,7 +64,7 @@ impl CaseRun<'_> {
         let (mut answers, mut failures) = (Vec::new(), Vec::new());
         for oracle in &self.needs.oracles_found {
             self.progress.step(format!("oracle {oracle}"));
-            match question.ask(oracle, &self.programs.paths, self.options.limit) {
+            match question.ask(oracle, &self.programs.paths, self.options.limit()) {
                 Ok(answer) => answers.push(answer),
                 Err(failure) if failure.is_interrupt() => return Err(failure),
                 Err(failure) => failures.push(failure),

@@ -34,7 +34,7 @@ impl CaseRun<'_> {
     /// Runs every layout on MPI and checks its mesh.
     pub fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
         match &self.needs.mpi {
-            Some(why) if !self.options.mpi => {
+            Some(why) if self.options.no_mpi => {
                 self.add(Check::new("ranks", RUNS, Outcome::left_out(why)), None);
             }
             Some(why) => self.leave_out_ranks(why),
@@ -44,10 +44,7 @@ impl CaseRun<'_> {
 
     /// The layouts on MPI that were asked for.
     fn layouts(&self) -> Vec<Layout> {
-        match self.options.mpi {
-            true => self.options.layouts(self.programs.engine.description()),
-            false => Vec::new(),
-        }
+        self.options.layouts(self.programs.engine.description())
     }
 
     /// Names every layout on MPI that has no check so far as left out.

@@ -67,7 +67,7 @@ impl CaseRun<'_> {
             status: true,
             ungraded: request.ungraded,
             sample_memory: true,
-            ..RunOptions::new(&place, self.options.limit)
+            ..RunOptions::new(&place, self.options.limit())
         };
         let completed = engine.run(request.case, request.layout, &options)?;
         let mesh = match request.write {

@@ -1,0 +1,37 @@
+//! Numbers for readers.
+
+/// A length with three significant digits.
+pub fn number(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let digits = 2 - x.abs().log10().floor() as i32;
+    if (-3..=6).contains(&digits) {
+        format!("{x:.*}", digits.max(0) as usize)
+    } else {
+        format!("{x:.2e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_three_significant_digits() {
+        for (length, text) in [
+            (0.0, "0"),
+            (1.0, "1.00"),
+            (-12.34, "-12.3"),
+            (99_999.0, "99999"),
+            (1e5, "100000"),
+            (1e6, "1.00e6"),
+            (123_456.0, "123456"),
+            (0.000_123_4, "0.000123"),
+            (0.000_099_9, "9.99e-5"),
+            (0.012_345, "0.0123"),
+        ] {
+            assert_eq!(number(length), text);
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Vertices and edges that facets share, by sorting.
+//!
+//! Facets with a repeated vertex are left out of the edges: they add an even number of facets to the one edge
+//! that they have, and no ray counts them.
+
+use contract::case::Facet;
+use contract::lattice::FacetLattice;
+use serde::Serialize;
+
+use super::finding::{Finding, Kind, Place};
+use super::input::Input;
+
+/// One facet at an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Use {
+    /// The facet.
+    pub facet: u32,
+    /// Whether the facet traverses the edge from its higher to its lower vertex.
+    pub is_down: bool,
+}
+
+/// The edges by the number of their facets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct EdgeCounts {
+    /// All edges.
+    pub all: u64,
+    /// With one facet.
+    pub open: u64,
+    /// With two facets of consistent winding.
+    pub paired: u64,
+    /// With two facets of opposite winding.
+    pub flipped: u64,
+    /// With three, five, ... facets.
+    pub odd: u64,
+    /// With four, six, ... facets.
+    pub even: u64,
+    /// Facets at edges with more than two.
+    pub facets_non_manifold: u64,
+}
+
+/// Vertices by number, and the facets at every edge.
+#[derive(Debug)]
+pub struct Edges {
+    /// Vertex numbers of every facet, in ascending order of coordinate bits.
+    pub corners: Vec<[u32; 3]>,
+    /// Number of distinct vertices.
+    pub vertices: u32,
+    /// Packed (lower vertex, higher vertex, facet, direction), sorted.
+    packed: Vec<u128>,
+}
+
+impl Edges {
+    /// Numbers the vertices and sorts the edges of at most 2^31 / 3 finite facets.
+    pub fn new(facets: &[Facet]) -> Self {
+        // Adding zero turns -0 into 0.
+        Self::of(facets.as_flattened().iter().map(|v| v.map(|x| (x + 0.0).to_bits())))
+    }
+
+    /// The same of facets on the lattice.
+    pub fn on_lattice(facets: &[FacetLattice]) -> Self {
+        Self::of(facets.as_flattened().iter().copied())
+    }
+
+    /// The edges of facets whose corners are given one by one.
+    fn of(corners: impl Iterator<Item = impl Ord>) -> Self {
+        let (corners, vertices) = number(corners);
+        let mut packed = Vec::with_capacity(3 * corners.len());
+        for (facet, &[a, b, c]) in corners.iter().enumerate() {
+            if a == b || b == c || c == a {
+                continue;
+            }
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let (low, high) = (from.min(to), from.max(to));
+                let word = (facet as u32) << 1 | u32::from(from > to);
+                packed.push(u128::from(low) << 64 | u128::from(high) << 32 | u128::from(word));
+            }
+        }
+        packed.sort_unstable();
+        Self { corners, vertices, packed }
+    }
+
+    /// Every edge: its vertices, lower first, and its facets.
+    pub fn iter(
+        &self,
+    ) -> impl Iterator<Item = ([u32; 2], impl ExactSizeIterator<Item = Use> + '_)> {
+        self.packed.chunk_by(|a, b| a >> 32 == b >> 32).map(|uses| {
+            let ends = [(uses[0] >> 64) as u32, (uses[0] >> 32) as u32];
+            let facet = |&word: &u128| Use { facet: word as u32 >> 1, is_down: word & 1 == 1 };
+            (ends, uses.iter().map(facet))
+        })
+    }
+
+    /// The edges by the number of their facets.
+    pub fn counts(&self) -> EdgeCounts {
+        let mut counts = EdgeCounts::default();
+        for (_, uses) in self.iter() {
+            let facets = uses.len();
+            let down = uses.filter(|facet| facet.is_down).count();
+            counts.all += 1;
+            *match facets {
+                1 => &mut counts.open,
+                2 if down == 1 => &mut counts.paired,
+                2 => &mut counts.flipped,
+                _ if facets % 2 == 1 => &mut counts.odd,
+                _ => &mut counts.even,
+            } += 1;
+            counts.facets_non_manifold += if facets > 2 { facets as u64 } else { 0 };
+        }
+        counts
+    }
+
+    /// The coordinates of a vertex of a facet, in the user's units.
+    pub fn position(&self, input: &Input, facet: u32, vertex: u32) -> [f64; 3] {
+        let corner = self.corners[facet as usize].iter().position(|&v| v == vertex);
+        input.facets[facet as usize][corner.expect("the facet has the vertex")].map(f64::from)
+    }
+}
+
+/// Numbers the distinct vertices, in their order. Returns the numbers of every facet's corners, and the number of vertices.
+fn number<T: Ord>(corners: impl Iterator<Item = T>) -> (Vec<[u32; 3]>, u32) {
+    let mut sorted: Vec<(T, u32)> = corners.zip(0..).collect();
+    sorted.sort_unstable();
+    let mut numbers = vec![[0; 3]; sorted.len() / 3];
+    let mut vertices = 0;
+    for same in sorted.chunk_by(|a, b| a.0 == b.0) {
+        same.iter().for_each(|&(_, corner)| numbers.as_flattened_mut()[corner as usize] = vertices);
+        vertices += 1;
+    }
+    (numbers, vertices)
+}
+
+/// Non-manifold edges, even and odd, and pairs of neighbours with inconsistent winding.
+pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 3] {
+    let kinds = [Kind::NonManifoldOdd, Kind::NonManifoldEven, Kind::Winding];
+    let mut findings = kinds.map(Finding::new);
+    for (ends, uses) in edges.iter() {
+        let at = match uses.len() {
+            0..=1 => continue,
+            2 => 2,
+            n => usize::from(n % 2 == 0),
+        };
+        let uses: Vec<Use> = uses.collect();
+        if at == 2 && uses[0].is_down != uses[1].is_down {
+            continue;
+        }
+        findings[at].add(first, || {
+            let [p, q] = ends.map(|v| edges.position(input, uses[0].facet, v));
+            let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
+            Place::new(uses.iter().map(|u| u.facet).take(Place::FACETS_MAX).collect(), middle)
+        });
+    }
+    findings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: [f32; 3] = [0.0; 3];
+    const B: [f32; 3] = [1.0, 0.0, 0.0];
+    const C: [f32; 3] = [0.0, 1.0, 0.0];
+    const D: [f32; 3] = [0.0, 0.0, 1.0];
+
+    fn sizes(facets: &[Facet]) -> Vec<usize> {
+        let mut sizes: Vec<usize> = Edges::new(facets).iter().map(|(_, uses)| uses.len()).collect();
+        sizes.sort_unstable();
+        sizes
+    }
+
+    #[test]
+    fn facets_share_edges_in_either_direction() {
+        assert_eq!(sizes(&[[A, C, B], [A, B, D], [A, D, C], [B, C, D]]), [2; 6]);
+        assert_eq!(sizes(&[[A, B, C], [A, B, D], [B, A, [0.0, -1.0, 0.0]]]), [1, 1, 1, 1, 1, 1, 3]);
+    }
+
+    #[test]
+    fn the_two_zeros_are_one_vertex() {
+        let edges = Edges::new(&[[A, B, C], [[-0.0, 0.0, -0.0], C, D]]);
+        assert_eq!((edges.vertices, edges.corners[0][0] == edges.corners[1][0]), (4, true));
+    }
+
+    #[test]
+    fn a_facet_with_a_repeated_vertex_has_no_edges() {
+        assert!(sizes(&[[A, B, A], [C, C, C]]).is_empty());
+    }
+}

@@ -1,0 +1,287 @@
+//! Self-intersections, exactly, on the lattice.
+//!
+//! Two convex sets have a common point in their interiors unless a plane separates them. For two triangles one
+//! of finitely many planes does: with the normal of a triangle, or normal to an edge of each; in a common plane,
+//! normal to an edge of either.
+
+use contract::lattice::FacetLattice;
+
+use super::facets::{is_degenerate, normal};
+use super::finding::{Finding, Kind, Place};
+use super::input::Input;
+use super::tree::FacetTree;
+
+/// The relative position of two triangles with area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relation {
+    /// They have no common point.
+    Disjoint,
+    /// They have common points, none of which is interior to both.
+    Touching,
+    /// Their interiors, as sets of their planes, have a common point.
+    Intersecting,
+}
+
+/// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or in
+/// one plane. Neither makes two volumes overlap.
+const ROUNDING: f64 = 2.0;
+
+/// The search ends when it has found this number of pairs.
+const PAIRS_MAX: usize = 1 << 22;
+
+/// Pairs of facets whose interiors intersect, and pairs without a common vertex that touch. Degenerate facets and
+/// pairs of facets with the same vertices are left out.
+pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> [Finding; 2] {
+    let facet = |f: u32| &input.lattice[f as usize];
+    let mut pairs: [Vec<(u32, u32)>; 2] = Default::default();
+    for f in (0..input.lattice.len() as u32).filter(|&f| !is_degenerate(facet(f))) {
+        for g in tree.overlapping(f).into_iter().filter(|&g| f < g && !is_degenerate(facet(g))) {
+            if let Some(kind) = classify(facet(f), facet(g)) {
+                pairs[kind].push((f, g));
+            }
+        }
+        if pairs[0].len() + pairs[1].len() >= PAIRS_MAX {
+            break;
+        }
+    }
+    let is_lower_bound = pairs[0].len() + pairs[1].len() >= PAIRS_MAX;
+    let [mut crossing, mut touching] = pairs;
+    let is_rounding = |&(f, g): &(u32, u32)| depth(facet(f), facet(g)) <= ROUNDING;
+    crossing.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
+    touching.sort_unstable();
+    let finding = |kind, pairs: &[(u32, u32)]| {
+        let places = pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect();
+        Finding { count: pairs.len() as u64, places, is_lower_bound, ..Finding::new(kind) }
+    };
+    let count_changing = crossing.partition_point(|pair| !is_rounding(pair)) as u64;
+    let intersections = Finding { count_changing, ..finding(Kind::Intersections, &crossing) };
+    [intersections, finding(Kind::Contacts, &touching)]
+}
+
+/// Index of the kind of a pair: 0 intersecting, 1 touching without a common vertex; none otherwise.
+fn classify(a: &FacetLattice, b: &FacetLattice) -> Option<usize> {
+    let common = a.iter().filter(|v| b.contains(v)).count();
+    if common == 3 {
+        return None;
+    }
+    match relation(a, b, common == 0) {
+        Relation::Intersecting => Some(0),
+        Relation::Touching if common == 0 => Some(1),
+        _ => None,
+    }
+}
+
+/// The relation of two triangles with area. Unless `is_exact`, `Touching` may stand for `Disjoint`.
+pub fn relation(a: &FacetLattice, b: &FacetLattice, is_exact: bool) -> Relation {
+    let mut touches = false;
+    for axis in axes(a, b) {
+        let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
+        if high_a < low_b || high_b < low_a {
+            return Relation::Disjoint;
+        }
+        touches |= high_a == low_b || high_b == low_a;
+        if touches && !is_exact {
+            break;
+        }
+    }
+    if touches { Relation::Touching } else { Relation::Intersecting }
+}
+
+/// An upper bound on the length of the least shift that separates the interiors of two intersecting triangles, in
+/// lattice units; 0 in one plane, where the smallest shift along the normal does.
+fn depth(a: &FacetLattice, b: &FacetLattice) -> f64 {
+    let along = |axis: [i64; 3]| {
+        let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
+        let length = axis.map(|x| (x as f64).powi(2)).iter().sum::<f64>().sqrt();
+        (high_a - low_b).min(high_b - low_a) as f64 / length
+    };
+    axes(a, b).chain([normal(a)]).map(along).fold(f64::INFINITY, f64::min)
+}
+
+/// The normals of the planes that can separate two triangles with area, none of them zero.
+fn axes(a: &FacetLattice, b: &FacetLattice) -> impl Iterator<Item = [i64; 3]> {
+    let (n, m) = (normal(a), normal(b));
+    let edges = |f: &FacetLattice| [sub(f[1], f[0]), sub(f[2], f[1]), sub(f[0], f[2])];
+    let (of_a, of_b) = (edges(a), edges(b));
+    let is_coplanar = range(b, a[0], n) == (0, 0);
+    // In one plane: the projection along an axis that is not parallel to the plane.
+    let along = (0..3).position(|x| n[x] != 0).expect("the facet has an area");
+    let unit = std::array::from_fn(|x| i64::from(x == along));
+    let axis = move |i: usize| match (is_coplanar, i) {
+        (true, 0..3) => cross(of_a[i], unit),
+        (true, _) => cross(of_b[i - 3], unit),
+        (false, 0) => n,
+        (false, 1) => m,
+        (false, _) => cross(of_a[(i - 2) / 3], of_b[(i - 2) % 3]),
+    };
+    (0..if is_coplanar { 6 } else { 11 }).map(axis).filter(|&axis| axis != [0; 3])
+}
+
+/// Least and greatest product of an axis (up to 2^59) with the corners' offsets from a point.
+fn range(facet: &FacetLattice, from: [i64; 3], axis: [i64; 3]) -> (i128, i128) {
+    let heights = facet
+        .map(|v| (0..3).map(|a| i128::from(axis[a]) * i128::from(v[a] - from[a])).sum::<i128>());
+    (heights[0].min(heights[1]).min(heights[2]), heights[0].max(heights[1]).max(heights[2]))
+}
+
+fn sub(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
+    std::array::from_fn(|a| {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        u[b] * v[c] - u[c] * v[b]
+    })
+}
+
+/// The centre of the common part of the bounding boxes.
+fn place(input: &Input, f: u32, g: u32) -> Place {
+    let (a, b) = (&input.lattice[f as usize], &input.lattice[g as usize]);
+    let middle = std::array::from_fn(|x| {
+        let low = |t: &FacetLattice| t.iter().map(|v| v[x]).fold(i64::MAX, i64::min);
+        let high = |t: &FacetLattice| t.iter().map(|v| v[x]).fold(i64::MIN, i64::max);
+        (low(a).max(low(b)) + high(a).min(high(b))) / 2
+    });
+    Place::new(vec![f, g], input.root.to_user(middle))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::lattice::UNITS_PER_EDGE;
+    use proptest::prelude::*;
+
+    const A: FacetLattice = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
+
+    fn of(b: FacetLattice) -> Relation {
+        relation(&A, &b, true)
+    }
+
+    #[test]
+    fn facets_in_different_planes() {
+        assert_eq!(of([[2, 2, -4], [2, 2, 4], [3, 9, 0]]), Relation::Intersecting);
+        // A vertex on the inside, an edge on an edge, an edge across an edge, a vertex on a vertex.
+        assert_eq!(of([[2, 2, 0], [2, 2, 4], [3, 3, 4]]), Relation::Touching);
+        assert_eq!(of([[2, 0, 0], [9, 0, 0], [4, 0, 7]]), Relation::Touching);
+        assert_eq!(of([[4, 0, -3], [4, 0, 3], [4, -5, 0]]), Relation::Touching);
+        assert_eq!(of([[0, 0, 0], [-1, 0, 3], [0, -1, 3]]), Relation::Touching);
+        assert_eq!(of([[2, 2, 1], [2, 2, 4], [3, 3, 4]]), Relation::Disjoint);
+        assert_eq!(of(A.map(|[x, y, z]| [x, y, z + 1])), Relation::Disjoint);
+        // On both sides of the other's plane, but beyond its edges.
+        assert_eq!(of([[5, 5, -4], [5, 5, 4], [6, 9, 0]]), Relation::Disjoint);
+    }
+
+    #[test]
+    fn facets_in_one_plane() {
+        assert_eq!(of(A), Relation::Intersecting);
+        assert_eq!(of([[1, 1, 0], [2, 1, 0], [1, 2, 0]]), Relation::Intersecting);
+        assert_eq!(of([[0, 0, 0], [8, 0, 0], [0, -8, 0]]), Relation::Touching);
+        assert_eq!(of([[8, 0, 0], [9, 0, 0], [9, 1, 0]]), Relation::Touching);
+        assert_eq!(of([[5, 4, 0], [9, 9, 0], [4, 5, 0]]), Relation::Disjoint);
+    }
+
+    #[test]
+    fn the_largest_coordinates_do_not_overflow() {
+        let (near, far) = (-UNITS_PER_EDGE, 2 * UNITS_PER_EDGE);
+        let a = [[near, near, far], [far, near, near], [near, far, far]];
+        let b = [[far, far, near], [near, near, near], [far, near, far]];
+        assert_eq!(relation(&a, &b, true), relation(&b, &a, true));
+        let lifted = a.map(|[x, y, z]| [x, y, z.min(far - 1)]);
+        assert_ne!(relation(&a, &lifted, true), Relation::Disjoint);
+    }
+
+    fn small() -> impl Strategy<Value = FacetLattice> {
+        prop::array::uniform3(prop::array::uniform3(-4i64..=4))
+            .prop_filter("has an area", |f| normal(f) != [0; 3])
+    }
+
+    #[test]
+    fn the_depth_is_the_least_shift_that_separates() {
+        let a = [[0, 0, 0], [80, 0, 0], [0, 80, 0]];
+        assert_eq!(depth(&a, &[[20, 20, -3], [20, 20, 50], [30, 20, 50]]), 3.0);
+        assert_eq!(depth(&a, &a.map(|[x, y, z]| [x + 20, y, z])), 0.0);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        /// Common points are found by cutting each edge with the other triangle's plane.
+        #[test]
+        fn disjoint_means_that_no_edge_meets_the_other_triangle(a in small(), b in small()) {
+            let meets = |f: &FacetLattice, g: &FacetLattice| {
+                (0..3).any(|i| edge_meets(f[i], f[(i + 1) % 3], g))
+            };
+            let expected = meets(&a, &b) || meets(&b, &a);
+            prop_assert_eq!(relation(&a, &b, true) != Relation::Disjoint, expected);
+        }
+
+        /// Interiors intersect exactly if the triangles, slightly shrunk, still have a common point.
+        #[test]
+        fn intersecting_means_that_shrunk_triangles_meet(a in small(), b in small()) {
+            let scale = 1 << 14;
+            let shrunk = |f: &FacetLattice| {
+                let centre: [i64; 3] = std::array::from_fn(|x| f[0][x] + f[1][x] + f[2][x]);
+                f.map(|v| std::array::from_fn(|x| 3 * scale * v[x] - (3 * v[x] - centre[x])))
+            };
+            let is_met = relation(&shrunk(&a), &shrunk(&b), true) != Relation::Disjoint;
+            prop_assert_eq!(relation(&a, &b, true) == Relation::Intersecting, is_met);
+        }
+
+        #[test]
+        fn neither_order_nor_axes_matter(a in small(), b in small()) {
+            let expected = relation(&a, &b, true);
+            let [p, q, r] = a;
+            prop_assert_eq!(relation(&b, &a, true), expected);
+            prop_assert_eq!(relation(&[r, q, p], &b, true), expected);
+            let turned = |f: FacetLattice| f.map(|[x, y, z]| [y, z, -x]);
+            prop_assert_eq!(relation(&turned(a), &turned(b), true), expected);
+            let quick = relation(&a, &b, false);
+            prop_assert_eq!(quick == Relation::Intersecting, expected == Relation::Intersecting);
+        }
+    }
+
+    /// Whether a closed segment meets a closed triangle: the point where it meets the plane lies within.
+    fn edge_meets(p: [i64; 3], q: [i64; 3], g: &FacetLattice) -> bool {
+        let n = normal(g);
+        let height = |v: [i64; 3]| (0..3).map(|a| n[a] * (v[a] - g[0][a])).sum::<i64>();
+        let (hp, hq) = (height(p), height(q));
+        if hp == 0 && hq == 0 {
+            return segment_in_plane_meets(p, q, g, n);
+        }
+        if hp.signum() * hq.signum() > 0 {
+            return false;
+        }
+        // The point p + (q - p) hp / (hp - hq), times hp - hq.
+        let d = hp - hq;
+        let at: [i64; 3] = std::array::from_fn(|a| p[a] * d + (q[a] - p[a]) * hp);
+        within(at, &g.map(|v| v.map(|c| c * d)), n)
+    }
+
+    fn within(at: [i64; 3], g: &FacetLattice, n: [i64; 3]) -> bool {
+        let side = |i: usize| {
+            let c = cross(sub(g[(i + 1) % 3], g[i]), sub(at, g[i]));
+            (0..3).map(|a| i128::from(c[a]) * i128::from(n[a])).sum::<i128>().signum()
+        };
+        (0..3).all(|i| side(i) >= 0)
+    }
+
+    fn segment_in_plane_meets(p: [i64; 3], q: [i64; 3], g: &FacetLattice, n: [i64; 3]) -> bool {
+        let turn = |a: [i64; 3], b: [i64; 3], c: [i64; 3]| {
+            let k = cross(sub(b, a), sub(c, a));
+            (0..3).map(|x| k[x] * n[x]).sum::<i64>().signum()
+        };
+        let between = |a: [i64; 3], b: [i64; 3], c: [i64; 3]| {
+            (0..3).all(|x| a[x].min(b[x]) <= c[x] && c[x] <= a[x].max(b[x]))
+        };
+        let cuts = |a, b| {
+            let (s, t, u, v) = (turn(p, q, a), turn(p, q, b), turn(a, b, p), turn(a, b, q));
+            (s != t && u != v)
+                || (s == 0 && between(p, q, a))
+                || (t == 0 && between(p, q, b))
+                || (u == 0 && between(a, b, p))
+                || (v == 0 && between(a, b, q))
+        };
+        within(p, g, n) || (0..3).any(|i| cuts(g[i], g[(i + 1) % 3]))
+    }
+}

@@ -1,0 +1,69 @@
+//! The ends of a path: points of the user, and whether they are in free leaves.
+
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
+use contract::word::{self, Side};
+
+use super::passage::to_user;
+use crate::tree::Point;
+
+/// Where a path ends, in the user's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// The far field: any leaf at the root's boundary.
+    Far,
+    /// The leaf that contains a point.
+    Point([f64; 3]),
+}
+
+/// A point on the lattice.
+///
+/// # Errors
+/// One sentence, if the point is outside the root.
+pub fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<Point, String> {
+    let inside = |q: &[i64; 3]| q.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));
+    let found = root.quantise(at).filter(inside);
+    found.map(|q| Point::from_array(q.map(|c| c as f64))).ok_or_else(|| {
+        let far = root.rounded(root.to_user([UNITS_PER_EDGE; 3]));
+        format!(
+            "{what} {at:?} is outside the root, which extends from {:?} to {far:?}",
+            root.rounded(root.origin)
+        )
+    })
+}
+
+/// The leaf that contains a point of the root, among the sorted words of a tree that fills it.
+pub fn leaf_at(words: &[u64], at: Point) -> u64 {
+    let last = i64::from(CELLS_PER_EDGE) - 1;
+    let cell = at.to_array().map(|c| (c as i64 / UNITS_PER_CELL).clamp(0, last) as u32);
+    let after = words.partition_point(|&w| word::key(w) <= word::key_of(cell));
+    words[after - 1]
+}
+
+/// Whether no facet touches a leaf.
+pub fn is_free(leaf: u64) -> bool {
+    word::side(leaf) != Side::Crossing
+}
+
+/// The centre of a leaf.
+pub fn centre(leaf: u64) -> [i64; 3] {
+    word::octant(leaf).centre()
+}
+
+/// Why an end is not in a free leaf, with the nearest centre of one.
+pub fn crossed(what: &str, at: Point, words: &[u64], root: &Root) -> Option<String> {
+    if is_free(leaf_at(words, at)) {
+        return None;
+    }
+    let free = words.iter().filter(|&&w| is_free(w)).map(|&w| centre(w));
+    let distance = |centre: &[i64; 3]| Point::from_array(centre.map(|c| c as f64)).distance(at);
+    let nearest = free.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let place = format!("{what} {:?} is in a leaf that facets cross", to_user(root, at));
+    Some(match nearest {
+        Some(near) => format!(
+            "{place}; the nearest centre of a free leaf is {:?}",
+            root.rounded(root.to_user(near))
+        ),
+        None => format!("{place}, and there are no free leaves: use a smaller spacing_min"),
+    })
+}

@@ -1,0 +1,263 @@
+//! Leaks: does a path of free leaves of the base tree join two places, how wide is it, and at which spacing does it
+//! close or open?
+//!
+//! - [`space`]: the cells of a base tree and the widest path through them; [`passage`]: its width, to 5 %;
+//! - [`ends`]: the ends of the path; [`surface`]: whether the facets form a closed surface between them;
+//! - [`report`]: the answer as data; [`invariants`]: what it satisfies; [`text`]: the answer for a terminal.
+//!
+//! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
+//! narrower of the two passes from one to the other, so an opening that joins leaves of edge e is at least e wide. An
+//! opening wider than 2 sqrt(3) e always joins leaves of edge e: the leaf that contains the centre of the ball is free.
+
+pub mod ends;
+mod invariants;
+mod passage;
+pub mod report;
+mod space;
+mod surface;
+mod text;
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+use crate::tree::{FacetTree, Point};
+use contract::case::Case;
+use contract::octant::LEVEL_MAX;
+use ends::Target;
+use report::{Answers, Destination, Meshed, Passage, Report, SCHEMA, Spacing};
+use space::{Goal, Space};
+
+/// The search was interrupted.
+#[derive(Clone, Copy, Debug)]
+pub struct Interrupted;
+
+/// Why a question has no answer.
+#[derive(Debug)]
+pub enum LeakError<E> {
+    /// The user's input, in one sentence.
+    Input(String),
+    /// A base tree could not be made.
+    Source(E),
+    /// The search was interrupted.
+    Interrupted,
+}
+
+impl<E> From<Interrupted> for LeakError<E> {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted
+    }
+}
+
+/// Events during the search.
+pub trait Watch {
+    /// A step begins.
+    fn step(&self, what: &str);
+    /// Whether the user has interrupted the search.
+    fn is_interrupted(&self) -> bool;
+}
+
+/// A case whose openings are searched.
+pub struct Leaks<'a, F> {
+    case: &'a Case,
+    facets: FacetTree,
+    /// Makes the sorted leaf words of the case's base tree at a surface level.
+    make: F,
+    /// Those that were made.
+    trees: BTreeMap<u8, Vec<u64>>,
+    /// Refinement ends before a base tree that would have more leaves than this.
+    leaves_max: u64,
+    watch: &'a dyn Watch,
+}
+
+impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
+    /// A case; `make` returns the sorted leaf words of its base tree at another surface level.
+    ///
+    /// # Errors
+    /// If the case has no facets.
+    pub fn new(
+        case: &'a Case,
+        make: F,
+        leaves_max: u64,
+        watch: &'a dyn Watch,
+    ) -> Result<Self, LeakError<E>> {
+        if case.facets.is_empty() {
+            return Err(LeakError::Input(
+                "the case has no facets, so nothing separates places".into(),
+            ));
+        }
+        let facets = FacetTree::new(&case.facets_lattice);
+        Ok(Self { case, facets, make, trees: BTreeMap::new(), leaves_max, watch })
+    }
+
+    /// The sorted words of the base tree that a path leads through.
+    pub fn words(&self, passage: &Passage) -> &[u64] {
+        &self.trees[&passage.spacing.level]
+    }
+
+    /// Answers for pairs of places, with their invariants checked.
+    ///
+    /// # Errors
+    /// If an end is outside the root or in a crossing leaf, if a base tree cannot be made, or if `watch` is interrupted.
+    pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers, LeakError<E>> {
+        let examined =
+            ends.iter().map(|&(from, to)| self.answer(from, to)).collect::<Result<_, _>>()?;
+        let case = self.case;
+        let facets = case.facets.len() as u64;
+        Ok(Answers { schema: SCHEMA, case: case.name.clone(), facets, root: case.root, examined })
+    }
+
+    fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report, LeakError<E>> {
+        let (root, level) = (&self.case.root, self.case.level_surface);
+        let start = ends::on_lattice("--from", from, root).map_err(LeakError::Input)?;
+        let (end, to) = match to {
+            Target::Far => (None, Destination::Far("far")),
+            Target::Point(at) => {
+                let end = ends::on_lattice("--to", at, root).map_err(LeakError::Input)?;
+                (Some(end), Destination::Point(at))
+            }
+        };
+        let ends = (start, end);
+        self.make_tree(level)?;
+        let mut levels = vec![self.search(level, ends)?];
+        if levels[0].why.is_some() {
+            return Err(LeakError::Input(self.crossed_end(level, ends)));
+        }
+        let spacing = |level| Spacing::of(level, root);
+        let (closes, opens, passage) = (None, None, None);
+        let (is_leak, is_separated) = (levels[0].is_joined, false);
+        let spacing_own = spacing(level);
+        let mut report = Report {
+            from,
+            to,
+            spacing: spacing_own,
+            is_leak,
+            closes,
+            opens,
+            is_separated,
+            limit: None,
+            passage,
+            levels: Vec::new(),
+        };
+        let mut measured = None;
+        if is_leak {
+            // A leaf of the level that joins the ends is free, so the opening is at least as wide, or 4 times the leaves two levels
+            // below. There the widest ball's centre lies in free leaves: no finer tree has a wider path.
+            const DEEPER: u8 = 2;
+            report.closes = self.coarsen(ends, &mut levels)?.map(spacing);
+            let open = report.closes.map_or(0, |closes| closes.level + 1);
+            measured = Some(level.min(open + DEEPER));
+        } else if self.is_separated(level, ends) {
+            report.is_separated = true;
+        } else {
+            match self.refine(ends, &mut levels)? {
+                Ok(open) => (report.opens, measured) = (Some(spacing(open)), Some(open)),
+                Err(limit) => report.limit = Some(limit),
+            }
+        }
+        report.levels = levels;
+        if let Some(level) = measured {
+            self.watch.step("measuring the width");
+            let stop = || self.watch.is_interrupted();
+            let tree = (level, &self.trees[&level][..]);
+            report.passage = Some(passage::widest((self.case, &self.facets), tree, ends, &stop)?);
+        }
+        let words = report.passage.as_ref().map_or(&[][..], |passage| self.words(passage));
+        report.check_invariants(self.case, words);
+        Ok(report)
+    }
+
+    fn make_tree(&mut self, level: u8) -> Result<(), LeakError<E>> {
+        if !self.trees.contains_key(&level) {
+            self.watch.step(&format!("meshing the base tree of level {level}"));
+            let words = (self.make)(level).map_err(LeakError::Source)?;
+            self.trees.insert(level, words);
+        }
+        Ok(())
+    }
+
+    /// Whether free leaves of a base tree join the ends. The coarsest leaves are searched first: few of them lead far.
+    fn search(
+        &self,
+        level: u8,
+        (from, to): (Point, Option<Point>),
+    ) -> Result<Meshed, LeakError<E>> {
+        self.watch.step(&format!("searching the base tree of level {level}"));
+        let words = &self.trees[&level];
+        let mut space = Space::new(words, &self.facets).map_err(LeakError::Input)?;
+        let is_crossed = |at: Point| !ends::is_free(ends::leaf_at(words, at));
+        let why = match (is_crossed(from), to.is_some_and(is_crossed)) {
+            (true, _) => Some("facets cross the leaf of the start"),
+            (_, true) => Some("facets cross the leaf of the end"),
+            _ => None,
+        };
+        let stop = || self.watch.is_interrupted();
+        let (start, goal) = (space.locate(from), to.map_or(Goal::Far, Goal::At));
+        let edge = |space: &mut Space, cell| space.edge(cell);
+        let is_joined =
+            why.is_none() && space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some();
+        let spacing = Spacing::of(level, &self.case.root);
+        Ok(Meshed { spacing, leaves: words.len() as u64, is_joined, why })
+    }
+
+    /// Why an end is not in a free leaf, for the user.
+    fn crossed_end(&self, level: u8, (from, to): (Point, Option<Point>)) -> String {
+        let (words, root) = (&self.trees[&level], &self.case.root);
+        let crossed = |what, at| ends::crossed(what, at, words, root);
+        crossed("--from", from)
+            .or_else(|| to.and_then(|to| crossed("--to", to)))
+            .expect("an end is crossed")
+    }
+
+    /// Whether a closed surface separates the centres of the leaves at the ends.
+    fn is_separated(&self, level: u8, (from, to): (Point, Option<Point>)) -> bool {
+        let centre = |at| ends::centre(ends::leaf_at(&self.trees[&level], at));
+        surface::separates(&self.case.facets_lattice, centre(from), to.map(centre))
+    }
+
+    /// Coarsens the surface until the ends are not joined. Returns that level.
+    fn coarsen(
+        &mut self,
+        ends: (Point, Option<Point>),
+        levels: &mut Vec<Meshed>,
+    ) -> Result<Option<u8>, LeakError<E>> {
+        for level in (0..self.case.level_surface).rev() {
+            self.make_tree(level)?;
+            levels.push(self.search(level, ends)?);
+            if !levels[levels.len() - 1].is_joined {
+                return Ok(Some(level));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Meshes finer until the ends are joined. Returns that level, or the limit that was met before.
+    fn refine(
+        &mut self,
+        ends: (Point, Option<Point>),
+        levels: &mut Vec<Meshed>,
+    ) -> Result<Result<u8, String>, LeakError<E>> {
+        // Halving the spacing of a surface multiplies its leaves by four.
+        const GROWTH: u64 = 4;
+        for level in self.case.level_surface + 1..=LEVEL_MAX {
+            let expected = levels[levels.len() - 1].leaves * GROWTH;
+            if expected > self.leaves_max {
+                let max = self.leaves_max;
+                return Ok(Err(format!(
+                    "level {level} would have about {expected} leaves, more than the limit of {max} (--leaves-max)"
+                )));
+            }
+            match self.make_tree(level) {
+                Err(LeakError::Source(error)) if !self.watch.is_interrupted() => {
+                    return Ok(Err(format!("level {level} could not be meshed: {error}")));
+                }
+                made => made?,
+            }
+            levels.push(self.search(level, ends)?);
+            if levels[levels.len() - 1].is_joined {
+                return Ok(Ok(level));
+            }
+            self.trees.remove(&level);
+        }
+        Ok(Err(format!("level {LEVEL_MAX} is the finest")))
+    }
+}

@@ -1,0 +1,257 @@
+//! The answer for a terminal.
+
+use std::fmt;
+
+use super::report::{Answers, Destination, Meshed, Passage, Report, Spacing};
+use contract::number::number;
+
+/// Facets at the rim that are printed.
+const FACETS_MAX: usize = 24;
+
+impl fmt::Display for Answers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, report) in self.examined.iter().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            report.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let to = match &self.to {
+            Destination::Point(at) => point(at),
+            Destination::Far(_) => "the far field".to_owned(),
+        };
+        writeln!(f, "from      {}", point(&self.from))?;
+        writeln!(f, "to        {to}")?;
+        writeln!(f, "spacing   {}", spacing(&self.spacing))?;
+        writeln!(f, "\n{:>5} {:>12} {:>12}  path", "level", "spacing", "leaves")?;
+        self.levels.iter().try_for_each(|level| row(level, f))?;
+        match (self.is_leak, &self.closes, &self.opens, &self.limit) {
+            (true, Some(closes), ..) => {
+                let why = self.levels.last().and_then(|level| level.why);
+                let why = why.map_or(String::new(), |why| format!(", where {why}"));
+                writeln!(f, "\n{}; closed at spacing {}{why}", self.verdict(), spacing(closes))?;
+            }
+            (true, None, ..) => writeln!(f, "\n{}, at every spacing", self.verdict())?,
+            (false, _, Some(opens), _) => {
+                writeln!(
+                    f,
+                    "\nno leak at this spacing; it would open at spacing {}",
+                    spacing(opens)
+                )?;
+            }
+            (false, ..) if self.is_separated => {
+                writeln!(
+                    f,
+                    "\nno leak at any spacing: the facets form a closed surface between start and end"
+                )?;
+            }
+            (false, _, _, limit) => {
+                let limit = limit.as_deref().unwrap_or_default();
+                writeln!(
+                    f,
+                    "\nno leak at this spacing, nor at any finer one that was tried; whether one leaks is not known: {limit}"
+                )?;
+            }
+        }
+        self.passage.iter().try_for_each(|passage| describe(passage, f))
+    }
+}
+
+impl Report {
+    /// What it means that free leaves join start and end.
+    fn verdict(&self) -> &'static str {
+        match &self.passage {
+            Some(passage) if passage.narrowest.is_end => {
+                "JOINED: start and end lie in one space, or one of them within the opening"
+            }
+            _ => "LEAK: free leaves join start and end",
+        }
+    }
+}
+
+fn row(meshed: &Meshed, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let path = match (meshed.is_joined, meshed.why) {
+        (true, _) => "open".to_owned(),
+        (false, None) => "closed".to_owned(),
+        (false, Some(why)) => format!("closed: {why}"),
+    };
+    let Spacing { level, spacing } = meshed.spacing;
+    writeln!(f, "{level:>5} {:>12} {:>12}  {path}", rounded_up(spacing), meshed.leaves)
+}
+
+fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let narrowest = &passage.narrowest;
+    let [min, width, max] = [narrowest.width_min, narrowest.width, narrowest.width_max].map(number);
+    let cells = number(narrowest.width_cells);
+    writeln!(f, "\nThe narrowest place of the widest path (level {})", passage.spacing.level)?;
+    writeln!(
+        f,
+        "width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes, {min} to {max}"
+    )?;
+    if !narrowest.is_end {
+        writeln!(
+            f,
+            "          Spacings above {max} close it wherever the lattice lies; a finer one may close it on this lattice only."
+        )?;
+    }
+    writeln!(f, "at        {}", point(&narrowest.at))?;
+    let [x, y, z] = narrowest.direction;
+    writeln!(f, "direction ({x:.3}, {y:.3}, {z:.3})")?;
+    let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
+    let listed: Vec<String> = listed.collect();
+    let more = match narrowest.facets.len().saturating_sub(FACETS_MAX) {
+        0 => String::new(),
+        more => format!(" and {more} more (--json)"),
+    };
+    writeln!(f, "facets    {}{more}", listed.join(", "))?;
+    if narrowest.is_end {
+        writeln!(
+            f,
+            "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends."
+        )?;
+    }
+    writeln!(f, "\nThe path: {} points, length {}", passage.points.len(), number(passage.length))
+}
+
+fn spacing(spacing: &Spacing) -> String {
+    format!("{} (level {})", rounded_up(spacing.spacing), spacing.level)
+}
+
+/// A spacing with three significant digits, rounded up: a case with this spacing has the same level.
+fn rounded_up(spacing: f64) -> String {
+    let unit = 10f64.powi(spacing.log10().floor() as i32 - 2);
+    let text = number(spacing);
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded < spacing => number(spacing + unit),
+        _ => text,
+    }
+}
+
+fn point(at: &[f64; 3]) -> String {
+    let [x, y, z] = at;
+    format!("({x}, {y}, {z})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leak::report::{Narrowest, Point};
+    use contract::lattice::Root;
+
+    fn narrowest(facets: std::ops::Range<u32>, index: usize, is_end: bool) -> Narrowest {
+        Narrowest {
+            at: [0.5, 0.0, -1.25],
+            width: 0.125,
+            width_min: 0.124,
+            width_max: 0.128,
+            width_cells: 0.25,
+            direction: [0.0, 0.6, -0.8],
+            touches: [0.5, 0.0, -1.1875],
+            facets: facets.collect(),
+            index,
+            is_end,
+        }
+    }
+
+    /// A leak through an opening, along a path of this many points.
+    fn leak(points: usize, narrowest: Narrowest) -> Report {
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let point = |i: usize| Point { at: [i as f64, 0.0, 1.0], width: 0.5 + i as f64 };
+        let spacing = Spacing::of(4, &root);
+        let meshed = |level, is_joined, why| Meshed {
+            spacing: Spacing::of(level, &root),
+            leaves: 100 * u64::from(level),
+            is_joined,
+            why,
+        };
+        let points: Vec<Point> = (0..points).map(point).collect();
+        Report {
+            from: [0.0, 0.25, 1.0],
+            to: Destination::Far("far"),
+            spacing,
+            is_leak: true,
+            closes: Some(Spacing::of(2, &root)),
+            opens: None,
+            is_separated: false,
+            limit: None,
+            passage: Some(Passage {
+                spacing,
+                narrowest,
+                length: 12.5,
+                inner: (0, points.len() - 1),
+                points,
+            }),
+            levels: vec![meshed(4, true, None), meshed(2, false, Some("the end is in a wall"))],
+        }
+    }
+
+    const HEAD: &str = "from      (0, 0.25, 1)\nto        the far field\nspacing   0.500 (level 4)\n\n\
+        level      spacing       leaves  path\n    4        0.500          400  open\n    \
+        2         2.00          200  closed: the end is in a wall\n\n";
+
+    #[test]
+    fn a_leak_is_described_with_its_opening_and_its_path() {
+        let expected = "LEAK: free leaves join start and end; closed at spacing 2.00 (level 2), where the end is in a wall\n\
+            \nThe narrowest place of the widest path (level 4)\n\
+            width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes, 0.124 to 0.128\n          \
+            Spacings above 0.128 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
+            at        (0.5, 0, -1.25)\ndirection (0.000, 0.600, -0.800)\nfacets    3, 4\n\
+            \nThe path: 3 points, length 12.5\n";
+        assert_eq!(leak(3, narrowest(3..5, 1, false)).to_string(), format!("{HEAD}{expected}"));
+    }
+
+    #[test]
+    fn of_long_rims_the_first_part_is_printed() {
+        let facets = |count| leak(1, narrowest(0..count, 0, false)).to_string();
+        assert!(facets(24).contains(" 22, 23\n"));
+        assert!(facets(26).contains(" 22, 23 and 2 more (--json)\n"));
+    }
+
+    #[test]
+    fn a_path_that_is_narrowest_at_its_end_has_no_opening() {
+        let mut report = leak(1, narrowest(3..4, 0, true));
+        (report.closes, report.to) = (None, Destination::Point([1.0, 2.0, 3.5]));
+        let text = report.to_string();
+        let start = "from      (0, 0.25, 1)\nto        (1, 2, 3.5)\n";
+        assert!(text.starts_with(start), "{text}");
+        let verdict = "\nJOINED: start and end lie in one space, or one of them within the opening, at every spacing\n";
+        assert!(text.contains(verdict), "{text}");
+        let remark = "facets    3\n          This is an end of the path: no place on the way is narrower, so there is no opening between \
+            the ends.\n\nThe path: 1 points";
+        assert!(text.contains(remark) && !text.contains("Spacings above"), "{text}");
+    }
+
+    #[test]
+    fn without_a_leak_the_answer_states_what_is_known_of_finer_spacings() {
+        let mut report = leak(1, narrowest(3..4, 0, false));
+        (report.is_leak, report.closes, report.passage) = (false, None, None);
+        let verdict = |report: &Report| report.to_string().split_off(HEAD.len());
+        report.limit = Some("the limit".to_owned());
+        let unknown = "no leak at this spacing, nor at any finer one that was tried; whether one leaks is not known: the limit\n";
+        assert_eq!(verdict(&report), unknown);
+        report.is_separated = true;
+        let never =
+            "no leak at any spacing: the facets form a closed surface between start and end\n";
+        assert_eq!(verdict(&report), never);
+        report.opens = Some(Spacing::of(5, &Root { origin: [0.0; 3], edge: 8.0 }));
+        assert_eq!(
+            verdict(&report),
+            "no leak at this spacing; it would open at spacing 0.250 (level 5)\n"
+        );
+    }
+
+    #[test]
+    fn a_printed_spacing_has_the_level_of_the_exact_one() {
+        for exact in [8.265 / 512.0, 4.28 / 128.0, 0.25, 0.9996, 1.0 / 3.0, 1234.5, 7.3e-9, 8.1e12]
+        {
+            let printed: f64 = rounded_up(exact).parse().unwrap();
+            assert!(printed >= exact && printed < 1.02 * exact, "{exact}: {printed}");
+        }
+    }
+}

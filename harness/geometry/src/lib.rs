@@ -1,0 +1,70 @@
+//! Geometries: their diagnosis before they are meshed, and [`leak`]s through their openings.
+//!
+//! - [`input`]: the file, its root and the cell's edge length;
+//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
+//! - [`facets`]: defects of single facets, and duplicates; [`extent`]: the body's position in the root;
+//! - [`tree`]: facets in a tree of boxes, for [`intersections`], [`sheets`] and leaks;
+//! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
+//!
+//! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Decisions that
+//! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
+
+mod edges;
+mod extent;
+mod facets;
+pub mod finding;
+pub mod input;
+mod intersections;
+mod junctions;
+pub mod leak;
+pub mod meaning;
+mod openings;
+pub mod report;
+mod sheets;
+mod shells;
+mod text;
+pub mod tree;
+mod width;
+
+use edges::Edges;
+use finding::Finding;
+use input::Input;
+use report::Diagnosis;
+use shells::Shells;
+use tree::FacetTree;
+
+/// Options of a diagnosis.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Whether to search for self-intersections.
+    pub intersections: bool,
+    /// Maximum number of places listed per finding.
+    pub first: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { intersections: true, first: 5 }
+    }
+}
+
+/// Diagnoses a geometry. The counts do not depend on the order of the facets or of a facet's vertices.
+pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
+    let edges = Edges::new(&input.facets);
+    let shells = Shells::new(&edges, &input.lattice);
+    let mut findings: Vec<Finding> = Vec::new();
+    findings.extend(openings::openings(input, &edges, options.first));
+    findings.extend(edges::findings(input, &edges, options.first));
+    findings.extend(shells.findings(input, options.first));
+    findings.push(facets::duplicates(input, &edges, options.first));
+    findings.extend(facets::shapes(input, options.first));
+    let tree = FacetTree::new(&input.lattice);
+    if options.intersections {
+        findings.extend(intersections::intersections(input, &tree, options.first));
+    }
+    if let Some(cell) = input.cell {
+        findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
+    }
+    findings.extend(extent::findings(input, options.first));
+    Diagnosis::new(input, &edges, &shells.all, findings, options.first)
+}

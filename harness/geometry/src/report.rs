@@ -1,0 +1,250 @@
+//! The result of a diagnosis as data; JSON of the schema `octree-geometry/2` when serialised.
+//!
+//! Invariants, which [`Diagnosis::check_invariants`] executes:
+//! - edges by class sum to all, and three times the facets of shells to the facets at edges;
+//! - facets of shells, and those without an edge, sum to all; all shells are closed iff no edge has an odd number of facets;
+//! - findings of edges agree with these counts; no finding occurs more often than there are edges, shells or facets that it can concern;
+//! - places are no more than occurrences, of existing facets; openings are listed from the widest, and no wider than across; widths of
+//!   sheets are positive, ordered as their quantiles, and less than a cell;
+//! - what changes the region is part of what occurs, and a body beyond the root is found there.
+
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::stl::Solid;
+use serde::Serialize;
+use std::cmp::Reverse;
+
+use super::edges::{EdgeCounts, Edges};
+use super::extent::{self, Extent};
+use super::finding::{Finding, Kind, Place};
+use super::input::Input;
+use super::meaning;
+use super::shells::Shell;
+
+/// Name and version of the JSON form.
+pub const SCHEMA: &str = "octree-geometry/2";
+
+/// The shells in numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct Shells {
+    /// Number of shells.
+    pub count: u64,
+    /// Number of closed shells.
+    pub closed: u64,
+    /// Number of their facets: all but those with a repeated vertex.
+    pub facets: u64,
+    /// The largest shells.
+    pub largest: Vec<Shell>,
+}
+
+/// The result of a diagnosis.
+#[derive(Clone, Debug, Serialize)]
+pub struct Diagnosis {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// Number of facets.
+    pub facets: u64,
+    /// Number of distinct vertices.
+    pub vertices: u64,
+    /// The edges of the facets of shells.
+    pub edges: EdgeCounts,
+    /// The solids of the file; none for a generated body.
+    pub solids: Vec<Solid>,
+    /// The shells.
+    pub shells: Shells,
+    /// The root cube.
+    pub root: Root,
+    /// Edge length of the cells at the surface; none if no spacing was given.
+    pub cell: Option<f64>,
+    /// The body's extent in the root.
+    pub extent: Extent,
+    /// One finding of every kind that was searched for.
+    pub findings: Vec<Finding>,
+    /// Whether a finding can change the mesh's region.
+    pub changes_region: bool,
+}
+
+impl Diagnosis {
+    pub(super) fn new(
+        input: &Input,
+        edges: &Edges,
+        shells: &[Shell],
+        mut findings: Vec<Finding>,
+        first: usize,
+    ) -> Self {
+        for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
+            if meaning::changes_region(finding.kind, input.keep) {
+                finding.count_changing = finding.count;
+            }
+            finding.meaning = meaning::meaning(finding, input);
+        }
+        let closed = shells.iter().filter(|shell| shell.is_closed).count() as u64;
+        let of_shells = shells.iter().map(|shell| u64::from(shell.facets)).sum();
+        let mut largest = shells.to_vec();
+        largest.sort_by_key(|shell| (Reverse(shell.facets), shell.facet_first));
+        largest.truncate(first);
+        let diagnosis = Self {
+            schema: SCHEMA,
+            facets: input.facets.len() as u64,
+            vertices: edges.vertices.into(),
+            edges: edges.counts(),
+            solids: input.solids.clone(),
+            shells: Shells { count: shells.len() as u64, closed, facets: of_shells, largest },
+            root: input.root,
+            cell: input.cell,
+            extent: extent::extent(input),
+            changes_region: findings.iter().any(|finding| finding.count_changing > 0),
+            findings,
+        };
+        diagnosis.check_invariants();
+        diagnosis
+    }
+
+    /// Asserts the invariants.
+    ///
+    /// # Panics
+    /// If one is violated, which is a bug.
+    pub fn check_invariants(&self) {
+        let Self { edges, shells, facets, .. } = self;
+        let classes = edges.open + edges.paired + edges.flipped + edges.odd + edges.even;
+        assert_eq!(classes, edges.all, "edges by class do not sum to all: {edges:?}");
+        let at_edges = edges.open + 2 * (edges.paired + edges.flipped) + edges.facets_non_manifold;
+        assert_eq!(at_edges, 3 * shells.facets, "facets at {edges:?} are not those of shells");
+        let collapsed =
+            facets.checked_sub(shells.facets).expect("shells have more facets than the geometry");
+        let are_closed = shells.closed == shells.count;
+        assert!(
+            shells.closed <= shells.count && are_closed == (edges.open + edges.odd == 0),
+            "{shells:?} with {edges:?}"
+        );
+        let count = |kind| self.finding(kind).map_or(0, |finding| finding.count);
+        let of_edges = [Kind::NonManifoldOdd, Kind::NonManifoldEven, Kind::Winding].map(count);
+        assert_eq!(
+            of_edges,
+            [edges.odd, edges.even, edges.flipped],
+            "findings of edges with {edges:?}"
+        );
+        let inward = count(Kind::InsideOut) + count(Kind::Cavities);
+        assert!(
+            inward <= shells.closed,
+            "{inward} of {} closed shells are wound inward",
+            shells.closed
+        );
+        assert!(
+            collapsed <= count(Kind::Degenerate),
+            "{collapsed} facets without edges have an area"
+        );
+        let cell = self.cell.unwrap_or(f64::INFINITY);
+        for finding in &self.findings {
+            let most = match finding.kind {
+                Kind::Openings | Kind::Junctions => edges.open,
+                Kind::Intersections | Kind::Contacts => facets * facets.saturating_sub(1) / 2,
+                _ => edges.all.max(*facets),
+            };
+            assert!(finding.count <= most, "{} of {most}: {:?}", finding.count, finding.kind);
+            finding.check_invariants(*facets, edges.open, cell);
+        }
+        let changes = self.findings.iter().any(|finding| finding.count_changing > 0);
+        assert_eq!(changes, self.changes_region, "whether a finding changes the region");
+        let beyond = 2.0 * self.root.edge / UNITS_PER_EDGE as f64;
+        let is_beyond = self.extent.margin < -beyond;
+        assert!(
+            !is_beyond || count(Kind::OutsideRoot) > 0,
+            "no facet is beyond the root, but the body is: {:?}",
+            self.extent
+        );
+    }
+
+    /// The finding of a kind, if this kind was searched for.
+    pub fn finding(&self, kind: Kind) -> Option<&Finding> {
+        self.findings.iter().find(|finding| finding.kind == kind)
+    }
+}
+
+impl Finding {
+    fn check_invariants(&self, facets: u64, open: u64, cell: f64) {
+        let Self { kind, count, count_changing, places, .. } = self;
+        let is_sheet = matches!(kind, Kind::ThinWalls | Kind::ThinGaps);
+        assert!(count_changing <= count, "{count_changing} of {count} change the region: {kind:?}");
+        assert_eq!(places.is_empty(), *count == 0, "places of {count}: {kind:?}");
+        assert!(
+            is_sheet || places.len() as u64 <= *count,
+            "{} places of {count}: {kind:?}",
+            places.len()
+        );
+        assert_eq!(self.meaning.is_empty(), *count == 0, "the meaning of {count}: {kind:?}");
+        let numbers = || places.iter().flat_map(|place| &place.facets);
+        assert!(numbers().all(|&facet| u64::from(facet) < facets), "facets of {kind:?}");
+        let widths: Vec<f64> = places.iter().filter_map(|place| place.width).collect();
+        if is_sheet {
+            let quantiles: Vec<f64> = places.iter().filter_map(|place| place.quantile).collect();
+            assert!(
+                quantiles.is_sorted() && widths.is_sorted(),
+                "{quantiles:?} of {kind:?} are {widths:?}"
+            );
+            assert!(
+                widths.iter().all(|w| (0.0..=1.000_001 * cell).contains(w)),
+                "{widths:?} of {kind:?} in cells of {cell}"
+            );
+        } else if *kind == Kind::Openings {
+            assert_eq!(self.edges, Some(open), "edges of openings");
+            let edges: u64 = places.iter().filter_map(|place| place.edges).sum();
+            assert!(edges <= open, "openings with {edges} of {open} open edges");
+            assert!(widths.is_sorted_by(|a, b| a >= b), "widths of openings: {widths:?}");
+            let is_across = |place: &Place| place.width <= place.diameter.map(|d| 1.000_001 * d);
+            assert!(places.iter().all(is_across), "an opening is wider than across: {places:?}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Requested;
+    use crate::{Options, diagnose};
+    use geometries::{Generator, Shape};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    #[test]
+    fn wrong_answers_are_noticed() {
+        // A sphere with a hole, a copy of a facet and a flipped one, half beyond the root and in cells wider than itself.
+        let mut facets = Generator::new(Shape::Sphere, 320).facets().unwrap();
+        facets.remove(9);
+        facets.push(facets[100]);
+        facets[200].swap(0, 1);
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let requested = Requested { spacing_min: Some(4.0), root: Some(root), root_scale: None };
+        let right = diagnose(&Input::new(facets, &requested).unwrap(), &Options::default());
+        let index = |kind| right.findings.iter().position(|f| f.kind == kind).unwrap();
+        let [openings, walls, winding] =
+            [Kind::Openings, Kind::ThinWalls, Kind::Winding].map(index);
+        assert!([openings, walls, winding].iter().all(|&i| right.findings[i].count > 0));
+        type Plant<'a> = (&'a str, &'a dyn Fn(&mut Diagnosis));
+        let plants: [Plant; 14] = [
+            ("an edge more", &|d| d.edges.all += 1),
+            ("a pair instead of an open edge", &|d| {
+                (d.edges.open, d.edges.paired) = (d.edges.open - 1, d.edges.paired + 1)
+            }),
+            ("a facet of no shell", &|d| d.shells.facets -= 1),
+            ("all shells closed", &|d| d.shells.closed = d.shells.count),
+            ("a flipped facet less", &|d| d.findings[winding].count -= 1),
+            ("a facet less", &|d| d.facets -= 1),
+            ("more changes than occurrences", &|d| d.findings[openings].count_changing = 9),
+            ("an opening without places", &|d| d.findings[openings].places.clear()),
+            ("a place of a facet that does not exist", &|d| {
+                d.findings[winding].places[0].facets[0] = 999
+            }),
+            ("an opening wider than across", &|d| d.findings[openings].places[0].width = Some(9.0)),
+            ("an opening of all edges", &|d| d.findings[openings].places[0].edges = Some(99)),
+            ("a wall thicker than a cell", &|d| d.findings[walls].places[2].width = Some(5.0)),
+            ("quantiles in another order", &|d| d.findings[walls].places.swap(0, 2)),
+            ("no effect on the region", &|d| d.changes_region = false),
+        ];
+        right.check_invariants();
+        for (what, plant) in plants {
+            let mut wrong = right.clone();
+            plant(&mut wrong);
+            let noticed = catch_unwind(AssertUnwindSafe(|| wrong.check_invariants()));
+            assert!(noticed.is_err(), "{what} is not noticed");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Thin sheets: facets with an opposite one less than one cell away, by rays along their normals.
+//!
+//! From points of each facet, a ray leads inward and one outward. The first facet that it meets within a cell is opposite if it has no
+//! vertex in common with the first one and their normals differ by at least 120 degrees. They are a wall on the inner side and a gap on
+//! the outer side, by the winding of the file; facets of two solids that overlap have inner sides that face each other, but no wall.
+//!
+//! Widths are quantiles by area, so a point where two surfaces touch does not stand for a whole wall.
+
+use contract::lattice::UNITS_PER_EDGE;
+use parry3d_f64::query::Ray;
+
+use super::edges::Edges;
+use super::finding::{Finding, Kind, Place};
+use super::input::Input;
+use super::shells::Shells;
+use super::tree::{FacetTree, Point};
+
+/// The cosine of 120 degrees.
+const OPPOSITE: f64 = -0.5;
+
+/// Facets that touch are no sheet: a nearer one, in lattice units, is there by rounding.
+const TOUCHING: f64 = 2.0;
+
+/// Quantiles of the width that are reported, by area.
+const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
+
+/// Weights of the corners in the points where rays start: the centroid, and three more in a facet that is larger than a cell.
+const STARTS: [[f64; 3]; 4] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+
+/// A ray that met an opposite facet.
+struct Hit {
+    width: f64,
+    area: f64,
+    facets: [u32; 2],
+    middle: Point,
+}
+
+/// Thin walls and thin gaps, with the places at the quantiles of their widths.
+pub fn sheets(
+    input: &Input,
+    tree: &FacetTree,
+    (edges, shells): (&Edges, &Shells),
+    cell: f64,
+) -> [Finding; 2] {
+    let unit = input.root.edge / UNITS_PER_EDGE as f64;
+    [(Kind::ThinWalls, -1.0), (Kind::ThinGaps, 1.0)].map(|(kind, side)| {
+        let may_be = |a: u32, b: u32| {
+            let [p, q] = [a, b].map(|facet| shells.of(facet as usize));
+            kind == Kind::ThinGaps || !shells.are_different_solids(p, q)
+        };
+        let mut hits = hits(tree, edges, side, cell / unit, may_be);
+        hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
+        let mut of_sheets: Vec<u32> = hits.iter().flat_map(|hit| hit.facets).collect();
+        of_sheets.sort_unstable();
+        of_sheets.dedup();
+        let place = |(quantile, hit): (f64, &Hit)| {
+            let width = hit.width * unit;
+            Place {
+                quantile: Some(quantile),
+                width: Some(width),
+                width_cells: input.in_cells(width),
+                ..Place::new(
+                    hit.facets.into(),
+                    input.root.to_user(hit.middle.round().to_array().map(|c| c as i64)),
+                )
+            }
+        };
+        let places = QUANTILES.iter().filter_map(|&q| Some((q, quantile(&hits, q)?))).map(place);
+        Finding { count: of_sheets.len() as u64, places: places.collect(), ..Finding::new(kind) }
+    })
+}
+
+/// The rays on one side of all facets with an area that meet an opposite facet within `reach`.
+fn hits(
+    tree: &FacetTree,
+    edges: &Edges,
+    side: f64,
+    reach: f64,
+    may_be: impl Fn(u32, u32) -> bool,
+) -> Vec<Hit> {
+    let mut hits = Vec::new();
+    for facet in 0..edges.corners.len() as u32 {
+        let triangle = tree.triangle(facet);
+        let Some(normal) = triangle.normal() else { continue };
+        let is_large = triangle.edges().iter().any(|edge| edge.length() > reach);
+        let starts = &STARTS[..if is_large { STARTS.len() } else { 1 }];
+        let [a, b, c] = *triangle.vertices();
+        for [u, v, w] in starts {
+            let ray = Ray::new(a * *u + b * *v + c * *w, side * normal);
+            let corners = &edges.corners[facet as usize];
+            let is_obstacle = |other: u32| {
+                let shares = edges.corners[other as usize].iter().any(|v| corners.contains(v));
+                !shares && may_be(facet, other)
+            };
+            let Some((other, width)) = tree.first_hit(&ray, reach, is_obstacle) else { continue };
+            let faces = tree.triangle(other).normal().is_some_and(|n| n.dot(normal) <= OPPOSITE);
+            if faces && width > TOUCHING {
+                let area = triangle.area() / starts.len() as f64;
+                let middle = ray.point_at(width / 2.0);
+                hits.push(Hit {
+                    width,
+                    area,
+                    facets: [facet.min(other), facet.max(other)],
+                    middle,
+                });
+            }
+        }
+    }
+    hits
+}
+
+/// The hit below whose width lies this part of the area of all, which are sorted by width.
+fn quantile(hits: &[Hit], part: f64) -> Option<&Hit> {
+    let mut rest = part * hits.iter().map(|hit| hit.area).sum::<f64>();
+    let found = hits.iter().find(|hit| {
+        rest -= hit.area;
+        rest <= 0.0
+    });
+    found.or(hits.last())
+}

@@ -1,0 +1,159 @@
+//! Shells: components of facets that are connected by shared edges.
+
+use contract::lattice::FacetLattice;
+use serde::Serialize;
+
+use super::edges::Edges;
+use super::finding::{Finding, Kind, Place};
+use super::input::Input;
+
+/// A shell.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Shell {
+    /// Index of the first facet.
+    pub facet_first: u32,
+    /// Number of facets.
+    pub facets: u32,
+    /// Whether an even number of facets meets at every edge, so that rays agree about the inside.
+    pub is_closed: bool,
+    /// Whether as many facets traverse every edge in one direction as in the other.
+    #[serde(skip)]
+    is_oriented: bool,
+    /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
+    #[serde(skip)]
+    volume_sixfold: i128,
+    /// Least coordinates on the lattice.
+    #[serde(skip)]
+    low: [i64; 3],
+    /// Greatest coordinates on the lattice.
+    #[serde(skip)]
+    high: [i64; 3],
+}
+
+impl Shell {
+    /// A shell without facets yet.
+    pub(super) fn new(facet_first: u32) -> Self {
+        let (low, high) = ([i64::MAX; 3], [i64::MIN; 3]);
+        Self {
+            facet_first,
+            facets: 0,
+            is_closed: true,
+            is_oriented: true,
+            volume_sixfold: 0,
+            low,
+            high,
+        }
+    }
+
+    fn add(&mut self, facet: &FacetLattice) {
+        self.facets += 1;
+        // Coordinates are below 2^29 and facets below 2^31.
+        let [p, q, r] = facet.map(|v| v.map(i128::from));
+        let along = |a: usize, b: usize, c: usize| p[a] * (q[b] * r[c] - q[c] * r[b]);
+        self.volume_sixfold += along(0, 1, 2) + along(1, 2, 0) + along(2, 0, 1);
+        for vertex in facet {
+            for (a, &c) in vertex.iter().enumerate() {
+                self.low[a] = self.low[a].min(c);
+                self.high[a] = self.high[a].max(c);
+            }
+        }
+    }
+
+    fn is_wound_inward(&self) -> bool {
+        self.is_oriented && self.volume_sixfold < 0
+    }
+
+    /// Whether the bounding box lies in the interior of that of the other shell.
+    fn may_be_in(&self, other: &Self) -> bool {
+        (0..3).all(|a| other.low[a] < self.low[a] && self.high[a] < other.high[a])
+    }
+}
+
+/// The shells of a geometry.
+#[derive(Debug)]
+pub struct Shells {
+    /// All shells, in the order of their first facets.
+    pub all: Vec<Shell>,
+    /// The index of every facet's shell; [`u32::MAX`] for a facet with a repeated vertex, which belongs to none.
+    of: Vec<u32>,
+}
+
+impl Shells {
+    /// Connects the facets that share edges.
+    pub fn new(edges: &Edges, lattice: &[FacetLattice]) -> Self {
+        let mut parents: Vec<u32> = (0..edges.corners.len() as u32).collect();
+        for (_, mut uses) in edges.iter() {
+            let Some(first) = uses.next() else { continue };
+            uses.for_each(|other| unite(&mut parents, first.facet, other.facet));
+        }
+        let mut all: Vec<Shell> = Vec::new();
+        let mut of = vec![u32::MAX; parents.len()];
+        for (facet, &[a, b, c]) in edges.corners.iter().enumerate() {
+            if a == b || b == c || c == a {
+                continue;
+            }
+            // The representative is the lowest facet, so its shell exists before those of its other facets.
+            let first = find(&mut parents, facet as u32);
+            if first as usize == facet {
+                of[facet] = all.len() as u32;
+                all.push(Shell::new(first));
+            }
+            of[facet] = of[first as usize];
+            all[of[facet] as usize].add(&lattice[facet]);
+        }
+        for (_, uses) in edges.iter() {
+            let count = uses.len();
+            let (mut facet, mut down) = (0, 0);
+            for one in uses {
+                facet = one.facet as usize;
+                down += usize::from(one.is_down);
+            }
+            let shell = &mut all[of[facet] as usize];
+            shell.is_closed &= count % 2 == 0;
+            shell.is_oriented &= 2 * down == count;
+        }
+        Self { all, of }
+    }
+
+    /// The index of a facet's shell; [`u32::MAX`] for a facet that belongs to none.
+    pub fn of(&self, facet: usize) -> u32 {
+        self.of[facet]
+    }
+
+    /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
+    pub fn are_different_solids(&self, a: u32, b: u32) -> bool {
+        let shell = |index: u32| self.all.get(index as usize);
+        let (Some(one), Some(other)) = (shell(a), shell(b)) else { return false };
+        a != b
+            && (one.is_closed && other.is_closed)
+            && !(one.may_be_in(other) || other.may_be_in(one))
+    }
+
+    /// Closed shells that are wound inward: those that are inside out, and those that may be cavities of another one.
+    pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
+        let mut findings = [Kind::InsideOut, Kind::Cavities].map(Finding::new);
+        let closed = || self.all.iter().filter(|shell| shell.is_closed);
+        for shell in closed().filter(|shell| shell.is_wound_inward()) {
+            let at = usize::from(closed().any(|other| shell.may_be_in(other)));
+            let facet = shell.facet_first;
+            findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
+        }
+        findings
+    }
+}
+
+/// The representative of a set; halves the path to it.
+pub(crate) fn find(parents: &mut [u32], mut of: u32) -> u32 {
+    while parents[of as usize] != of {
+        let above = parents[parents[of as usize] as usize];
+        parents[of as usize] = above;
+        of = above;
+    }
+    of
+}
+
+/// Unites the sets of two members under the lower representative.
+pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (find(parents, a), find(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
+}

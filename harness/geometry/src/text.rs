@@ -1,0 +1,276 @@
+//! The diagnosis for a terminal.
+
+use std::fmt;
+
+use super::finding::{Finding, Kind, Place};
+use super::report::Diagnosis;
+use contract::number::number;
+
+impl Kind {
+    /// The heading of the kind's row.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Openings => "openings",
+            Self::Junctions => "edges at T-junctions",
+            Self::NonManifoldOdd => "edges with 3, 5, ... facets",
+            Self::NonManifoldEven => "edges with 4, 6, ... facets",
+            Self::Winding => "neighbours, opposite winding",
+            Self::InsideOut => "closed shells inside out",
+            Self::Cavities => "closed shells, likely cavities",
+            Self::Duplicates => "duplicate facets",
+            Self::Degenerate => "facets without area",
+            Self::Slivers => "slivers",
+            Self::Intersections => "intersecting pairs of facets",
+            Self::Contacts => "touching pairs of facets",
+            Self::ThinWalls => "facets of thin walls",
+            Self::ThinGaps => "facets at thin gaps",
+            Self::OutsideRoot => "facets beyond the root",
+            Self::TouchingRoot => "facets on the root's boundary",
+        }
+    }
+}
+
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.header(f)?;
+        writeln!(f, "\n{:<31}{:>10}  effect on the mesh's region", "finding", "count")?;
+        for finding in &self.findings {
+            let effect = match (finding.count, finding.count_changing) {
+                (0, _) => String::new(),
+                (_, 0) => "none".into(),
+                (all, changing) if all == changing => "POSSIBLE".into(),
+                (_, changing) => format!("POSSIBLE for {changing}"),
+            };
+            let count =
+                format!("{}{}", if finding.is_lower_bound { ">=" } else { "" }, finding.count);
+            let row = format!("{:<31}{count:>10}  {effect}", finding.kind.title());
+            writeln!(f, "{}", row.trim_end())?;
+        }
+        for finding in self.findings.iter().filter(|finding| finding.count > 0) {
+            self.details(finding, f)?;
+        }
+        let verdict = match self.changes_region {
+            true => "findings that can change the mesh's region",
+            false => "no finding that changes the mesh's region",
+        };
+        write!(f, "\n{verdict}")
+    }
+}
+
+impl Diagnosis {
+    fn header(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { facets, vertices, shells, extent, root, .. } = self;
+        writeln!(f, "facets    {facets}, with {vertices} distinct vertices")?;
+        let names = self.solids.iter().filter_map(|s| s.name.as_ref().map(|name| (name, s)));
+        if !self.solids.is_empty() {
+            writeln!(f, "solids    {}", self.solids.len())?;
+        }
+        for (name, solid) in names {
+            writeln!(
+                f,
+                "          {name:?}: {} facets from number {}",
+                solid.facets, solid.facet_first
+            )?;
+        }
+        writeln!(f, "shells    {}, {} closed", shells.count, shells.closed)?;
+        for shell in shells.largest.iter().filter(|_| shells.count > 1) {
+            let state = if shell.is_closed { "closed" } else { "open" };
+            writeln!(
+                f,
+                "          {} facets from number {}, {state}",
+                shell.facets, shell.facet_first
+            )?;
+        }
+        more(f, shells.largest.len() as u64, shells.count)?;
+        writeln!(f, "extent    {} to {}", point(&extent.low), point(&extent.high))?;
+        let cells = |length: f64| in_cells(self.cell.map(|cell| length / cell));
+        writeln!(
+            f,
+            "root      {} with edge {}{}; least distance to a face {}{}",
+            point(&root.origin),
+            number(root.edge),
+            cells(root.edge),
+            number(extent.margin),
+            cells(extent.margin)
+        )?;
+        match self.cell {
+            Some(cell) => writeln!(f, "cell      {} at the surface", number(cell)),
+            None => writeln!(
+                f,
+                "cell      not known; --spacing-min reports sizes in cells and thin sheets"
+            ),
+        }
+    }
+
+    fn details(&self, finding: &Finding, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\n{}: {}", finding.kind.title(), finding.meaning)?;
+        for place in &finding.places {
+            writeln!(f, "  {}", line(place))?;
+        }
+        // Two facets of a thin sheet are listed once.
+        let is_sheet = matches!(finding.kind, Kind::ThinWalls | Kind::ThinGaps);
+        if is_sheet { Ok(()) } else { more(f, finding.places.len() as u64, finding.count) }
+    }
+}
+
+fn more(f: &mut fmt::Formatter<'_>, listed: u64, count: u64) -> fmt::Result {
+    if listed > 0 && listed < count {
+        writeln!(f, "          and {} more (--first)", count - listed)?;
+    }
+    Ok(())
+}
+
+fn line(place: &Place) -> String {
+    let mut text = format!("at {}", point(&place.at));
+    if let Some(width) = place.width {
+        text += &format!(": {} wide{}", number(width), in_cells(place.width_cells));
+    }
+    if let Some(quantile) = place.quantile {
+        text += &format!(", wider than {:.0} % of the area", 100.0 * quantile);
+    }
+    if let Some(diameter) = place.diameter {
+        text += &format!(", {} across{}", number(diameter), in_cells(place.diameter_cells));
+    }
+    if let Some(edges) = place.edges {
+        text += &format!(", {edges} edges");
+    }
+    let facets: Vec<String> = place.facets.iter().map(ToString::to_string).collect();
+    let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
+    let noun = if facets.len() == 1 { "facet" } else { "facets" };
+    format!("{text}; {noun} {}{dots}", facets.join(", "))
+}
+
+fn in_cells(cells: Option<f64>) -> String {
+    cells.map_or(String::new(), |cells| format!(" ({} cells)", number(cells)))
+}
+
+fn point(at: &[f64; 3]) -> String {
+    let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
+    format!("({x}, {y}, {z})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::edges::EdgeCounts;
+    use crate::extent::Extent;
+    use crate::report::Shells;
+    use crate::shells::Shell;
+    use contract::lattice::Root;
+    use contract::stl::Solid;
+
+    fn finding(kind: Kind, count: u64, count_changing: u64, places: Vec<Place>) -> Finding {
+        let meaning = format!("Meaning of {kind:?}.");
+        Finding { count, count_changing, meaning, places, ..Finding::new(kind) }
+    }
+
+    /// A body of one open and two closed shells, with findings of every form.
+    fn diagnosis() -> Diagnosis {
+        let at = [0.1, 2.0, -3.5];
+        let hole = Place {
+            edges: Some(4),
+            diameter: Some(2.5),
+            diameter_cells: Some(10.0),
+            width: Some(0.5),
+            width_cells: Some(2.0),
+            ..Place::new(vec![1, 2], at)
+        };
+        let sheet =
+            Place { quantile: Some(0.05), width: Some(0.125), ..Place::new(vec![1, 2], at) };
+        let one = |facets: std::ops::Range<u32>| vec![Place::new(facets.collect(), at)];
+        let shell = |facet_first, facets, is_closed| {
+            let mut shell = Shell::new(facet_first);
+            (shell.facets, shell.is_closed) = (facets, is_closed);
+            shell
+        };
+        let solid = |name: Option<&str>, facets| Solid {
+            name: name.map(str::to_owned),
+            facet_first: 3,
+            facets,
+        };
+        let mut lower_bound = finding(Kind::Intersections, 2, 2, one(0..8));
+        lower_bound.is_lower_bound = true;
+        Diagnosis {
+            schema: crate::report::SCHEMA,
+            facets: 30,
+            vertices: 17,
+            edges: EdgeCounts::default(),
+            solids: vec![solid(Some("wing"), 20), solid(None, 10)],
+            shells: Shells {
+                count: 3,
+                closed: 2,
+                facets: 30,
+                largest: vec![shell(0, 16, true), shell(16, 8, false)],
+            },
+            root: Root { origin: [-8.0; 3], edge: 16.0 },
+            cell: Some(0.25),
+            extent: Extent {
+                low: [-1.0; 3],
+                high: [1.0, 1.0, 2.5],
+                margin: 5.5,
+                margin_cells: Some(22.0),
+            },
+            findings: vec![
+                finding(Kind::Openings, 2, 1, vec![hole]),
+                finding(Kind::Junctions, 3, 0, one(4..5)),
+                finding(Kind::Winding, 0, 0, vec![]),
+                lower_bound,
+                finding(Kind::ThinWalls, 4, 4, vec![sheet]),
+                finding(Kind::Slivers, 1, 0, one(0..7)),
+            ],
+            changes_region: true,
+        }
+    }
+
+    #[test]
+    fn a_diagnosis_lists_shells_findings_and_places() {
+        let expected = "facets    30, with 17 distinct vertices\n\
+            solids    2\n          \"wing\": 20 facets from number 3\n\
+            shells    3, 2 closed\n          16 facets from number 0, closed\n          8 facets from number 16, open\n          \
+            and 1 more (--first)\n\
+            extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
+            root      (-8.0, -8.0, -8.0) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
+            cell      0.250 at the surface\n\n\
+            finding                             count  effect on the mesh's region\n\
+            openings                                2  POSSIBLE for 1\n\
+            edges at T-junctions                    3  none\n\
+            neighbours, opposite winding            0\n\
+            intersecting pairs of facets          >=2  POSSIBLE\n\
+            facets of thin walls                    4  POSSIBLE\n\
+            slivers                                 1  none\n\n\
+            openings: Meaning of Openings.\n  \
+            at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells), 2.50 across (10.0 cells), 4 edges; facets 1, 2\n          \
+            and 1 more (--first)\n\n\
+            edges at T-junctions: Meaning of Junctions.\n  at (0.1, 2.0, -3.5); facet 4\n          and 2 more (--first)\n\n\
+            intersecting pairs of facets: Meaning of Intersections.\n  \
+            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--first)\n\n\
+            facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide, wider than 5 % of the area; facets 1, 2\n\n\
+            slivers: Meaning of Slivers.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
+            findings that can change the mesh's region";
+        assert_eq!(diagnosis().to_string(), expected);
+    }
+
+    #[test]
+    fn a_single_shell_and_an_unknown_cell_need_fewer_lines() {
+        let mut plain = diagnosis();
+        (plain.cell, plain.changes_region) = (None, false);
+        (plain.solids, plain.findings) = (Vec::new(), Vec::new());
+        plain.shells = Shells {
+            count: 1,
+            closed: 1,
+            facets: 16,
+            largest: vec![plain.shells.largest[0].clone()],
+        };
+        let expected = "facets    30, with 17 distinct vertices\nshells    1, 1 closed\n\
+            extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
+            root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\
+            cell      not known; --spacing-min reports sizes in cells and thin sheets\n\n\
+            finding                             count  effect on the mesh's region\n\n\
+            no finding that changes the mesh's region";
+        assert_eq!(plain.to_string(), expected);
+        // Without places, nothing is left unlisted.
+        plain.shells = Shells { count: 2, closed: 0, facets: 2, largest: Vec::new() };
+        plain.findings = vec![finding(Kind::Slivers, 3, 0, Vec::new())];
+        assert!(!plain.to_string().contains("more"));
+    }
+}

@@ -1,0 +1,191 @@
+//! Facets in a tree of boxes: distances and rays, in lattice units.
+
+use contract::lattice::FacetLattice;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Pose;
+pub use parry3d_f64::math::Vector as Point;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+use parry3d_f64::query::details::distance_segment_segment;
+use parry3d_f64::query::{PointQuery, Ray, RayCast};
+use parry3d_f64::shape::{Segment, Triangle};
+
+/// The facets. Those without area count too: they cross leaves like all others.
+#[derive(Debug)]
+pub struct FacetTree {
+    triangles: Vec<Triangle>,
+    boxes: Bvh,
+}
+
+impl FacetTree {
+    /// The facets of a case.
+    pub fn new(facets: &[FacetLattice]) -> Self {
+        let triangles: Vec<Triangle> = facets.iter().map(triangle).collect();
+        let bounds = triangles.iter().map(Triangle::local_aabb).enumerate();
+        let boxes = Bvh::from_iter(BvhBuildStrategy::Binned, bounds);
+        Self { triangles, boxes }
+    }
+
+    /// A facet.
+    pub fn triangle(&self, facet: u32) -> &Triangle {
+        &self.triangles[facet as usize]
+    }
+
+    /// Distance from a point to the nearest facet; infinite without facets.
+    pub fn distance(&self, at: Point) -> f64 {
+        self.nearest(at).map_or(f64::INFINITY, |(_, distance)| distance)
+    }
+
+    /// A nearest facet and its distance.
+    pub fn nearest(&self, at: Point) -> Option<(u32, f64)> {
+        self.nearest_by(at, at, |facet| from_point(at, facet))
+    }
+
+    /// Distance to the nearest facet from a square that none enters; infinite without facets. The square has its corners in order
+    /// around it, and lies in a plane normal to an axis.
+    pub fn distance_of_square(&self, corners: &[Point; 4]) -> f64 {
+        let (low, high) = (corners[0].min(corners[2]), corners[0].max(corners[2]));
+        let nearest = self.nearest_by(low, high, |facet| {
+            let of_corners = corners.iter().map(|&corner| from_point(corner, facet));
+            let of_vertices = facet.vertices().iter().map(|v| v.distance(v.clamp(low, high)));
+            let edges = (0..4).map(|i| Segment::new(corners[i], corners[(i + 1) % 4]));
+            let of_edges = edges.map(|edge| from_edges(&edge, facet));
+            of_corners.chain(of_vertices).chain(of_edges).fold(f64::INFINITY, f64::min)
+        });
+        nearest.map_or(f64::INFINITY, |(_, distance)| distance)
+    }
+
+    /// The facets no farther than `radius`, each with its distance, nearest first.
+    pub fn within(&self, at: Point, radius: f64) -> Vec<(u32, f64)> {
+        let around = Aabb::from_half_extents(at, Point::splat(radius));
+        let candidates = self.boxes.intersect_aabb(&around);
+        let distances = candidates.map(|facet| (facet, from_point(at, self.triangle(facet))));
+        let mut found: Vec<(u32, f64)> = distances.filter(|(_, d)| *d <= radius).collect();
+        found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+        found
+    }
+
+    /// The facets whose bounding boxes meet that of a facet, itself included.
+    pub fn overlapping(&self, facet: u32) -> Vec<u32> {
+        self.boxes.intersect_aabb(&self.triangle(facet).local_aabb()).collect()
+    }
+
+    /// The first facet that a ray meets within `reach`, among those that `is_obstacle` accepts, and its distance.
+    pub fn first_hit(
+        &self,
+        ray: &Ray,
+        reach: f64,
+        is_obstacle: impl Fn(u32) -> bool,
+    ) -> Option<(u32, f64)> {
+        self.boxes.cast_ray(ray, reach, |facet, best| {
+            self.triangle(facet).cast_local_ray(ray, best, false).filter(|_| is_obstacle(facet))
+        })
+    }
+
+    /// The facet nearest to anything in a box, by its distance from a triangle.
+    fn nearest_by(
+        &self,
+        low: Point,
+        high: Point,
+        distance: impl Fn(&Triangle) -> f64,
+    ) -> Option<(u32, f64)> {
+        let from_box = |node: &BvhNode, _| {
+            (node.mins() - high).max(low - node.maxs()).max(Point::ZERO).length()
+        };
+        self.boxes
+            .find_best(f64::INFINITY, from_box, |facet, _| Some(distance(self.triangle(facet))))
+    }
+}
+
+/// A facet in f64.
+pub fn triangle(facet: &FacetLattice) -> Triangle {
+    let [a, b, c] = facet.map(|v| Point::from_array(v.map(|c| c as f64)));
+    Triangle::new(a, b, c)
+}
+
+/// Distance of a point from a triangle, which may have no area.
+pub fn from_point(at: Point, facet: &Triangle) -> f64 {
+    facet.project_local_point(at, true).point.distance(at)
+}
+
+/// Distance of a segment from a triangle's edges.
+pub fn from_edges(segment: &Segment, facet: &Triangle) -> f64 {
+    let distances =
+        facet.edges().map(|edge| distance_segment_segment(&Pose::IDENTITY, segment, &edge));
+    distances.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Some are segments or points.
+    fn facets() -> impl Strategy<Value = Vec<FacetLattice>> {
+        let corner = prop::array::uniform3(0i64..4000);
+        let facet =
+            (prop::array::uniform3(corner), 0..4).prop_map(|([a, b, c], kind)| match kind {
+                0 => [a, a, a],
+                1 => [a, b, a],
+                _ => [a, b, c],
+            });
+        prop::collection::vec(facet, 0..60)
+    }
+
+    /// Points of a triangle, close to each other; their distances do not share code with the tree's.
+    fn samples(facet: &FacetLattice) -> impl Iterator<Item = Point> {
+        const PARTS: i32 = 40;
+        let [a, b, c] = facet.map(|v| Point::from_array(v.map(|c| c as f64)));
+        let part = |i: i32| f64::from(i) / f64::from(PARTS);
+        (0..=PARTS).flat_map(move |i| {
+            (0..=PARTS - i).map(move |j| a + (b - a) * part(i) + (c - a) * part(j))
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_facet_is_found_among_all(facets in facets(), at in prop::array::uniform3(-99.0f64..4099.0)) {
+            let (tree, at) = (FacetTree::new(&facets), Point::from_array(at));
+            let of = |f: &FacetLattice| samples(f).map(|p| p.distance(at)).fold(f64::INFINITY, f64::min);
+            let expected = facets.iter().map(of).fold(f64::INFINITY, f64::min);
+            let found = tree.distance(at);
+            // Samples of a facet are at most 250 apart.
+            prop_assert!(facets.is_empty() || (found <= expected && expected <= found + 130.0), "{found} for {expected}");
+            prop_assert_eq!(facets.is_empty(), found.is_infinite());
+            let within = tree.within(at, found * 1.5);
+            let by_hand = facets.iter().filter(|f| from_point(at, &triangle(f)) <= found * 1.5).count();
+            prop_assert!(facets.is_empty() || (within.len() == by_hand && within[0].1 == found));
+        }
+
+        #[test]
+        fn a_square_is_as_far_from_the_facets_as_its_nearest_point(
+            facets in facets(), at in prop::array::uniform3(0.0f64..4000.0), edge in 100.0f64..500.0, axis in 0usize..3,
+        ) {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            // Beside the facets, so that none crosses the square.
+            let mut at = at;
+            at[axis] += 4000.0;
+            let point = |s: f64, t: f64| {
+                let mut point = at;
+                (point[u], point[v]) = (at[u] + s * edge, at[v] + t * edge);
+                Point::from_array(point)
+            };
+            let tree = FacetTree::new(&facets);
+            let found = tree.distance_of_square(&[point(0.0, 0.0), point(1.0, 0.0), point(1.0, 1.0), point(0.0, 1.0)]);
+            let part = |i: i32| f64::from(i) / 16.0;
+            let of = |(i, j)| tree.distance(point(part(i), part(j)));
+            let sampled = (0..=16).flat_map(|i| (0..=16).map(move |j| (i, j))).map(of).fold(f64::INFINITY, f64::min);
+            // Samples are at most edge / 16 apart.
+            prop_assert!(facets.is_empty() || (found <= sampled + 1e-6 && sampled <= found + edge / 16.0), "{found}, {sampled}");
+        }
+
+        #[test]
+        fn a_ray_meets_the_first_facet_on_its_way(facets in facets(), at in prop::array::uniform3(0.0f64..4000.0), axis in 0usize..3) {
+            let tree = FacetTree::new(&facets);
+            let ray = Ray::new(Point::from_array(at), [Point::X, Point::Y, Point::Z][axis]);
+            let Some((facet, distance)) = tree.first_hit(&ray, 5000.0, |_| true) else { return Ok(()) };
+            prop_assert!(from_point(ray.point_at(distance), tree.triangle(facet)) < 1e-3);
+            let next = tree.first_hit(&ray, 5000.0, |other| other != facet);
+            prop_assert!(next.is_none_or(|(_, farther)| farther >= distance));
+        }
+    }
+}

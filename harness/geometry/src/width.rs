@@ -1,0 +1,202 @@
+//! The size of an opening: its widest diameter and its free width.
+
+/// Diameter and width of a set of points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// The largest distance of two points.
+    pub diameter: f64,
+    /// The least width of the convex hull of the points, projected on the plane that they span: a ball that is
+    /// wider does not pass through a flat opening.
+    pub width: f64,
+}
+
+/// Of more vertices of a hull, only some are used, evenly spread.
+const VERTICES_MAX: usize = 1024;
+
+type Point = [f64; 3];
+
+/// The size of a set of at least one point.
+pub fn size(points: &[Point]) -> Size {
+    let (from, to) = farthest(points);
+    let along = sub(to, from);
+    let diameter = norm(along);
+    if diameter == 0.0 {
+        return Size { diameter, width: 0.0 };
+    }
+    let u = along.map(|x| x / diameter);
+    let across = |p: &Point| {
+        let offset = sub(*p, from);
+        let t = dot(offset, u);
+        std::array::from_fn(|a| offset[a] - t * u[a])
+    };
+    let far = points.iter().map(across).max_by(|a, b| norm(*a).total_cmp(&norm(*b)));
+    let far = far.expect("at least one point");
+    let height = norm(far);
+    // Rounding leaves points of one line at a distance from it.
+    if height <= 1e-12 * diameter {
+        return Size { diameter, width: 0.0 };
+    }
+    let v = far.map(|x| x / height);
+    let flat = points.iter().map(|p| [dot(sub(*p, from), u), dot(sub(*p, from), v)]).collect();
+    size_of_hull(&hull(flat), diameter)
+}
+
+/// Two points neither of which has a farther one than the other.
+fn farthest(points: &[Point]) -> (Point, Point) {
+    let from = |p: Point| {
+        let distance = |q: &Point| norm(sub(*q, p));
+        *points
+            .iter()
+            .max_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .expect("at least one point")
+    };
+    let (mut p, mut q) = (points[0], from(points[0]));
+    loop {
+        let next = from(q);
+        if norm(sub(next, q)) <= norm(sub(p, q)) {
+            return (p, q);
+        }
+        (p, q) = (q, next);
+    }
+}
+
+/// The convex hull, counter-clockwise (Andrew's monotone chain).
+fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    let mut hull: Vec<[f64; 2]> = Vec::new();
+    let forward: Vec<_> = points.clone();
+    points.reverse();
+    for chain in [forward, points] {
+        let start = hull.len();
+        for p in chain {
+            while hull.len() >= start + 2
+                && turn(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0.0
+            {
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.pop();
+    }
+    hull
+}
+
+/// The largest distance of two vertices of a convex polygon, which is at least `diameter`, and the least distance of two parallel lines
+/// that enclose it; one of them contains an edge.
+fn size_of_hull(hull: &[[f64; 2]], diameter: f64) -> Size {
+    let vertices: Vec<_> = hull.iter().step_by(hull.len().div_ceil(VERTICES_MAX)).collect();
+    let mut size = Size { diameter, width: f64::INFINITY };
+    for (i, &p) in vertices.iter().enumerate() {
+        let q = vertices[(i + 1) % vertices.len()];
+        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let across = vertices.iter().map(|r| (r[0] - p[0]).hypot(r[1] - p[1]));
+        size.diameter = across.fold(size.diameter, f64::max);
+        // The direction of a shorter edge is a rounding error.
+        if length > 1e-9 * diameter {
+            let heights = vertices.iter().map(|r| turn(*p, *q, **r) / length);
+            let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
+            size.width = size.width.min(high - low);
+        }
+    }
+    size
+}
+
+/// Twice the signed area of a triangle.
+fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+fn sub(a: Point, b: Point) -> Point {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn circle(n: usize, radius: f64) -> Vec<Point> {
+        let point = |i: usize| {
+            let (sin, cos) = (i as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+            [radius * cos, radius * sin * 0.6, radius * sin * 0.8]
+        };
+        (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn a_slit_is_as_wide_as_its_short_side() {
+        let slit = size(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]);
+        assert!(
+            (slit.width - 0.5).abs() < 1e-12 && (slit.diameter - 100.25f64.sqrt()).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn a_circle_is_as_wide_as_its_diameter_for_few_and_many_points() {
+        for n in [64, 1000, 5000] {
+            let Size { diameter, width } = size(&circle(n, 2.0));
+            assert!((3.96..=4.0 + 1e-12).contains(&diameter), "{n}: {diameter}");
+            assert!((3.96..=4.0 + 1e-12).contains(&width), "{n}: {width}");
+        }
+    }
+
+    proptest! {
+        /// The least distance of two parallel lines, one through two of the points, with all points between them.
+        #[test]
+        fn the_size_of_flat_points_is_that_of_a_search_among_all_pairs(
+            flat in prop::collection::vec(prop::array::uniform2(-9i32..9), 1..14), turn in 0usize..3,
+        ) {
+            let flat: Vec<[f64; 2]> = flat.into_iter().map(|p| p.map(f64::from)).collect();
+            let mut least = f64::INFINITY;
+            let mut farthest = 0.0f64;
+            for (i, &p) in flat.iter().enumerate() {
+                for &q in &flat[i + 1..] {
+                    let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+                    farthest = farthest.max(length);
+                    let heights: Vec<f64> = flat.iter().map(|&r| turn_of(p, q, r) / length).collect();
+                    let (low, high) = heights.iter().fold((0.0f64, 0.0f64), |(l, h), &x| (l.min(x), h.max(x)));
+                    if length > 0.0 && low.abs().min(high) < 1e-9 {
+                        least = least.min(high - low);
+                    }
+                }
+            }
+            let points: Vec<Point> = flat.iter().map(|&[x, y]| {
+                let mut at = [x, y, 3.0];
+                at.rotate_left(turn);
+                at
+            }).collect();
+            let found = size(&points);
+            prop_assert!((found.diameter - farthest).abs() < 1e-9);
+            let expected = if least.is_finite() { least } else { 0.0 };
+            prop_assert!((found.width - expected).abs() < 1e-9, "{} instead of {}", found.width, expected);
+        }
+    }
+
+    fn turn_of(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    }
+
+    #[test]
+    fn a_rim_with_three_points_on_a_line_is_as_wide_as_the_others_are_far_from_it() {
+        let flat = [[-3, -6], [-8, 4], [-2, -8], [4, 4], [6, -8], [-7, 2]];
+        let rim = size(&flat.map(|[x, y]| [f64::from(x), f64::from(y), 3.0]));
+        // Of (-8, 4), (-7, 2) and (-2, -8), from (4, 4).
+        assert!((rim.width - 24.0 / 5.0f64.sqrt()).abs() < 1e-9, "{rim:?}");
+    }
+
+    #[test]
+    fn points_of_one_line_have_no_width() {
+        let line = size(&[[0.0; 3], [0.1, 0.2, 0.3], [0.3, 0.6, 0.9]]);
+        assert_eq!(line.width, 0.0);
+        assert_eq!(size(&[[7.0; 3]; 2]), Size { diameter: 0.0, width: 0.0 });
+    }
+}

@@ -1,0 +1,421 @@
+//! Shapes with known defects, and shapes without any.
+
+use contract::case::Facet;
+use contract::lattice::Root;
+use contract::testing::assert_text;
+use geometries::{Generator, Shape};
+use geometry::finding::{Kind, Place};
+use geometry::input::{Input, Requested};
+use geometry::report::Diagnosis;
+use geometry::{Options, diagnose};
+use proptest::prelude::*;
+
+/// Lattice units are powers of two, so that vertices with integer coordinates are exact.
+const ROOT: Root = Root { origin: [-16.0; 3], edge: 32.0 };
+
+fn diagnosis(facets: Vec<Facet>, spacing_min: Option<f64>) -> Diagnosis {
+    let requested = Requested { spacing_min, root: Some(ROOT), root_scale: None };
+    diagnose(&Input::new(facets, &requested).unwrap(), &Options::default())
+}
+
+fn count(diagnosis: &Diagnosis, kind: Kind) -> u64 {
+    diagnosis.finding(kind).unwrap().count
+}
+
+/// The kinds that occur, with their counts.
+fn counts(diagnosis: &Diagnosis) -> Vec<(Kind, u64)> {
+    let found = diagnosis.findings.iter().filter(|f| f.count > 0);
+    found.map(|f| (f.kind, f.count)).collect()
+}
+
+fn first(diagnosis: &Diagnosis, kind: Kind) -> &Place {
+    &diagnosis.finding(kind).unwrap().places[0]
+}
+
+fn quad([a, b, c, d]: [[f32; 3]; 4]) -> [Facet; 2] {
+    [[a, b, c], [a, c, d]]
+}
+
+/// An axis-parallel box, wound outward. The first two facets are the face z = low.
+fn cuboid(low: [f32; 3], high: [f32; 3]) -> Vec<Facet> {
+    let corner = |i: usize| std::array::from_fn(|a| if i >> a & 1 == 1 { high[a] } else { low[a] });
+    let faces =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    faces.iter().flat_map(|face| quad(face.map(corner))).collect()
+}
+
+fn cube() -> Vec<Facet> {
+    cuboid([0.0; 3], [4.0; 3])
+}
+
+/// A cube whose face z = 0 has a rectangular hole.
+fn cube_with_hole(low: [f32; 2], high: [f32; 2]) -> Vec<Facet> {
+    let outer = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+    let inner = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    let at = |[x, y]: [f32; 2]| [x, y, 0.0];
+    let side = |i: usize| {
+        let j = (i + 1) % 4;
+        quad([at(outer[i]), at(inner[i]), at(inner[j]), at(outer[j])])
+    };
+    (0..4).flat_map(side).chain(cube().split_off(2)).collect()
+}
+
+fn close(a: Option<f64>, b: f64) -> bool {
+    a.is_some_and(|a| (a - b).abs() < 1e-9)
+}
+
+#[test]
+fn a_cube_has_no_findings() {
+    let cube = diagnosis(cube(), Some(0.25));
+    assert_eq!(counts(&cube), []);
+    assert!(!cube.changes_region);
+    assert_eq!((cube.vertices, cube.shells.count, cube.shells.closed), (8, 1, 1));
+    assert_eq!((cube.extent.margin, cube.extent.margin_cells), (12.0, Some(48.0)));
+}
+
+#[test]
+fn a_removed_facet_leaves_one_opening_of_known_size() {
+    let mut facets = cube();
+    facets.remove(0);
+    let wide = diagnosis(facets.clone(), Some(2.0));
+    assert_eq!(counts(&wide), [(Kind::Openings, 1)]);
+    let hole = first(&wide, Kind::Openings);
+    assert_eq!(hole.edges, Some(3));
+    assert!(close(hole.diameter, 32f64.sqrt()) && close(hole.width, 8f64.sqrt()));
+    assert!(close(hole.width_cells, 2f64.sqrt()));
+    assert!(wide.changes_region);
+    assert_eq!(wide.shells.closed, 0);
+    // At a spacing above its width no cell fits through.
+    let narrow = diagnosis(facets, Some(4.0));
+    assert_eq!((count(&narrow, Kind::Openings), narrow.changes_region), (1, false));
+}
+
+#[test]
+fn a_slit_is_judged_by_its_width_and_not_by_its_length() {
+    let facets = cube_with_hole([1.0, 2.0], [3.0, 2.125]);
+    for (spacing, changes) in [(0.125, true), (0.25, false)] {
+        let slit = diagnosis(facets.clone(), Some(spacing));
+        assert_eq!(count(&slit, Kind::Openings), 1);
+        assert!(close(first(&slit, Kind::Openings).width, 0.125));
+        assert_eq!(slit.changes_region, changes, "spacing {spacing}");
+    }
+}
+
+#[test]
+fn a_repeated_facet_is_a_duplicate_in_any_order_of_its_vertices() {
+    let mut facets = cube();
+    let [a, b, c] = facets[5];
+    facets.push([c, b, a]);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!(counts(&found), [(Kind::NonManifoldOdd, 3), (Kind::Duplicates, 1)]);
+    assert_eq!(first(&found, Kind::Duplicates).facets, [5, 12]);
+    assert!(found.changes_region);
+}
+
+#[test]
+fn a_flipped_facet_disagrees_with_three_neighbours() {
+    let mut facets = cube();
+    facets[7].swap(0, 1);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!(counts(&found), [(Kind::Winding, 3)]);
+    assert!(!found.changes_region);
+}
+
+#[test]
+fn a_closed_shell_that_is_wound_inward_is_inside_out_or_a_cavity() {
+    let inward = |low, high| {
+        let mut facets = cuboid(low, high);
+        facets.iter_mut().for_each(|f| f.swap(0, 1));
+        facets
+    };
+    let small = inward([1.0; 3], [2.0; 3]);
+    let beside = diagnosis([cube(), inward([5.0; 3], [6.0; 3])].concat(), Some(0.25));
+    assert_eq!(counts(&beside), [(Kind::InsideOut, 1)]);
+    assert_eq!(first(&beside, Kind::InsideOut).facets, [12]);
+    assert!(!beside.changes_region);
+    assert_eq!(
+        counts(&diagnosis([cube(), small.clone()].concat(), Some(0.25))),
+        [(Kind::Cavities, 1)]
+    );
+    // An open shell has no volume.
+    assert_eq!(counts(&diagnosis(small[1..].to_vec(), None)), [(Kind::Openings, 1)]);
+    let far = [inward([-15.0; 3], [-14.0; 3]), cuboid([14.0; 3], [15.0; 3])].concat();
+    assert_eq!(counts(&diagnosis(far, Some(0.25))), [(Kind::InsideOut, 1)]);
+}
+
+#[test]
+fn an_overlap_of_two_solids_is_not_a_thin_wall_but_the_wall_of_a_cavity_is() {
+    // The lower face of the upper box is a quarter below the upper face of the lower one.
+    let overlap =
+        [cuboid([0.0; 3], [4.0, 4.0, 4.0]), cuboid([1.0, 1.0, 3.75], [3.0, 3.0, 8.0])].concat();
+    let overlap = diagnosis(overlap, Some(0.5));
+    assert!(count(&overlap, Kind::Intersections) > 0);
+    assert_eq!(count(&overlap, Kind::ThinWalls), 0);
+    let mut cavity = cuboid([0.25; 3], [3.75; 3]);
+    cavity.iter_mut().for_each(|f| f.swap(0, 1));
+    assert_eq!(count(&diagnosis([cube(), cavity].concat(), Some(0.5)), Kind::ThinWalls), 24);
+}
+
+#[test]
+fn overlapping_boxes_intersect_along_six_segments() {
+    // Each segment of the hexagon lies in one facet of each box.
+    let facets = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat();
+    let found = diagnosis(facets.clone(), Some(0.25));
+    assert_eq!(count(&found, Kind::Intersections), 6);
+    assert_eq!((found.shells.count, found.shells.closed), (2, 2));
+    assert!(found.changes_region);
+    let apart = [cuboid([0.0; 3], [4.0; 3]), cuboid([5.0; 3], [6.0; 3])].concat();
+    assert_eq!(counts(&diagnosis(apart, Some(0.25))), []);
+}
+
+#[test]
+fn boxes_that_share_part_of_a_face_intersect_in_its_plane() {
+    let facets = [cube(), cuboid([4.0, 1.0, 1.0], [6.0, 3.0, 3.0])].concat();
+    let found = diagnosis(facets, Some(0.25));
+    // The diagonals of both faces are on one line, so each half of one overlaps with one half of the other.
+    assert_eq!(count(&found, Kind::Intersections), 2);
+}
+
+#[test]
+fn a_vertex_on_an_edge_is_a_t_junction_and_not_an_opening() {
+    let mut facets = cube();
+    let [a, b, c] = facets[0];
+    let middle = std::array::from_fn(|x| (b[x] + c[x]) / 2.0);
+    facets[0] = [a, b, middle];
+    facets.push([a, middle, c]);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!(counts(&found), [(Kind::Junctions, 3)]);
+    assert!(!found.changes_region);
+}
+
+/// A lattice unit is 2^-26 of this root, and vertices of large coordinates are far from one another.
+#[test]
+fn a_vertex_farther_from_an_edge_than_two_lattice_units_leaves_an_opening() {
+    for (scale, edge) in [(1.0, 8.0), (1024.0, 8192.0)] {
+        let unit = edge / (1u64 << 27) as f32;
+        for (units, kind) in [(1.0, Kind::Junctions), (4.0, Kind::Openings)] {
+            let mut facets: Vec<Facet> =
+                cube().into_iter().map(|facet| facet.map(|v| v.map(|c| scale * c))).collect();
+            // The facets of the face z = 0 have the vertices (0, 0), (0, 4), (4, 4) and (4, 0); that at (0, 2) is off the edge.
+            let [a, b, c] = facets[0];
+            let middle = [units * unit, 2.0 * scale, 0.0];
+            facets[0] = [a, middle, c];
+            facets.push([middle, b, c]);
+            let root = Some(Root {
+                origin: [-1.0; 3].map(|c| c * f64::from(scale)),
+                edge: f64::from(edge),
+            });
+            let requested = Requested { spacing_min: None, root, root_scale: None };
+            let input = Input::new(facets, &requested).unwrap();
+            let found = diagnose(&input, &Options::default());
+            assert_eq!(
+                counts(&found).first().map(|found| found.0),
+                Some(kind),
+                "{units} units, {scale}"
+            );
+        }
+    }
+}
+
+#[test]
+fn edges_with_more_than_two_facets_are_even_or_odd() {
+    let adjacent = [cube(), cuboid([4.0, 4.0, 0.0], [8.0, 8.0, 4.0])].concat();
+    assert_eq!(count(&diagnosis(adjacent, Some(0.25)), Kind::NonManifoldEven), 1);
+    let mut with_fin = cube();
+    let [a, b, _] = with_fin[0];
+    with_fin.push([a, b, [-4.0; 3]]);
+    let found = diagnosis(with_fin, Some(0.25));
+    assert_eq!(count(&found, Kind::NonManifoldOdd), 1);
+    assert_eq!(found.shells.closed, 0);
+}
+
+#[test]
+fn facets_without_area_and_slivers_have_no_effect() {
+    let mut facets = cube();
+    // A copy of one is no duplicate.
+    facets.extend([[[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [1.0, 1.0, 1.0]]; 2]);
+    facets.push([[9.0, 9.0, 9.0]; 3]);
+    let found = diagnosis(facets, Some(0.25));
+    assert_eq!((counts(&found), found.changes_region), (vec![(Kind::Degenerate, 3)], false));
+    let point = diagnosis(vec![[[9.0, 9.0, 9.0]; 3]], Some(0.25));
+    assert_eq!(count(&point, Kind::Degenerate), 1);
+    let sliver = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]];
+    assert_eq!(count(&diagnosis(vec![sliver], None), Kind::Slivers), 1);
+    let thicker = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [4.0, 0.015625, 0.0]];
+    assert_eq!(count(&diagnosis(vec![thicker], None), Kind::Slivers), 0);
+}
+
+#[test]
+fn walls_and_gaps_narrower_than_a_cell_are_thin() {
+    let plates = |gap: f32| {
+        let upper = 1.0 + gap;
+        [cuboid([0.0; 3], [4.0, 4.0, 1.0]), cuboid([0.0, 0.0, upper], [4.0, 4.0, 9.0])].concat()
+    };
+    let found = diagnosis(plates(0.375), Some(0.5));
+    assert_eq!(counts(&found), [(Kind::ThinGaps, 4)]);
+    assert!(close(first(&found, Kind::ThinGaps).width_cells, 0.75));
+    assert!(found.changes_region);
+    assert_eq!(counts(&diagnosis(plates(0.5), Some(0.5))), []);
+    // The lower plate is thinner than two units: with an outer flow its inside does not matter.
+    let found = diagnosis(cuboid([0.0; 3], [4.0, 4.0, 1.0]), Some(2.0));
+    assert_eq!((count(&found, Kind::ThinWalls), found.changes_region), (4, false));
+    assert!(close(first(&found, Kind::ThinWalls).width, 1.0));
+}
+
+#[test]
+fn facets_on_and_beyond_the_root_are_found() {
+    let on = diagnosis(cuboid([-16.0, 0.0, 0.0], [0.0, 1.0, 1.0]), Some(0.25));
+    assert!(count(&on, Kind::TouchingRoot) > 2 && !on.changes_region);
+    let beyond = diagnosis(cuboid([-17.0, 0.0, 0.0], [0.0, 1.0, 1.0]), Some(0.25));
+    assert!(count(&beyond, Kind::OutsideRoot) > 2 && beyond.changes_region);
+    assert_eq!(beyond.extent.margin, -1.0);
+}
+
+#[test]
+fn json_has_the_schema_and_text_has_every_kind() {
+    let found = diagnosis(cube_with_hole([1.0, 1.0], [3.0, 3.0]), Some(0.5));
+    let json: serde_json::Value = serde_json::to_value(&found).unwrap();
+    assert_eq!(json["schema"], "octree-geometry/2");
+    assert_eq!(json["findings"][0]["kind"], "openings");
+    assert_eq!(json["findings"][0]["places"][0]["width_cells"], 4.0);
+    let text = found.to_string();
+    for finding in &found.findings {
+        assert!(text.contains(finding.kind.title()), "{text}");
+    }
+    assert!(text.contains("2.00 wide (4.00 cells)"), "{text}");
+}
+
+/// Every kind of finding at a place of its own.
+#[test]
+fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
+    let at = |[x, y, z]: [f32; 3], facets: Vec<Facet>| -> Vec<Facet> {
+        facets
+            .iter()
+            .map(|facet| facet.map(|v| [v[0] / 2.0 + x, v[1] / 2.0 + y, v[2] / 2.0 + z]))
+            .collect()
+    };
+    let mut without_two = cube();
+    without_two.drain(2..4);
+    let mut junction = cube();
+    let [a, b, c] = junction[0];
+    let middle = std::array::from_fn(|x| (b[x] + c[x]) / 2.0);
+    junction[0] = [a, b, middle];
+    junction.push([a, middle, c]);
+    let mut with_fin = cube();
+    let [a, b, _] = with_fin[0];
+    with_fin.push([a, b, [-1.0; 3]]);
+    with_fin.push([b, a, [1.0, -1.0, -2.0]]);
+    let mut odd = cube();
+    odd.push([a, b, [-1.0; 3]]);
+    let mut flipped = cube();
+    flipped[7].swap(0, 1);
+    let mut copied = cube();
+    copied.extend([flipped[0], flipped[0]]);
+    let plates =
+        [cuboid([0.0; 3], [4.0, 4.0, 0.375]), cuboid([0.0, 0.0, 0.75], [4.0, 4.0, 4.0])].concat();
+    let facets = [
+        at([-12.0; 3], cube_with_hole([1.0, 1.0], [2.0, 3.0])),
+        at([-8.0, -12.0, -12.0], without_two),
+        at([-4.0, -12.0, -12.0], junction),
+        at([0.0, -12.0, -12.0], with_fin),
+        at([4.0, -12.0, -12.0], odd),
+        at([8.0, -12.0, -12.0], flipped),
+        at([-12.0, -8.0, -12.0], copied),
+        at([-8.0, -8.0, -12.0], [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [6.0; 3])].concat()),
+        at([-4.0, -8.0, -12.0], [cube(), cuboid([4.0, 1.0, 1.0], [6.0, 3.0, 3.0])].concat()),
+        at([4.0, -8.0, -12.0], plates),
+        at([-12.0, -4.0, -12.0], vec![[[0.0; 3], [8.0, 0.0, 0.0], [4.0, 0.0078125, 0.0]]]),
+        at([-12.0, 0.0, -12.0], vec![[[1.0; 3], [2.0; 3], [1.0; 3]], [[9.0; 3]; 3]]),
+        at([-16.0, 4.0, 0.0], cube()),
+        at([15.0, 8.0, 0.0], cube()),
+    ]
+    .concat();
+    for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no-cells")] {
+        let requested = Requested { spacing_min: spacing, root: Some(ROOT), root_scale: None };
+        let input = Input::new(facets.clone(), &requested).unwrap();
+        let text = diagnose(&input, &Options { first, ..Options::default() }).to_string();
+        assert_text(&text, &format!("tests/geometry/expected/{name}.txt"));
+    }
+}
+
+/// Closed shapes at random sizes and places.
+fn shape() -> impl Strategy<Value = Vec<Facet>> {
+    let shapes = [Shape::Cube, Shape::Sphere, Shape::Torus, Shape::NestedSpheres, Shape::Pipe];
+    (prop::sample::select(shapes.to_vec()), 100usize..600, prop::array::uniform3(-4.0f64..4.0))
+        .prop_map(|(shape, facets, centre)| {
+            let generator = Generator { centre: Some(centre), ..Generator::new(shape, 2 * facets) };
+            generator.facets().unwrap()
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn closed_shapes_have_no_findings_but_a_cavity(facets in shape()) {
+        let found = diagnosis(facets, Some(0.002));
+        // The inner one of two spheres is a cavity.
+        let cavity = (found.shells.count == 2).then_some((Kind::Cavities, 1));
+        prop_assert_eq!(counts(&found), Vec::from_iter(cavity));
+    }
+
+    /// Defects at random: some facets removed, repeated, flipped, and a second shape put over the first.
+    #[test]
+    fn the_order_of_facets_and_vertices_has_no_effect(
+        a in shape(),
+        b in shape(),
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..3), 0..12),
+        seed in any::<u64>(),
+        spacing in 0.01f64..0.5,
+    ) {
+        let mut facets = [a, b].concat();
+        for (index, edit) in edits {
+            let i = index.index(facets.len());
+            match edit {
+                0 => drop(facets.remove(i)),
+                1 => facets.push(facets[i]),
+                _ => facets[i].swap(0, 1),
+            }
+        }
+        let expected = diagnosis(facets.clone(), Some(spacing));
+        let mut state = seed;
+        let mut random = |n: usize| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as usize % n
+        };
+        for i in (1..facets.len()).rev() {
+            facets.swap(i, random(i + 1));
+            facets[i].rotate_left(random(3));
+        }
+        let got = diagnosis(facets, Some(spacing));
+        prop_assert_eq!(counts(&got), counts(&expected));
+        prop_assert_eq!(got.changes_region, expected.changes_region);
+        prop_assert_eq!((got.shells.count, got.shells.closed), (expected.shells.count, expected.shells.closed));
+    }
+
+    /// Both sides of a wall of known thickness, in any direction, beside a wall that is thicker than a cell.
+    #[test]
+    fn the_widths_of_a_plate_are_its_thickness(
+        thickness in 0.05f32..0.45, axis in prop::array::uniform3(-1.0f64..1.0), angle in 0.0f64..3.0,
+    ) {
+        let length = axis.iter().map(|c| c * c).sum::<f64>().sqrt();
+        prop_assume!(length > 0.1);
+        let [x, y, z] = axis.map(|c| c / length);
+        let (sin, cos) = angle.sin_cos();
+        // Rodrigues' formula.
+        let rotated = |v: [f32; 3]| {
+            let v = v.map(f64::from);
+            let along = x * v[0] + y * v[1] + z * v[2];
+            let cross = [y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]];
+            std::array::from_fn(|a| (v[a] * cos + cross[a] * sin + [x, y, z][a] * along * (1.0 - cos)) as f32)
+        };
+        let bodies = [cuboid([0.0; 3], [4.0, 4.0, thickness]), cuboid([0.0, 0.0, 2.0], [4.0, 4.0, 4.0])].concat();
+        let found = diagnosis(bodies.iter().map(|f| f.map(rotated)).collect(), Some(0.5));
+        let walls = found.finding(Kind::ThinWalls).unwrap();
+        // The four facets at the rim of the plate see each other too where it is thinner than a cell wide.
+        prop_assert!(walls.count >= 4 && count(&found, Kind::ThinGaps) == 0);
+        for place in &walls.places {
+            prop_assert!((place.width.unwrap() - f64::from(thickness)).abs() < 1e-5, "{:?}", place);
+        }
+    }
+}

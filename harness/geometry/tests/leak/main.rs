@@ -1,0 +1,274 @@
+//! Leaks through openings of known width: holes, slits, cracks at T-junctions, pipes and missing facets, in any orientation.
+
+mod openings;
+
+use contract::case::{Case, Facet};
+use contract::lattice::Root;
+use contract::testing::{assert_text, base_tree};
+use geometry::leak::ends::Target;
+use geometry::leak::report::{Answers, Report};
+use geometry::leak::{LeakError, Leaks, Watch};
+use openings::{
+    Body, ROTATIONS, bodies, crack, hole, missing_facet, pipe, slit, torn_sphere, two_holes,
+};
+use proptest::prelude::*;
+use std::cell::Cell;
+use std::convert::Infallible;
+
+/// Neither the bodies' centre nor their walls are in the planes of cells.
+const ROOT: Root = Root { origin: [-3.91, -4.13, -4.07], edge: 8.0 };
+
+const LEAVES_MAX: u64 = 1_000_000;
+
+struct Silent;
+
+impl Watch for Silent {
+    fn step(&self, _: &str) {}
+
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+fn case_in(root: Root, facets: &[Facet], level: u8) -> Case {
+    let spacing = root.edge / f64::from(1u32 << level);
+    let Root { origin, edge } = root;
+    let text = format!("spacing_min = {spacing:?}\n[root]\norigin = {origin:?}\nedge = {edge:?}");
+    Case::from_parts(&text, facets.to_vec()).unwrap()
+}
+
+fn case(facets: &[Facet], level: u8) -> Case {
+    case_in(ROOT, facets, level)
+}
+
+fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report, LeakError<Infallible>> {
+    answers(case, &[(from, to)], LEAVES_MAX).map(|mut answers| answers.examined.remove(0))
+}
+
+fn answers(
+    case: &Case,
+    ends: &[([f64; 3], Target)],
+    leaves_max: u64,
+) -> Result<Answers, LeakError<Infallible>> {
+    Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, level)), leaves_max, &Silent)?
+        .answers(ends)
+}
+
+fn from_centre(facets: &[Facet], level: u8) -> Report {
+    ask(&case(facets, level), [0.0; 3], Target::Far).unwrap()
+}
+
+fn text(case: &Case, from: [f64; 3]) -> String {
+    answers(case, &[(from, Target::Far)], LEAVES_MAX).unwrap().to_string()
+}
+
+/// The narrowest place is the opening: its width to 5 %, which its bounds enclose, and its rim.
+fn assert_describes(report: &Report, body: &Body, what: &str) {
+    let narrowest = &report.passage.as_ref().unwrap().narrowest;
+    let is_within =
+        narrowest.width_min <= 1.001 * body.width && body.width <= 1.001 * narrowest.width_max;
+    assert!(
+        is_within && narrowest.width_max <= 1.0501 * narrowest.width_min,
+        "{what}: {narrowest:?} for {}",
+        body.width
+    );
+    let near = body.at_rim(1);
+    assert!(
+        !narrowest.is_end && narrowest.facets.iter().all(|f| near.contains(f)),
+        "{what}: {:?}",
+        narrowest.facets
+    );
+    let points = &report.passage.as_ref().unwrap().points;
+    let passes = points.windows(2).filter(|pair| body.passes(pair[0].at, pair[1].at)).count();
+    assert_eq!(passes % 2, 1, "{what}: the path crosses the opening {passes} times");
+}
+
+/// An opening that is wider than 2 sqrt(3) cells joins the leaves on both sides, one that is narrower than a cell does not.
+fn assert_levels(report: &Report, body: &Body, what: &str) {
+    let cells = body.width / report.spacing.spacing;
+    assert!(report.is_leak || cells < 3.47, "{what}: closed at {cells} cells");
+    assert!(!report.is_leak || cells > 0.99, "{what}: open at {cells} cells");
+    if let Some(closes) = report.closes {
+        assert!(
+            closes.spacing > body.width / 12f64.sqrt() && closes.spacing / 2.0 <= body.width,
+            "{what}"
+        );
+    }
+    if let Some(opens) = report.opens {
+        assert!(
+            opens.spacing <= body.width && 2.0 * opens.spacing > body.width / 12f64.sqrt(),
+            "{what}"
+        );
+    }
+}
+
+fn torn() -> impl Strategy<Value = Body> {
+    let sizes = (0.05f64..0.35, 0.5f64..0.8, 0usize..320);
+    (0..5, sizes).prop_map(|(kind, (small, large, index))| match kind {
+        0 => hole(small),
+        1 => slit([large, small / 2.0]),
+        2 => crack(small),
+        3 => missing_facet(index),
+        _ => pipe(large as f32, small),
+    })
+}
+
+fn quaternion() -> impl Strategy<Value = [f64; 4]> {
+    let drawn = prop::array::uniform4(-1.0f64..1.0);
+    let unit = drawn.prop_filter_map("not zero", |q| {
+        let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+        (length > 0.1).then(|| q.map(|c| c / length))
+    });
+    prop_oneof![Just(ROTATIONS[0]), Just(ROTATIONS[1]), unit]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Invariants are checked by the answer itself.
+    #[test]
+    fn the_width_of_an_opening_is_within_its_bounds(
+        body in torn(), rotation in quaternion(), shift in prop::array::uniform3(0.0f64..0.25), level in 4u8..8
+    ) {
+        let body = body.rotated(rotation);
+        let what = format!("{} of {}, {rotation:?}", body.name, body.width);
+        let origin = std::array::from_fn(|a| -4.0 - shift[a]);
+        let case = case_in(Root { origin, edge: 8.0 }, &body.facets, level);
+        let report = match ask(&case, [0.0; 3], Target::Far) {
+            // Facets cross the leaf of the start at coarse levels.
+            Err(LeakError::Input(why)) => {
+                prop_assert!(why.contains("facets cross"), "{}", why);
+                return Ok(());
+            }
+            answered => answered.unwrap(),
+        };
+        prop_assert!(report.limit.is_none(), "{}", what);
+        assert_levels(&report, &body, &what);
+        assert_describes(&report, &body, &what);
+    }
+}
+
+#[test]
+fn the_widest_of_several_openings_is_reported() {
+    for (level, radius, opposite) in [(7, 0.2, 0.185), (8, 0.15, 0.14)] {
+        for rotation in ROTATIONS {
+            let body = two_holes(radius, opposite).rotated(rotation);
+            let report = from_centre(&body.facets, level);
+            assert_describes(&report, &body, &format!("level {level}, radius {radius}"));
+        }
+    }
+}
+
+#[test]
+fn a_path_that_starts_in_a_pipe_is_as_wide_as_the_pipe() {
+    for (radius, length) in [(0.1, 2.0), (0.13, 1.0)] {
+        for rotation in ROTATIONS {
+            let body = pipe(length, radius).rotated(rotation);
+            let start = std::array::from_fn(|i| {
+                let mean = body.rim.iter().map(|v| v[i]).sum::<f64>() / body.rim.len() as f64;
+                mean + 0.3 * body.axis()[i]
+            });
+            let in_pipe =
+                ask(&case(&body.facets, 8), start, Target::Far).unwrap().passage.unwrap().narrowest;
+            let error = in_pipe.width / body.width - 1.0;
+            assert!(error.abs() < 0.05, "{radius}, {length}, from {start:?}: error {error}");
+        }
+    }
+}
+
+#[test]
+fn the_answer_is_the_expected_text() {
+    let [hole, slit, _, missing] = <[Body; 4]>::try_from(bodies()).unwrap();
+    let turned = |body: Body| body.rotated(ROTATIONS[2]).facets;
+    let all = [
+        ("hole", turned(hole), 6),
+        ("missing-facet", turned(missing), 7),
+        ("pipe", turned(pipe(1.0, 0.13)), 6),
+        ("slit-open", slit.facets.clone(), 7),
+        ("slit-closed", slit.facets, 4),
+        ("torn-sphere", torn_sphere(), 5),
+    ];
+    for (name, facets, level) in all {
+        assert_text(
+            &text(&case(&facets, level), [0.0; 3]),
+            &format!("tests/leak/expected/{name}.txt"),
+        );
+    }
+}
+
+#[test]
+fn a_closed_body_never_opens_and_that_is_proven_without_refinement() {
+    let body = missing_facet(77);
+    let rim: Facet = [0, 1, 2].map(|i| body.rim[i].map(|c| c as f32));
+    let closed: Vec<Facet> = body.facets.iter().copied().chain([rim]).collect();
+    let report = from_centre(&closed, 4);
+    assert!(!report.is_leak && report.is_separated && report.passage.is_none());
+    assert_eq!(report.levels.len(), 1);
+}
+
+#[test]
+fn a_finer_base_tree_that_cannot_be_meshed_ends_the_refinement_and_is_reported() {
+    struct Interruptible(Cell<bool>);
+    impl Watch for Interruptible {
+        fn step(&self, _: &str) {}
+
+        fn is_interrupted(&self) -> bool {
+            self.0.get()
+        }
+    }
+    let case = case(&bodies()[0].facets, 3);
+    let ask = |interrupts: bool| {
+        let watch = Interruptible(Cell::new(false));
+        let tree = |level| match level {
+            3 => Ok(base_tree(&case.facets_lattice, level)),
+            _ => {
+                watch.0.set(interrupts);
+                Err(format!("no memory for level {level}"))
+            }
+        };
+        let answers = Leaks::new(&case, tree, LEAVES_MAX, &watch)
+            .unwrap()
+            .answers(&[([0.0; 3], Target::Far)]);
+        answers.map(|mut answers| answers.examined.remove(0))
+    };
+    let report = ask(false).unwrap();
+    assert!(!report.is_leak && report.opens.is_none() && report.passage.is_none());
+    assert_eq!(report.limit.unwrap(), "level 4 could not be meshed: no memory for level 4");
+    // A mesher that the user's signal ended is no reason to answer.
+    assert!(matches!(ask(true), Err(LeakError::Source(_))));
+}
+
+#[test]
+fn refinement_ends_at_the_limit_of_leaves_and_that_is_reported() {
+    let case = case(&bodies()[2].facets, 3);
+    // A tree is meshed if it is expected to have just as many leaves as allowed.
+    let expected = 4 * base_tree(&case.facets_lattice, 3).len() as u64;
+    for (leaves_max, levels) in [(expected - 1, 1), (expected, 2)] {
+        let report =
+            answers(&case, &[([0.0; 3], Target::Far)], leaves_max).unwrap().examined.remove(0);
+        assert!(!report.is_leak && report.opens.is_none());
+        assert!(report.limit.unwrap().contains(&format!("more than the limit of {leaves_max}")));
+        assert_eq!(report.levels.len(), levels, "at most {leaves_max}");
+    }
+}
+
+#[test]
+fn a_path_to_a_point_ends_there_and_bad_points_are_input_errors() {
+    let body = bodies().remove(0);
+    let case = case(&body.facets, 8);
+    let report = ask(&case, [0.1, 0.0, 0.0], Target::Point([0.0, 0.0, 3.0])).unwrap();
+    assert_describes(&report, &body, "to a point");
+    let points = report.passage.unwrap().points;
+    assert_eq!((points[0].at, points[points.len() - 1].at), ([0.1, 0.0, 0.0], [0.0, 0.0, 3.0]));
+    let same = ask(&case, [0.0; 3], Target::Point([0.01; 3])).unwrap();
+    assert!(same.is_leak && same.passage.unwrap().narrowest.is_end);
+    let why = |from, to| match ask(&case, from, to) {
+        Err(LeakError::Input(why)) => why,
+        other => panic!("{other:?}"),
+    };
+    assert!(why([9.0; 3], Target::Far).contains("--from [9.0, 9.0, 9.0] is outside the root"));
+    let crossing = why([0.3, 0.2, -1.0], Target::Far);
+    assert!(crossing.contains("--from") && crossing.contains("nearest centre"), "{crossing}");
+    let crossing = why([0.0; 3], Target::Point([0.3, 0.2, -1.0]));
+    assert!(crossing.contains("--to") && crossing.contains("nearest centre"), "{crossing}");
+}
