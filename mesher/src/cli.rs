@@ -19,7 +19,7 @@ pub const UNPRINTED: i32 = 4;
 
 /// Makes an off-body hexahedral oct-tree mesh around a geometry.
 ///
-/// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 2 unusable
+/// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
 /// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
 #[derive(Parser)]
@@ -69,6 +69,9 @@ pub struct Args {
     /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
     #[arg(long)]
     pub force: bool,
+    /// Make no mesh of a geometry that leaks between spacings, which is a warning otherwise, but end with exit code 1
+    #[arg(long, conflicts_with = "plan")]
+    pub strict: bool,
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
@@ -254,11 +257,19 @@ pub fn output(args: &Args) -> Option<Output> {
     out.map(|directory| Output { directory, words, tree, cell_ranks: args.cell_ranks })
 }
 
+/// The case in advice to the user: only case files have a name.
+pub fn case_name(args: &Args) -> String {
+    if is_case_file(args) { args.input.display().to_string() } else { "CASE".to_owned() }
+}
+
+fn is_case_file(args: &Args) -> bool {
+    args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
 /// The case that the command line describes.
 pub fn case(args: &Args) -> Result<Case, Error> {
     let b = &args.body;
-    let is_case = args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    if is_case {
+    if is_case_file(args) {
         let given = b.spacing_min.is_some()
             || b.layer_cells_min.is_some()
             || b.keep.is_some()

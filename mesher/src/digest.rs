@@ -74,13 +74,18 @@ fn of_facets_lanes(facets: &[Facet]) -> u128 {
         let mut words = [0; 64];
         for i in 0..9 {
             for (w, f) in words.iter_mut().zip(chunk) {
-                let c = i64::from(f.v[i / 3][i % 3]) as u64;
-                *w = finalise((*w ^ c).wrapping_add(INCREMENT));
+                *w = chained(*w, f.v[i / 3][i % 3]);
             }
         }
         total = total.wrapping_add(digest_lanes(&words[..chunk.len()]));
     }
     total
+}
+
+/// The word of some coordinates and of one more.
+#[inline(always)]
+pub fn chained(word: u64, coordinate: i32) -> u64 {
+    finalise((word ^ i64::from(coordinate) as u64).wrapping_add(INCREMENT))
 }
 
 /// A digest in the manifest's notation: 32 hexadecimal digits.

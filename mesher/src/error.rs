@@ -1,6 +1,6 @@
 //! Errors that a user can correct; bugs panic instead.
 //!
-//! Exit codes: 0 success, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 130 interrupted.
+//! Exit codes: 0 success, 1 a geometry that leaks, on request, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 130 interrupted.
 
 use files::OUT_OF_MEMORY;
 use thiserror::Error;
@@ -11,6 +11,9 @@ pub const STALLED: i32 = 75;
 /// An error with a message of one sentence: what, where, what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Error {
+    /// The geometry leaks, and the user wants no mesh then.
+    #[error("{0}")]
+    Leak(String),
     /// The case, the geometry or an option is unusable.
     #[error("{0}")]
     Input(String),
@@ -41,6 +44,7 @@ impl Error {
     /// The process's exit code.
     pub fn exit_code(&self) -> i32 {
         match self {
+            Self::Leak(_) => 1,
             Self::Input(_) => 2,
             Self::Output(_) => 4,
             Self::Memory(_) => OUT_OF_MEMORY,

@@ -5,17 +5,18 @@ use crate::comm::{Comm, uncounted};
 use crate::error::Error;
 use crate::facet::Facet;
 use crate::kept::Kept;
-use crate::lattice::Rules;
+use crate::lattice::{Keep, Rules};
 use crate::mesh::{Mesh, Options};
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition::{self, LeafCounts, Sets};
 use crate::quantise::FacetCounts;
 use crate::record::Recorder;
-use crate::report::Counters;
+use crate::report::{Counters, warnings};
+use crate::sides::{self, leaks, openness};
 use crate::tree::Tree;
 use crate::voxelise::BinnedFacets;
-use crate::{exposed, grade, refine, sides};
+use crate::{exposed, grade, refine};
 use std::borrow::Borrow;
 
 /// Phases 3 to 8: from this rank's facets, and the numbers of all, to the tree. `count` sees the base tree. Collective.
@@ -82,10 +83,19 @@ pub fn grow<F: Borrow<[Facet]>>(
     count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let sides = record.phase("sides", comm, || {
-        sides::decide(&tree, &ownership, facets.borrow(), &rules, options, comm)
+    let is_closed = record.phase("leaks", comm, || openness::is_closed(facets.borrow(), comm));
+    let (sides, regions) = record.phase("sides", comm, || {
+        sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
     })?;
     debug_check(options, comm, || check::sides(&sides, &tree, &rules, &ownership, comm));
+    let (leaks, bounds_nothing) = record.phase("leaks", comm, || {
+        let facets = facets.borrow();
+        let leaks = leaks::find(regions, &tree, &ownership, facets, &rules, comm);
+        let bounds_nothing = rules.keep == Keep::Outside
+            && (is_closed, sides.summary.inside, leaks.0.len()) == (false, 0, 0)
+            && !openness::is_sheet(facets, comm);
+        (leaks, bounds_nothing)
+    });
     drop(facets);
     let Tree { split, crossing } = tree;
     let mut mesh = Mesh {
@@ -98,8 +108,16 @@ pub fn grow<F: Borrow<[Facet]>>(
         split,
         crossing,
         sides,
+        leaks,
+        bounds_nothing,
+        case_name: options.case_name.clone(),
         is_base: options.ungraded,
     };
+    if options.strict
+        && let Some(warning) = warnings::of_leaks(&mesh)
+    {
+        return Err(Error::Leak(warning));
+    }
     if options.ungraded {
         return Ok(mesh);
     }

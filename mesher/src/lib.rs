@@ -52,6 +52,7 @@ use error::Error;
 use files::interrupt::stop_at;
 use grow::grow;
 use lattice::Rules;
+use manifest::LeakEntry;
 use octant::Level;
 use partition::cost::Counts;
 use partition::ownership::Ownership;
@@ -113,20 +114,20 @@ fn mesh_into(
     Ok(Report::gather(&mesh, &totals, &counters, record, comm))
 }
 
-/// The leaf words that this rank owns, in order, and a summary of the components: phases 1 to 8, and no report.
+/// The leaf words that this rank owns, in order, a summary of the components and the leaks: phases 1 to 8, and no report.
 /// Collective.
 pub fn words(
     case: &Case,
     options: &Options,
     comm: &dyn Comm,
-) -> Result<(Vec<u64>, sides::Summary), Error> {
+) -> Result<(Vec<u64>, sides::Summary, Vec<LeakEntry>), Error> {
     let mesh = make(case, options, comm, &mut Recorder::default(), &mut Counters::default())?;
     let mut words = Vec::new();
     mesh.leaves().emit(|w| {
         words.extend_from_slice(w);
         Ok::<(), Error>(())
     })?;
-    Ok((words, mesh.sides.summary))
+    Ok((words, mesh.sides.summary, LeakEntry::of(&mesh)))
 }
 
 /// The plan of a case: what a run with these options takes. Makes pilot runs and no mesh. Collective.
@@ -199,7 +200,8 @@ fn pilot(
     options: &Options,
     comm: &dyn Comm,
 ) -> Result<Amounts, Error> {
-    let options = Options { check: false, out: None, weight_exposed: None, ..options.clone() };
+    let options =
+        Options { check: false, out: None, weight_exposed: None, strict: false, ..options.clone() };
     let run = |rules: Rules| {
         let (mut record, mut counters) = (Recorder::default(), Counters::default());
         let mut collector = Collector::default();

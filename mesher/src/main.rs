@@ -277,6 +277,8 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         check: args.check,
         weight_exposed: args.weight_exposed,
         force: args.force,
+        strict: args.strict,
+        case_name: cli::case_name(args),
     };
     let outcome = if args.plan {
         Outcome::Planned(plan(&case, &options, comm, record)?)

@@ -2,11 +2,12 @@
 
 use crate::comm::Comm;
 use crate::digest::{Digests, hex};
-use crate::lattice::{Enclosed, Keep};
+use crate::lattice::{Enclosed, Keep, Root};
 use crate::mesh::Mesh;
-use crate::octant::LEVEL_MAX;
+use crate::octant::{LEVEL_MAX, Level};
 use crate::quantise::FacetCounts;
 use crate::sides::Summary;
+use crate::sides::leaks::Leak;
 use crate::stream::Counts;
 use crate::write::{Output, TREE, Written, part_name};
 use serde::Serialize;
@@ -24,6 +25,7 @@ pub struct Manifest {
     keep_crossing: bool,
     boxes: Vec<BoxEntry>,
     geometry: Geometry,
+    leaks: Vec<LeakEntry>,
     leaves: u64,
     leaves_by_level: Vec<u64>,
     leaves_by_side: SideEntry,
@@ -51,6 +53,34 @@ impl Geometry {
     /// The facets of all ranks.
     pub fn of(facets: &FacetCounts) -> Self {
         Self { facets: facets.total, digest: hex(facets.digest) }
+    }
+}
+
+/// A leak, in manifest and report, in the unit of the geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LeakEntry {
+    /// The spacing at which the region is closed.
+    pub spacing_coarse: f64,
+    /// The spacing of the mesh.
+    pub spacing_fine: f64,
+    /// The region's volume at the coarser spacing.
+    pub volume: f64,
+    /// A point in it.
+    pub point: [f64; 3],
+}
+
+impl LeakEntry {
+    /// The leaks of a mesh.
+    pub fn of(mesh: &Mesh) -> Vec<Self> {
+        let Root { edge, .. } = mesh.rules.root;
+        let edge_of = |l: Level| edge / f64::from(1u32 << l);
+        let entry = |leak: &Leak| Self {
+            spacing_coarse: edge_of(leak.level),
+            spacing_fine: edge_of(mesh.rules.level_surface),
+            volume: leak.volume as f64 * edge_of(LEVEL_MAX).powi(3),
+            point: mesh.rules.root.locate(leak.first.centroid()),
+        };
+        mesh.leaks.0.iter().map(entry).collect()
     }
 }
 
@@ -155,6 +185,7 @@ impl Manifest {
                 .map(|b| BoxEntry { min: b.min, max: b.max, level: b.level })
                 .collect(),
             geometry: Geometry::of(&mesh.facets),
+            leaks: LeakEntry::of(mesh),
             leaves: counts.total(),
             leaves_by_level: counts.by_level[..=LEVEL_MAX as usize]
                 .iter()

@@ -6,6 +6,7 @@ use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner};
 use crate::quantise::FacetCounts;
 use crate::sides::Sides;
+use crate::sides::leaks::Leaks;
 use crate::stream::Leaves;
 use crate::tree::PerLevel;
 use crate::write::Output;
@@ -25,6 +26,10 @@ pub struct Options {
     pub weight_exposed: Option<u32>,
     /// Mesh even if the memory probably does not suffice.
     pub force: bool,
+    /// Fail if the geometry leaks.
+    pub strict: bool,
+    /// What to call the case in advice to the user.
+    pub case_name: String,
 }
 
 /// A mesh as one rank holds it.
@@ -47,6 +52,12 @@ pub struct Mesh {
     pub crossing: PerLevel,
     /// Sides of the leaves of T0.
     pub sides: Sides,
+    /// What is closed at a coarser spacing, and open at that of the mesh.
+    pub leaks: Leaks,
+    /// Whether the facets are an open body, and bound nothing although the outside is kept.
+    pub bounds_nothing: bool,
+    /// Name of the case in advice to the user.
+    pub case_name: String,
     /// Whether the tree is T0, of which all leaves are in the mesh.
     pub is_base: bool,
 }

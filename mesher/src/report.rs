@@ -7,14 +7,14 @@
 //! - the wall time is that of the slowest rank.
 
 mod text;
-mod warnings;
+pub(crate) mod warnings;
 
 pub(crate) use text::grouped;
 
 use crate::comm::{Comm, Traffic, matrix};
 use crate::digest::hex;
 use crate::leaves::Totals;
-use crate::manifest::Geometry;
+use crate::manifest::{Geometry, LeakEntry};
 use crate::mesh::Mesh;
 use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::Partitioner;
@@ -153,6 +153,8 @@ pub struct Report {
     pub components_ambiguous: u64,
     /// A point in one of them.
     pub ambiguous_example: Option<[f64; 3]>,
+    /// What is closed at a coarser spacing, and open at that of the mesh.
+    pub leaks: Vec<LeakEntry>,
     /// What is probably not as the user intended, and what to try: a sentence each.
     pub warnings: Vec<String>,
     /// Number of ranks.
@@ -233,6 +235,7 @@ impl Report {
             enclosed_example: enclosed.map(|e| rules.root.locate(e.example)),
             components_ambiguous: ambiguous.map_or(0, |a| a.count),
             ambiguous_example: ambiguous.map(|a| rules.root.locate(a.example)),
+            leaks: LeakEntry::of(mesh),
             warnings: warnings::of(mesh),
             ranks: comm.size(),
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),

@@ -64,14 +64,8 @@ impl Leaves<'_> {
     /// # Errors
     /// The first error of the sink, which ends the stream.
     pub fn emit<E>(&self, sink: impl FnMut(&[u64]) -> Result<(), E>) -> Result<Counts, E> {
-        let levels = (0..LEVELS).map(|l| LevelCursors {
-            split: self.split[l].cursor(),
-            crossing: self.crossing[l].cursor(),
-            inside: self.sides.inside[l].cursor(),
-            deleted: self.sides.deleted[l].cursor(),
-        });
         let mut walk = Walk {
-            levels: levels.collect(),
+            levels: (0..LEVELS).map(|l| LevelCursors::new(self, l)).collect(),
             of: self,
             buffer: Vec::with_capacity(CHUNK + 512),
             counts: Counts::default(),
@@ -85,11 +79,53 @@ impl Leaves<'_> {
 }
 
 /// Cursors over the sets of one level.
-struct LevelCursors<'a> {
+pub struct LevelCursors<'a> {
+    keep: Keep,
     split: Cursor<'a>,
     crossing: Cursor<'a>,
     inside: Cursor<'a>,
     deleted: Cursor<'a>,
+}
+
+/// The split octants of a brick, and the sides that its octants have or inherit from the leaves of T0 that contain them.
+#[derive(Clone, Copy, Default)]
+pub struct Octants {
+    /// Octants with children.
+    pub split: u64,
+    /// Those in crossing leaves.
+    pub crossing: u64,
+    /// Those that are inside, crossing ones among them. Deleted leaves have no side.
+    pub inside: u64,
+    /// Leaves that are deleted.
+    pub deleted: u64,
+}
+
+impl<'a> LevelCursors<'a> {
+    /// The cursors of level `l`.
+    pub fn new(of: &Leaves<'a>, l: usize) -> Self {
+        Self {
+            keep: of.sides.keep,
+            split: of.split[l].cursor(),
+            crossing: of.crossing[l].cursor(),
+            inside: of.sides.inside[l].cursor(),
+            deleted: of.sides.deleted[l].cursor(),
+        }
+    }
+
+    /// Reads a brick, to which the octants above pass on that they cross or are inside. Keys must ascend.
+    #[inline]
+    pub fn read(&mut self, key: u64, crossing: u64, inside: u64) -> Octants {
+        Octants {
+            split: self.split.get(key),
+            crossing: self.crossing.get(key) | crossing,
+            inside: match self.keep {
+                Keep::Outside => 0,
+                Keep::Inside => u64::MAX,
+                Keep::All => self.inside.get(key) | inside,
+            },
+            deleted: self.deleted.get(key),
+        }
+    }
 }
 
 /// A brick on the path from the root.
@@ -122,15 +158,8 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         } else {
             of.ownership.placement(l, key)
         };
-        let split = cursors.split.get(key) & exists;
-        let crossing = cursors.crossing.get(key) | crossing;
-        let deleted = cursors.deleted.get(key);
-        let inside = match of.sides.keep {
-            // Deleted leaves are not emitted.
-            Keep::Outside => 0,
-            Keep::Inside => u64::MAX,
-            Keep::All => cursors.inside.get(key) | inside,
-        };
+        let Octants { split, crossing, inside, deleted } = cursors.read(key, crossing, inside);
+        let split = split & exists;
         let mut leaves = exists & !split;
         if !of.all_leaves {
             leaves &= !deleted;

@@ -10,7 +10,6 @@ use crate::comm::{Comm, agree};
 use crate::digest::Digests;
 use crate::error::Error;
 use files::{Claim, ClaimError, Draft};
-use npyz::WriterBuilder;
 use serde::Serialize;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -97,7 +96,7 @@ impl OutDir {
         let name = part_name(rank);
         let begin = || -> io::Result<BufWriter<Draft>> {
             let mut file = BufWriter::with_capacity(1 << 20, self.claim.draft(&name)?);
-            file.write_all(&header(u64::MAX)?)?;
+            file.write_all(&header(u64::MAX))?;
             Ok(file)
         };
         let file = begin().map_err(|e| output(&self.path, &e))?;
@@ -195,7 +194,7 @@ impl Part {
     pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
         self.digests.add(words);
         self.leaves += words.len() as u64;
-        // The words' bytes in memory. npyz writes word by word, which takes longer than meshing.
+        // The words' bytes in memory: to write word by word takes longer than meshing.
         let written = match cfg!(target_endian = "little") {
             true => self.file.write_all(bytemuck::cast_slice(words)),
             false => words.iter().try_for_each(|w| self.file.write_all(&w.to_le_bytes())),
@@ -212,7 +211,7 @@ impl Part {
         let close = || -> io::Result<()> {
             let mut file = file.into_inner()?;
             file.seek(SeekFrom::Start(0))?;
-            file.write_all(&header(leaves)?)?;
+            file.write_all(&header(leaves))?;
             file.publish()
         };
         close().map_err(|e| output(&path, &e))?;
@@ -220,21 +219,12 @@ impl Part {
     }
 }
 
-/// The header of a `.npy` file of `leaves` words. Padded with spaces to the same length for any number, so that
-/// it can be overwritten when the number is known.
-fn header(leaves: u64) -> io::Result<Vec<u8>> {
-    /// Bytes before the header's text: magic, version, and the text's length in the last two (format 1.0).
-    const BEFORE: usize = 10;
-    let of = |leaves: u64| {
-        let head = npyz::WriteOptions::<u64>::new().default_dtype().shape(&[leaves]);
-        head.writer(Vec::new()).write_header_only()
-    };
-    let (mut head, length) = (of(leaves)?, of(u64::MAX)?.len());
-    let newline = head.pop();
-    head.resize(length - 1, b' ');
-    head.extend(newline);
-    head[BEFORE - 2..BEFORE].copy_from_slice(&((length - BEFORE) as u16).to_le_bytes());
-    Ok(head)
+/// The header of a `.npy` file of `leaves` words, in format 1.0. Padded with spaces to the same length for any number, so that it can be
+/// overwritten when the number is known.
+fn header(leaves: u64) -> Vec<u8> {
+    let text = format!("{{'descr': '<u8', 'fortran_order': False, 'shape': ({leaves}, ), }}");
+    // The last two of the bytes before the text are its length.
+    [&b"\x93NUMPY\x01\x00\x76\x00"[..], format!("{text:<117}\n").as_bytes()].concat()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //!
 //! The root is refined wherever a facet crosses it or an extent box requires it ([`tree`],
 //! [`crossing`]). A flood fill and either rays or seeds determine which leaves are inside
-//! ([`sides`], [`ray`], [`seeds`]). Leaves outside the kept region are deleted ([`kept`]). For each level from the finest to the coarsest,
+//! ([`sides`], [`ray`], [`seeds`]). Coarser base trees show what leaks ([`leaks`]). Leaves outside the kept region are deleted ([`kept`]). For each level from the finest to the coarsest,
 //! every cell refines two enlarged extent boxes, one for its layer and one for balance
 //! ([`gradation`]). The remaining leaves are written as leaf words ([`leaves`], [`mod@write`]). Nothing
 //! here is fast: each step is the shortest implementation of the corresponding section of
@@ -18,6 +18,7 @@ pub mod gradation;
 mod input_file;
 pub mod kept;
 pub mod lattice;
+pub mod leaks;
 pub mod leaves;
 pub mod octant;
 pub mod ray;
@@ -30,6 +31,7 @@ pub mod write;
 pub use case::{BoxSpec, Case, Enclosed, Keep, Root};
 pub use error::Error;
 pub use kept::Components;
+pub use leaks::Leak;
 pub use leaves::{Geometry, digest, mix};
 pub use octant::Side;
 pub use sides::Ambiguous;
@@ -51,6 +53,8 @@ pub struct Mesh {
     pub seeds: Vec<Seed>,
     /// The facets as read.
     pub geometry: Geometry,
+    /// What is closed at a coarser spacing, and open at that of the mesh.
+    pub leaks: Vec<Leak>,
     /// The numbers of components of T0.
     pub components: Components,
     /// The components that no candidate decided; `None` if every component was decided.
@@ -64,11 +68,12 @@ pub struct Mesh {
 pub fn mesh(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
     let (mut tree, components) = base(&input)?;
+    let leaks = leaks::find(&tree, &input);
     kept::delete_the_rest(&mut tree, &input, &components);
     gradation::grade(&mut tree, &input);
     debug_check(&tree);
     let words = tree.words(|side| case.keep_crossing || side != Side::Crossing);
-    Ok(Mesh::new(words, &tree, &components, input))
+    Ok(Mesh::new(words, &tree, &components, leaks, input))
 }
 
 /// The base tree T0 of a case: all leaves with their sides, before deletion and gradation.
@@ -78,7 +83,8 @@ pub fn mesh(case: &Case) -> Result<Mesh, Error> {
 pub fn base_tree(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
     let (tree, components) = base(&input)?;
-    Ok(Mesh::new(tree.words(|_| true), &tree, &components, input))
+    let leaks = leaks::find(&tree, &input);
+    Ok(Mesh::new(tree.words(|_| true), &tree, &components, leaks, input))
 }
 
 fn base(input: &Input) -> Result<(Tree, Vec<Component>), Error> {
@@ -103,7 +109,13 @@ fn debug_check(tree: &Tree) {
 impl Mesh {
     /// `components` are those of T0, from which `tree` may have been refined: an octant keeps its
     /// index.
-    fn new(words: Vec<u64>, tree: &Tree, components: &[Component], input: Input) -> Self {
+    fn new(
+        words: Vec<u64>,
+        tree: &Tree,
+        components: &[Component],
+        leaks: Vec<Leak>,
+        input: Input,
+    ) -> Self {
         assert!(words.is_sorted_by(|a, b| a < b), "leaves are traversed in Morton order");
         Self {
             words,
@@ -111,6 +123,7 @@ impl Mesh {
             components: Components::of(tree, &input, components),
             ambiguous: Ambiguous::of(tree, &input, components),
             geometry: Geometry::of(&input.facets),
+            leaks,
             boxes: input.boxes,
             seeds: input.seeds,
         }

@@ -2,7 +2,7 @@
 use clap::Parser;
 use files::{Heap, interrupt};
 use reference::write::{self, AmbiguousCount, Which};
-use reference::{Error, Geometry, Mesh, base_tree, case_file, leaves, mesh};
+use reference::{Error, Geometry, Leak, Mesh, base_tree, case_file, leaves, mesh};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -46,6 +46,7 @@ struct Run {
     ranks: u32,
     facets: u64,
     geometry: Geometry,
+    leaks: Vec<Leak>,
     cells: u64,
     cells_by_level: [u64; 20],
     components_ambiguous: AmbiguousCount,
@@ -107,6 +108,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         ranks: 1,
         facets: case.facets.len() as u64,
         geometry: mesh.geometry.clone(),
+        leaks: mesh.leaks.clone(),
         cells: mesh.words.len() as u64,
         cells_by_level: tally.leaves_by_level,
         components_ambiguous: AmbiguousCount::of(&mesh),
@@ -128,6 +130,13 @@ fn print_summary(mesh: &Mesh, record: &Run) -> Result<(), Error> {
             "warning: the rays of {} components disagree, for example at ({x}, {y}, {z}); \
              look for holes or single sheets there",
             ambiguous.components
+        ))?;
+    }
+    if let Some(Leak { spacing_coarse, spacing_fine, point: [x, y, z], .. }) = mesh.leaks.last() {
+        complain(&format_args!(
+            "warning: {} regions are closed at a coarser spacing and open at {spacing_fine}, for example \
+             at {spacing_coarse} the one at ({x}, {y}, {z}); look for holes there",
+            mesh.leaks.len()
         ))?;
     }
     let enclosed = &mesh.components.enclosed;

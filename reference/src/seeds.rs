@@ -29,7 +29,7 @@ pub fn leaves(tree: &Tree, input: &Input) -> Result<Vec<Index>, Error> {
 
 /// The leaf whose half-open cube contains a lattice point; `None` outside the root. Corners are
 /// integers, so the unit cube at the point lies in one leaf.
-fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
+pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
     let cube = Extent { min: point, max: point.map(|x| x + 1) };
     tree.leaves_meeting(&cube).first().copied()
 }

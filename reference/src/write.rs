@@ -4,6 +4,7 @@ use crate::Mesh;
 use crate::case::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
 use crate::kept::Components;
+use crate::leaks::Leak;
 use crate::leaves::{Geometry, Tally, hex};
 use files::{Claim, ClaimError, write_atomically};
 use serde::Serialize;
@@ -41,6 +42,7 @@ struct Manifest {
     seeds: Vec<[i64; 3]>,
     enclosed: Enclosed,
     geometry: Geometry,
+    leaks: Vec<Leak>,
     leaves: u64,
     leaves_by_level: [u64; 20],
     leaves_by_side: BySide,
@@ -110,6 +112,7 @@ impl Manifest {
             seeds: mesh.seeds.iter().map(|seed| seed.point).collect(),
             enclosed: case.enclosed,
             geometry: mesh.geometry.clone(),
+            leaks: mesh.leaks.clone(),
             leaves,
             leaves_by_level: tally.leaves_by_level,
             leaves_by_side: BySide { outside, inside, crossing },

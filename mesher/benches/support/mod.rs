@@ -229,5 +229,5 @@ fn leaves_of(tree: &Tree) -> u64 {
 }
 
 fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
-    decide(tree, ownership, facets, rules, &options(), &Solo).expect("a case without seeds")
+    decide(tree, ownership, facets, rules, &options(), true, &Solo).expect("a case without seeds").0
 }

@@ -122,7 +122,7 @@ pub fn uncounted<T>(comm: &dyn Comm, body: impl FnOnce() -> T) -> T {
 }
 
 fn pack(e: &Error) -> Vec<u64> {
-    let (Error::Input(text) | Error::Output(text) | Error::Memory(text)) = e;
+    let (Error::Leak(text) | Error::Input(text) | Error::Output(text) | Error::Memory(text)) = e;
     let head = [e.exit_code() as u64, text.len() as u64];
     let body = text.as_bytes().chunks(8).map(|c| {
         let mut word = [0; 8];
@@ -137,6 +137,7 @@ fn unpack(words: &[u64]) -> Error {
         words[2..].iter().flat_map(|w| w.to_le_bytes()).take(words[1] as usize).collect();
     let text = String::from_utf8_lossy(&bytes).into_owned();
     match words[0] {
+        1 => Error::Leak(text),
         2 => Error::Input(text),
         71 => Error::Memory(text),
         _ => Error::Output(text),
@@ -312,9 +313,12 @@ mod tests {
 
     #[test]
     fn errors_are_unpacked_as_they_were_packed() {
-        for e in
-            [Error::input("häßlich: 'x'"), Error::output("no space"), Error::memory("12345678")]
-        {
+        for e in [
+            Error::Leak("a".into()),
+            Error::input("häßlich: 'x'"),
+            Error::output("no space"),
+            Error::memory("12345678"),
+        ] {
             assert_eq!(unpack(&pack(&e)), e);
         }
     }

@@ -2,10 +2,10 @@
 
 use super::numbering::{Interval, Numbering};
 use crate::brick::{byte, children};
-use crate::brickset::{BrickSet, ChildBricks, Cursor};
-use crate::lattice::Keep;
+use crate::brickset::{BrickSet, ChildBricks};
 use crate::mesh::Mesh;
 use crate::octant::Level;
+use crate::stream::{LevelCursors, Octants};
 use crate::tree::LEVELS;
 use vtkhdf::tree::Siblings;
 
@@ -19,7 +19,7 @@ pub(super) struct OwnSiblings<'a> {
     at: Interval,
     /// The interval of the last brick.
     interval: Option<usize>,
-    brick: Brick,
+    brick: Octants,
     /// Groups of siblings of the current brick that remain.
     left: u8,
     /// The number of the next siblings.
@@ -37,7 +37,7 @@ impl<'a> OwnSiblings<'a> {
             path: Path::new(mesh, 0),
             at: Interval::default(),
             interval: None,
-            brick: Brick::default(),
+            brick: Octants::default(),
             left: 0,
             next: 0,
         }
@@ -55,7 +55,7 @@ impl<'a> OwnSiblings<'a> {
         let j = u64::from(self.left.trailing_zeros());
         self.left &= self.left - 1;
         self.next += 1;
-        Some((self.next - 1, self.brick.siblings(self.mesh, j)))
+        Some((self.next - 1, siblings(self.brick, self.mesh, j)))
     }
 
     /// Goes to the next brick; none after the last.
@@ -84,77 +84,56 @@ impl<'a> OwnSiblings<'a> {
 
 /// The root.
 pub(super) fn root(mesh: &Mesh) -> Siblings {
-    let root = Path::new(mesh, 0).load(0, 0).siblings(mesh, 0);
+    let root = siblings(Path::new(mesh, 0).load(0, 0), mesh, 0);
     // The seven other octants of the brick do not exist.
     let [split, deleted, crossing, inside] =
         [root.split, root.deleted, root.crossing, root.inside].map(|bits| bits & 1);
     Siblings { split, deleted, crossing, inside }
 }
 
-/// A brick, with the sides that its octants inherit from the leaves of T0 that contain them.
-#[derive(Clone, Copy, Default)]
-struct Brick {
-    split: u64,
-    crossing: u64,
-    inside: u64,
-    deleted: u64,
-}
-
-impl Brick {
-    /// Siblings that exist: byte `j` of the brick.
-    #[inline]
-    fn siblings(&self, mesh: &Mesh, j: u64) -> Siblings {
-        let Self { split, crossing, inside, deleted } = *self;
-        let mut gone = 0;
-        if !mesh.is_base {
-            gone = deleted;
-            if !mesh.rules.keep_crossing {
-                gone |= crossing;
-            }
+/// Siblings that exist: byte `j` of a brick.
+#[inline]
+fn siblings(brick: Octants, mesh: &Mesh, j: u64) -> Siblings {
+    let Octants { split, crossing, inside, deleted } = brick;
+    let mut gone = 0;
+    if !mesh.is_base {
+        gone = deleted;
+        if !mesh.rules.keep_crossing {
+            gone |= crossing;
         }
-        let kept = !split & !gone;
-        Siblings {
-            split: byte(split, j),
-            deleted: byte(gone & !split, j),
-            crossing: byte(crossing & kept, j),
-            inside: byte(inside & kept & !crossing, j),
-        }
+    }
+    let kept = !split & !gone;
+    Siblings {
+        split: byte(split, j),
+        deleted: byte(gone & !split, j),
+        crossing: byte(crossing & kept, j),
+        inside: byte(inside & kept & !crossing, j),
     }
 }
 
 /// The bricks that contain the current one, of all coarser levels, and readers of the sets.
-struct Path<'a> {
-    levels: Vec<PathLevel<'a>>,
-    keep: Keep,
-}
+struct Path<'a>(Vec<PathLevel<'a>>);
 
 struct PathLevel<'a> {
-    split: Cursor<'a>,
-    crossing: Cursor<'a>,
-    inside: Cursor<'a>,
-    deleted: Cursor<'a>,
+    cursors: LevelCursors<'a>,
     key: Option<u64>,
-    brick: Brick,
+    brick: Octants,
 }
 
 impl<'a> Path<'a> {
     /// A path to bricks of level `deepest`.
     fn new(mesh: &'a Mesh, deepest: Level) -> Self {
-        let level = |l: usize| PathLevel {
-            split: mesh.split[l].cursor(),
-            crossing: mesh.crossing[l].cursor(),
-            inside: mesh.sides.inside[l].cursor(),
-            deleted: mesh.sides.deleted[l].cursor(),
-            key: None,
-            brick: Brick::default(),
+        let level = |l: usize| {
+            let cursors = LevelCursors::new(&mesh.leaves(), l);
+            PathLevel { cursors, key: None, brick: Octants::default() }
         };
-        Self { levels: (0..=deepest as usize).map(level).collect(), keep: mesh.sides.keep }
+        Self((0..=deepest as usize).map(level).collect())
     }
 
     /// Reads a brick. Keys must not descend.
-    fn load(&mut self, l: Level, key: u64) -> Brick {
-        if self.levels[l as usize].key == Some(key) {
-            return self.levels[l as usize].brick;
+    fn load(&mut self, l: Level, key: u64) -> Octants {
+        if self.0[l as usize].key == Some(key) {
+            return self.0[l as usize].brick;
         }
         let (mut crossing, mut inside) = (0, 0);
         if l > 0 {
@@ -162,20 +141,9 @@ impl<'a> Path<'a> {
             let below = |sides: u64| children(byte(sides & above.split, key & 7));
             (crossing, inside) = (below(above.crossing), below(above.inside));
         }
-        let keep = self.keep;
-        let level = &mut self.levels[l as usize];
+        let level = &mut self.0[l as usize];
         level.key = Some(key);
-        level.brick = Brick {
-            split: level.split.get(key),
-            crossing: level.crossing.get(key) | crossing,
-            inside: match keep {
-                // Deleted leaves have no side in the file.
-                Keep::Outside => 0,
-                Keep::Inside => u64::MAX,
-                Keep::All => level.inside.get(key) | inside,
-            },
-            deleted: level.deleted.get(key),
-        };
+        level.brick = level.cursors.read(key, crossing, inside);
         level.brick
     }
 }

@@ -129,7 +129,7 @@ impl Collector {
             phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
         };
         let all: f64 = record.phases().iter().map(|p| p.time_cpu_s).sum();
-        let [refine, sides] = [time(&["refine"]), time(&["sides"])];
+        let [refine, sides] = [time(&["refine"]), time(&["sides", "leaks"])];
         let leaves = time(&["grade", "rebalance", "share top", "leaves"]);
         Amounts {
             cells: cells as f64,

@@ -170,6 +170,7 @@ mod tests {
             enclosed_example: None,
             components_ambiguous: 0,
             ambiguous_example: None,
+            leaks: vec![],
             partitioner: None,
             warnings: vec![],
             ranks: 2,

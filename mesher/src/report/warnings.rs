@@ -1,6 +1,7 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
 use crate::lattice::Keep;
+use crate::manifest::LeakEntry;
 use crate::mesh::Mesh;
 use crate::sides::Summary;
 
@@ -16,12 +17,49 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
     let facets_cut = if explains_cut { 0 } else { mesh.facets.beyond_root };
     let warnings = [
+        of_leaks(mesh),
         empty,
         summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
         summary.flow_misses_boundary.then(flow_without_far_field),
         (facets_cut > 0).then(|| body_cut(facets_cut, mesh.facets.total)),
     ];
     warnings.into_iter().flatten().collect()
+}
+
+/// The warning of a geometry that leaks.
+pub fn of_leaks(mesh: &Mesh) -> Option<String> {
+    let leaks = LeakEntry::of(mesh);
+    let case = &mesh.case_name;
+    // What is closed at the coarsest spacing has the most of the volume.
+    let Some(coarse) = leaks.last().map(|leak| leak.spacing_coarse) else {
+        return mesh.bounds_nothing.then(|| bounds_nothing(mesh));
+    };
+    let of_coarse =
+        leaks.iter().zip(&mesh.leaks.0).filter(|(leak, _)| leak.spacing_coarse == coarse);
+    let (count, volume) =
+        of_coarse.clone().fold((0, 0.0), |sum, (leak, _)| (sum.0 + 1, sum.1 + leak.volume));
+    let (largest, of) = of_coarse.max_by_key(|(_, of)| of.volume)?;
+    let ([x, y, z], fine) = (largest.point, largest.spacing_fine);
+    let regions = if count == 1 { "a region".to_owned() } else { format!("{count} regions") };
+    let (before, after) = if of.is_inside { ("outside", "inside") } else { ("inside", "outside") };
+    // A search starts in the flow if that is known.
+    let end = if mesh.rules.seeds.is_empty() { "from" } else { "to" };
+    Some(format!(
+        "the geometry leaks: {regions} with a volume of {volume:.4e}, the largest at ({x}, {y}, {z}), {before} at a spacing of {coarse}, \
+         became {after} at {fine}: close what `harness leak {case} --{end} {x},{y},{z}` finds, or increase spacing_min"
+    ))
+}
+
+fn bounds_nothing(mesh: &Mesh) -> String {
+    let (case, rules) = (&mesh.case_name, &mesh.rules);
+    let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
+    format!(
+        "the facets bound no inside at spacings of {spacing}, {} and {}, and are neither closed nor a sheet: either the flow fills the \
+         body through openings, which `harness leak {case} --from X,Y,Z` finds from a point in the body, or the body is thinner than \
+         its cells; close the openings, or change spacing_min",
+        2.0 * spacing,
+        4.0 * spacing
+    )
 }
 
 fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {

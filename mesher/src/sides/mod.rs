@@ -6,7 +6,7 @@
 //! in a walk of the tree ([`components`]). Across ranks they receive common labels, by messages about
 //! the faces between ranks ([`global`]). Each component is then put to a vote of rays ([`rays`],
 //! [`vote`]) or, if the case has seeds, decided by them ([`seeds`]). Outside components that the far field
-//! does not reach are found last ([`enclosed`]).
+//! does not reach are found last ([`enclosed`]), and what is closed at a coarser spacing only ([`leaks`]).
 //!
 //! Invariants of [`Sides`]:
 //! - `inside` and `deleted` hold non-crossing leaves of the base tree;
@@ -17,7 +17,9 @@
 pub mod components;
 pub mod enclosed;
 pub mod global;
+pub mod leaks;
 pub mod nodes;
+pub mod openness;
 pub mod rays;
 pub mod seeds;
 pub mod vote;
@@ -34,7 +36,9 @@ use crate::partition::ownership::Ownership;
 use crate::tree::{LEVELS, PerLevel, Tree, assert_none, per_level};
 use enclosed::Region;
 use global::Label;
+use nodes::{Component, Nodes};
 use std::collections::HashSet;
+use vote::{FirstLeaf, FirstLeaves};
 
 /// Sides of the base tree's leaves.
 #[derive(Clone, Debug)]
@@ -99,6 +103,41 @@ pub struct Verdict {
     pub rays: u64,
 }
 
+/// The components of a tree.
+struct Components {
+    nodes: Nodes,
+    /// The merged component of each local one.
+    merged: Vec<u32>,
+    /// Labels of the merged components.
+    labels: Vec<Label>,
+    /// The first leaves of each component that this rank owns.
+    candidates: FirstLeaves,
+    /// All components of the tree: the same on all ranks.
+    all: Vec<FirstLeaf>,
+    /// Local components with a face on the root's boundary; some more than once.
+    at_boundary: Vec<Component>,
+}
+
+impl Components {
+    /// Finds the components of a tree's leaves that do not cross. Collective.
+    fn new(tree: &Tree, ownership: &Ownership, comm: &dyn Comm) -> Self {
+        let nodes = Nodes::new(tree, ownership);
+        let mut local = components::merge(&nodes, ownership);
+        let faces = std::mem::take(&mut local.faces);
+        let at_boundary = std::mem::take(&mut local.at_boundary);
+        let merged = local.numbered();
+        let labels = global::labels(&nodes, tree, ownership, faces, &merged, comm);
+        let candidates = vote::candidates(&nodes, tree, &merged.of, &labels, ownership);
+        let all = vote::all_components(&candidates, comm);
+        Self { nodes, merged: merged.of, labels, candidates, all, at_boundary }
+    }
+
+    /// The label of a local component.
+    fn label(&self, c: Component) -> Label {
+        self.labels[self.merged[c as usize] as usize]
+    }
+}
+
 /// The result of the phase for a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Class {
@@ -109,7 +148,8 @@ enum Class {
 }
 
 /// Decides the sides of all leaves. `facets` are this rank's slice of the geometry: each facet is on exactly
-/// one rank. Nothing is deleted if the options ask for T0. Collective.
+/// one rank. Nothing is deleted if the options ask for T0. Also returns the regions in which to look for leaks, of which a surface that
+/// `is_closed` has none. Collective.
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf; the same on all ranks.
@@ -119,45 +159,41 @@ pub fn decide(
     facets: &[Facet],
     rules: &Rules,
     options: &Options,
+    is_closed: bool,
     comm: &dyn Comm,
-) -> Result<Sides, Error> {
-    let mut nodes = nodes::Nodes::new(tree, ownership);
+) -> Result<(Sides, Vec<leaks::Region>), Error> {
+    let mut components = Components::new(tree, ownership, comm);
     if check::is_on(options) {
-        nodes.check_invariants();
+        components.nodes.check_invariants();
     }
-    let mut local = components::merge(&nodes, ownership);
-    let faces = std::mem::take(&mut local.faces);
-    let at_boundary = std::mem::take(&mut local.at_boundary);
-    let merged = local.numbered();
-    let labels = global::labels(&nodes, tree, ownership, faces, &merged, comm);
-    let label = |c| labels[merged.of[c as usize] as usize];
-    let candidates = vote::candidates(&nodes, tree, &merged.of, &labels, ownership);
-    let components = vote::all_components(&candidates, comm);
     let verdict = if rules.seeds.is_empty() {
-        vote::decide(&components, &candidates, facets, comm)
+        vote::decide(&components.all, &components.candidates, facets, comm)
     } else {
-        let flow = seeds::flow(rules, tree, &nodes, ownership, label, comm)?;
-        seeds::decide(&components, flow, rules.keep)
+        let label = |c| components.label(c);
+        let found = seeds::find(rules, tree, &components.nodes, ownership, label, comm);
+        let flow = seeds::flow(&found, rules, tree, ownership, comm)?;
+        seeds::decide(&components.all, flow, rules.keep)
     };
-    nodes.drop_links();
+    components.nodes.drop_links();
 
-    let at_boundary = at_boundary.into_iter().map(label);
-    let region = Region::new(rules, &components, &verdict, at_boundary, comm);
+    let at_boundary = components.at_boundary.iter().map(|&c| components.label(c));
+    let region = Region::new(rules, &components.all, &verdict, at_boundary, comm);
     let class = |label| match () {
         () if verdict.inside.contains(label) => Class::Inside,
         () if region.enclosed.contains(label) => Class::Enclosed,
         () => Class::Outside,
     };
+    let Components { nodes, merged, labels, all, .. } = components;
     let classes: Vec<Class> = labels.iter().map(class).collect();
-    let mut of_local = Vec::with_capacity(merged.of.len());
-    of_local.extend(merged.of.iter().map(|&c| classes[c as usize]));
+    let mut of_local = Vec::with_capacity(merged.len());
+    of_local.extend(merged.iter().map(|&c| classes[c as usize]));
     drop(merged);
     let mut sides = Sides {
         keep: if options.ungraded { Keep::All } else { rules.keep },
         inside: per_level(),
         deleted: per_level(),
         summary: Summary {
-            outside: (components.len() - verdict.inside.len()) as u64,
+            outside: (all.len() - verdict.inside.len()) as u64,
             inside: verdict.inside.len() as u64,
             enclosed: None,
             ambiguous: verdict.ambiguous,
@@ -167,12 +203,15 @@ pub fn decide(
         rays: verdict.rays,
     };
     let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership);
-    sides.summary.enclosed = region.summary(&components, leaves_enclosed, comm);
+    sides.summary.enclosed = region.summary(&all, leaves_enclosed, comm);
     debug_check(options, comm, || {
         let decided = (&verdict, &region);
-        check::sides::components(&components, decided, &sides, (rules, facets), ownership, comm);
+        check::sides::components(&all, decided, &sides, (rules, facets), ownership, comm);
     });
-    Ok(sides)
+    let is_inside = |c: Component| of_local[c as usize] == Class::Inside;
+    let regions =
+        if is_closed { Vec::new() } else { leaks::Region::of(tree, &nodes, rules, is_inside) };
+    Ok((sides, regions))
 }
 
 impl Sides {
@@ -181,7 +220,7 @@ impl Sides {
     fn store(
         &mut self,
         tree: &Tree,
-        nodes: &nodes::Nodes,
+        nodes: &Nodes,
         of_local: &[Class],
         ownership: &Ownership,
     ) -> u64 {
@@ -258,7 +297,8 @@ mod tests {
         let tree = small();
         let rules = Rules { keep, ..rules() };
         let options = crate::tests::options();
-        let sides = decide(&tree, &Ownership::solo(), &[], &rules, &options, &Solo).unwrap();
+        let (sides, _) =
+            decide(&tree, &Ownership::solo(), &[], &rules, &options, true, &Solo).unwrap();
         sides.check_invariants(&tree);
         (tree, sides)
     }

@@ -17,19 +17,16 @@ use std::collections::{HashMap, HashSet};
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
 const CROSSING: Label = Label::MAX;
 
-/// The components that have a seed; `label` returns the label of a local component. Collective; the result is
-/// the same on all ranks.
-///
-/// # Errors
-/// If a seed is outside the root or in a crossing leaf.
-pub fn flow(
+/// The seeds in the root by number, each with the component that it lies in; none in a crossing leaf. `label` returns the label of a local component.
+/// Collective; the same on all ranks.
+pub fn find(
     rules: &Rules,
     tree: &Tree,
     nodes: &Nodes,
     ownership: &Ownership,
     label: impl Fn(Component) -> Label,
     comm: &dyn Comm,
-) -> Result<HashSet<Label>, Error> {
+) -> HashMap<u64, Option<Label>> {
     let mut mine = Vec::new();
     for (number, seed) in (0..).zip(&rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
         let (l, code) = leaf_at(tree, seed);
@@ -42,17 +39,30 @@ pub fn flow(
         mine.extend([number, found]);
     }
     let all = comm.all_gather(&mine);
-    let found: HashMap<u64, Label> =
-        all.words().as_chunks().0.iter().map(|&[n, label]| (n, label)).collect();
+    let found = all.words().as_chunks().0.iter();
+    found.map(|&[number, label]| (number, (label != CROSSING).then_some(label))).collect()
+}
+
+/// The components that have a seed, of seeds that were [found](find). Collective; the same on all ranks.
+///
+/// # Errors
+/// If a seed is outside the root or in a crossing leaf.
+pub fn flow(
+    found: &HashMap<u64, Option<Label>>,
+    rules: &Rules,
+    tree: &Tree,
+    ownership: &Ownership,
+    comm: &dyn Comm,
+) -> Result<HashSet<Label>, Error> {
     for (number, seed) in (0..).zip(&rules.seeds) {
         let problem = match found.get(&number) {
             None => "lies outside the root",
-            Some(&CROSSING) => "lies in a leaf that the geometry crosses",
-            Some(_) => continue,
+            Some(None) => "lies in a leaf that the geometry crosses",
+            Some(Some(_)) => continue,
         };
         return Err(unusable(number, seed, problem, rules, tree, ownership, comm));
     }
-    Ok(found.into_values().collect())
+    Ok(found.values().copied().flatten().collect())
 }
 
 /// The sides of all components: the flow is on the side that is kept, outside if everything is.

@@ -38,6 +38,7 @@ fn assert_reference(case: &Small, run: &Run) -> Result<(), TestCaseError> {
         let (got, want) = (case.outcome(run, ungraded), case.reference_outcome(ungraded));
         assert_same!(got.words, want.words, "{what}");
         prop_assert_eq!(got.summary, want.summary);
+        prop_assert_eq!(got.leaks, want.leaks);
     }
     Ok(())
 }

@@ -72,7 +72,7 @@ fn counted(case: &Small, run: &Run, weight: Option<u32>) -> (Vec<Counted>, Strin
     let case = case.mesher_case();
     let options = Options { weight_exposed: weight, ..options(run.division, false) };
     let mut ranks = sim::run(run.ranks, run.seed, |comm| {
-        let (words, _) = words(&case, &options, comm).expect("the case is good");
+        let (words, ..) = words(&case, &options, comm).expect("the case is good");
         let report = mesh(&case, &options, comm, &mut Recorder::default()).expect("it is");
         let counts = report.counters.get("exposed_faces");
         ((words, counts.map(|counts| counts[comm.rank()])), report.digest)

@@ -9,6 +9,7 @@ mod candidates;
 mod digest_vectors;
 mod equals_reference;
 mod exposed;
+mod leaks;
 mod metamorphic;
 mod orders;
 mod schedules;

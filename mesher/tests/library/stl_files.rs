@@ -196,7 +196,7 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
     };
     let options = crate::support::options(crate::support::Run::SOLO.division, false);
     match mesher::words(&case, &options, &Solo) {
-        Ok((words, _)) => prop_assert!(words.is_sorted() && !words.is_empty()),
+        Ok((words, ..)) => prop_assert!(words.is_sorted() && !words.is_empty()),
         Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),
     }
     // A root that most facets are outside.

@@ -84,7 +84,7 @@ fn assert_manifest(folder: &Path, words: &[u64], ungraded: bool, ranks: usize) {
     assert_eq!(manifest["octant_digests"], json!(octants));
     assert_parts(folder, &manifest, words, ranks);
     let fields = manifest.as_object().expect("an object").len();
-    assert_eq!(fields, 20, "a field is untested, or missing");
+    assert_eq!(fields, 21, "a field is untested, or missing");
 }
 
 fn assert_parts(folder: &Path, manifest: &Value, words: &[u64], ranks: usize) {
@@ -131,6 +131,7 @@ fn written_meshes_are_read_back() {
             assert_report(&report, &words, ranks);
             for json in [crate::process::read_json(&folder.join("mesh.json")), report] {
                 assert_eq!(json["geometry"], geometry, "{ranks} ranks");
+                assert_eq!(json["leaks"], json!([]), "{ranks} ranks");
             }
             std::fs::remove_dir_all(folder).expect("the mesh exists");
         }

@@ -12,6 +12,7 @@ mod command_line;
 mod htg;
 mod interrupts;
 mod leaf_set;
+mod leaks;
 mod memory;
 mod message_matrix;
 #[path = "../support/process.rs"]

@@ -56,6 +56,35 @@ pub fn cuboid(lo: [f32; 3], hi: [f32; 3]) -> Vec<Facet> {
     out
 }
 
+/// A box with a slit of some width in its upper face, in the root of edge 64 with cells of edge 2.
+pub fn slit(width: f32, at: f32, keep: Keep, seeds: Vec<[f64; 3]>) -> Small {
+    let (lo, hi) = ([9.0, 11.0, 10.0], [33.0, 35.0, 31.0]);
+    let mut facets = cuboid(lo, hi);
+    facets.retain(|f| !f.iter().all(|v| v[2] == hi[2]));
+    for f in &mut facets {
+        // All normals point outwards.
+        if (0..3).any(|a| f.iter().all(|v| v[a] == lo[a])) {
+            f.swap(0, 1);
+        }
+    }
+    for [x0, x1] in [[lo[0], at], [at + width, hi[0]]] {
+        let p = |x, y| [x, y, hi[2]];
+        facets.push([p(x0, lo[1]), p(x1, lo[1]), p(x1, hi[1])]);
+        facets.push([p(x0, lo[1]), p(x1, hi[1]), p(x0, hi[1])]);
+    }
+    Small {
+        facets,
+        root: Root { origin: [0.0; 3], edge: 64.0 },
+        spacing_min: 2.0,
+        layer_cells_min: 1,
+        keep,
+        keep_crossing: true,
+        boxes: vec![],
+        seeds,
+        enclosed: Enclosed::Delete,
+    }
+}
+
 fn tetrahedron(v: [[f32; 3]; 4]) -> Vec<Facet> {
     vec![[v[0], v[1], v[2]], [v[0], v[3], v[1]], [v[0], v[2], v[3]], [v[1], v[3], v[2]]]
 }

@@ -6,6 +6,7 @@ use mesher::comm::{Solo, sim};
 use mesher::error::Error;
 use mesher::ingest::Source;
 use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::manifest::LeakEntry;
 use mesher::octant::position;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
@@ -19,7 +20,7 @@ pub mod symmetry;
 
 // Each test uses some of these.
 #[allow(unused_imports)]
-pub use draw::{closed, config, cuboid, leaky_on_rays, run, small, soup, thin};
+pub use draw::{closed, config, cuboid, leaky_on_rays, run, slit, small, soup, thin};
 
 pub type Facet = [[f32; 3]; 3];
 
@@ -119,7 +120,12 @@ impl Small {
             inside_reaches_boundary,
             flow_misses_boundary,
         };
-        Ok(Outcome { words: mesh.words, summary })
+        let leak = |leak: reference::Leak| {
+            let reference::Leak { spacing_coarse, spacing_fine, volume, point } = leak;
+            LeakEntry { spacing_coarse, spacing_fine, volume, point }
+        };
+        let leaks = mesh.leaks.into_iter().map(leak).collect();
+        Ok(Outcome { words: mesh.words, summary, leaks })
     }
 
     /// Leaf words by the mesher on one rank.
@@ -151,9 +157,11 @@ impl Small {
         let summary = parts[0].1;
         assert!(parts.iter().all(|p| p.1 == summary), "ranks must agree on components");
         assert!(parts.iter().all(|p| p.0.is_sorted()), "parts must be sorted");
+        assert!(parts.iter().all(|p| p.2 == parts[0].2), "ranks must agree on leaks");
+        let leaks = parts[0].2.clone();
         let mut words: Vec<u64> = parts.into_iter().flat_map(|p| p.0).collect();
         words.sort_unstable();
-        Ok(Outcome { words, summary })
+        Ok(Outcome { words, summary, leaks })
     }
 
     /// The nearest case on a root of edge 64 at the origin whose coordinates are multiples of 1/128. They are lattice
@@ -202,11 +210,12 @@ fn is_at_boundary(word: u64) -> bool {
     position(word >> 7).iter().any(|&c| c == 0 || c + edge == 1 << 19)
 }
 
-/// A mesh: leaf words and a summary of its components.
+/// A mesh: leaf words, a summary of its components, and its leaks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     pub words: Vec<u64>,
     pub summary: Summary,
+    pub leaks: Vec<LeakEntry>,
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {

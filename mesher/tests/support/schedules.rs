@@ -8,6 +8,7 @@ use mesher::case::Case;
 use mesher::comm::sim::{Adversary, Schedule, Sim};
 use mesher::comm::{Comm, Solo};
 use mesher::error::Error;
+use mesher::manifest::LeakEntry;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
 use mesher::{Options, mesh, words};
@@ -80,8 +81,11 @@ impl Serial {
     }
 }
 
-/// Leaf words, components, and digest and number of cells in the report if it was asked for.
-pub type Part = Result<(Vec<u64>, Summary, Option<(String, u64)>), Error>;
+/// Leaf words, components and leaks, and digest and number of cells in the report if it was asked for.
+pub type Part = Result<(Vec<u64>, Common, Option<(String, u64)>), Error>;
+
+/// Components and leaks, the same on all ranks.
+pub type Common = (Summary, Vec<LeakEntry>);
 
 /// A rank's part of the mesh.
 pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
@@ -92,8 +96,8 @@ pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Par
             Some((report.digest, report.cells))
         }
     };
-    let (words, summary) = words(case, options, comm)?;
-    Ok((words, summary, reported))
+    let (words, summary, leaks) = words(case, options, comm)?;
+    Ok((words, (summary, leaks), reported))
 }
 
 /// The mesh of which these are the parts of all ranks.
@@ -104,15 +108,15 @@ pub fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
     let (mut all, mut same) = (Vec::new(), None);
     for part in parts {
         let (words, common) = match part {
-            Ok((words, summary, reported)) => (words, Ok((summary, reported))),
+            Ok((words, common, reported)) => (words, Ok((common, reported))),
             Err(e) => (Vec::new(), Err(e)),
         };
         all.extend(words);
         assert!(*same.get_or_insert(common.clone()) == common, "ranks must agree on the result");
     }
     all.sort_unstable();
-    let (summary, reported) = same.expect("at least one rank")?;
-    Ok(Meshed { outcome: Outcome { words: all, summary }, reported })
+    let ((summary, leaks), reported) = same.expect("at least one rank")?;
+    Ok(Meshed { outcome: Outcome { words: all, summary, leaks }, reported })
 }
 
 /// Draws a value that depends on the number alone.

@@ -33,7 +33,6 @@ pub mod truth;
 
 pub use outcome::Outcome;
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
-pub(crate) use subject::valid_leaves;
 pub use subject::{CAPACITY, Subject};
 pub use terms::Terms;
 

@@ -157,9 +157,3 @@ impl<'a> Subject<'a> {
         Some(self.facets.get_or_init(|| Facets::new(&case.facets_lattice)))
     }
 }
-
-/// The sorted words that are leaves and overlap no earlier one.
-pub(crate) fn valid_leaves(words: &[u64]) -> Vec<u64> {
-    let mut builder = Builder::default();
-    words.iter().copied().filter(|&w| builder.push(w).is_ok()).collect()
-}

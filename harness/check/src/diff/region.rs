@@ -2,7 +2,6 @@
 
 use super::rule::{Dispute, Mesh};
 use crate::checks::components;
-use crate::checks::valid_leaves;
 use contract::manifest::{Enclosed, Keep};
 use contract::word::{self, Leaf, Side};
 
@@ -92,16 +91,15 @@ impl Dispute<'_> {
         if words.len() > LEAVES_GROUPED {
             return None;
         }
-        let words = valid_leaves(words);
         let index = words.binary_search(&word::encode(leaf)).ok()? as u32;
-        let groups = components::groups(&words);
+        let groups = components::groups(words);
         let group = groups.into_iter().find(|group| group.contains(&index))?;
         let holds = |seed: &[i64; 3]| {
-            components::leaf_at(&words, *seed).is_some_and(|i| group.contains(&(i as u32)))
+            components::leaf_at(words, *seed).is_some_and(|i| group.contains(&(i as u32)))
         };
         Some(Component {
             seed: self.terms.seeds.iter().position(holds),
-            at_boundary: components::touches_boundary(&words, &group),
+            at_boundary: components::touches_boundary(words, &group),
             leaves: group.len(),
         })
     }

@@ -1,0 +1,283 @@
+//! Leaks between spacings: regions that are closed at a coarser spacing and open at that of the mesh.
+//!
+//! T0/k is T0 cut k levels above the surface level. Its octants are crossed if one of their children in T0 is, so a leaf of T0/k that
+//! is not crossed lies in one component of T0, and a component of T0/k does, too. One that is inside by its rays although it lies in an outside
+//! component of T0 has leaked; if the inside is kept, also one that is outside and lies in an inside component. Where there are seeds,
+//! it has leaked only into the flow, and if no seed lies in it. Only one side of T0 matters for each of these, so the other one is a
+//! wall, like crossing leaves.
+//!
+//! Invariants of [`Leaks`]:
+//! - the coarser level is one or two levels above the surface level; leaks are in the order of k, then of their first leaves;
+//! - a leak's volume is a whole number of octants of its level, and at least that of its first leaf, which is not deeper than that
+//!   level and lies in the root;
+//! - the leaks of one k do not overlap: together they are no larger than the root.
+
+use super::global::Label;
+use super::nodes::{Component, Nodes};
+use super::vote::{self, Candidate};
+use super::{Components, seeds};
+use crate::brick::{self, Brick};
+use crate::brickset::BrickSet;
+use crate::comm::{Comm, all_gather_reduced, uncounted};
+use crate::facet::Facet;
+use crate::lattice::{Keep, Rules};
+use crate::octant::{LEVEL_MAX, Level};
+use crate::partition::ownership::Ownership;
+use crate::tree::{LEVELS, PerLevel, Tree, per_level};
+use std::collections::HashSet;
+
+/// Number of coarser spacings that are compared with that of the mesh.
+const COARSER: Level = 2;
+
+/// A region that has leaked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leak {
+    /// The level of the coarser spacing.
+    pub level: Level,
+    /// The region's volume at the coarser spacing, in octants of level 19.
+    pub volume: u64,
+    /// Its first leaf at that spacing, by level and Morton code.
+    pub first: Candidate,
+    /// Whether the region is inside at the spacing of the mesh.
+    pub is_inside: bool,
+}
+
+/// All leaks. The same on all ranks.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Leaks(pub Vec<Leak>);
+
+/// One side of T0, cut at the level above the surface level.
+pub struct Region {
+    is_inside: bool,
+    /// Octants that a facet crosses or that lie on the other side.
+    walls: PerLevel,
+}
+
+impl Region {
+    /// The regions in which leaks are looked for; `is_inside` returns the side of a local component.
+    pub fn of(
+        tree: &Tree,
+        nodes: &Nodes,
+        rules: &Rules,
+        is_inside: impl Fn(Component) -> bool,
+    ) -> Vec<Self> {
+        let sides: &[bool] = match rules.keep {
+            _ if rules.level_surface == 0 => &[],
+            Keep::Inside if rules.seeds.is_empty() => &[false, true],
+            Keep::Inside => &[true],
+            Keep::Outside | Keep::All => &[false],
+        };
+        let region = |&side: &bool| {
+            let walls = walls(tree, nodes, rules.level_surface - 1, |c| is_inside(c) != side);
+            Self { is_inside: side, walls }
+        };
+        sides.iter().map(region).collect()
+    }
+}
+
+/// Crossing leaves and those of components that are walls, cut at level `cut`: a deeper one makes the octant of that level a wall. Walks
+/// upwards, so that no set deeper than the cut is stored.
+fn walls(tree: &Tree, nodes: &Nodes, cut: Level, is_wall: impl Fn(Component) -> bool) -> PerLevel {
+    let mut walls = per_level();
+    let mut below = BrickSet::default();
+    for l in (0..LEVELS as Level).rev() {
+        let (mut crossing, mut deeper) = (tree.crossing[l as usize].cursor(), below.cursor());
+        let mut set = BrickSet::default();
+        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
+            let of_wall = nodes.components(l, n).filter(|(c, _)| is_wall(*c));
+            let bits =
+                of_wall.fold(crossing.get(key) | deeper.get(key), |all, (_, bits)| all | bits);
+            if l > cut {
+                set.push(key >> 3, u64::from(brick::parents(bits)) << (8 * (key & 7)));
+            } else {
+                set.push(key, bits);
+            }
+        }
+        if l > cut {
+            below = set;
+        } else {
+            below = BrickSet::default();
+            walls[l as usize] = set;
+        }
+    }
+    walls
+}
+
+/// The leaks in all regions of T0. `facets` are this rank's slice of the geometry. Messages are not counted: the mesh does not depend on
+/// them. Collective; the same on all ranks.
+pub fn find(
+    regions: Vec<Region>,
+    tree: &Tree,
+    ownership: &Ownership,
+    facets: &[Facet],
+    rules: &Rules,
+    comm: &dyn Comm,
+) -> Leaks {
+    let mut leaks = Vec::new();
+    uncounted(comm, || {
+        for Region { is_inside, mut walls } in regions {
+            for k in 1..=COARSER.min(rules.level_surface) {
+                let level = rules.level_surface - k;
+                if k > 1 {
+                    let finer = std::mem::take(&mut walls[level as usize + 1]);
+                    let own = std::mem::take(&mut walls[level as usize]);
+                    walls[level as usize] = own.union(finer.coarsen());
+                }
+                // A rank knows the walls in its own part of a brick that others have part of, too.
+                ownership.synchronise_replicas(&mut [&mut walls], comm);
+                let mut split = tree.split[..level as usize].to_vec();
+                split.resize(LEVELS, BrickSet::default());
+                let coarse = Tree { split, crossing: walls };
+                leaks.extend(of_tree(&coarse, level, is_inside, ownership, facets, rules, comm));
+                walls = coarse.crossing;
+            }
+        }
+    });
+    leaks.sort_unstable_by_key(|leak| (u32::MAX - leak.level, leak.first));
+    let leaks = Leaks(leaks);
+    leaks.check_invariants(rules);
+    leaks
+}
+
+/// The components of T0/k without seeds whose side by rays is not that of their region.
+fn of_tree(
+    tree: &Tree,
+    level: Level,
+    is_inside: bool,
+    ownership: &Ownership,
+    facets: &[Facet],
+    rules: &Rules,
+    comm: &dyn Comm,
+) -> Vec<Leak> {
+    let components = Components::new(tree, ownership, comm);
+    let label = |c| components.label(c);
+    let found = seeds::find(rules, tree, &components.nodes, ownership, label, comm);
+    let seeded: HashSet<Label> = found.into_values().flatten().collect();
+    let verdict = vote::decide(&components.all, &components.candidates, facets, comm);
+    let leaked =
+        |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);
+    let leaked: Vec<_> = components.all.iter().filter(|(label, _)| leaked(label)).collect();
+    if leaked.is_empty() {
+        return Vec::new();
+    }
+    let volumes = components.volumes(tree, ownership, comm);
+    let volume = |label| volumes[volumes.partition_point(|v| v[0] < label)][1];
+    let leak = |&&(label, first): &&_| Leak { level, volume: volume(label), first, is_inside };
+    leaked.iter().map(leak).collect()
+}
+
+impl Components {
+    /// Each component's label and volume, in octants of level 19. Collective; the same on all ranks.
+    fn volumes(&self, tree: &Tree, ownership: &Ownership, comm: &dyn Comm) -> Vec<[u64; 2]> {
+        let mut mine = vec![0; self.labels.len()];
+        for l in 0..=LEVEL_MAX {
+            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
+                for (c, bits) in self.nodes.components(l, n).filter(|_| ownership.owns(l, key)) {
+                    mine[self.merged[c as usize] as usize] +=
+                        u64::from(bits.count_ones()) << (3 * (LEVEL_MAX - l));
+                }
+            }
+        }
+        let mine = self.labels.iter().zip(mine).map(|(&label, volume)| [label, volume]).collect();
+        all_gather_reduced(mine, |a, b| a + b, comm)
+    }
+}
+
+impl Leaks {
+    /// Checks the invariants.
+    ///
+    /// # Panics
+    /// If one is violated; the message names the leak.
+    pub fn check_invariants(&self, rules: &Rules) {
+        let order = |leak: &Leak| (u32::MAX - leak.level, leak.first);
+        for pair in self.0.windows(2) {
+            assert!(order(&pair[0]) < order(&pair[1]), "leaks must be in order: {pair:?}");
+        }
+        let volume = |l: Level| 1u64 << (3 * (LEVEL_MAX - l));
+        for leak in &self.0 {
+            let (level, (first, code)) = (rules.level_surface, leak.first.leaf());
+            assert!(
+                leak.level < level && leak.level + COARSER >= level && first <= leak.level,
+                "a leak of surface level {level} must have one of the {COARSER} levels above: {leak:?}"
+            );
+            assert!(
+                leak.volume >= volume(first) && leak.volume.is_multiple_of(volume(leak.level)),
+                "a leak's volume must be that of leaves, its first among them: {leak:?}"
+            );
+            assert!(code >> (3 * first) == 0, "a leak's first leaf must lie in the root: {leak:?}");
+        }
+        for level in 0..rules.level_surface {
+            let of_level = self.0.iter().filter(|leak| leak.level == level);
+            let sum: u64 = of_level.map(|leak| leak.volume).sum();
+            assert!(
+                sum <= volume(0),
+                "the leaks of level {level} must fit into the root: {self:?}"
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tree::tests::rules;
+
+    /// A leak between level 2 and the surface level, 3: two octants of level 2.
+    fn leak() -> Leak {
+        let volume = 2 << (3 * (LEVEL_MAX - 2));
+        Leak { level: 2, volume, first: Candidate::new(2, 5), is_inside: false }
+    }
+
+    fn check(leaks: &[Leak]) {
+        Leaks(leaks.to_vec()).check_invariants(&rules());
+    }
+
+    #[test]
+    fn leaks_of_both_coarser_levels_are_in_order() {
+        check(&[]);
+        let finer = Leak { first: Candidate::new(2, 9), ..leak() };
+        let coarser = Leak {
+            level: 1,
+            volume: 1 << (3 * (LEVEL_MAX - 1)),
+            first: Candidate::new(1, 1),
+            ..leak()
+        };
+        check(&[leak(), finer, coarser]);
+    }
+
+    #[test]
+    #[should_panic(expected = "leaks must be in order")]
+    fn a_leak_that_is_listed_twice_is_found() {
+        check(&[leak(); 2]);
+    }
+
+    #[test]
+    #[should_panic(expected = "must have one of the 2 levels above")]
+    fn a_leak_of_the_surface_level_is_found() {
+        check(&[Leak { level: 3, ..leak() }]);
+    }
+
+    #[test]
+    #[should_panic(expected = "must be that of leaves")]
+    fn a_volume_of_a_part_of_an_octant_is_found() {
+        check(&[Leak { volume: leak().volume + 1, ..leak() }]);
+    }
+
+    #[test]
+    #[should_panic(expected = "must be that of leaves")]
+    fn a_volume_smaller_than_the_first_leaf_is_found() {
+        check(&[Leak { volume: 0, ..leak() }]);
+    }
+
+    #[test]
+    #[should_panic(expected = "must lie in the root")]
+    fn a_point_outside_the_root_is_found() {
+        check(&[Leak { first: Candidate::new(2, 64), ..leak() }]);
+    }
+
+    #[test]
+    #[should_panic(expected = "must fit into the root")]
+    fn leaks_larger_than_the_root_are_found() {
+        check(&[Leak { volume: 65 << (3 * (LEVEL_MAX - 2)), ..leak() }]);
+    }
+}

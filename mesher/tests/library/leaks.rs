@@ -1,0 +1,74 @@
+//! Regions that are closed at a coarser spacing and open at that of the mesh.
+
+use crate::support::{Facet, Run, Small, closed, config, division, run, slit, small};
+use mesher::lattice::Keep;
+use mesher::partition::Partitioner;
+use proptest::prelude::*;
+
+/// Cells of edge 2 leak through slits wider than 4 for certain, those of edge 4 not through slits of 4 or less.
+#[test]
+fn slits_leak_into_the_spacing_that_they_are_wider_than() {
+    let (inside, far) = (vec![[20.0, 20.0, 20.0]], vec![[2.0, 2.0, 2.0]]);
+    let mut leaks = [0; 9];
+    for (number, width) in (1..=8u8).zip(1..) {
+        for at in [20.0, 21.5, 23.0] {
+            for (keep, seeds) in [
+                (Keep::Outside, vec![]),
+                (Keep::All, vec![]),
+                (Keep::Inside, vec![]),
+                (Keep::Inside, inside.clone()),
+                (Keep::Outside, far.clone()),
+            ] {
+                let case = slit(f32::from(number), at, keep, seeds);
+                let want = case.reference_outcome(false).leaks;
+                for ranks in [1, 3, 11] {
+                    let division = division(Partitioner::Morton, None);
+                    let run = Run { ranks, seed: 7, division };
+                    assert_eq!(case.outcome(&run, false).leaks, want, "{case:?} on {ranks} ranks");
+                }
+                // The box is 24 x 24 x 21, without crossing cells of edge 4 or 8. If the inside is kept, the rest of the root may leak into it.
+                let volumes = if keep == Keep::Inside { 1e3..3e5 } else { 1e3..1e4 };
+                for leak in &want {
+                    assert!(volumes.contains(&leak.volume), "{leak:?} of {case:?}");
+                    assert_eq!(leak.spacing_fine, 2.0);
+                }
+                leaks[width] += usize::from(!want.is_empty());
+            }
+        }
+    }
+    assert_eq!((&leaks[..3], &leaks[5..8]), (&[0; 3][..], &[15; 3][..]), "{leaks:?}");
+}
+
+/// Bodies without some of their facets.
+fn torn() -> impl Strategy<Value = Vec<Facet>> {
+    (closed(), prop::collection::vec(any::<prop::sample::Index>(), 1..4)).prop_map(
+        |(mut facets, missing)| {
+            missing.into_iter().for_each(|i| _ = facets.swap_remove(i.index(facets.len())));
+            facets
+        },
+    )
+}
+
+fn seeded(facets: impl Strategy<Value = Vec<Facet>>) -> impl Strategy<Value = Small> {
+    let seed = [0.0f64..64.0, 0.0f64..64.0, 0.0f64..64.0];
+    let seeds = prop_oneof![Just(vec![]), prop::collection::vec(seed, 1..3)];
+    (small(facets), seeds).prop_map(|(case, seeds)| Small { seeds, ..case })
+}
+
+proptest! {
+    #![proptest_config(config(150))]
+
+    #[test]
+    fn leaks_of_torn_bodies_equal_the_reference(case in seeded(torn()), run in run()) {
+        match case.try_reference_outcome(false) {
+            Ok(want) => prop_assert_eq!(case.outcome(&run, false).leaks, want.leaks),
+            Err(_) => prop_assert!(case.try_outcome(&run, false).is_err()),
+        }
+    }
+
+    #[test]
+    fn closed_bodies_do_not_leak(case in seeded((closed(), closed()).prop_map(|(a, b)| [a, b].concat()))) {
+        let Ok(want) = case.try_reference_outcome(false) else { return Ok(()) };
+        prop_assert_eq!((case.outcome(&Run::SOLO, false).leaks, want.leaks), (vec![], vec![]));
+    }
+}

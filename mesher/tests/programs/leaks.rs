@@ -1,0 +1,62 @@
+//! What users see of a geometry that leaks.
+
+use crate::process::{Workspace, read_json, run};
+use crate::support::schedules::write;
+use crate::support::{Small, slit};
+use mesher::lattice::Keep;
+use serde_json::{Value, json};
+
+/// Runs the mesher on a case; returns its warnings and the leaks in report and manifest. With `--strict`, a warning is an error and leaves no mesh.
+fn meshed(case: &Small, comm: &str) -> (Vec<String>, Value) {
+    let workspace = Workspace::new();
+    write(case, workspace.path(), "case");
+    let args = ["case.toml", "--out", "mesh", "--json", "run.json", comm];
+    let ended = run(workspace.mesher(&args));
+    assert_eq!(ended.code, Some(0), "{ended:?}");
+    let warnings = ended.stderr.lines().filter_map(|line| line.strip_prefix("mesher: warning: "));
+    let warnings: Vec<String> = warnings.map(str::to_owned).collect();
+    let (report, manifest) =
+        (workspace.json("run.json"), read_json(&workspace.path().join("mesh/mesh.json")));
+    assert_eq!((&report["warnings"], &report["leaks"]), (&json!(warnings), &manifest["leaks"]));
+
+    let strict = run(workspace.mesher(&["case.toml", "--out", "strict", "--strict", comm]));
+    let message = warnings.first().map_or(String::new(), |warning| format!("mesher: {warning}\n"));
+    let code = i32::from(!warnings.is_empty());
+    assert_eq!((strict.code, strict.stderr), (Some(code), message));
+    assert_eq!(workspace.path().join("strict").exists(), code == 0);
+    (warnings, manifest["leaks"].clone())
+}
+
+#[test]
+fn leaks_are_warnings_or_errors() {
+    for comm in ["--comm=solo", "--comm=sim:3"] {
+        let (warnings, leaks) = meshed(&slit(6.0, 20.0, Keep::Outside, vec![]), comm);
+        assert_eq!(
+            (warnings.len(), &leaks[0]["spacing_coarse"], &leaks[0]["spacing_fine"]),
+            (1, &json!(4.0), &json!(2.0))
+        );
+        let [x, y, z] = [0, 1, 2]
+            .map(|a| leaks[leaks.as_array().expect("a list").len() - 1]["point"][a].to_string());
+        let command = format!("`harness leak case.toml --from {x},{y},{z}`")
+            .replace(".0,", ",")
+            .replace(".0`", "`");
+        assert!(
+            warnings[0].starts_with("the geometry leaks: a region with a volume of "),
+            "{warnings:?}"
+        );
+        assert!(warnings[0].contains(&command), "{command} in {warnings:?}");
+
+        let closed = slit(0.0, 20.0, Keep::Outside, vec![]);
+        assert_eq!(meshed(&closed, comm), (vec![], json!([])));
+        // Wider than the cells of any spacing that is compared.
+        let (warnings, leaks) = meshed(&slit(20.0, 11.0, Keep::Outside, vec![]), comm);
+        assert_eq!((warnings.len(), leaks), (1, json!([])));
+        assert!(
+            warnings[0].starts_with("the facets bound no inside at spacings of 2, 4 and 8"),
+            "{warnings:?}"
+        );
+        let mut sheet = closed;
+        sheet.facets.truncate(2);
+        assert_eq!(meshed(&sheet, comm), (vec![], json!([])));
+    }
+}

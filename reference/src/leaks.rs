@@ -1,0 +1,87 @@
+//! Leaks between spacings: regions that are closed at a coarser spacing and open at that of the mesh.
+use crate::base;
+use crate::case::Keep;
+use crate::lattice::{Facet, Input, LatticeBox, location};
+use crate::octant::{LEVEL_MAX, Side};
+use crate::seeds::leaf_at;
+use crate::sides::Component;
+use crate::tree::{Index, Tree};
+use serde::Serialize;
+use std::collections::HashSet;
+
+/// A region that has leaked, in the user's unit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Leak {
+    /// The spacing at which the region is closed.
+    pub spacing_coarse: f64,
+    /// The spacing of the mesh.
+    pub spacing_fine: f64,
+    /// The region's volume at the coarser spacing.
+    pub volume: f64,
+    /// The centroid of its first leaf at that spacing.
+    pub point: [f64; 3],
+}
+
+/// The leaks of T0, which is `tree` with its sides.
+#[must_use]
+pub fn find(tree: &Tree, input: &Input) -> Vec<Leak> {
+    // Without seeds this follows from the rays.
+    if !input.seeds.is_empty() && is_closed(&input.facets) {
+        return Vec::new();
+    }
+    (1..=input.level_surface.min(2)).flat_map(|k| between(tree, input, k)).collect()
+}
+
+/// Whether every edge belongs to an even number of facets.
+fn is_closed(facets: &[Facet]) -> bool {
+    let mut odd = HashSet::new();
+    for [a, b, c] in facets {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            let edge = [from.min(to), from.max(to)];
+            if from != to && !odd.remove(&edge) {
+                odd.insert(edge);
+            }
+        }
+    }
+    odd.is_empty()
+}
+
+/// The leaks between T0/k and T0.
+fn between(tree: &Tree, input: &Input, k: u32) -> Vec<Leak> {
+    let level = input.level_surface - k;
+    let cut = |b: &LatticeBox| LatticeBox { level: b.level.min(level), ..*b };
+    let boxes = input.boxes.iter().map(cut).collect();
+    let by_rays = Input { level_surface: level, boxes, seeds: Vec::new(), ..input.clone() };
+    let Ok((coarse, components)) = base(&by_rays) else {
+        unreachable!("only seeds can be unusable");
+    };
+    let leaked = |coarse: Side, fine: Side| match (coarse, fine) {
+        (Side::Inside, Side::Outside) => input.seeds.is_empty() || input.keep != Keep::Inside,
+        (Side::Outside, Side::Inside) => input.keep == Keep::Inside,
+        _ => false,
+    };
+    let seeds = input.seeds.iter();
+    let seeded: Vec<Index> = seeds.filter_map(|seed| leaf_at(&coarse, seed.point)).collect();
+    let has_seed =
+        |component: &Component| seeded.iter().any(|leaf| component.leaves.contains(leaf));
+    let mut leaks = Vec::new();
+    for component in components {
+        let first = coarse.octant(component.leaves[0]);
+        // All leaves of T0 within a leaf of T0/k that no facet crosses have one side.
+        let within = tree.leaves_meeting(&first.extent())[0];
+        if leaked(component.side, tree.side(within)) && !has_seed(&component) {
+            let edge = |level: u32| input.root.edge / f64::from(1_u32 << level);
+            let volume = |level: u32| 1_u64 << (3 * (LEVEL_MAX - level));
+            let levels = component.leaves.iter().map(|&leaf| coarse.octant(leaf).level);
+            let leak = Leak {
+                spacing_coarse: edge(level),
+                spacing_fine: edge(input.level_surface),
+                volume: levels.map(volume).sum::<u64>() as f64 * edge(LEVEL_MAX).powi(3),
+                point: location(&input.root, first.centroid()),
+            };
+            leaks.push((first.coarsest_first(), leak));
+        }
+    }
+    leaks.sort_by_key(|(first, _)| *first);
+    leaks.into_iter().map(|(_, leak)| leak).collect()
+}
