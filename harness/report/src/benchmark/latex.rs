@@ -1,16 +1,16 @@
 //! A LaTeX fragment with all figures, and a draft of an artifact description.
 
 use crate::figure::Figure;
-use crate::figure::tikz::escape;
+use crate::figure::tex::{PREAMBLE, escape};
 use bench::experiments::entry::{Entry, Line, Machine};
 use std::fmt::Write;
 
-/// The TikZ figures with captions and labels, for `\input` in a document.
+/// The figures with captions and labels, for `\input` in a document.
 pub fn fragment(figures: &[Figure]) -> String {
-    let mut out = String::from(
-        "% Made by `harness report`. Requires \\usepackage{pgfplots} and \\pgfplotsset{compat=1.16}.\n\
-         % \\figures is the directory of the .tex files and of the images of the message matrices.\n\
-         \\providecommand{\\figures}{figures}\n",
+    let mut out = format!(
+        "% Made by `harness report`. Requires {PREAMBLE}.\n\
+         % \\figures is the directory of the .tex files and of the .csv files that they read.\n\
+         \\providecommand{{\\figures}}{{figures}}\n"
     );
     for f in figures {
         let _ = write!(

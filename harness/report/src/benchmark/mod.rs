@@ -16,7 +16,7 @@ pub mod tables;
 use crate::figure::check::check_invariants;
 #[cfg(feature = "figures")]
 use crate::figure::raster;
-use crate::figure::{Body, Figure, csv, heat, name_apart, svg, tikz};
+use crate::figure::{Figure, csv, name_apart, svg, tex};
 use crate::track::figures as trend;
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
@@ -77,12 +77,7 @@ fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<Drawn<'a
     let path = |extension: &str| directory.join(format!("{}.{extension}", figure.id));
     write(&path("svg"), &svg)?;
     write(&path("csv"), &csv)?;
-    write(&path("tex"), tikz::tikz(figure))?;
-    if let Body::HeatMap(map) = &figure.body {
-        for layer in &map.layers {
-            write(&directory.join(tikz::image(figure, layer)), heat::png(map.order, layer))?;
-        }
-    }
+    write(&path("tex"), tex::tex(figure))?;
     #[cfg(feature = "figures")]
     {
         write(&path("png"), raster::png(&svg).map_err(io::Error::other)?)?;

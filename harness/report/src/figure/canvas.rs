@@ -1,7 +1,13 @@
-//! Lines, markers and text as elements of an SVG document.
+//! A drawing as SVG. `plotters` draws axes, lines, markers and text; shapes of which there may be thousands are one path for each colour,
+//! below what `plotters` draws.
 
-use super::palette::{MARKERS, colour, hex};
-use maud::{Markup, html};
+use super::palette::{MARKERS, colour};
+use maud::html;
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::fmt::Write;
 
 /// Width of every figure in the units of its coordinates.
 pub const WIDTH: u32 = 1600;
@@ -13,11 +19,17 @@ pub const SIZE: f64 = 42.0;
 /// Colour of axes and text: that of the page's text where the drawing is part of a page, else black.
 pub const INK: &str = "currentColor";
 /// Colour of grid lines.
-pub const FAINT: &str = "#AAAAAA";
+pub const FAINT: RGBColor = RGBColor(170, 170, 170);
+
+/// Dashes and gaps of a line; `None` for a solid one.
+pub type Dashes = Option<(u32, u32)>;
 /// Dashes of a theoretical bound, and of the first reference line.
-pub const DOTTED: &str = "14 10";
+pub const DOTTED: Dashes = Some((14, 10));
 /// Dashes of a series that is not measured.
-pub const DASHED: &str = "22 15";
+pub const DASHED: Dashes = Some((22, 15));
+
+/// A point on the page.
+pub type At = (f64, f64);
 
 /// Position of a text relative to its point.
 #[derive(Clone, Copy, Debug)]
@@ -32,50 +44,92 @@ pub enum Anchor {
     Turned,
 }
 
-/// An SVG document under construction; each element is on a line of its own. The origin is the upper left corner.
-pub struct Canvas {
-    /// Identifier of the figure: on one page, identifiers of patterns must differ.
-    id: String,
-    elements: String,
+/// Why drawing cannot fail.
+const DRAWN: &str = "a string accepts every element";
+
+/// Height of the page while it is drawn on; its own is known when all is drawn.
+const HEIGHT_MAX: u32 = 1 << 14;
+
+/// A drawing; the origin is the upper left corner.
+pub struct Canvas<'a> {
+    /// What `plotters` draws on.
+    pub area: DrawingArea<SVGBackend<'a>, Shift>,
+    /// Shapes as text.
+    below: String,
+    above: String,
 }
 
-impl Canvas {
-    /// An empty canvas.
-    pub fn new(id: &str) -> Self {
-        Self { id: id.to_owned(), elements: String::new() }
+/// The document of what `paint` draws, which returns its height; `title` describes it to those who do not see it.
+pub fn document(title: &str, paint: impl FnOnce(&mut Canvas) -> u32) -> String {
+    let mut lines = String::new();
+    let (height, below, above) = {
+        let area = SVGBackend::with_string(&mut lines, (WIDTH, HEIGHT_MAX)).into_drawing_area();
+        let mut canvas = Canvas { area, below: String::new(), above: String::new() };
+        let height = paint(&mut canvas);
+        canvas.area.present().expect(DRAWN);
+        (height, canvas.below, canvas.above)
+    };
+    let (_, lines) = lines.split_once('\n').expect("an element begins the document");
+    let lines = lines.trim_end().strip_suffix("</svg>").expect("it ends the document");
+    let lines = lines.replace("\"#000000\"", &format!("\"{INK}\"")).replace(" opacity=\"1\"", "");
+    // A text is on the line of its element.
+    let lines = lines.replace("\n</text>", "</text>");
+    let end = |line: &str| if line.starts_with("<text") { "" } else { "\n" };
+    let lines: String = lines.lines().flat_map(|line| [line, end(line)]).collect();
+    let content = maud::PreEscaped(format!("\n{below}{lines}{above}"));
+    let document = html! {
+        svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label=(title) width=(WIDTH) height=(height)
+            viewBox=(format!("0 0 {WIDTH} {height}")) font-family=(FONT) font-size=(SIZE) { (content) }
+    };
+    document.into_string() + "\n"
+}
+
+fn pixel((x, y): At) -> (i32, i32) {
+    (x.round() as i32, y.round() as i32)
+}
+
+/// The font of all text, turned upwards or not.
+pub fn font() -> TextStyle<'static> {
+    // plotters divides the size by this factor in SVG.
+    (FONT, SIZE * 1.24).into_font().color(&BLACK)
+}
+
+/// Estimated width of a text; exact widths depend on the reader's fonts.
+pub fn width(text: &str) -> f64 {
+    text.chars().count() as f64 * SIZE * 0.56
+}
+
+impl Canvas<'_> {
+    /// Draws a line through points.
+    pub fn line(&self, points: &[At], colour: RGBColor, width: u32, dashes: Dashes) {
+        let style = colour.stroke_width(width);
+        let points: Vec<(i32, i32)> = points.iter().copied().map(pixel).collect();
+        match dashes {
+            None => self.area.draw(&PathElement::new(points, style)),
+            Some((dash, gap)) => {
+                self.area.draw(&DashedPathElement::new(points.into_iter(), dash, gap, style))
+            }
+        }
+        .expect(DRAWN);
     }
 
-    /// The document with the given height; `title` describes it to those who do not see it.
-    pub fn document(self, title: &str, height: u32) -> String {
-        let content = maud::PreEscaped(format!("\n{}", self.elements));
-        let document = html! {
-            svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label=(title) width=(WIDTH) height=(height)
-                viewBox=(format!("0 0 {WIDTH} {height}")) font-family=(FONT) font-size=(SIZE) { (content) }
-        };
-        document.into_string() + "\n"
+    /// Draws the frame of a rectangle given by two opposite corners.
+    pub fn frame(&self, (x0, y0): At, (x1, y1): At) {
+        self.line(&[(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], BLACK, 2, None);
     }
 
-    fn put(&mut self, element: Markup) {
-        self.elements.push_str(&element.0);
-        self.elements.push('\n');
+    /// Draws a bar, filled with its colour or with a tint of it: bars with odd styles are lighter, so that neighbours differ in grey too.
+    pub fn bar(&self, from: At, to: At, style: usize) {
+        let ink = colour(style);
+        let fill = ink.mix(if style % 2 == 1 { 0.35 } else { 1.0 }).filled();
+        self.area.draw(&Rectangle::new([pixel(from), pixel(to)], fill)).expect(DRAWN);
+        let corners = [from, (to.0, from.1), to, (from.0, to.1), from];
+        self.line(&corners, ink, 2, None);
     }
 
-    /// A line through points, solid or with dashes.
-    pub fn line(&mut self, points: &[(f64, f64)], colour: &str, width: f64, dashes: Option<&str>) {
-        self.put(html! {
-            polyline points=(coordinates(points)) fill="none" stroke=(colour) stroke-width=(width)
-                stroke-dasharray=[dashes] {}
-        });
-    }
-
-    /// The frame of a rectangle given by two opposite corners.
-    pub fn frame(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) {
-        self.line(&[(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], INK, 2.0, None);
-    }
-
-    /// The marker of a style, filled or hollow, with a note that is shown under the pointer.
-    pub fn marker(&mut self, (x, y): (f64, f64), style: usize, filled: bool, note: Option<&str>) {
-        let corners: &[(f64, f64)] = match style % MARKERS {
+    /// Draws the marker of a style, filled or hollow.
+    pub fn marker(&self, (x, y): At, style: usize, filled: bool) {
+        let corners: &[At] = match style % MARKERS {
             1 => &[(-11.0, -11.0), (11.0, -11.0), (11.0, 11.0), (-11.0, 11.0)],
             2 => &[(0.0, -15.0), (14.0, 11.0), (-14.0, 11.0)],
             3 => &[(0.0, -16.0), (16.0, 0.0), (0.0, 16.0), (-16.0, 0.0)],
@@ -83,96 +137,90 @@ impl Canvas {
             5 => &[(-14.0, -5.0), (0.0, -15.0), (14.0, -5.0), (9.0, 12.0), (-9.0, 12.0)],
             _ => &[],
         };
-        let ink = hex(colour(style));
-        let fill = if filled { ink.as_str() } else { "none" };
-        let title = html! { @if let Some(note) = note { title { (note) } } };
+        let ink = colour(style);
         if corners.is_empty() {
-            return self.put(html! {
-                circle cx=(round(x)) cy=(round(y)) r="12" fill=(fill) stroke=(ink) stroke-width="4" { (title) }
-            });
+            let shape = if filled { ink.filled() } else { ink.stroke_width(4) };
+            return self
+                .area
+                .draw(&Circle::new(pixel((x, y)), if filled { 14 } else { 12 }, shape))
+                .expect(DRAWN);
         }
-        let points: Vec<(f64, f64)> = corners.iter().map(|p| (x + p.0, y + p.1)).collect();
-        self.put(html! {
-            polygon points=(coordinates(&points)) fill=(fill) stroke=(ink) stroke-width="4" { (title) }
-        });
+        let mut points: Vec<At> = corners.iter().map(|c| (x + c.0, y + c.1)).collect();
+        if filled {
+            let corners: Vec<(i32, i32)> = points.iter().copied().map(pixel).collect();
+            self.area.draw(&Polygon::new(corners, ink.filled())).expect(DRAWN);
+        }
+        // Twice the first edge, so that the corner where the line ends is like the others.
+        points.extend_from_within(..2);
+        self.line(&points, ink, 4, None);
     }
 
-    /// Defines the hatching of bars of a style. Bars with odd styles are hatched so that neighbours differ in grey
-    /// too.
-    pub fn define_hatching(&mut self, style: usize) {
-        let ink = hex(colour(style));
-        self.put(html! {
-            pattern id=(self.hatching(style)) width="18" height="18" patternUnits="userSpaceOnUse" {
-                rect width="18" height="18" fill=(ink) fill-opacity="0.35" {}
-                path d="M-4 4L4 -4M0 18L18 0M14 22L22 14" stroke=(ink) stroke-width="3" {}
-            }
-        });
+    /// Draws a text.
+    pub fn text(&self, text: &str, at: At, anchor: Anchor) {
+        let pos = match anchor {
+            Anchor::Start => Pos::new(HPos::Left, VPos::Center),
+            Anchor::Below => Pos::new(HPos::Center, VPos::Top),
+            Anchor::End => Pos::new(HPos::Right, VPos::Center),
+            Anchor::Turned => Pos::new(HPos::Center, VPos::Bottom),
+        };
+        let style = match anchor {
+            Anchor::Turned => font().transform(FontTransform::Rotate270),
+            _ => font(),
+        };
+        self.area.draw(&Text::new(text, pixel(at), style.pos(pos))).expect(DRAWN);
     }
 
-    fn hatching(&self, style: usize) -> String {
-        format!("{}-hatching-{style}", self.id)
+    // Many shapes of one colour are one path, below all else. Coordinates are rounded to a tenth of a unit.
+
+    fn path(&mut self, path: &str, style: &str) {
+        // Writing into a string cannot fail.
+        let _ = writeln!(self.below, "<path d=\"{path}\" {style}/>");
     }
 
-    /// A bar of a style, given by its upper left and lower right corner.
-    pub fn bar(&mut self, from: (f64, f64), to: (f64, f64), style: usize) {
-        let ink = hex(colour(style));
-        let fill =
-            if style % 2 == 1 { format!("url(#{})", self.hatching(style)) } else { ink.clone() };
-        self.put(html! {
-            rect x=(round(from.0)) y=(round(from.1)) width=(round(to.0 - from.0)) height=(round(to.1 - from.1))
-                fill=(fill) stroke=(ink) stroke-width="2" {}
-        });
-    }
-
-    /// Rectangles of one colour as one element: lower corner and size of each.
+    /// Rectangles of one colour without seams between neighbours: corner and size of each.
     pub fn fill(&mut self, rectangles: &[[f64; 4]], colour: &str) {
-        let path = rectangle_path(rectangles);
-        // Without smoothing, neighbours have no seam between them.
-        self.put(html! { path d=(path) fill=(colour) shape-rendering="crispEdges" {} });
+        self.path(
+            &rectangle_path(rectangles),
+            &format!("fill=\"{colour}\" shape-rendering=\"crispEdges\""),
+        );
     }
 
-    /// Outlined rectangles of one colour as one element: lower corner and size of each.
+    /// Outlined rectangles of one colour.
     pub fn outlined(&mut self, rectangles: &[[f64; 4]], fill: &str, stroke: &str) {
-        let path = rectangle_path(rectangles);
-        self.put(html! { path d=(path) fill=(fill) stroke=(stroke) stroke-width="0.7" {} });
+        self.path(
+            &rectangle_path(rectangles),
+            &format!("fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"0.7\""),
+        );
     }
 
-    /// Segments as one element, with round ends.
-    pub fn segments(&mut self, segments: &[[(f64, f64); 2]], colour: &str, width: f64) {
-        let path = |[p, q]: &[(f64, f64); 2]| {
+    /// Outlined polygons of one colour.
+    pub fn polygons(&mut self, polygons: &[Vec<At>], fill: &str, stroke: &str) {
+        let point = |p: &At| format!("{},{}", round(p.0), round(p.1));
+        let path = |polygon: &Vec<At>| {
+            format!("M{}z", polygon.iter().map(point).collect::<Vec<_>>().join(" "))
+        };
+        let path: String = polygons.iter().map(path).collect();
+        self.path(&path, &format!("fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"1.5\""));
+    }
+
+    /// Segments of one colour and width, with round ends.
+    pub fn segments(&mut self, segments: &[[At; 2]], colour: &str, width: f64) {
+        let path = |[p, q]: &[At; 2]| {
             let [x0, y0, x1, y1] = [p.0, p.1, q.0, q.1].map(round);
             format!("M{x0} {y0}L{x1} {y1}")
         };
         let path: String = segments.iter().map(path).collect();
-        self.put(html! {
-            path d=(path) fill="none" stroke=(colour) stroke-width=(width) stroke-linecap="round" {}
-        });
+        self.path(&path, &format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\""));
     }
 
-    /// Outlined polygons as one element.
-    pub fn polygons(&mut self, polygons: &[Vec<(f64, f64)>], fill: &str, stroke: &str) {
-        let path = |polygon: &Vec<(f64, f64)>| format!("M{}z", coordinates(polygon));
-        let path: String = polygons.iter().map(path).collect();
-        self.put(html! { path d=(path) fill=(fill) stroke=(stroke) stroke-width="1.5" {} });
-    }
-
-    /// A text.
-    pub fn text(&mut self, text: &str, (x, y): (f64, f64), anchor: Anchor) {
-        let (x, y) = (round(x), round(y));
-        let (align, shift) = match anchor {
-            Anchor::Start => ("start", "0.36em"),
-            Anchor::Below => ("middle", "0.76em"),
-            Anchor::End => ("end", "0.36em"),
-            Anchor::Turned => ("middle", "0"),
-        };
-        let turn = matches!(anchor, Anchor::Turned).then(|| format!("rotate(-90 {x} {y})"));
-        self.put(html! {
-            text x=(x) y=(y) dy=(shift) text-anchor=(align) fill=(INK) transform=[turn] { (text) }
-        });
+    /// A note that is shown while the pointer is near a point.
+    pub fn note(&mut self, (x, y): At, note: &str) {
+        let circle = html! { circle cx=(round(x)) cy=(round(y)) r="16" fill-opacity="0" { title { (note) } } };
+        self.above += &(circle.into_string() + "\n");
     }
 }
 
-/// Coordinates to a tenth of a unit.
+/// A coordinate to a tenth of a unit.
 fn round(value: f64) -> f64 {
     // Adding zero turns -0 into 0.
     (value * 10.0).round() / 10.0 + 0.0
@@ -184,15 +232,4 @@ fn rectangle_path(rectangles: &[[f64; 4]]) -> String {
         format!("M{x} {y}h{width}v{height}h-{width}z")
     };
     rectangles.iter().map(path).collect()
-}
-
-fn coordinates(points: &[(f64, f64)]) -> String {
-    let pairs: Vec<String> =
-        points.iter().map(|p| format!("{},{}", round(p.0), round(p.1))).collect();
-    pairs.join(" ")
-}
-
-/// Estimated width of a text; exact widths depend on the reader's fonts.
-pub fn width(text: &str) -> f64 {
-    text.chars().count() as f64 * SIZE * 0.5
 }

@@ -1,52 +1,69 @@
-//! The values of a figure as CSV.
+//! The values of a figure as CSV. Numbers come first and text has no commas, so that `pgfplots` can read it.
 
-use super::{Body, Figure};
+use super::{Body, Figure, HeatMap};
 
-/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title and the axes.
+/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title, the axes and the command of a run. Rows that belong
+/// together have the same number `plot`.
 pub fn csv(figure: &Figure) -> String {
     let mut head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
-    let rows = match &figure.body {
-        Body::Points { series, .. } => series
-            .iter()
-            .flat_map(|s| s.points.iter().map(move |p| (s, p)))
-            .map(|(s, p)| {
-                let numbers = [p.x, p.y, p.low, p.high].map(|v| v.to_string());
-                let mut row = vec![s.name.clone(), s.provenance.word().to_owned()];
-                row.extend(numbers);
-                row.extend([p.count.to_string(), format!("{:.4}", p.coverage)]);
-                row
-            })
-            .collect(),
-        Body::Bars(bars) => {
-            let word = bars.provenance.word();
-            let bar = |(i, category): (usize, &String)| {
-                let value = |(name, values): &(String, Vec<f64>)| {
-                    vec![category.clone(), name.clone(), word.to_owned(), values[i].to_string()]
+    let (columns, rows): (&[&str], Vec<(usize, Vec<f64>, Vec<String>)>) = match &figure.body {
+        Body::Points { series, .. } => {
+            let of = |(plot, s): (usize, &super::Series)| {
+                let text = vec![s.name.clone(), s.provenance.word().to_owned()];
+                let row = |p: &super::Point| {
+                    let coverage = (p.coverage * 1e4).round() / 1e4;
+                    (plot, vec![p.x, p.y, p.low, p.high, p.count as f64, coverage], text.clone())
                 };
-                bars.segments.iter().map(value).collect::<Vec<_>>()
+                s.points.iter().map(row).collect::<Vec<_>>()
             };
-            let reference = |(name, level): &(String, f64)| {
-                vec![String::new(), name.clone(), "bound".to_owned(), level.to_string()]
-            };
-            let mut rows: Vec<_> = bars.categories.iter().enumerate().flat_map(bar).collect();
-            rows.extend(bars.references.iter().map(reference));
-            rows
+            let columns = &["plot", "x", "y", "low", "high", "count", "coverage", "series", "how"];
+            (columns, series.iter().enumerate().flat_map(of).collect())
         }
-        Body::HeatMap(map) => {
-            head.push_str(&format!("# {}\n", map.command));
-            let entries = map.layers.iter().flat_map(|l| l.entries.iter().map(move |e| (l, e)));
-            let row = |(layer, (row, column, value)): (&super::Layer, &(usize, usize, f64))| {
-                vec![row.to_string(), column.to_string(), layer.label.clone(), value.to_string()]
-            };
-            entries.map(row).collect::<Vec<_>>()
+        Body::Bars(bars) => {
+            let how = bars.provenance.word();
+            let mut rows = Vec::new();
+            for (plot, (part, values)) in bars.segments.iter().enumerate() {
+                let bar = |(i, name): (usize, &String)| {
+                    (
+                        plot,
+                        vec![i as f64, values[i]],
+                        vec![name.clone(), part.clone(), how.to_owned()],
+                    )
+                };
+                rows.extend(bars.categories.iter().enumerate().map(bar));
+            }
+            // A level is a line from the first bar to the last.
+            let ends = [-0.5, bars.categories.len() as f64 - 0.5];
+            for (plot, (name, level)) in (bars.segments.len()..).zip(&bars.references) {
+                let text = vec![String::new(), name.clone(), "bound".to_owned()];
+                rows.extend(ends.map(|x| (plot, vec![x, *level], text.clone())));
+            }
+            (&["plot", "x", "value", "bar", "part", "how"], rows)
+        }
+        Body::HeatMap(HeatMap { layers, command, .. }) => {
+            head += &format!("# {command}\n");
+            let layers = layers.iter().enumerate();
+            let rows = layers.flat_map(|(plot, layer)| {
+                let row = move |&(row, column, value): &(usize, usize, f64)| {
+                    (plot, vec![row as f64, column as f64, value], vec![layer.label.clone()])
+                };
+                layer.entries.iter().map(row)
+            });
+            (&["plot", "row", "column", "value", "quantity"], rows.collect())
         }
     };
-    let columns: &[&str] = match figure.body {
-        Body::Points { .. } => &["series", "how", "x", "y", "low", "high", "count", "coverage"],
-        Body::Bars(_) => &["bar", "part", "how", "value"],
-        Body::HeatMap(_) => &["row", "column", "quantity", "value"],
+    let row = |(plot, numbers, text): (usize, Vec<f64>, Vec<String>)| {
+        let numbers = numbers.iter().map(f64::to_string);
+        let text = text.iter().map(|text| plain(text));
+        std::iter::once(plot.to_string()).chain(numbers).chain(text).collect()
     };
-    head + &table(columns, rows)
+    head + &table(columns, rows.into_iter().map(row))
+}
+
+/// A name without what ends a field or means something to TeX.
+fn plain(text: &str) -> String {
+    text.replace(", ", "; ")
+        .replace([',', '"', '%', '#', '\\', '{', '}', '$', '&', '~', '^', '\n', '\r'], " ")
 }
 
 /// A CSV table with its head.
@@ -73,15 +90,19 @@ mod tests {
     #[test]
     fn a_matrix_has_its_command_and_a_line_per_entry() {
         let text = csv(&heat_map());
-        assert!(text.contains("# mesher a,b\nrow,column,quantity,value\n0,1,bytes,10\n"), "{text}");
+        assert!(
+            text.contains("# mesher a,b\nplot,row,column,value,quantity\n0,0,1,10,bytes\n"),
+            "{text}"
+        );
         assert_eq!(text.lines().count(), 4 + 3);
     }
 
     #[test]
-    fn every_point_is_a_line() {
+    fn every_point_is_a_line_and_text_is_plain() {
         let both = vec![series(Provenance::Measured), series(Provenance::Projected)];
         let text = csv(&figure(Body::points(both)));
         assert_eq!(text.lines().count(), 3 + 6);
-        assert!(text.contains("\"UAV, projected\",projected,4,4,3.6,4.4,6,0.9700"), "{text}");
+        assert!(text.contains("\n1,4,4,3.6,4.4,6,0.97,UAV; projected,projected\n"), "{text}");
+        assert_eq!(plain("5 % of \"a\", b_1"), "5   of  a ; b_1");
     }
 }

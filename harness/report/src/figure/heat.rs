@@ -1,12 +1,12 @@
-//! Matrices as heat maps, side by side, as drawings and as images.
+//! Matrices as heat maps, side by side.
 //!
 //! Invariants: larger values are darker, so that the order survives in grey; zero has the colour of the background; the
 //! colour scale is logarithmic and ends at powers of ten.
 
-use super::canvas::{Anchor, Canvas, INK, SIZE, WIDTH};
+use super::canvas::{Canvas, SIZE, WIDTH};
 use super::palette::{SHADES, hex, shade};
-use super::scale::Scale;
-use super::{Axis, Figure, HeatMap, Layer, tick_label};
+use super::svg::axes;
+use super::{Axis, Figure, HeatMap, Layer};
 
 /// Ends of the colour scale of a layer: powers of ten that enclose its values.
 pub fn range(layer: &Layer) -> (f64, f64) {
@@ -29,53 +29,21 @@ fn shades(layer: &Layer) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
     layer.entries.iter().filter(|e| e.2 > 0.0).map(move |&(row, column, v)| (row, column, shade(v)))
 }
 
-/// About four ticks along the side of a matrix.
-pub fn ticks(order: usize) -> Vec<usize> {
-    (0..order).step_by(order.div_ceil(4).max(1)).collect()
-}
-
-/// Pixels per entry and direction of an image. More than one, because some viewers smooth small images.
-const ZOOM: usize = 8;
-
-/// A layer as PNG without axes.
-///
-/// # Panics
-/// If an entry is outside of the matrix.
-pub fn png(order: usize, layer: &Layer) -> Vec<u8> {
-    // The last colour of the palette is the background.
-    let mut pixels = vec![SHADES as u8; order * order];
-    shades(layer).for_each(|(row, column, shade)| pixels[row * order + column] = shade as u8);
-    let zoomed = |row: &[u8]| -> Vec<u8> {
-        row.iter().flat_map(|&pixel| [pixel; ZOOM]).collect::<Vec<u8>>().repeat(ZOOM)
-    };
-    let image: Vec<u8> = pixels.chunks(order.max(1)).flat_map(zoomed).collect();
-    let palette: Vec<u8> = (0..SHADES).flat_map(shade).chain([255; 3]).collect();
-    let side = (order.max(1) * ZOOM) as u32;
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, side, side);
-    encoder.set_color(png::ColorType::Indexed);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_palette(palette);
-    encoder.set_compression(png::Compression::Best);
-    encoder.set_filter(png::FilterType::Up);
-    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&image));
-    written.expect("memory accepts an image of the stated size");
-    bytes
-}
-
 /// Edge of a map: a multiple of 16, 32 and 64 ranks.
 const EDGE: f64 = 576.0;
 const TOP: f64 = 30.0;
+/// Space at the right of the last map, for half of a label.
+const RIGHT: f64 = 20.0;
 /// Space for labels at the left of a map.
-const LEFT: f64 = 180.0;
+const LEFT: f64 = 190.0;
 
 /// Draws the layers side by side, each with its colour scale below it.
 pub fn draw(canvas: &mut Canvas, figure: &Figure, map: &HeatMap) {
-    let column = f64::from(WIDTH) / map.layers.len().max(1) as f64;
+    let column = (f64::from(WIDTH) - RIGHT) / map.layers.len().max(1) as f64;
     for (i, layer) in map.layers.iter().enumerate() {
         let left = column * i as f64 + LEFT;
         draw_layer(canvas, figure, map.order, layer, left);
-        draw_scale(canvas, layer, left, f64::from(figure.height) - 250.0);
+        draw_scale(canvas, layer, left, f64::from(figure.height) - 5.4 * SIZE);
     }
 }
 
@@ -83,7 +51,6 @@ fn draw_layer(canvas: &mut Canvas, figure: &Figure, order: usize, layer: &Layer,
     let side = EDGE / order.max(1) as f64;
     // White on a dark page too: the shades are chosen for it.
     canvas.fill(&[[left, TOP, EDGE, EDGE]], "#FFFFFF");
-    // One element per shade instead of one per entry keeps the file small.
     let mut of_shade = vec![Vec::new(); SHADES];
     for (row, column, shade) in shades(layer) {
         of_shade[shade].push([left + column as f64 * side, TOP + row as f64 * side, side, side]);
@@ -91,18 +58,13 @@ fn draw_layer(canvas: &mut Canvas, figure: &Figure, order: usize, layer: &Layer,
     for (i, rectangles) in of_shade.iter().enumerate().filter(|(_, r)| !r.is_empty()) {
         canvas.fill(rectangles, &hex(shade(i)));
     }
-    canvas.frame((left, TOP), (left + EDGE, TOP + EDGE));
-    let bottom = TOP + EDGE;
-    for t in ticks(order) {
-        let middle = (t as f64 + 0.5) * side;
-        let (x, y) = (left + middle, TOP + middle);
-        canvas.line(&[(x, bottom), (x, bottom + 12.0)], INK, 2.0, None);
-        canvas.text(&t.to_string(), (x, bottom + 20.0), Anchor::Below);
-        canvas.line(&[(left - 12.0, y), (left, y)], INK, 2.0, None);
-        canvas.text(&t.to_string(), (left - 20.0, y), Anchor::End);
-    }
-    canvas.text(&figure.x.label, (left + EDGE / 2.0, bottom + 74.0), Anchor::Below);
-    canvas.text(&figure.y.label, (left - 100.0, TOP + EDGE / 2.0), Anchor::Turned);
+    // The middle of an entry has its number.
+    let ticks = (0..order).step_by(order.div_ceil(4).max(1)).map(|t| t as f64);
+    let ticks: Vec<f64> = ticks.collect();
+    let [x, y] = [&figure.x, &figure.y].map(|axis| axis.clone().with_ticks(ticks.clone()));
+    let (first, last) = (-0.5, order as f64 - 0.5);
+    let _ =
+        axes(canvas, [&x, &y], [first..last, last..first], (left, TOP), (left + EDGE, TOP + EDGE));
 }
 
 /// All shades, ticks at powers of ten, and the quantity.
@@ -111,25 +73,20 @@ fn draw_scale(canvas: &mut Canvas, layer: &Layer, left: f64, top: f64) {
     for i in 0..SHADES {
         canvas.fill(&[[left + i as f64 * step, top, step, height]], &hex(shade(i)));
     }
-    let bottom = top + height;
-    canvas.frame((left, top), (left + EDGE, bottom));
-    let scale = Scale::of(&Axis { range: Some(range(layer)), ..Axis::log("") }, []);
+    let (low, high) = range(layer);
+    let decades = (high / low).log10().round() as i32;
     // Labels of many decades would overlap.
-    let every = scale.ticks.len().div_ceil(5).max(1);
-    for (i, t) in scale.ticks.iter().enumerate() {
-        let x = left + scale.position(*t) * EDGE;
-        canvas.line(&[(x, bottom), (x, bottom + 12.0)], INK, 2.0, None);
-        if i % every == 0 {
-            canvas.text(&tick_label(*t), (x, bottom + 20.0), Anchor::Below);
-        }
-    }
-    canvas.text(&layer.label, (left + EDGE / 2.0, bottom + SIZE + 38.0), Anchor::Below);
+    let powers = (0..=decades).step_by(decades.unsigned_abs().div_ceil(4).max(1) as usize);
+    let ticks = powers.map(|power| low * 10f64.powi(power)).collect();
+    let x = Axis { ticks, ..Axis::log(&layer.label) };
+    let y = Axis { ticks: vec![f64::NAN], ..Axis::linear("") };
+    let _ = axes(canvas, [&x, &y], [low..high, 1.0..0.0], (left, top), (left + EDGE, top + height));
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::samples::heat_map;
-    use super::super::{Body, svg};
+    use super::super::svg;
     use super::*;
 
     fn layer(entries: &[(usize, usize, f64)]) -> Layer {
@@ -148,8 +105,6 @@ mod tests {
     fn one_value_and_no_values_have_a_range() {
         assert_eq!(range(&layer(&[(0, 1, 100.0)])), (100.0, 1000.0));
         assert_eq!(range(&layer(&[])), (1.0, 10.0));
-        assert_eq!(ticks(64), [0, 16, 32, 48]);
-        assert_eq!(ticks(3), [0, 1, 2]);
     }
 
     #[test]
@@ -162,24 +117,5 @@ mod tests {
         for text in ["from rank", "to rank", "bytes", "10⁵"] {
             assert!(svg.contains(&format!(">{text}<")), "{text} is missing in\n{svg}");
         }
-    }
-
-    #[test]
-    fn a_decoder_finds_the_entries_in_the_image() {
-        let Body::HeatMap(map) = heat_map().body else { panic!("not a heat map") };
-        let bytes = png(map.order, &map.layers[0]);
-        let mut decoder = png::Decoder::new(&bytes[..]);
-        decoder.set_transformations(png::Transformations::EXPAND);
-        let mut reader = decoder.read_info().unwrap();
-        let mut image = vec![0; reader.output_buffer_size()];
-        let info = reader.next_frame(&mut image).unwrap();
-        assert_eq!((info.width, info.height), (24, 24));
-        let colour = |row: usize, column: usize| {
-            let start = 3 * (row * 24 + column);
-            <[u8; 3]>::try_from(&image[start..start + 3]).unwrap()
-        };
-        assert_eq!(colour(3, 12), shade(0));
-        assert_eq!(colour(20, 4), shade(SHADES - 1));
-        assert_eq!(colour(0, 0), [255; 3]);
     }
 }

@@ -1,5 +1,5 @@
-//! The model of a figure: axes, series, bars, heat maps. SVG ([`svg`]), PGF/TikZ ([`tikz`]) and CSV ([`csv`]) are
-//! produced from it, and PNG and PDF from the SVG.
+//! The model of a figure: axes, series, bars, heat maps. SVG ([`svg`], by `plotters`) and CSV ([`csv`]) are produced from it, PNG and PDF
+//! from the SVG, and an axis of `pgfplots` that reads the CSV ([`tex`]).
 //!
 //! Invariants: every value states its provenance; points are joined only where interpolation between them is
 //! meaningful; captions state the confidence intervals.
@@ -13,7 +13,7 @@ pub mod palette;
 pub mod raster;
 mod scale;
 pub mod svg;
-pub mod tikz;
+pub mod tex;
 
 pub use scale::tick_label;
 

@@ -1,5 +1,7 @@
 //! Colours, dashes and markers of series, and the colour map of heat maps.
 
+use plotters::style::RGBColor;
+
 /// Distinguishable with every kind of colour vision (Okabe and Ito), the first ones also in grey.
 pub const COLOURS: [[u8; 3]; 7] = [
     [0, 114, 178],
@@ -15,8 +17,14 @@ pub const COLOURS: [[u8; 3]; 7] = [
 pub const MARKERS: usize = 6;
 
 /// The colour of a style.
-pub fn colour(style: usize) -> [u8; 3] {
-    COLOURS[style % COLOURS.len()]
+pub fn colour(style: usize) -> RGBColor {
+    let [r, g, b] = COLOURS[style % COLOURS.len()];
+    RGBColor(r, g, b)
+}
+
+/// The colour of a style in the notation of SVG.
+pub fn hex_of(style: usize) -> String {
+    hex(COLOURS[style % COLOURS.len()])
 }
 
 /// A colour in the notation of SVG.

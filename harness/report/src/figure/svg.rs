@@ -1,45 +1,29 @@
 //! A figure as SVG: frame, axes, legend, data.
 //!
-//! Axes and legend are our own: plotters drops ticks of logarithmic axes (see `scale`), puts the legend inside the
-//! frame in one column, where it hides data, and breaks no labels of bars.
+//! The legend is above the data in as many columns as fit, because that of `plotters` is within the frame, where it hides data.
 
-use super::canvas::{Anchor, Canvas, DASHED, DOTTED, FAINT, INK, SIZE, WIDTH, width};
-use super::palette::{colour, hex};
-use super::scale::Scale;
+use super::canvas::*;
+use super::palette::colour;
+use super::scale::{Scale, range, ticks};
 use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series, heat, tick_label};
+use plotters::coord::combinators::BindKeyPoints;
+use plotters::coord::ranged1d::Ranged;
+use plotters::prelude::*;
+use std::ops::Range;
 
 /// Usual height of a figure.
 pub const HEIGHT: u32 = 1040;
 
 /// The figure as an SVG document.
 pub fn svg(figure: &Figure) -> String {
-    let mut canvas = Canvas::new(&figure.id);
-    match &figure.body {
-        Body::Points { series, marks } => points(&mut canvas, figure, series, marks),
-        Body::Bars(bars) => draw_bars(&mut canvas, figure, bars),
-        Body::HeatMap(map) => heat::draw(&mut canvas, figure, map),
-    }
-    canvas.document(&figure.title, figure.height)
-}
-
-/// The rectangle that contains the data.
-struct Frame {
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
-    /// Additional space between the lower edge and the label of the axis.
-    below: f64,
-}
-
-impl Frame {
-    fn x(&self, position: f64) -> f64 {
-        self.left + (self.right - self.left) * position
-    }
-
-    fn y(&self, position: f64) -> f64 {
-        self.bottom - (self.bottom - self.top) * position
-    }
+    document(&figure.title, |canvas| {
+        match &figure.body {
+            Body::Points { series, marks } => points(canvas, figure, series, marks),
+            Body::Bars(bars) => draw_bars(canvas, figure, bars),
+            Body::HeatMap(map) => heat::draw(canvas, figure, map),
+        }
+        figure.height
+    })
 }
 
 /// The symbol beside a name in the legend.
@@ -51,6 +35,110 @@ enum Symbol<'a> {
     Reference(usize),
 }
 
+/// Least space at the left of the data, for ticks and label.
+const LEFT: f64 = 190.0;
+/// Space at the left of ticks.
+const BESIDE_TICKS: f64 = 100.0;
+/// Space at the right of the data.
+const RIGHT: f64 = 40.0;
+/// Space below the data, for ticks and label.
+const BELOW: f64 = 130.0;
+/// Width of a symbol in the legend.
+const SYMBOL: f64 = 80.0;
+/// Distance of lines of text.
+const LINE: f64 = SIZE + 8.0;
+
+/// Space at the left of data on this axis.
+fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
+    let widths = ticks(axis, ends).into_iter().map(|tick| width(&tick_label(tick)));
+    widths.map(|width| BESIDE_TICKS + width).fold(LEFT, f64::max)
+}
+
+/// Draws the legend in as many rows as it needs, and returns its lower end.
+fn legend(canvas: &Canvas, left: f64, entries: &[(&str, Symbol)]) -> f64 {
+    let (mut x, mut y) = (left, 36.0);
+    for (name, symbol) in entries {
+        let entry = SYMBOL + width(name) + 50.0;
+        if x > left && x + entry > f64::from(WIDTH) {
+            (x, y) = (left, y + LINE);
+        }
+        draw_symbol(canvas, (x, y), symbol);
+        canvas.text(name, (x + SYMBOL, y), Anchor::Start);
+        x += entry;
+    }
+    y + 40.0
+}
+
+fn draw_symbol(canvas: &Canvas, (x, y): At, symbol: &Symbol) {
+    let (ends, middle) = ([(x, y), (x + SYMBOL - 18.0, y)], (x + (SYMBOL - 18.0) / 2.0, y));
+    match symbol {
+        Symbol::Reference(index) => canvas.line(&ends, BLACK, 3, reference_dashes(*index)),
+        Symbol::Series(s) if s.provenance == Provenance::Bound => {
+            canvas.line(&ends, BLACK, 3, DOTTED)
+        }
+        Symbol::Series(s) => {
+            let solid = s.provenance.is_solid();
+            if s.joined {
+                canvas.line(&ends, colour(s.style), 4, if solid { None } else { DASHED });
+            }
+            canvas.marker(middle, s.style, solid);
+        }
+        Symbol::Mark(style) => {
+            let ends = [(middle.0, y - 18.0), (middle.0, y + 18.0)];
+            canvas.line(&ends, colour(*style), 4, None);
+        }
+        Symbol::Bar(style) => {
+            canvas.bar((x + 12.0, y - 16.0), (x + SYMBOL - 22.0, y + 16.0), *style)
+        }
+    }
+}
+
+/// Dashes of a reference line, which differ from those of the next.
+fn reference_dashes(index: usize) -> Dashes {
+    [DOTTED, Some((40, 20)), Some((6, 6))][index % 3]
+}
+
+/// Where values are on the page.
+pub type ToPage = Box<dyn Fn(f64, f64) -> At>;
+
+/// Draws the axes around a rectangle of the page, given by two opposite corners, with the ends of their values; returns where values are.
+pub fn axes(canvas: &Canvas, axes: [&Axis; 2], ends: [Range<f64>; 2], from: At, to: At) -> ToPage {
+    let scales = || [0, 1].map(|i| Scale::new(axes[i], &ends[i]));
+    let [x, y] = scales();
+    let (x, y) =
+        (x.with_key_points(ticks(axes[0], &ends[0])), y.with_key_points(ticks(axes[1], &ends[1])));
+    let space = |i: usize, space: f64| if axes[i].label.is_empty() { 0.0 } else { space };
+    // The label of the vertical axis keeps clear of the edge of the page.
+    let [left, below] = [space(1, left(axes[1], &ends[1]) - 14.0), space(0, BELOW)];
+    let height = f64::from(canvas.area.dim_in_pixel().1);
+    let whole =
+        canvas.area.margin(from.1, height - to.1 - below, from.0 - left, f64::from(WIDTH) - to.0);
+    let mut chart = ChartBuilder::on(&whole)
+        .set_label_area_size(LabelAreaPosition::Left, left)
+        .set_label_area_size(LabelAreaPosition::Bottom, below)
+        .build_cartesian_2d(x, y)
+        .expect("the rectangle lies on the page");
+    let format = |value: &f64| tick_label(*value);
+    let mut mesh = chart.configure_mesh();
+    // A matrix, whose first row is at the top, has no grid.
+    let grid = if ends[1].start > ends[1].end { TRANSPARENT } else { FAINT.to_rgba() };
+    mesh.light_line_style(TRANSPARENT).bold_line_style(grid).axis_style(BLACK.stroke_width(2));
+    mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(12);
+    mesh.x_label_formatter(&format).y_label_formatter(&format);
+    mesh.x_desc(axes[0].label.as_str()).y_desc(axes[1].label.as_str());
+    mesh.draw().expect("a string accepts every element");
+    canvas.frame(from, to);
+    let (scales, limits) = (scales(), [(from.0 as i32, to.0 as i32), (to.1 as i32, from.1 as i32)]);
+    Box::new(move |x, y| {
+        let at = |i: usize, value: f64| {
+            let Range { start, end } = ends[i];
+            let within = value.clamp(start.min(end), start.max(end));
+            f64::from(scales[i].map(&within, limits[i]))
+        };
+        (at(0, x), at(1, y))
+    })
+}
+
 fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark]) {
     let mut entries: Vec<(&str, Symbol)> =
         series.iter().map(|s| (s.name.as_str(), Symbol::Series(s))).collect();
@@ -60,183 +148,101 @@ fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark
         }
     }
     let all = || series.iter().flat_map(|s| s.points.iter());
-    let x = Scale::of(&figure.x, all().map(|p| p.x));
-    let y = Scale::of(&figure.y, all().flat_map(|p| [p.y, p.low, p.high]));
-    let widest = y.ticks.iter().map(|tick| width(&tick_label(*tick))).fold(0.0, f64::max);
-    let frame = frame(canvas, figure, &entries, LEFT.max(BESIDE_TICKS + widest));
-    axes(canvas, &frame, (&figure.x, &x), (&figure.y, &y));
+    let x = range(&figure.x, all().map(|p| p.x));
+    let y = range(&figure.y, all().flat_map(|p| [p.y, p.low, p.high]));
+    let left = left(&figure.y, &y);
+    let (top, bottom) = (legend(canvas, left, &entries), f64::from(figure.height) - BELOW);
+    let to_page = axes(
+        canvas,
+        [&figure.x, &figure.y],
+        [x, y.clone()],
+        (left, top),
+        (f64::from(WIDTH) - RIGHT, bottom),
+    );
     for mark in marks {
-        let at = frame.x(x.position(mark.x));
-        let ends = [(at, frame.top), (at, frame.bottom)];
-        canvas.line(&ends, &hex(colour(mark.style)), 4.0, None);
+        let ends = [y.start, y.end].map(|y| to_page(mark.x, y));
+        canvas.line(&ends, colour(mark.style), 4, None);
     }
-    for s in series {
-        draw_series(canvas, &frame, s, &x, &y);
-    }
+    series.iter().for_each(|s| draw_series(canvas, s, &to_page));
 }
 
-fn draw_series(canvas: &mut Canvas, frame: &Frame, s: &Series, x: &Scale, y: &Scale) {
-    let at = |px: f64, py: f64| (frame.x(x.position(px)), frame.y(y.position(py)));
-    let line: Vec<(f64, f64)> = s.points.iter().map(|p| at(p.x, p.y)).collect();
+fn draw_series(canvas: &mut Canvas, s: &Series, to_page: &ToPage) {
+    let at: Vec<At> = s.points.iter().map(|p| to_page(p.x, p.y)).collect();
     if s.provenance == Provenance::Bound {
-        return canvas.line(&line, INK, 3.0, Some(DOTTED));
+        return canvas.line(&at, BLACK, 3, DOTTED);
     }
-    let ink = hex(colour(s.style));
-    if s.joined && line.len() > 1 {
-        canvas.line(&line, &ink, 4.0, (!s.provenance.is_solid()).then_some(DASHED));
+    let (ink, solid) = (colour(s.style), s.provenance.is_solid());
+    if s.joined && at.len() > 1 {
+        canvas.line(&at, ink, 4, if solid { None } else { DASHED });
     }
     for (i, p) in s.points.iter().enumerate() {
-        let (low, high) = (at(p.x, p.low), at(p.x, p.high));
+        let [low, high] = [p.low, p.high].map(|y| to_page(p.x, y));
         if low.1 - high.1 > 2.0 {
-            canvas.line(&[low, high], &ink, 4.0, None);
+            canvas.line(&[low, high], ink, 4, None);
             for end in [low, high] {
-                canvas.line(&[(end.0 - 10.0, end.1), (end.0 + 10.0, end.1)], &ink, 4.0, None);
+                canvas.line(&[(end.0 - 10.0, end.1), (end.0 + 10.0, end.1)], ink, 4, None);
             }
         }
-        let note = s.notes.get(i).map(String::as_str);
-        canvas.marker(line[i], s.style, s.provenance.is_solid(), note);
-    }
-}
-
-/// Dashes of a reference line, which differ from those of the next.
-fn reference_dashes(index: usize) -> &'static str {
-    [DOTTED, "40 20", "6 6"][index % 3]
-}
-
-/// Usual left edge of the data.
-const LEFT: f64 = 230.0;
-
-/// Space for the label of the vertical axis.
-const BESIDE_TICKS: f64 = 130.0;
-
-/// Width of a symbol in the legend.
-const SYMBOL: f64 = 80.0;
-
-/// Draws the legend above the data, in as many rows as it needs, and returns the rectangle that is left for the data.
-fn frame(canvas: &mut Canvas, figure: &Figure, entries: &[(&str, Symbol)], left: f64) -> Frame {
-    let right = f64::from(WIDTH) - 40.0;
-    let (mut x, mut y) = (left, 36.0);
-    for (name, symbol) in entries {
-        let entry = SYMBOL + width(name) + 60.0;
-        if x > left && x + entry > right {
-            (x, y) = (left, y + SIZE + 14.0);
-        }
-        draw_symbol(canvas, (x, y), symbol);
-        canvas.text(name, (x + SYMBOL, y), Anchor::Start);
-        x += entry;
-    }
-    Frame { left, right, top: y + 46.0, bottom: f64::from(figure.height) - 150.0, below: 0.0 }
-}
-
-fn draw_symbol(canvas: &mut Canvas, (x, y): (f64, f64), symbol: &Symbol) {
-    let (line, middle) = ([(x, y), (x + SYMBOL - 18.0, y)], (x + (SYMBOL - 18.0) / 2.0, y));
-    match symbol {
-        Symbol::Reference(index) => canvas.line(&line, INK, 3.0, Some(reference_dashes(*index))),
-        Symbol::Series(s) if s.provenance == Provenance::Bound => {
-            canvas.line(&line, INK, 3.0, Some(DOTTED));
-        }
-        Symbol::Series(s) => {
-            let solid = s.provenance.is_solid();
-            if s.joined {
-                canvas.line(&line, &hex(colour(s.style)), 4.0, (!solid).then_some(DASHED));
-            }
-            canvas.marker(middle, s.style, solid, None);
-        }
-        Symbol::Mark(style) => {
-            let ends = [(middle.0, y - 18.0), (middle.0, y + 18.0)];
-            canvas.line(&ends, &hex(colour(*style)), 4.0, None);
-        }
-        Symbol::Bar(style) => {
-            canvas.bar((x + 12.0, y - 16.0), (x + SYMBOL - 22.0, y + 16.0), *style);
+        canvas.marker(at[i], s.style, solid);
+        if let Some(note) = s.notes.get(i) {
+            canvas.note(at[i], note);
         }
     }
 }
 
-fn axes(canvas: &mut Canvas, frame: &Frame, x: (&Axis, &Scale), y: (&Axis, &Scale)) {
-    for t in &y.1.ticks {
-        let at = frame.y(y.1.position(*t));
-        canvas.line(&[(frame.left, at), (frame.right, at)], FAINT, 1.0, None);
-        canvas.line(&[(frame.left - 12.0, at), (frame.left, at)], INK, 2.0, None);
-        canvas.text(&tick_label(*t), (frame.left - 20.0, at), Anchor::End);
-    }
-    for t in &y.1.minor {
-        let at = frame.y(y.1.position(*t));
-        canvas.line(&[(frame.left - 6.0, at), (frame.left, at)], INK, 2.0, None);
-    }
-    for t in &x.1.ticks {
-        let at = frame.x(x.1.position(*t));
-        canvas.line(&[(at, frame.top), (at, frame.bottom)], FAINT, 1.0, None);
-        canvas.line(&[(at, frame.bottom), (at, frame.bottom + 12.0)], INK, 2.0, None);
-        canvas.text(&tick_label(*t), (at, frame.bottom + 22.0), Anchor::Below);
-    }
-    for t in &x.1.minor {
-        let at = frame.x(x.1.position(*t));
-        canvas.line(&[(at, frame.bottom), (at, frame.bottom + 6.0)], INK, 2.0, None);
-    }
-    canvas.frame((frame.left, frame.top), (frame.right, frame.bottom));
-    let middle = ((frame.left + frame.right) / 2.0, (frame.top + frame.bottom) / 2.0);
-    canvas.text(&x.0.label, (middle.0, frame.bottom + frame.below + 82.0), Anchor::Below);
-    canvas.text(&y.0.label, (50.0, middle.1), Anchor::Turned);
-}
-
-fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
-    (0..bars.segments.len()).filter(|s| s % 2 == 1).for_each(|s| canvas.define_hatching(s));
+fn draw_bars(canvas: &Canvas, figure: &Figure, bars: &Bars) {
     let segments = bars.segments.iter().enumerate();
     let references = bars.references.iter().enumerate();
     let entries: Vec<(&str, Symbol)> = segments
         .map(|(style, s)| (s.0.as_str(), Symbol::Bar(style)))
         .chain(references.map(|(i, r)| (r.0.as_str(), Symbol::Reference(i))))
         .collect();
-    let mut frame = frame(canvas, figure, &entries, LEFT);
-    let count = bars.categories.len();
-    let step = (frame.right - frame.left) / count.max(1) as f64;
-    let labels = labels(&bars.categories, step);
-    frame.below = labels.iter().map(Vec::len).max().unwrap_or(1).saturating_sub(1) as f64 * LINE;
-    frame.bottom -= frame.below;
     let total = |i: usize| bars.segments.iter().map(|s| s.1[i]).sum::<f64>();
-    let y = Scale::of(&figure.y, (0..count).map(total).chain(bars.references.iter().map(|r| r.1)));
-    let categories = Scale::of(&figure.x, []).without_ticks();
-    axes(canvas, &frame, (&figure.x, &categories), (&figure.y, &y));
+    let (count, right) = (bars.categories.len(), f64::from(WIDTH) - RIGHT);
+    let y = range(&figure.y, (0..count).map(total).chain(bars.references.iter().map(|r| r.1)));
+    let left = left(&figure.y, &y);
+    let top = legend(canvas, left, &entries);
+    let labels = labels(&bars.categories, (right - left) / count.max(1) as f64);
+    let lines = labels.iter().map(Vec::len).max().unwrap_or(1).saturating_sub(1) as f64;
+    let bottom = f64::from(figure.height) - BELOW - lines * LINE;
+    // The names of the bars are below the axis in place of ticks, and its label is below them.
+    let unnamed = Axis { label: " ".to_owned(), ticks: vec![f64::NAN], ..Axis::linear("") };
+    let ends = [0.0..count.max(1) as f64, y.clone()];
+    let to_page = axes(canvas, [&unnamed, &figure.y], ends, (left, top), (right, bottom));
     let gap = if count > 20 { 0.1 } else { 0.2 };
-    for i in 0..count {
-        let left = frame.left + step * (i as f64 + gap);
-        let right = frame.left + step * (i as f64 + 1.0 - gap);
-        let mut sum = 0.0;
+    for (i, names) in labels.iter().enumerate() {
+        let (begin, end, mut sum) = (i as f64 + gap, (i + 1) as f64 - gap, 0.0);
         for (style, (_, values)) in bars.segments.iter().enumerate() {
-            let (top, bottom) = (frame.y(y.position(sum + values[i])), frame.y(y.position(sum)));
-            if bottom > top {
-                canvas.bar((left, top), (right, bottom), style);
+            if values[i] > 0.0 {
+                canvas.bar(to_page(begin, sum + values[i]), to_page(end, sum), style);
             }
             sum += values[i];
         }
-        for (line, text) in labels[i].iter().enumerate() {
-            let at = ((left + right) / 2.0, frame.bottom + 22.0 + LINE * line as f64);
-            canvas.text(text, at, Anchor::Below);
+        let (x, _) = to_page(i as f64 + 0.5, 0.0);
+        for (line, name) in names.iter().enumerate() {
+            canvas.text(name, (x, bottom + 22.0 + LINE * line as f64), Anchor::Below);
         }
     }
     for (i, (_, level)) in bars.references.iter().enumerate() {
-        let at = frame.y(y.position(*level));
-        canvas.line(&[(frame.left, at), (frame.right, at)], INK, 3.0, Some(reference_dashes(i)));
+        let ends = [0.0, count as f64].map(|x| to_page(x, *level));
+        canvas.line(&ends, BLACK, 3, reference_dashes(i));
     }
+    let below = (left.midpoint(right), bottom + 82.0 + lines * LINE);
+    canvas.text(&figure.x.label, below, Anchor::Below);
 }
-
-/// Distance of the lines of a label.
-const LINE: f64 = SIZE + 4.0;
 
 /// The lines of the label below every bar. Labels too long for their bars are broken at spaces; where that does not
 /// suffice, only every second, third ... bar has one.
 fn labels(names: &[String], step: f64) -> Vec<Vec<String>> {
     let widest = |all: &[Vec<String>]| all.iter().flatten().map(|w| width(w)).fold(0.0, f64::max);
-    let (gap, gap_broken) = (16.0, 4.0);
     let whole: Vec<Vec<String>> = names.iter().map(|n| vec![n.clone()]).collect();
     let broken: Vec<Vec<String>> =
         names.iter().map(|n| n.split(' ').map(str::to_owned).collect()).collect();
-    let mut chosen = if widest(&whole) + gap <= step { whole } else { broken };
-    let every = ((widest(&chosen) + gap_broken) / step).ceil().max(1.0) as usize;
+    let mut chosen = if widest(&whole) + 16.0 <= step { whole } else { broken };
+    let every = ((widest(&chosen) + 4.0) / step).ceil().max(1.0) as usize;
     chosen.iter_mut().enumerate().filter(|(i, _)| i % every != 0).for_each(|(_, l)| l.clear());
     chosen
 }
-
 #[cfg(test)]
 mod tests {
     use super::super::samples::{figure, series};
@@ -300,7 +306,7 @@ mod tests {
         };
         let svg = svg(&Figure { y: Axis::linear("s"), ..figure(Body::Bars(bars)) });
         assert!(svg.contains(">grade<") && svg.contains(">mean<"));
-        // Three segments, two entries of the legend, and the rectangle of the hatching.
-        assert_eq!(svg.matches("<rect").count(), 6, "{svg}");
+        // Three segments and two entries of the legend.
+        assert_eq!(svg.matches("<rect").count(), 5, "{svg}");
     }
 }

@@ -1,14 +1,15 @@
 //! A slice through the narrowest place of a leak as SVG: the plane that contains the direction of the path and a point
 //! of the rim. It shows the leaves, the section of the facets, the largest ball that passes and the path.
 
-use crate::figure::canvas::{Anchor, Canvas, DOTTED, FAINT, INK, SIZE, WIDTH, width};
-use crate::figure::palette::{colour, hex};
+use crate::figure::canvas::{Anchor, Canvas, DOTTED, SIZE, WIDTH, document, width};
+use crate::figure::palette::colour;
 use crate::section::{Planar, Window};
 use contract::case::Case;
 use contract::number::number;
 use contract::word::{self, Side};
 use geometry::leak::report::Passage;
 use geometry::tree::Point;
+use plotters::style::colors::BLACK;
 
 /// Half of the window's edge, in widths of the narrowest place and in cells; the larger one counts.
 const HALF: (f64, f64) = (2.0, 6.0);
@@ -18,22 +19,25 @@ const MARGIN: (f64, f64) = (150.0, 190.0);
 const SIDES: f64 = 40.0;
 /// Fill of crossing leaves.
 const CROSSING: &str = "#D9D9D9";
+/// Colour of the edges of leaves.
+const FAINT: &str = "#AAAAAA";
 
 /// The slice as an SVG document; `words` are the leaves of the base tree that the path leads through.
 pub fn svg(case: &Case, words: &[u64], passage: &Passage) -> String {
     let window = window(passage);
-    let mut canvas = Canvas::new("leak");
-    draw_leaves(&mut canvas, &window, case, words);
-    draw_facets(&mut canvas, &window, case);
-    draw_passage(&mut canvas, &window, passage);
-    let (left, top) = on_page(&window, [-window.half[0], window.half[1]]);
-    let (right, bottom) = on_page(&window, [window.half[0], -window.half[1]]);
-    canvas.frame((left, top), (right, bottom));
-    draw_legend(&mut canvas);
-    draw_scale(&mut canvas, &window, passage);
     let title =
         format!("The narrowest place of the widest path, {} wide", number(passage.narrowest.width));
-    canvas.document(&title, (bottom + MARGIN.1) as u32)
+    document(&title, |canvas| {
+        draw_leaves(canvas, &window, case, words);
+        draw_facets(canvas, &window, case);
+        draw_passage(canvas, &window, passage);
+        let (left, top) = on_page(&window, [-window.half[0], window.half[1]]);
+        let (right, bottom) = on_page(&window, [window.half[0], -window.half[1]]);
+        canvas.frame((left, top), (right, bottom));
+        draw_legend(canvas);
+        draw_scale(canvas, &window, passage);
+        (bottom + MARGIN.1) as u32
+    })
 }
 
 /// The square around the narrowest place. Its abscissa is the direction of the path.
@@ -77,7 +81,7 @@ fn draw_leaves(canvas: &mut Canvas, window: &Window, case: &Case, words: &[u64])
 fn draw_facets(canvas: &mut Canvas, window: &Window, case: &Case) {
     for facet in &case.facets {
         if let Some(ends) = window.of_facet(facet.map(|v| v.map(f64::from))) {
-            canvas.line(&ends.map(|p| on_page(window, p)), INK, 5.0, None);
+            canvas.line(&ends.map(|p| on_page(window, p)), BLACK, 5, None);
         }
     }
 }
@@ -87,7 +91,7 @@ fn draw_passage(canvas: &mut Canvas, window: &Window, passage: &Passage) {
         if let Some(ends) =
             window.of_segment([window.project(pair[0].at), window.project(pair[1].at)])
         {
-            canvas.line(&ends.map(|p| on_page(window, p)), &hex(colour(0)), 5.0, None);
+            canvas.line(&ends.map(|p| on_page(window, p)), colour(0), 5, None);
         }
     }
     let radius = passage.narrowest.width / 2.0;
@@ -96,20 +100,20 @@ fn draw_passage(canvas: &mut Canvas, window: &Window, passage: &Passage) {
         on_page(window, [radius * cos, radius * sin])
     };
     let circle: Vec<_> = (0..=96).map(on_circle).collect();
-    canvas.line(&circle, &hex(colour(1)), 6.0, None);
+    canvas.line(&circle, colour(1), 6, None);
 }
 
 fn draw_legend(canvas: &mut Canvas) {
     let entries = [
         ("leaf crossed by facets", None),
-        ("facets", Some(INK.to_owned())),
-        ("projected path", Some(hex(colour(0)))),
-        ("largest ball", Some(hex(colour(1)))),
+        ("facets", Some(BLACK)),
+        ("projected path", Some(colour(0))),
+        ("largest ball", Some(colour(1))),
     ];
     let (mut x, y) = (SIDES, 70.0);
     for (name, line) in entries {
         match line {
-            Some(ink) => canvas.line(&[(x, y), (x + 50.0, y)], &ink, 6.0, None),
+            Some(ink) => canvas.line(&[(x, y), (x + 50.0, y)], ink, 6, None),
             None => {
                 let box_ =
                     vec![(x, y - 22.0), (x + 50.0, y - 22.0), (x + 50.0, y + 22.0), (x, y + 22.0)];
@@ -127,17 +131,17 @@ fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
     let (left, bottom) = on_page(window, window.half.map(|h| -h));
     let length = |l: f64| on_page(window, [l, 0.0]).0 - on_page(window, [0.0, 0.0]).0;
     let bars = [
-        (format!("width {}", number(narrowest.width)), narrowest.width, hex(colour(1)), None),
+        (format!("width {}", number(narrowest.width)), narrowest.width, colour(1), None),
         (
             format!("cell {}", number(passage.spacing.spacing)),
             passage.spacing.spacing,
-            INK.to_owned(),
-            Some(DOTTED),
+            BLACK,
+            DOTTED,
         ),
     ];
     let (mut x, y) = (left, bottom + 46.0);
     for (name, long, ink, dashes) in bars {
-        canvas.line(&[(x, y), (x + length(long), y)], &ink, 8.0, dashes);
+        canvas.line(&[(x, y), (x + length(long), y)], ink, 8, dashes);
         canvas.text(&name, (x + length(long) + 16.0, y), Anchor::Start);
         x += length(long) + width(&name) + 70.0;
     }
@@ -155,6 +159,7 @@ fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
 #[cfg(test)]
 mod tests {
     use super::{Passage, *};
+    use crate::figure::palette::hex_of;
     use contract::testing::words_with_sides;
     use geometry::leak::report::{Narrowest, Point, Spacing};
 
@@ -188,7 +193,7 @@ mod tests {
         assert!(svg.contains("width 1.00") && svg.contains("cell 1.00"));
         let strokes = |ink: &str| svg.matches(&format!("stroke=\"{ink}\"")).count();
         // Two segments of the path and its symbol, the ball with its symbol and the bar.
-        assert_eq!((strokes(&hex(colour(0))), strokes(&hex(colour(1)))), (3, 3));
+        assert_eq!((strokes(&hex_of(0)), strokes(&hex_of(1))), (3, 3));
         assert_eq!(svg.matches(CROSSING).count(), 2);
     }
 }

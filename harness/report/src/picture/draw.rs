@@ -4,7 +4,7 @@ use super::Picture;
 use super::colour::short;
 use super::sheet::Sheet;
 use super::squares::Square;
-use crate::figure::canvas::{Anchor, Canvas, INK, SIZE, WIDTH};
+use crate::figure::canvas::{Anchor, INK, SIZE, WIDTH, document};
 use crate::figure::palette::hex;
 use crate::section::Planar;
 use std::collections::BTreeSet;
@@ -43,9 +43,7 @@ pub fn scale(window: &[Planar; 2]) -> f64 {
 
 /// The picture as an SVG document.
 pub fn svg(picture: &Picture) -> String {
-    let mut canvas = Canvas::new("picture");
-    let height = draw(picture, &mut canvas);
-    canvas.document(&picture.title(), height)
+    document(&picture.title(), |canvas| draw(picture, canvas))
 }
 
 /// The place of the window on the page.

@@ -12,7 +12,7 @@ pub trait Sheet {
     fn text(&mut self, text: &str, at: (f64, f64), anchor: Anchor);
 }
 
-impl Sheet for Canvas {
+impl Sheet for Canvas<'_> {
     fn rectangles(&mut self, rectangles: &[[f64; 4]], fill: &str, outline: Option<&str>) {
         match outline {
             Some(outline) => self.outlined(rectangles, fill, outline),

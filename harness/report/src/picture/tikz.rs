@@ -4,7 +4,7 @@ use super::Picture;
 use super::draw::draw;
 use super::sheet::Sheet;
 use crate::figure::canvas::{Anchor, INK, WIDTH};
-use crate::figure::tikz::escape;
+use crate::figure::tex::escape;
 use std::fmt::Write;
 
 /// The picture as a `tikzpicture` as wide as a line.
