@@ -64,8 +64,9 @@ impl<'a> Visitor<'a> {
         self.with_readers(|readers| {
             let (mut intervals, mut before) = (Vec::new(), 0);
             for (part, file) in self.mesh.parts.iter().enumerate() {
-                let mut bound =
-                    |key| readers.lower_bound(part, 0..file.len(), key).map_err(ExportError::from);
+                let mut bound = |key| {
+                    readers.lower_bound(part, 0..file.leaves(), key).map_err(ExportError::from)
+                };
                 let interval = bound(keys.start)?..bound(keys.end)?;
                 before += interval.start;
                 intervals.extend((!interval.is_empty()).then_some((part, interval)));
@@ -81,7 +82,7 @@ impl<'a> Visitor<'a> {
     pub fn count(&self, keys: Range<u64>) -> Result<u64, ExportError> {
         self.with_readers(|readers| {
             (0..self.mesh.parts.len()).try_fold(0, |sum, part| {
-                let all = 0..self.mesh.parts[part].len();
+                let all = 0..self.mesh.parts[part].leaves();
                 let start = readers.lower_bound(part, all.clone(), keys.start)?;
                 Ok(sum + readers.lower_bound(part, start..all.end, keys.end)? - start)
             })
@@ -130,7 +131,7 @@ impl Mesh {
 
     /// Number of leaves in all parts.
     pub fn len(&self) -> u64 {
-        self.parts.iter().map(Part::len).sum()
+        self.parts.iter().map(Part::leaves).sum()
     }
 
     /// Whether the mesh has no leaves.
@@ -170,7 +171,7 @@ impl Mesh {
                     Ok::<(), ExportError>(())
                 })?
             }
-            parts => leaves.extend(parts.iter().map(Part::len)),
+            parts => leaves.extend(parts.iter().map(Part::leaves)),
         }
         Ok(self.leaves_by_rank.get_or_init(|| leaves))
     }
@@ -207,7 +208,8 @@ impl Mesh {
         let mut readers = Readers::new(&self.parts);
         // Leaves that are not selected separate the next block from the last one.
         let mut has_gap = false;
-        let all = self.parts.iter().enumerate().map(|(part, file)| (part, 0..file.len())).collect();
+        let all =
+            self.parts.iter().enumerate().map(|(part, file)| (part, 0..file.leaves())).collect();
         let mut stack: Vec<(Octant, Vec<Interval>)> = vec![(Octant::ROOT, all)];
         while let Some((octant, intervals)) = stack.pop() {
             let leaves = count(&intervals);

@@ -15,7 +15,7 @@ pub fn all_facets(slice: &[Facet], comm: &dyn Comm) -> Vec<Facet> {
     let all = comm.all_gather(&pod_collect_to_vec::<Facet, u64>(slice));
     let facets = |words: &[u64]| {
         let mut facets = pod_collect_to_vec::<u64, Facet>(words);
-        facets.truncate(words.len() * size_of::<u64>() / size_of::<Facet>());
+        facets.truncate(size_of_val(words) / size_of::<Facet>());
         facets
     };
     all.messages().flat_map(|(_, words)| facets(words)).collect()

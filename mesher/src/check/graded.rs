@@ -47,7 +47,7 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
         let children = gather(l, BrickSet::from_unsorted(groups.child_bricks().collect()));
         let layer = dilated(leaves(l, children), l, rules.layer_cells_min - 1).coarsen();
         let asked = asked.union(gather(l - 1, layer));
-        for code in owned(l - 1, above).without(&asked).codes() {
+        if let Some(code) = owned(l - 1, above).without(&asked).codes().next() {
             panic!("octant {} of level {} is split without need", path(l - 1, code), l - 1);
         }
         for code in asked.without(above).codes() {

@@ -58,7 +58,7 @@ impl Mesh {
 
     /// Number of leaves in the files, whatever the manifest states.
     pub fn len(&self) -> u64 {
-        self.parts.iter().map(Part::len).sum()
+        self.parts.iter().map(Part::leaves).sum()
     }
 
     /// Whether there are no leaves.
@@ -123,9 +123,9 @@ impl Mesh {
         let (start, mut readers) = (word::key_of(octant.corner), Readers::new(&self.parts));
         let mut all = Vec::new();
         for (part, file) in self.parts.iter().enumerate() {
-            let first = readers.lower_bound(part, 0..file.len(), start)?;
+            let first = readers.lower_bound(part, 0..file.leaves(), start)?;
             let end = start + word::span(octant.level);
-            let end = readers.lower_bound(part, first..file.len(), end)?;
+            let end = readers.lower_bound(part, first..file.leaves(), end)?;
             all.extend(readers.words(part, octant, first..end)?.0);
         }
         all.sort_unstable();

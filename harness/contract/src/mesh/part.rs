@@ -42,7 +42,7 @@ impl Part {
     }
 
     /// Number of leaves.
-    pub fn len(&self) -> u64 {
+    pub fn leaves(&self) -> u64 {
         match self {
             Self::Words(file) => file.len(),
             Self::Tree(tree) => tree.1.leaves,
