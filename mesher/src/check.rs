@@ -13,7 +13,7 @@ pub mod sides;
 use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::case::Case;
-use crate::comm::{Comm, MessageBuffer};
+use crate::comm::{Comm, MessageBuffer, uncounted};
 use crate::facet::Facet;
 use crate::ingest::Slice;
 use crate::lattice::{Root, Rules};
@@ -32,6 +32,15 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// Whether checks run: in debug builds, and in release builds if the options ask for them.
 pub fn is_on(options: &Options) -> bool {
     cfg!(debug_assertions) || options.check
+}
+
+/// Splits from which on debug builds leave out the checks that take more memory than the mesh. `--check` always runs them.
+const SPLITS_MANY: u64 = 1 << 16;
+
+/// Whether the checks run that take more memory than the mesh. Collective.
+pub fn is_whole(options: &Options, split: &PerLevel, comm: &dyn Comm) -> bool {
+    let splits = || uncounted(comm, || comm.sum(split.iter().map(BrickSet::count).sum()));
+    options.check || is_on(options) && splits() < SPLITS_MANY
 }
 
 /// Runs a check if checks [are on](is_on). Its messages are not counted. Collective if the check is.
@@ -134,7 +143,6 @@ pub fn sides(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership, c
     sides.check_invariants(tree);
     replicas(&[&sides.inside, &sides.deleted], ownership, comm);
     same(&format!("{:?}", (sides.rays, sides.summary)), "results of sides", comm);
-    sides::agree_over_faces(sides, tree, ownership, comm);
     sides::seeds(sides, tree, rules, ownership);
 }
 

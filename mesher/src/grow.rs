@@ -79,6 +79,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         check::base_tree(&tree, &all_facets, &rules, &ownership, comm);
     });
     drop(all_facets);
+    let is_whole = check::is_whole(options, &tree.split, comm);
 
     count(&tree, &ownership);
 
@@ -87,7 +88,12 @@ pub fn grow<F: Borrow<[Facet]>>(
     let (sides, regions) = record.phase("sides", comm, || {
         sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
     })?;
-    debug_check(options, comm, || check::sides(&sides, &tree, &rules, &ownership, comm));
+    debug_check(options, comm, || {
+        check::sides(&sides, &tree, &rules, &ownership, comm);
+        if is_whole {
+            check::sides::agree_over_faces(&sides, &tree, &ownership, comm);
+        }
+    });
     let (leaks, bounds_nothing) = record.phase("leaks", comm, || {
         let facets = facets.borrow();
         let leaks = leaks::find(regions, &tree, &ownership, facets, &rules, comm);
@@ -123,7 +129,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     }
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.
-    let base = check::is_on(options).then(|| mesh.split.clone());
+    let base = is_whole.then(|| mesh.split.clone());
     let (split, work) = record.phase("grade", comm, || {
         let split = std::mem::take(&mut mesh.split);
         let kept = Kept::new(&mesh.sides.deleted);
@@ -134,7 +140,9 @@ pub fn grow<F: Borrow<[Facet]>>(
     let mut fingerprint = 0;
     debug_check(options, comm, || {
         check::graded(&mesh, comm);
-        check::graded::gradation(&mesh, base.as_ref().expect("T0 was stored"), comm);
+        if let Some(base) = &base {
+            check::graded::gradation(&mesh, base, comm);
+        }
         fingerprint = check::fingerprint(&mesh, comm);
     });
     drop(base);

@@ -54,7 +54,9 @@ fn check_base_tree(mesh: Mesh, comm: &dyn Comm) {
 
 fn check_sides(mesh: Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides: s, ownership, rules, .. } = mesh;
-    sides(&s, &Tree { split, crossing }, &rules, &ownership, comm);
+    let tree = Tree { split, crossing };
+    sides(&s, &tree, &rules, &ownership, comm);
+    sides::agree_over_faces(&s, &tree, &ownership, comm);
 }
 
 fn check_graded(mesh: Mesh, comm: &dyn Comm) {
