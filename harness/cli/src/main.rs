@@ -6,12 +6,13 @@ mod output;
 mod cli;
 mod commands;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
-use files::{BUG, Heap, message};
+use files::{BUG, Heap};
 use run::engine::interrupt;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_OUTPUT};
-use std::io::ErrorKind;
+use std::io;
 use std::panic::{catch_unwind, set_hook, take_hook};
 use std::process::{ExitCode, exit};
 use std::sync::Once;
@@ -42,16 +43,20 @@ fn main() -> ExitCode {
     ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
 }
 
-/// Prints what is wrong with the command line, or the help that it asks for.
+/// Prints what is wrong with the command line in one sentence, or the help that it asks for.
 fn refuse(error: &clap::Error) -> ExitCode {
     interrupt::uninstall();
-    let text = error.render().to_string();
-    if error.use_stderr() && message(&text) != text {
-        eprintln!("{text}");
+    if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        let text = error.render().to_string();
+        let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+        let is_said = |line: &&str| !line.starts_with("Usage:") && !line.starts_with("For more");
+        let sentence = lines.take_while(is_said).collect::<Vec<_>>().join(" ");
+        let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
+        eprintln!("harness: {sentence}; see --help");
         return ExitCode::from(EXIT_INPUT);
     }
     match error.print() {
-        Err(why) if why.kind() != ErrorKind::BrokenPipe => ExitCode::from(EXIT_OUTPUT),
+        Err(why) if why.kind() != io::ErrorKind::BrokenPipe => ExitCode::from(EXIT_OUTPUT),
         _ => ExitCode::from(if error.use_stderr() { EXIT_INPUT } else { EXIT_HOLDS }),
     }
 }

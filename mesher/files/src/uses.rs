@@ -111,6 +111,10 @@ fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
         };
         let why =
             format!("this run also {verb} it as {}: give the output another name", name.display());
+        if role == Use::Input {
+            // Whatever the reader makes of the error, the file is not written.
+            uses.insert(id, (role, path.to_owned()));
+        }
         return Err(io::Error::new(ErrorKind::InvalidInput, why));
     }
     uses.insert(id, (role, path.to_owned()));
@@ -123,33 +127,34 @@ mod tests {
     use crate::{check_writable, write_atomically};
     use std::io::Write;
 
+    /// A file under its own name, a hard link and a symbolic link.
     #[test]
     fn no_output_is_an_input_whichever_comes_first() {
         let place = tempfile::tempdir().unwrap();
-        let path = |name: &str| place.path().join(name);
-        for (number, first_is_input) in [(0, true), (1, false)] {
-            let (file, link, other) = (path(&format!("{number}")), path("hard"), path("symbolic"));
+        for case in 0..6 {
+            let [file, other] = ["a", "b"].map(|name| place.path().join(format!("{case}{name}")));
             fs::write(&file, "body").unwrap();
-            fs::hard_link(&file, &link).unwrap();
-            std::os::unix::fs::symlink(&file, &other).unwrap();
-            for alias in [&file, &link, &other] {
-                if first_is_input {
-                    open(&file).unwrap();
-                    assert!(check_writable(alias).is_err() && register_output(alias).is_err());
-                    let error = write_atomically(alias, |_| Ok(())).unwrap_err().to_string();
-                    assert!(
-                        error.contains("also reads it as") && error.contains("another name"),
-                        "{error}"
-                    );
-                } else {
-                    check_writable(&file).unwrap();
-                    assert!(register_input(alias).is_err());
-                    let error = read(alias).unwrap_err().to_string();
-                    assert!(error.contains("also writes it as"), "{error}");
-                }
-                assert_eq!(fs::read(&file).unwrap(), b"body");
+            match case % 3 {
+                0 => {}
+                1 => fs::hard_link(&file, &other).unwrap(),
+                _ => std::os::unix::fs::symlink(&file, &other).unwrap(),
             }
-            [link, other].iter().for_each(|path| fs::remove_file(path).unwrap());
+            let alias = if case % 3 == 0 { &file } else { &other };
+            if case < 3 {
+                open(&file).unwrap();
+                assert!(check_writable(alias).is_err() && register_output(alias).is_err());
+            } else {
+                check_writable(&file).unwrap();
+                let error = read(alias).unwrap_err().to_string();
+                assert!(error.contains("also writes it as"), "{error}");
+            }
+            // Also if the reader has made something else of its error.
+            let error = write_atomically(alias, |_| Ok(())).unwrap_err().to_string();
+            assert!(
+                error.contains("also reads it as") && error.contains("another name"),
+                "{error}"
+            );
+            assert_eq!(fs::read(&file).unwrap(), b"body");
         }
     }
 
