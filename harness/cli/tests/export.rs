@@ -78,7 +78,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
             &[][..],
             "mesh.png: no format has such a name: choose one that ends in .vtu, .pvtu",
         ),
-        ("none/mesh.vtu", &[], "none/mesh.vtu: No such file or directory"),
+        ("none/mesh.vtu", &[], "none/mesh.vtu: none is not a directory: create it"),
         (
             "part.vtu",
             &["--side", "outside", "--level-max", "2"],

@@ -32,7 +32,7 @@ pub enum ExportError {
         index: u64,
     },
     /// A file could not be written.
-    #[error("{0}: choose another file")]
+    #[error("{0}")]
     Write(#[from] io::Error),
     /// The user interrupted the export.
     #[error("interrupted")]

@@ -27,8 +27,8 @@ if [ "$ranks" -ge 3 ] && grep -q 'vertex 0.25 ' "$body" && grep -q 'vertex 0.5 '
     mesh=wrong
 fi
 [ -z "$out" ] || cp -r "$here/$mesh" "$out"
-[ -z "$json" ] || printf '{"cells": 1, "digest": "%s", "counters": {"words": [%s, EXTRA]}}' \
-    "$(cat "$here/$mesh.digest")" "$(grep -c outer "$body")" > "$json"
+[ -z "$json" ] || printf '{"ranks": %s, "cells": 1, "digest": "%s", "counters": {"words": [%s, EXTRA]}}' \
+    "$ranks" "$(cat "$here/$mesh.digest")" "$(grep -c outer "$body")" > "$json"
 "#;
 
 const DESCRIPTION: &str = r#"

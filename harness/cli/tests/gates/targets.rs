@@ -6,16 +6,19 @@ use std::os::unix::fs::PermissionsExt;
 
 /// Reports 1000 cells in 2 s, fails on three ranks, and writes the correct mesh.
 const MESHER: &str = r#"#!/bin/sh
-here=$(dirname "$0")
+here=$(dirname "$0") ranks=1
 while [ $# -gt 0 ]; do
     case "$1" in
     --out) cp -r "$here/right" "$2" ;;
     --json) json="$2" ;;
-    --comm) [ "$2" != sim:3:1 ] || { echo "mesher: no three" >&2; exit 70; } ;;
+    --comm)
+        [ "$2" != sim:3:1 ] || { echo "mesher: no three" >&2; exit 70; }
+        case "$2" in sim:*) ranks="${2#sim:}" ranks="${ranks%%:*}" ;; esac
+        ;;
     esac
     shift
 done
-[ -z "$json" ] || printf '{"facets": 40, "cells": 1000, "digest": "00", "time_wall_s": 2.0, "peak_rss_bytes": [4096]}' > "$json"
+[ -z "$json" ] || printf '{"ranks": %s, "facets": 40, "cells": 1000, "digest": "00", "time_wall_s": 2.0, "peak_rss_bytes": [4096]}' "$ranks" > "$json"
 "#;
 
 const TARGETS: &str = r#"
