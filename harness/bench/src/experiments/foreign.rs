@@ -77,7 +77,7 @@ fn time_and_memory_are_measured_from_outside_if_they_are_not_reported() {
 
 #[test]
 fn reported_time_and_memory_take_precedence() {
-    let report = r#"{"cells": 8, "digest": "ab", "time_wall_s": 7.5, "peak_rss_bytes": [3, 4],
+    let report = r#"{"ranks": 2, "cells": 8, "digest": "ab", "time_wall_s": 7.5, "peak_rss_bytes": [3, 4],
         "phases": [{"name": "all", "time_cpu_s": [2.0, 1.0]}]}"#;
     let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
     assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (7.5, 4.0));
@@ -86,7 +86,7 @@ fn reported_time_and_memory_take_precedence() {
 
 #[test]
 fn a_run_without_the_required_output_is_a_failure() {
-    let script = "echo '{\"cells\": 8, \"digest\": \"ab\"}' > $2";
+    let script = "echo '{\"ranks\": 2, \"cells\": 8, \"digest\": \"ab\"}' > $2";
     assert!(scripted(script, REPORTS, Comm::Sim).unwrap_err().contains("no phases"));
     assert!(scripted("mkdir $2", "", Comm::Solo).unwrap_err().contains("mesh.json"));
     assert!(

@@ -36,7 +36,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
     for component in &truth.components {
         let leaves = component.leaves.iter().map(|&i| word::octant(truth.words[i as usize]));
-        let example = leaves.filter(|leaf| has_leaves(subject.tree(), leaf)).next();
+        let example = leaves.clone().find(|leaf| has_leaves(subject.tree(), leaf));
         kept_or_deleted(component, example, &subject.terms, result);
     }
     let counts = count(&truth.components, &subject.inputs);

@@ -27,7 +27,8 @@ pub struct Points(Vec<u64>);
 /// The Morton code of a point.
 fn key(point: Point) -> u64 {
     let beyond = |a: usize| u64::from(point[a] / CELLS_PER_EDGE) << a;
-    (beyond(0) | beyond(1) | beyond(2)) * KEY_END | word::key_of(point.map(|c| c % CELLS_PER_EDGE))
+    ((beyond(0) | beyond(1) | beyond(2)) * KEY_END)
+        | word::key_of(point.map(|c| c % CELLS_PER_EDGE))
 }
 
 impl Points {
@@ -89,7 +90,8 @@ impl Points {
 
     /// The number of the point at the minimum corner of an octant of this level, if it is a point.
     fn corner(&self, of: Span, level: u8) -> Option<u32> {
-        let has_corner = of.begin < of.end && self.0[of.begin as usize] % word::span(level) == 0;
+        let has_corner =
+            of.begin < of.end && self.0[of.begin as usize].is_multiple_of(word::span(level));
         has_corner.then_some(of.begin)
     }
 
