@@ -263,7 +263,7 @@ mod tests {
             PartFile::open(file.path()).unwrap_err()
         };
         assert!(matches!(refused("<i8", "(2,)", 16), NpyError::Type(_)));
-        assert!(matches!(refused(">u8", "(2,)", 16), NpyError::Type(_)));
+        assert!(matches!(refused(">u8", "(2,)", 16), NpyError::Swapped));
         assert!(matches!(refused("<u4", "(4,)", 16), NpyError::Type(_)));
         assert!(matches!(refused("<u8", "(1, 2)", 16), NpyError::Shape(_)));
         assert!(matches!(refused("<u8", "()", 8), NpyError::Shape(_)));

@@ -24,7 +24,7 @@ pub enum Baseline {
     /// A program: it can be run, so times can be compared.
     Program(Box<Subject>),
     /// The recorded measurements of a program.
-    Record(Measured, Measures),
+    Record(Measured, Box<Measures>),
     /// Nothing: the candidate is only recorded.
     None,
 }
@@ -44,7 +44,7 @@ impl Baseline {
                 let measures = Measures::parse(&start)
                     .map_err(|why| GateError::Input(format!("{named}: {why}")))?;
                 let measured = Measured { named: named.clone(), ..measures.of.clone() };
-                return Ok(Self::Record(measured, measures));
+                return Ok(Self::Record(measured, Box::new(measures)));
             }
         }
         Ok(Self::Program(Box::new(Subject::find(named, options, engine)?)))
