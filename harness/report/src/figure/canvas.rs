@@ -106,9 +106,7 @@ impl Canvas<'_> {
         let points: Vec<(i32, i32)> = points.iter().copied().map(pixel).collect();
         match dashes {
             None => self.area.draw(&PathElement::new(points, style)),
-            Some((dash, gap)) => {
-                self.area.draw(&DashedPathElement::new(points.into_iter(), dash, gap, style))
-            }
+            Some((dash, gap)) => self.area.draw(&DashedPathElement::new(points, dash, gap, style)),
         }
         .expect(DRAWN);
     }

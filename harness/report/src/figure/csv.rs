@@ -2,11 +2,14 @@
 
 use super::{Body, Figure, HeatMap};
 
+/// The number of the plot, numbers and texts.
+type Row = (usize, Vec<f64>, Vec<String>);
+
 /// The values as CSV, one per line. Comments at the head, starting with `#`, name the title, the axes and the command of a run. Rows that belong
 /// together have the same number `plot`.
 pub fn csv(figure: &Figure) -> String {
     let mut head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
-    let (columns, rows): (&[&str], Vec<(usize, Vec<f64>, Vec<String>)>) = match &figure.body {
+    let (columns, rows): (&[&str], Vec<Row>) = match &figure.body {
         Body::Points { series, .. } => {
             let of = |(plot, s): (usize, &super::Series)| {
                 let text = vec![s.name.clone(), s.provenance.word().to_owned()];
