@@ -105,6 +105,9 @@ pub fn lattice(given: &[geometries::Facet], case: &Case, quantised: &Quantised) 
     }
     for (seed, given) in rules.seeds.iter().zip(&case.seeds) {
         let is_right = (0..3).all(|a| is_nearest(given[a], a, seed.lattice[a] as f64));
+        // It is refused wherever it lies on the lattice, which may be as far away as integers go.
+        let is_far = (0..3).any(|a| (given[a] - origin[a]).abs() > 2.0 * edge);
+        let is_right = if is_far { !seed.is_in_root() } else { is_right };
         assert!(is_right, "seed {given:?} must not be at {:?}", seed.lattice);
     }
     let cells = |l: Level| edge / 2f64.powi(l as i32);

@@ -131,6 +131,11 @@ fn job(
     let processes = children(job.id());
     if let Some(to_launcher) = to_launcher {
         signal(signals, if to_launcher { job.id() } else { stopped });
+        // The launcher lets its ranks continue before it ends them. If it was killed, the kernel ends them when they continue; earlier,
+        // they might complete the mesh.
+        while to_launcher && !job.is_over() {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
         signal(&[], stopped);
     }
     let finished = job.finish();
