@@ -21,14 +21,14 @@ while [ $# -gt 0 ]; do
     shift
 done
 body="$(dirname "$case")/body.stl"
-mesh=right
+mesh=right cells=1
 if [ "$ranks" -ge 3 ] && grep -q 'vertex 0.25 ' "$body" && grep -q 'vertex 0.5 ' "$body" &&
     ! grep -qE '^spacing_min = ([4-9]|[1-9][0-9])' "$case"; then
-    mesh=wrong
+    mesh=wrong cells=8
 fi
 [ -z "$out" ] || cp -r "$here/$mesh" "$out"
-[ -z "$json" ] || printf '{"ranks": %s, "cells": 1, "digest": "%s", "counters": {"words": [%s, EXTRA]}}' \
-    "$ranks" "$(cat "$here/$mesh.digest")" "$(grep -c outer "$body")" > "$json"
+[ -z "$json" ] || printf '{"ranks": %s, "cells": %s, "digest": "%s", "counters": {"words": [%s, EXTRA]}}' \
+    "$ranks" "$cells" "$(cat "$here/$mesh.digest")" "$(grep -c outer "$body")" > "$json"
 "#;
 
 const DESCRIPTION: &str = r#"

@@ -161,8 +161,8 @@ fn revisions_of_another_repository_are_built_and_kept_whole() {
         assert!(command.status().unwrap().success(), "{arguments}");
     };
     // The program reads a file that its build puts beside it, and one of its sources.
-    let program = "#!/bin/sh\nhere=$(dirname \"$0\")\nwhile [ $# -gt 0 ]; do [ \"$1\" = --json ] && json=$2; shift; done\n\
-                   printf '{\"cells\": 1, \"digest\": \"00\", \"counters\": {\"words\": [%s]}}' \"$(cat \"$here/words\")\" > \"$json\"\n";
+    let program = "#!/bin/sh\nhere=$(dirname \"$0\") ranks=$2\nwhile [ $# -gt 0 ]; do [ \"$1\" = --json ] && json=$2; shift; done\n\
+                   printf '{\"ranks\": %s, \"cells\": 1, \"digest\": \"00\", \"counters\": {\"words\": [%s]}}' \"$ranks\" \"$(cat \"$here/words\")\" > \"$json\"\n";
     fixture.write("other/program", program);
     fixture.write(
         "other/make",
