@@ -2,6 +2,7 @@
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
 use files::{Plain, message};
+use run::engine::interrupt;
 use run::verify::report::{EXIT_HOLDS, EXIT_OUTPUT};
 use std::fmt::{self, Arguments};
 use std::io::{self, ErrorKind, Write, stderr, stdout};
@@ -32,7 +33,10 @@ pub fn write(text: Arguments) {
 
 /// Writes a message to standard error, at most a screen. If that fails, there is no place left to report it.
 pub fn write_error(text: Arguments) {
-    let _ = writeln!(stderr().lock(), "{}", message(&text));
+    match message(&text).to_string() {
+        text if text == "harness: interrupted" => interrupt::announce(),
+        text => _ = writeln!(stderr().lock(), "{text}"),
+    }
 }
 
 fn note(written: io::Result<()>) {

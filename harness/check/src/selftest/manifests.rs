@@ -4,7 +4,7 @@ use super::SelftestCase;
 use super::edit::other_side;
 use super::mutant::{Mutant, Mutation, audited, informed};
 use contract::digest::Digest;
-use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
+use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest, Part, Tree};
 
 pub(super) const MUTANTS: &[Mutant] = &[
     audited("manifest: one leaf too many", "manifest", |s| edited(s, |m| m.leaves += 1)),
@@ -17,7 +17,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     audited("manifest: digests of two octants swapped", "manifest", |s| edited(s, octants_swapped)),
     audited("manifest: wrong digest of one part", "manifest", |s| edited(s, part_digest)),
     audited("manifest: one leaf too many in one part", "manifest", |s| {
-        edited(s, |m| m.parts[1].leaves += 1)
+        edited(s, |m| last_part(m).leaves += 1)
     }),
     informed("manifest: wrong root corner", "manifest", |s| {
         edited(s, |m| m.root.origin[1] += m.root.edge)
@@ -82,7 +82,11 @@ fn octants_swapped(m: &mut Manifest) {
 }
 
 fn part_digest(m: &mut Manifest) {
-    m.parts.last_mut().expect("there is a part").digest.0 ^= 1;
+    last_part(m).digest.0 ^= 1;
+}
+
+fn last_part(m: &mut Manifest) -> &mut Part {
+    m.parts.last_mut().expect("there is a part")
 }
 
 fn keep(m: &mut Manifest) {

@@ -17,7 +17,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{LazyLock, Mutex, MutexGuard, OnceLock};
+use std::sync::{LazyLock, Mutex, MutexGuard, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
@@ -139,10 +139,16 @@ pub fn has_directory(path: &Path) -> bool {
     leftovers().directories.iter().any(|directory| directory == path)
 }
 
+/// Prints that the harness was interrupted. Once: a command may be about to say so when its time is over.
+pub fn announce() {
+    static SAID: Once = Once::new();
+    SAID.call_once(|| _ = writeln!(io::stderr(), "harness: interrupted"));
+}
+
 /// Ends the harness, whatever its other threads do.
 fn end() -> ! {
     clean();
-    let _ = writeln!(io::stderr(), "harness: interrupted");
+    announce();
     exit(INTERRUPTED)
 }
 

@@ -1,6 +1,6 @@
 //! The processes of a session, read from `/proc`.
 
-use rustix::process::{Pid, Signal, WaitOptions, getsid, kill_process, waitpid};
+use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 use std::fs;
 use std::thread::sleep;
 use std::time::Duration;
@@ -19,14 +19,18 @@ pub(super) fn members(leader: u32) -> Vec<Pid> {
     };
     let ids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     // A machine has hundreds of processes. To read a file of each takes longer than to mesh a small case.
-    // SAFETY: getsid touches no memory. That of rustix has no result for kernel threads, whose session is 0.
-    let session = |id: u32| libc::pid_t::try_from(id).map(|id| unsafe { libc::getsid(id) });
-    let is_of_session = |&id: &u32| session(id).is_ok_and(|s| u32::try_from(s) == Ok(leader));
-    let of_session = ids.filter(is_of_session).filter(|&id| {
+    let of_session = ids.filter(|&id| session(id) == Some(leader)).filter(|&id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
         session_and_liveness(&stat) == Some((leader, true))
     });
     of_session.filter_map(pid_of).collect()
+}
+
+/// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container.
+fn session(id: u32) -> Option<u32> {
+    let id = libc::pid_t::try_from(id).ok()?;
+    // SAFETY: getsid touches no memory. That of rustix panics where the session is 0.
+    u32::try_from(unsafe { libc::getsid(id) }).ok()
 }
 
 /// Sends a signal to every process of a session.
@@ -57,10 +61,10 @@ fn adopted() -> Vec<Pid> {
     let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let children = threads.flat_map(|thread| {
         let text = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
-        text.split_whitespace().filter_map(|id| pid_of(id.parse().ok()?)).collect::<Vec<_>>()
+        text.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>()
     });
-    let own = getsid(None).ok();
-    children.filter(|&child| getsid(Some(child)).ok() != own).collect()
+    let own = session(0);
+    children.filter(|&child| session(child) != own).filter_map(pid_of).collect()
 }
 
 /// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.
