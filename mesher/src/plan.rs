@@ -126,8 +126,8 @@ const PART_OF_CELLS: f64 = 64.0;
 const CELLS_PER_FACET: f64 = 2048.0;
 /// Cells of a pilot run that takes a moment, a fraction of a second.
 const CELLS_MOMENT: f64 = 8.4e6;
-/// Greatest number of cells of a pilot run.
-const CELLS_PILOT: f64 = 67e6;
+/// Greatest number of cells of a pilot run: layers of many cells fill the far field, and only a large pilot shows how that grows.
+const CELLS_PILOT: f64 = 1e9;
 /// Bytes per cell of the tree's file.
 const TREE_BYTES_PER_CELL: f64 = 0.055;
 /// CPU time to write the leaf word of a cell, in seconds, and its part of the tree.

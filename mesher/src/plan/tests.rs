@@ -182,7 +182,8 @@ fn extents_and_boxes_decide_whether_a_run_is_small() {
 
 #[test]
 fn pilots_of_runs_that_cannot_fit_are_short() {
-    assert_eq!(cells_max(6.4e9, 100.0, 0.0), 67e6);
+    assert_eq!(cells_max(6.4e9, 100.0, 0.0), 1e8);
+    assert_eq!(cells_max(2e11, 100.0, 0.0), 1e9);
     assert_eq!(cells_max(6.4e9, 101.0, 0.0), 2.1e6);
     assert_eq!(cells_max(6.4e8, 1.0, 0.0), 1e7);
     assert_eq!(cells_max(6.4e8, 1.0, 2e7), 2e7);
