@@ -1,4 +1,4 @@
-//! The partition: which rank owns which octants (the paper's sections II.A and III).
+//! The partition: which rank owns which octants (the paper's section III).
 //!
 //! [`initial`] partitions T0 before it is refined, by an estimate of the leaves. [`repartition`] shifts the boundaries after
 //! refinement and after gradation, when the work is known better. Both rest on [`ownership`], which maps octants to ranks,
@@ -26,7 +26,7 @@ use crate::octant::Level;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Partitioner {
-    /// METIS on the graph of base leaves that share a face (the paper's choice)
+    /// METIS, the paper's choice, on the graph of base leaves that share a face
     Metis,
     /// Intervals of the Morton curve with equal weight
     #[default]

@@ -1,4 +1,4 @@
-//! Refinement: T0 down to its deepest level (the paper's section II.A), on the ranks that own its octants.
+//! Refinement: T0 down to its deepest level (the paper's section II.B), on the ranks that own its octants.
 //!
 //! Every facet is sent to the owners of the octants that its extent reaches; each rank then [voxelises](voxelise) its
 //! own octants.

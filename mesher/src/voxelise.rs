@@ -1,4 +1,4 @@
-//! Refinement around facets and extent boxes: from facets to the base tree T0 (the paper's section II.A).
+//! Refinement around facets and extent boxes: from facets to the base tree T0 (the paper's section II.B).
 //!
 //! Depth first from the root of a subtree, two levels at a time. The facets of a brick are tested against
 //! its 64 octants at once, and each crossed octant receives the list of the facets that cross it. The

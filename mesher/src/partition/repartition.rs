@@ -3,7 +3,7 @@
 //! The work in a region is estimated from facet areas before refinement, estimated better from T0, and known exactly after
 //! gradation. So boundaries move twice: after refinement by the [predicted time](super::cost) of sides and gradation, after
 //! gradation by the number of leaves. They move no further than the tolerated imbalance requires, and bricks are redistributed
-//! to the ranks that hold them then. The paper suggests this in its conclusions.
+//! to the ranks that hold them then. The paper names this as an idea in section V.
 
 use crate::brick::{self, Brick};
 use crate::brickset::{BrickSet, ones};
