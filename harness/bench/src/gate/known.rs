@@ -44,7 +44,8 @@ pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> Finding {
             (Verdict::Regression, format!("{counts}; worse than the baseline: {check}: {why}"))
         }
         (None, Some(check)) => {
-            (Verdict::Missing, format!("neither program makes a mesh: {}", first(check)))
+            let note = format!("neither program makes a mesh: {}", first(check));
+            return Finding::noted(name, CHECKS, Verdict::Missing, note);
         }
         (None, None) if candidate == *baseline => (Verdict::Unchanged, counts),
         (None, None) => (Verdict::Improvement, counts),
@@ -83,8 +84,9 @@ mod tests {
     #[test]
     fn two_programs_without_a_mesh_cannot_be_compared() {
         let baseline = known(&case(&[(RUNS, 1)]));
-        let verdict = |known: &Known| against("c", &case(&[(RUNS, 1)]), known).verdict;
-        assert_eq!(verdict(&baseline), Verdict::Missing);
-        assert_eq!(verdict(&Known::new()), Verdict::Regression);
+        let finding = |known: &Known| against("c", &case(&[(RUNS, 1)]), known);
+        let missing = finding(&baseline);
+        assert_eq!((missing.verdict, missing.compared), (Verdict::Missing, 0));
+        assert_eq!(finding(&Known::new()).verdict, Verdict::Regression);
     }
 }

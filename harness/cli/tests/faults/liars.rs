@@ -13,12 +13,17 @@ use std::time::Duration;
 /// Time for a command: several programs may hang until their limit of a second, and are then given time to end.
 const LIMIT: Duration = HANGS;
 
-/// The real program, whose output is `$out` and whose report is `$json` afterwards. It meshes in less than the limit.
+/// The real program, whose output is `$out` and whose report is `$json` afterwards.
 const HONEST: &str = "out=; json=; last=; for word; do case \"$last\" in --out) out=$word;; --json) json=$word;; esac; last=$word; done\n\
                       \"$REAL\" \"$@\" || exit";
 
 /// What is wrong with a program, and a shell script that acts so.
 type Lie<'a> = (&'a str, &'a str);
+
+/// The time limit of a program that acts so, in seconds: long, unless it lasts until its limit.
+fn timeout(lie: Lie) -> &'static str {
+    if lie.0.contains("hangs") || lie.0.contains("floods") { "1" } else { "600" }
+}
 
 const PROGRAMS: [Lie<'static>; 7] = [
     ("hangs", "sleep 600"),
@@ -65,7 +70,7 @@ pub fn family() {
         Test { place: &place, mesher: &mesher, reference: &reference, before: place.files() };
     let mut table = Table::new();
     for lie in PROGRAMS {
-        let is_slow = lie.0.contains("hangs") || lie.0.contains("floods");
+        let is_slow = timeout(lie) == "1";
         let commands = if is_slow && !is_full() { &COMMANDS[..1] } else { &COMMANDS[..] };
         commands.iter().for_each(|command| table.push(test.mesher(command, lie, lie.1)));
         table.push(test.oracle(lie));
@@ -100,17 +105,17 @@ const NPY: &str = "n=$(wc -c < sides); text=\"{'descr': '|u1', 'fortran_order': 
 const COMMANDS: [(&str, &str, &[i32]); 5] = [
     (
         "verify",
-        "verify case.toml --no-mpi --no-oracles --no-p4est --timeout 1 --reference REFERENCE",
+        "verify case.toml --no-mpi --no-oracles --no-p4est --timeout LIMIT --reference REFERENCE",
         &[1, 3],
     ),
     (
         "gate",
-        "gate --rules both.toml --layers correctness,counters --timeout 1 --baseline REAL",
+        "gate --rules both.toml --layers correctness,counters --timeout LIMIT --baseline REAL",
         &[1],
     ),
-    ("leak", "leak open.toml --from 0.3,0.2,0.2 --timeout 1", &[2]),
-    ("picture", "picture case.toml --out p.svg --timeout 1", &[2]),
-    ("why", "why case.toml 0,0,0 --timeout 1", &[2]),
+    ("leak", "leak open.toml --from 0.3,0.2,0.2 --timeout LIMIT", &[2]),
+    ("picture", "picture case.toml --out p.svg --timeout LIMIT", &[2]),
+    ("why", "why case.toml 0,0,0 --timeout LIMIT", &[2]),
 ];
 
 struct Test<'a> {
@@ -128,6 +133,7 @@ impl Test<'_> {
         let liar = self.script("liar", script);
         let arguments = arguments.replace("REFERENCE", self.reference.to_str().unwrap());
         let arguments = arguments.replace("REAL", self.mesher.to_str().unwrap());
+        let arguments = arguments.replace("LIMIT", timeout(lie));
         let mut command = Command::new(HARNESS);
         command.args(arguments.split(' ')).arg("--mesher").arg(liar);
         self.judge(name, &format!("the mesher {}", lie.0), command, codes)
@@ -142,7 +148,7 @@ impl Test<'_> {
             lie.1
         );
         let python = self.script("python", &script);
-        let mut command = self.verify("--no-mpi --no-p4est --require oracles");
+        let mut command = self.verify("--no-mpi --no-p4est --require oracles", timeout(lie));
         command.env("HARNESS_PYTHON", python);
         self.judge("verify --require oracles", &format!("the oracle {}", lie.0), command, &[1, 3])
     }
@@ -151,7 +157,8 @@ impl Test<'_> {
     fn launcher(&self, lie: Lie) -> Row {
         self.place.reset(&self.before);
         let launcher = self.script("bin/mpirun", lie.1);
-        let mut command = self.verify("--ranks 2 --no-oracles --no-p4est --require mpi");
+        let options = "--ranks 2 --no-oracles --no-p4est --require mpi";
+        let mut command = self.verify(options, timeout(lie));
         let path = std::env::var("PATH").unwrap_or_default();
         command.env("PATH", format!("{}:{path}", launcher.parent().unwrap().display()));
         self.judge("verify --require mpi", &format!("the launcher {}", lie.0), command, &[1, 3])
@@ -160,16 +167,15 @@ impl Test<'_> {
     /// `verify` without a launcher.
     fn missing(&self) -> Row {
         self.place.reset(&self.before);
-        let mut command = self.verify("--ranks 2 --no-oracles --no-p4est --require mpi");
+        let mut command = self.verify("--ranks 2 --no-oracles --no-p4est --require mpi", "600");
         command.env("PATH", "/nowhere");
         self.judge("verify --require mpi", "the launcher is missing", command, &[3])
     }
 
-    fn verify(&self, options: &str) -> Command {
+    fn verify(&self, options: &str, timeout: &str) -> Command {
         let mut command = Command::new(HARNESS);
-        command.args(
-            "verify case.toml --partitioners morton --level-bases auto --timeout 1".split(' '),
-        );
+        command.args("verify case.toml --partitioners morton --level-bases auto".split(' '));
+        command.args(["--timeout", timeout]);
         command.args(options.split(' ')).arg("--mesher").arg(self.mesher);
         command.arg("--reference").arg(self.reference);
         command
