@@ -1,4 +1,4 @@
-//! Instructions per kernel: `cargo bench -p mesher --bench instructions [-- NAME...]`. Counts repeat exactly,
+//! Instructions per kernel: `cargo bench -p mesher-library --bench instructions [-- NAME...]`. Counts repeat exactly,
 //! unlike times. Without valgrind the bench prints that and succeeds.
 //!
 //! Each kernel runs once, after a warm-up, in a process of its own under callgrind, which counts only what

@@ -1,4 +1,4 @@
-//! The mesher's kernels one by one: `cargo bench -p mesher --bench kernels [-- NAME]`.
+//! The mesher's kernels one by one: `cargo bench -p mesher-library --bench kernels [-- NAME]`.
 #![allow(missing_docs)]
 
 mod support;

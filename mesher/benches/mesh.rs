@@ -4,9 +4,9 @@
 mod support;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mesher::comm::Solo;
 use mesher::mesh;
 use mesher::record::Recorder;
+use ranks::Solo;
 use std::time::Duration;
 
 fn meshes(c: &mut Criterion) {

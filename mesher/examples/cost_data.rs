@@ -3,16 +3,16 @@
 //!
 //! Usage: `cost_data RANKS REPEATS CASE.toml...`. Times are medians over the repeats.
 
+use bricks::kept::Kept;
 use cpu_time::ThreadTime;
 use mesher::case::Case;
-use mesher::comm::{Comm, sim};
 use mesher::error::Error;
-use mesher::kept::Kept;
 use mesher::partition::cost::Counts;
 use mesher::partition::initial::{self, Partition};
 use mesher::partition::repartition;
 use mesher::voxelise::BinnedFacets;
 use mesher::{Options, grade, ingest, quantise, refine, sides};
+use ranks::{Comm, sim};
 use std::path::Path;
 
 /// Phases 1 to 7 of a case on this rank: the counts, and the CPU time of sides and of gradation in nanoseconds.
@@ -49,7 +49,7 @@ fn main() {
         "case,rank,bricks,components,components_extra,components_single,neighbours,sides_ns,grade_ns"
     );
     for path in cases {
-        let case = Case::read(Path::new(path)).expect("a good case");
+        let case = program::case_file::read(Path::new(path)).expect("a good case");
         let runs: Vec<_> = (1..=repeats)
             .map(|seed| sim::run(ranks, seed, |comm| measure(&case, comm).expect("a good case")))
             .collect();

@@ -1,18 +1,18 @@
 //! Draws the mesh of one small case after every phase, for `mesher/walkthrough/README.md`.
 //!
 //! ```text
-//! cargo run -p mesher --example walkthrough          # rewrites mesher/walkthrough/*.svg
+//! cargo run -p mesher-library --example walkthrough          # rewrites mesher/walkthrough/*.svg
 //! ```
 //!
 //! Every drawing is a section through the tree just beside the plane y = 0, made from the mesher's own leaf words on four
 //! simulated ranks. `tests/library/walkthrough.rs` fails when a committed drawing differs from what this program draws.
 
+use bricks::octant::{LEVEL_MAX, Side};
 use mesher::case::Case;
-use mesher::comm::sim;
 use mesher::ingest;
-use mesher::octant::{LEVEL_MAX, Side};
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::{Options, words};
+use ranks::sim;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,8 @@ struct CutLeaf {
 
 /// The case of the walk-through.
 fn case() -> Case {
-    Case::read(&directory().join("case.toml")).expect("the walk-through's case is valid")
+    program::case_file::read(&directory().join("case.toml"))
+        .expect("the walk-through's case is valid")
 }
 
 /// Where the case is, and the drawings.
@@ -48,7 +49,7 @@ pub fn directory() -> PathBuf {
 /// The leaf words of each rank after refinement (`ungraded`) or after gradation, partitioned by `weights`.
 pub fn leaves_by_rank(ungraded: bool, weights: Weights) -> Vec<Vec<u64>> {
     let division = Division { partitioner: Partitioner::Morton, weights, level_base: None };
-    let options = Options { division, ungraded, check: true, force: true, ..Options::default() };
+    let options = Options { division, ungraded, check: true, ..Options::default() };
     sim::run(RANKS, 1, |comm| {
         words(&case(), &options, comm).expect("the walk-through's case is valid").0
     })
@@ -64,7 +65,7 @@ fn section(ungraded: bool, weights: Weights) -> Vec<CutLeaf> {
 
 /// The part of a leaf that lies in the section, if any.
 fn cut(rank: usize, word: u64) -> Option<CutLeaf> {
-    let [x, y, z] = mesher::octant::position(word >> 7);
+    let [x, y, z] = bricks::octant::position(word >> 7);
     let cells = 1u32 << (LEVEL_MAX - (word >> 2 & 31) as u32);
     let unit = EDGE / f64::from(1u32 << LEVEL_MAX);
     // The drawing shows x to the right and z upwards; SVG's second axis points down.
@@ -79,7 +80,7 @@ fn cut(rank: usize, word: u64) -> Option<CutLeaf> {
 
 /// The body's outline in the section: one line segment per facet that crosses the plane.
 fn outline() -> String {
-    let geometry = ingest::read(&case().source, &mesher::comm::Solo).expect("a generated shape");
+    let geometry = ingest::read(&case().source, &ranks::Solo).expect("a generated shape");
     let plane = (f64::from(SECTION) / f64::from(1u32 << LEVEL_MAX) - 0.5) * ROOT_EDGE;
     let mut lines = String::new();
     for facet in geometry.facets {

@@ -5,9 +5,9 @@
 //! of the mesher.
 
 use crate::case::Case;
-use crate::comm::{Comm, uncounted};
 use crate::error::Error;
 use crate::ingest::Source;
+use ranks::{Comm, agree, pack_bytes, uncounted, unpack_bytes};
 use std::fs::File;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Read;
@@ -25,7 +25,7 @@ pub fn on_options(
     comm: &dyn Comm,
 ) -> Result<(), Error> {
     uncounted(comm, || {
-        comm.agree(understood)?;
+        agree(comm, understood)?;
         same("option", words, comm)
     })
 }
@@ -70,22 +70,20 @@ fn same(what: &str, words: &[String], comm: &dyn Comm) -> Result<(), Error> {
     )))
 }
 
-/// Words as their bytes, with a zero after each; the first word is the number of bytes.
 fn pack(words: &[String]) -> Vec<u64> {
-    let bytes: Vec<u8> = words.iter().flat_map(|w| w.bytes().chain([0])).collect();
-    let packed = bytes.chunks(8).map(|c| {
-        let mut word = [0; 8];
-        word[..c.len()].copy_from_slice(c);
-        u64::from_le_bytes(word)
-    });
-    [bytes.len() as u64].into_iter().chain(packed).collect()
+    let mut packed = Vec::new();
+    words.iter().for_each(|w| pack_bytes(w.as_bytes(), &mut packed));
+    packed
 }
 
-fn unpack(words: &[u64]) -> Vec<String> {
-    let Some((&length, words)) = words.split_first() else { return Vec::new() };
-    let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take(length as usize).collect();
-    let words = bytes.split_inclusive(|&b| b == 0);
-    words.map(|w| String::from_utf8_lossy(&w[..w.len() - 1]).into_owned()).collect()
+fn unpack(mut packed: &[u64]) -> Vec<String> {
+    let mut words = Vec::new();
+    while !packed.is_empty() {
+        let (word, rest) = unpack_bytes(packed);
+        words.push(String::from_utf8_lossy(&word).into_owned());
+        packed = rest;
+    }
+    words
 }
 
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.
@@ -120,7 +118,7 @@ fn content(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::sim;
+    use ranks::sim;
 
     #[test]
     fn the_first_difference_of_the_first_rank_is_named_on_all_ranks() {

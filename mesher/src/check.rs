@@ -1,6 +1,6 @@
 //! Checks of the invariants at the end of each phase, on all ranks.
 //!
-//! [`debug_check`] runs them in debug builds, and in release builds with `--check`. Invariants of sets and trees are checked next
+//! [`Job::check`](crate::Job::check) runs them in debug builds, and in release builds with `--check`. Invariants of sets and trees are checked next
 //! to their definitions; those that need other ranks, or the sets of several modules, are here. What a phase computes is compared with
 //! its definition, literally: the lattice, T0 ([`base`]), sides ([`sides`](mod@sides)) and gradation ([`graded`](mod@graded)). A check takes
 //! memory proportional to the sets that it checks and to all facets. All functions are collective, and panic if an
@@ -10,29 +10,24 @@ pub mod base;
 pub mod graded;
 pub mod sides;
 
-use crate::brick::{self, Brick};
-use crate::brickset::BrickSet;
 use crate::case::Case;
-use crate::comm::{Comm, MessageBuffer, uncounted};
-use crate::facet::Facet;
 use crate::ingest::Slice;
 use crate::lattice::{Root, Rules};
 use crate::leaves::Totals;
 use crate::mesh::{Mesh, Options};
-use crate::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour};
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
 use crate::quantise::Quantised;
 use crate::sides::Sides;
 use crate::stream::Counts;
-use crate::tree::{PerLevel, Tree, check_existing, check_split};
 use crate::write::Written;
+use bricks::brick::{self, Brick};
+use bricks::brickset::BrickSet;
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour};
+use bricks::tree::{PerLevel, Tree, check_existing, check_split};
+use ranks::{Comm, MessageBuffer, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
-
-/// Whether checks run: in debug builds, and in release builds if the options ask for them.
-pub fn is_on(options: &Options) -> bool {
-    cfg!(debug_assertions) || options.check
-}
 
 /// Splits from which on debug builds leave out the checks that take more memory than the mesh. `--check` always runs them.
 const SPLITS_MANY: u64 = 1 << 16;
@@ -40,21 +35,14 @@ const SPLITS_MANY: u64 = 1 << 16;
 /// Whether the checks run that take more memory than the mesh. Collective.
 pub fn is_whole(options: &Options, split: &PerLevel, comm: &dyn Comm) -> bool {
     let splits = || uncounted(comm, || comm.sum(split.iter().map(BrickSet::count).sum()));
-    options.check || is_on(options) && splits() < SPLITS_MANY
-}
-
-/// Runs a check if checks [are on](is_on). Its messages are not counted. Collective if the check is.
-pub fn debug_check(options: &Options, comm: &dyn Comm, mut check: impl FnMut()) {
-    if is_on(options) {
-        comm.uncounted(&mut check);
-    }
+    options.check || options.checks() && splits() < SPLITS_MANY
 }
 
 /// The slices of all ranks are contiguous and add up to the total.
 pub fn slices(slice: &Slice, comm: &dyn Comm) {
-    let all = comm.all_gather(&[slice.first, slice.facets.len() as u64, slice.total]);
     let mut end = 0;
-    for &[first, count, total] in all.words().as_chunks().0 {
+    let mine = [slice.first, slice.facets.len() as u64, slice.total];
+    for [first, count, total] in gather(comm, &[mine]) {
         assert_eq!((first, total), (end, slice.total), "slices of facets must be contiguous");
         end += count;
     }
@@ -214,7 +202,7 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
     }
     let received = comm.sparse_all_to_all(MessageBuffer::of_entries(out));
     let mut all: BTreeMap<[u64; 2], Vec<u64>> = BTreeMap::new();
-    for &[id, key, bits] in received.words().as_chunks().0 {
+    for [id, key, bits] in received.values::<[u64; 3]>() {
         all.entry([id, key]).or_default().push(bits);
     }
     for ([id, key], bits) in all {
@@ -233,8 +221,7 @@ fn to_owners(set: BrickSet, l: Level, ownership: &Ownership, comm: &dyn Comm) ->
     let entry = |b: Brick| (ownership.owner(l, b.key), [b.key, b.bits]);
     let received =
         comm.sparse_all_to_all(MessageBuffer::of_entries(set.bricks().map(entry).collect()));
-    let bricks = received.words().as_chunks().0.iter().map(|&[key, bits]| Brick { key, bits });
-    BrickSet::from_unsorted(bricks.collect())
+    BrickSet::from_unsorted(received.values().collect())
 }
 
 /// The octants one step from those of a brick of level `l`, four bricks along each axis, some of them empty.

@@ -5,9 +5,6 @@
 use files::OUT_OF_MEMORY;
 use thiserror::Error;
 
-/// Exit code of a job with a rank that keeps the others waiting.
-pub const STALLED: i32 = 75;
-
 /// An error with a message of one sentence: what, where, what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Error {
@@ -48,6 +45,37 @@ impl Error {
             Self::Input(_) => 2,
             Self::Output(_) => 4,
             Self::Memory(_) => OUT_OF_MEMORY,
+        }
+    }
+}
+
+/// For ranks to [agree](ranks::agree) on.
+impl From<Error> for (i32, String) {
+    fn from(error: Error) -> Self {
+        (error.exit_code(), error.to_string())
+    }
+}
+
+impl From<(i32, String)> for Error {
+    fn from((exit_code, message): (i32, String)) -> Self {
+        match exit_code {
+            1 => Self::Leak(message),
+            2 => Self::Input(message),
+            OUT_OF_MEMORY => Self::Memory(message),
+            _ => Self::Output(message),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_pass_between_ranks_as_they_are() {
+        let of = |make: fn(String) -> Error| make("no space".into());
+        for e in [Error::Leak, Error::Input, Error::Output, Error::Memory].map(of) {
+            assert_eq!(Error::from(<(i32, String)>::from(e.clone())), e);
         }
     }
 }

@@ -8,13 +8,13 @@
 //! bricks in which they arrive. There, bit operations find the leaves of the same level, of the next finer one, and of the next coarser
 //! one. Nothing is done per leaf.
 
-use crate::brick::{self, AXES, Brick};
-use crate::brickset::{BrickSet, ones};
-use crate::comm::{Comm, MessageBuffer};
 use crate::mesh::Mesh;
-use crate::octant::{self, Level};
 use crate::partition::ownership::Ownership;
-use crate::tree::{PerLevel, per_level};
+use bricks::brick::{self, AXES, Brick};
+use bricks::brickset::{BrickSet, ones};
+use bricks::octant::{self, Level};
+use bricks::tree::{PerLevel, per_level};
+use ranks::{Comm, MessageBuffer};
 use std::collections::BTreeMap;
 
 /// The six directions: an axis, and whether it is followed upwards.

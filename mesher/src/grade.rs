@@ -2,7 +2,7 @@
 //! II.C, "bottom up").
 //!
 //! At each level `l` the kept leaves are final and serve as sources. Their extent boxes, enlarged by
-//! `layer_cells_min - 1` cells of level `l`, are one [dilation](crate::dilate). The parents of the
+//! `layer_cells_min - 1` cells of level `l`, are one [dilation](bricks::dilate). The parents of the
 //! octants that it reaches are split where they are kept: this makes the layer. The same with one cell
 //! of level `l` and grandparents instead of parents makes the balance. An octant that is split needs
 //! split ancestors. They are added when the sweep comes to their level, before anything reads it.
@@ -44,15 +44,15 @@
 //! part of the segment may then begin in a crossing leaf coarser than `l`: a whole group would act
 //! through a deleted body. Hence only leaves are sources there.
 
-use crate::brick::{self, Brick};
-use crate::brickset::BrickSet;
-use crate::comm::Comm;
-use crate::dilate::{Reach, Tile, Words};
-use crate::kept::Kept;
 use crate::lattice::Rules;
-use crate::octant::Level;
 use crate::partition::ownership::Ownership;
-use crate::tree::{PerLevel, Tree};
+use bricks::brick::{self, Brick};
+use bricks::brickset::BrickSet;
+use bricks::dilate::{Reach, Tile, Words};
+use bricks::kept::Kept;
+use bricks::octant::Level;
+use bricks::tree::{PerLevel, Tree};
+use ranks::Comm;
 
 /// The work done on this rank; repeats exactly.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,80 +1,82 @@
 //! Phases 3 to 8: from facets and rules on the lattice to the tree.
 
-use crate::check::{self, debug_check};
-use crate::comm::{Comm, uncounted};
+use crate::check;
 use crate::error::Error;
-use crate::facet::Facet;
-use crate::kept::Kept;
-use crate::lattice::{Keep, Rules};
-use crate::mesh::{Mesh, Options};
+use crate::job::Job;
+use crate::lattice::Keep;
+use crate::mesh::Mesh;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition::{self, LeafCounts, Sets};
-use crate::quantise::FacetCounts;
-use crate::record::Recorder;
-use crate::report::{Counters, warnings};
+use crate::quantise::Quantised;
+use crate::report::warnings;
 use crate::sides::{self, leaks, openness};
-use crate::tree::Tree;
-use crate::voxelise::BinnedFacets;
+use crate::voxelise::{BinnedFacets, Work};
 use crate::{exposed, grade, refine};
+use bricks::facet::Facet;
+use bricks::kept::Kept;
+use bricks::tree::Tree;
+use ranks::{Comm, uncounted};
 use std::borrow::Borrow;
 
-/// Phases 3 to 8: from this rank's facets, and the numbers of all, to the tree. `count` sees the base tree. Collective.
+/// Phases 3 to 8: from the facets and the rules on the lattice to the tree. `count` sees the base tree. Collective.
+///
+/// # Errors
+/// The same on all ranks.
 pub fn grow<F: Borrow<[Facet]>>(
-    (facets, counts): (F, FacetCounts),
-    rules: Rules,
-    options: &Options,
-    comm: &dyn Comm,
-    record: &mut Recorder,
-    counters: &mut Counters,
-    count: &mut dyn FnMut(&Tree, &Ownership),
+    Quantised { rules, facets, counts, .. }: Quantised<F>,
+    job: &mut Job,
+    count: impl FnOnce(&Tree, &Ownership),
 ) -> Result<Mesh, Error> {
+    let (options, comm) = (job.options, job.comm);
     let division = &options.division;
     let all = || uncounted(comm, || check::base::all_facets(facets.borrow(), comm));
-    let all_facets = if check::is_on(options) { all() } else { Vec::new() };
+    let all_facets = if options.checks() { all() } else { Vec::new() };
     let is_parallel = comm.size() > 1;
 
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
+    let mut work_top = Work::default();
     let mark = |level| {
         let (tree, work) = refine::refine_top(facets.borrow(), &rules, level);
-        counters.add_voxelised(&work);
+        work_top = work;
         tree.split
     };
     let Partition { mut ownership, base_starts, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
-        true => record.phase("base tree", comm, || {
+        true => job.phase("base tree", |comm| {
             initial::partition(facets.borrow(), &rules, division, mark, comm)
         })?,
     };
-    debug_check(options, comm, || check::ownership(&ownership, comm));
+    job.counters.add_voxelised(&work_top);
+    job.check(|comm| check::ownership(&ownership, comm));
 
     // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
     let routed = is_parallel
-        .then(|| record.phase("route", comm, || refine::route(facets.borrow(), &ownership, comm)));
+        .then(|| job.phase("route", |comm| refine::route(facets.borrow(), &ownership, comm)));
     if let Some(routed) = &routed {
-        debug_check(options, comm, || check::base::routed(routed, &all_facets, &ownership));
+        job.check(|_| check::base::routed(routed, &all_facets, &ownership));
     }
-    let (mut tree, work) = record.phase("refine", comm, || {
+    let (mut tree, work) = job.phase("refine", |_| {
         let binned = BinnedFacets::new(routed.as_deref().unwrap_or(facets.borrow()));
         drop(routed);
-        if check::is_on(options) {
+        if options.checks() {
             binned.check_invariants();
         }
         refine::refine(&binned, &rules, &ownership)
     });
-    counters.add_voxelised(&work);
+    job.counters.add_voxelised(&work);
 
     // 5. Repartition after refinement: by the predicted work on T0. Replicas of bricks become equal.
     if is_parallel {
         let name = if division.repartitions() { "rebalance" } else { "share top" };
-        record.phase(name, comm, || {
+        job.phase(name, |comm| {
             if division.repartitions() {
                 ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);
             }
             ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
         });
     }
-    debug_check(options, comm, || {
+    job.check(|comm| {
         check::ownership(&ownership, comm);
         check::base_tree(&tree, &all_facets, &rules, &ownership, comm);
     });
@@ -84,17 +86,17 @@ pub fn grow<F: Borrow<[Facet]>>(
     count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let is_closed = record.phase("leaks", comm, || openness::is_closed(facets.borrow(), comm));
-    let (sides, regions) = record.phase("sides", comm, || {
+    let is_closed = job.phase("leaks", |comm| openness::is_closed(facets.borrow(), comm));
+    let (sides, regions) = job.phase("sides", |comm| {
         sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
     })?;
-    debug_check(options, comm, || {
+    job.check(|comm| {
         check::sides(&sides, &tree, &rules, &ownership, comm);
         if is_whole {
             check::sides::agree_over_faces(&sides, &tree, &ownership, comm);
         }
     });
-    let (leaks, bounds_nothing) = record.phase("leaks", comm, || {
+    let (leaks, bounds_nothing) = job.phase("leaks", |comm| {
         let facets = facets.borrow();
         let leaks = leaks::find(regions, &tree, &ownership, facets, &rules, comm);
         let bounds_nothing = rules.keep == Keep::Outside
@@ -130,15 +132,15 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.
     let base = is_whole.then(|| mesh.split.clone());
-    let (split, work) = record.phase("grade", comm, || {
+    let (split, work) = job.phase("grade", |comm| {
         let split = std::mem::take(&mut mesh.split);
         let kept = Kept::new(&mesh.sides.deleted);
         grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
     });
     mesh.split = split;
-    counters.add_graded(&work);
+    job.counters.add_graded(&work);
     let mut fingerprint = 0;
-    debug_check(options, comm, || {
+    job.check(|comm| {
         check::graded(&mesh, comm);
         if let Some(base) = &base {
             check::graded::gradation(&mesh, base, comm);
@@ -149,14 +151,14 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
     let exposed = options.weight_exposed.map(|weight| {
-        let faces = record.phase("exposed", comm, || exposed::faces(&mesh, comm));
+        let faces = job.phase("exposed", |comm| exposed::faces(&mesh, comm));
         (faces, weight)
     });
     if is_parallel && division.repartitions() {
-        record.phase("rebalance", comm, || {
+        job.phase("rebalance", |comm| {
             repartition_by_leaves(&mut mesh, exposed.as_ref(), comm);
         });
-        debug_check(options, comm, || {
+        job.check(|comm| {
             check::ownership(&mesh.ownership, comm);
             check::graded(&mesh, comm);
             let moved = check::fingerprint(&mesh, comm);
@@ -164,8 +166,8 @@ pub fn grow<F: Borrow<[Facet]>>(
         });
     }
     if let Some((faces, _)) = exposed {
-        let owned = record.phase("exposed", comm, || exposed::owned(&faces, &mesh.ownership, comm));
-        counters.exposed_faces = Some(owned);
+        let owned = job.phase("exposed", |comm| exposed::owned(&faces, &mesh.ownership, comm));
+        job.counters.exposed_faces = Some(owned);
     }
     Ok(mesh)
 }

@@ -8,11 +8,11 @@
 mod numbering;
 mod siblings;
 
-use crate::comm::{Comm, MessageBuffer};
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::write::{OutDir, TreeFile};
 use numbering::Numbering;
+use ranks::{Comm, MessageBuffer, pack_bytes, unpack_bytes};
 use siblings::{OwnSiblings, root};
 use std::ops::Range;
 use vtkhdf::tree::{Shape, Siblings, Window, groups};
@@ -31,7 +31,7 @@ pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Re
     let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
     let is_first = comm.rank() == 0;
     let file = is_first.then(|| out.tree(shape.clone(), with_ranks)).transpose();
-    let mut file = crate::comm::agree(comm, file)?;
+    let mut file = ranks::agree(comm, file)?;
     let mut own = Source { siblings: OwnSiblings::new(mesh, &numbering), last: None };
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
@@ -47,10 +47,10 @@ pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Re
         }
         let compressed = comm.sparse_all_to_all(chunks);
         let written = file.as_mut().map_or(Ok(()), |file| add(&compressed, file));
-        comm.agree(written)?;
+        ranks::agree(comm, written)?;
         begin = windows.end;
     }
-    comm.agree(file.map_or(Ok(()), TreeFile::finish))
+    ranks::agree(comm, file.map_or(Ok(()), TreeFile::finish))
 }
 
 /// The nodes that this rank owns, sent window by window.
@@ -117,22 +117,13 @@ fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer, with_ranks: bool) ->
     filled
 }
 
-/// Appends a window's chunks to the message to rank 0: its number, then for each array the bytes of its chunk, 0 for none,
-/// and the chunk.
+/// Appends a window's chunks to the message to rank 0: its number, then for each array the bytes of its chunk, none for no
+/// chunk.
 fn pack(window: u64, chunks: &[Option<Vec<u8>>], messages: &mut MessageBuffer) {
-    messages.write(0, [window, chunks.len() as u64]);
-    for chunk in chunks {
-        let bytes = chunk.as_deref().unwrap_or_default();
-        messages.write(0, [bytes.len() as u64]);
-        messages.write(
-            0,
-            bytes.chunks(8).map(|part| {
-                let mut word = [0; 8];
-                word[..part.len()].copy_from_slice(part);
-                u64::from_le_bytes(word)
-            }),
-        );
-    }
+    messages.append(0, |words| {
+        words.extend([window, chunks.len() as u64]);
+        chunks.iter().for_each(|c| pack_bytes(c.as_deref().unwrap_or_default(), words));
+    });
 }
 
 /// Writes the chunks that all ranks have sent, in the order of their windows.
@@ -141,16 +132,12 @@ fn add(messages: &MessageBuffer, file: &mut TreeFile) -> Result<(), Error> {
     messages.sort_by_key(|words| words[0]);
     for words in messages {
         let mut rest = &words[2..];
-        let chunks: Vec<Option<Vec<u8>>> = (0..words[1])
-            .map(|_| {
-                let bytes = rest[0] as usize;
-                let (chunk, after) = rest[1..].split_at(bytes.div_ceil(8));
-                rest = after;
-                let chunk = chunk.iter().flat_map(|w| w.to_le_bytes()).take(bytes).collect();
-                (bytes > 0).then_some(chunk)
-            })
-            .collect();
-        file.add(words[0], &chunks)?;
+        let chunks = (0..words[1]).map(|_| {
+            let (chunk, after) = unpack_bytes(rest);
+            rest = after;
+            (!chunk.is_empty()).then_some(chunk)
+        });
+        file.add(words[0], &chunks.collect::<Vec<_>>())?;
     }
     Ok(())
 }

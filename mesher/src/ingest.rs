@@ -5,10 +5,10 @@
 //!
 //! Invariant: the slices of the ranks are contiguous, in the order of the ranks, and add up to all facets.
 
-use crate::comm::{Comm, MessageBuffer, agree};
 use crate::error::Error;
 use crate::stl;
 use geometries::{Facet, Generator};
+use ranks::{Comm, MessageBuffer, agree};
 use std::path::PathBuf;
 
 /// The source of the facets.
@@ -55,7 +55,7 @@ pub fn read(source: &Source, comm: &dyn Comm) -> Result<Slice, Error> {
         }
         Source::Given(facets) => distribute(comm, || Ok(facets.clone()))?,
     };
-    comm.agree(stl::check_finite(&slice.facets, slice.first))?;
+    agree(comm, stl::check_finite(&slice.facets, slice.first))?;
     Ok(slice)
 }
 
@@ -77,48 +77,25 @@ fn distribute(
     if comm.size() == 1 {
         return Ok(Slice { facets, first, total });
     }
-    let messages = if comm.rank() == 0 {
-        let slice = |r: usize| {
+    let mut messages = MessageBuffer::default();
+    if comm.rank() == 0 {
+        for r in 1..comm.size() {
             let (start, end) = range(total, r, comm);
-            (r, pack(&facets[start as usize..end as usize]))
-        };
-        (1..comm.size()).map(slice).collect()
-    } else {
-        MessageBuffer::default()
-    };
+            messages.write_values(r, &facets[start as usize..end as usize]);
+        }
+    }
     let received = comm.sparse_all_to_all(messages);
-    let facets = if comm.rank() == 0 {
-        facets[..end as usize].to_vec()
-    } else {
-        unpack(received.words()).into_iter().take((end - first) as usize).collect()
+    let facets = match comm.rank() {
+        0 => facets[..end as usize].to_vec(),
+        _ => received.values().collect(),
     };
     Ok(Slice { facets, first, total })
-}
-
-/// Coordinates, two in each word.
-fn pack(facets: &[Facet]) -> impl Iterator<Item = u64> {
-    let flat: &[f32] = facets.as_flattened().as_flattened();
-    let word = |c: &[f32]| -> u64 {
-        u64::from(c[0].to_bits()) | u64::from(c.get(1).map_or(0, |v| v.to_bits())) << 32
-    };
-    flat.chunks(2).map(word)
-}
-
-/// Inverse of [`pack`]; the last facet may be padding.
-fn unpack(words: &[u64]) -> Vec<Facet> {
-    let flat: Vec<f32> = words
-        .iter()
-        .flat_map(|w| [f32::from_bits(*w as u32), f32::from_bits((w >> 32) as u32)])
-        .collect();
-    flat.chunks_exact(9)
-        .map(|c| std::array::from_fn(|v| std::array::from_fn(|a| c[3 * v + a])))
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::sim;
+    use ranks::sim;
 
     #[test]
     fn every_facet_is_in_one_slice_and_slices_are_in_order() {

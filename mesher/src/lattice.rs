@@ -3,11 +3,12 @@
 //! The root cube has 2^27 lattice units along an edge, 256 for each cell of level 19. Vertices and extent
 //! boxes are rounded to the lattice once; no later step rounds.
 
-use crate::brick::{SPANS, valid};
 use crate::error::Error;
-use crate::facet::Facet;
-use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE};
-use crate::wide::widest;
+use bricks::brick::{SPANS, valid};
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE};
+use bricks::widest;
+use bytemuck::{Pod, Zeroable};
 
 /// The root cube, in the unit of the geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +20,8 @@ pub struct Root {
 }
 
 /// Bounding box of a set of vertices.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Bounds {
     /// Least coordinates; greater than `hi` if there are no vertices.
     pub lo: [f64; 3],
@@ -247,17 +249,8 @@ impl Seed {
 }
 
 /// The treatment of outside components that do not reach the root's boundary, such as sealed cavities.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    serde::Deserialize,
-    serde::Serialize,
-    clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Enclosed {
     /// They are deleted if the outside is kept, no seeds are given, and another component reaches the boundary.
@@ -268,9 +261,8 @@ pub enum Enclosed {
 }
 
 /// The side of the geometry that the mesh keeps.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
     /// External flow: outside and crossing leaves.
@@ -306,7 +298,7 @@ mod tests {
         let facets: Vec<geometries::Facet> =
             (0..500).map(|_| [0; 3].map(|_| [0; 3].map(|_| draw()))).collect();
         let root = Root { origin: [-5.0, -4.5, -7.25], edge: 24.0 };
-        let all = crate::wide::tests::widths(|| {
+        let all = bricks::wide::widths(|| {
             let bounds = Bounds::of(&facets);
             (bounds, root.facets(facets.clone(), &bounds, 0).unwrap())
         });

@@ -1,14 +1,14 @@
 //! The leaves of the finished mesh: digests, files and the manifest.
 
-use crate::comm::{Comm, agree};
-use crate::digest::Digests;
 use crate::error::Error;
 use crate::manifest::{self, Manifest};
 use crate::mesh::Mesh;
 use crate::partition::base_leaves::Heaviest;
 use crate::stream::Counts;
 use crate::write::{OutDir, Written};
+use bricks::digest::Digests;
 use files::interrupt::stop_at;
+use ranks::{Comm, agree};
 
 /// Sums over all ranks.
 pub struct Totals {
@@ -50,7 +50,7 @@ pub fn emit(
             Ok((counts, part.finish()?))
         }
     };
-    let result = work();
+    let result: Result<_, Error> = work();
     let (counts, written) = agree(comm, result)?;
     Ok((counts, written, heaviest.max()))
 }
@@ -72,6 +72,6 @@ pub fn finish(
         }
         _ => Ok(()),
     };
-    comm.agree(publish())?;
+    agree(comm, publish())?;
     Ok(Totals { counts, digests, parts })
 }

@@ -1,15 +1,15 @@
 //! The manifest of a mesh, `mesh.json`: its inputs, counts, digests and files.
 
-use crate::comm::Comm;
-use crate::digest::{Digests, hex};
 use crate::lattice::{Enclosed, Keep, Root};
 use crate::mesh::Mesh;
-use crate::octant::{LEVEL_MAX, Level};
 use crate::quantise::FacetCounts;
 use crate::sides::Summary;
 use crate::sides::leaks::Leak;
 use crate::stream::Counts;
 use crate::write::{Output, TREE, Written, part_name};
+use bricks::digest::{Digests, hex};
+use bricks::octant::{LEVEL_MAX, Level};
+use ranks::Comm;
 use serde::Serialize;
 
 /// Contents of `mesh.json`. Boxes are in lattice units, the root is in the geometry's unit.

@@ -1,15 +1,15 @@
 //! The options of a run, and the mesh as the phases pass it on.
 
 use crate::lattice::Rules;
-use crate::octant::Level;
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner};
 use crate::quantise::FacetCounts;
 use crate::sides::Sides;
 use crate::sides::leaks::Leaks;
 use crate::stream::Leaves;
-use crate::tree::PerLevel;
 use crate::write::Output;
+use bricks::octant::Level;
+use bricks::tree::PerLevel;
 
 /// Options that have no effect on the mesh, but for `ungraded`.
 #[derive(Clone, Debug, Default)]
@@ -24,12 +24,17 @@ pub struct Options {
     pub check: bool,
     /// Count the [exposed faces](crate::exposed), each of which weighs as much as this many leaves in the last repartition.
     pub weight_exposed: Option<u32>,
-    /// Mesh even if the memory probably does not suffice.
-    pub force: bool,
     /// Fail if the geometry leaks.
     pub strict: bool,
     /// What to call the case in advice to the user.
     pub case_name: String,
+}
+
+impl Options {
+    /// Whether checks run: in debug builds, and in release builds on request.
+    pub fn checks(&self) -> bool {
+        cfg!(debug_assertions) || self.check
+    }
 }
 
 /// A mesh as one rank holds it.

@@ -20,10 +20,11 @@ mod metis;
 pub mod ownership;
 pub mod repartition;
 
-use crate::octant::Level;
+use bricks::octant::Level;
 
 /// The method that assigns base leaves to ranks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Partitioner {
     /// METIS, the paper's choice, on the graph of base leaves that share a face
@@ -34,7 +35,8 @@ pub enum Partitioner {
 }
 
 /// The weight of a part of T0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Weights {
     /// 1 for each base leaf (the paper's choice)
     Unit,

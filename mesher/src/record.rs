@@ -1,8 +1,8 @@
 //! Times and messages of each phase on one rank, and the phase that it is in.
 
-use crate::comm::{Comm, Traffic};
 use cpu_time::ThreadTime;
 use files::interrupt::stop_at;
+use ranks::{Comm, Traffic};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -114,7 +114,7 @@ pub fn peak_rss_bytes() -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::sim;
+    use ranks::sim;
 
     #[test]
     fn phases_of_one_name_add_up_with_their_messages() {

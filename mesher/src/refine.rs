@@ -5,13 +5,13 @@
 //!
 //! Invariant: a rank has every facet whose extent reaches an octant that it owns, once.
 
-use crate::comm::{Comm, MessageBuffer};
-use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::{LEVEL_MAX, Level, corner, edge};
 use crate::partition::ownership::Ownership;
-use crate::tree::Tree;
 use crate::voxelise::{self, BinnedFacets, ContainingOctant, Depth, SubtreeRoot, Work};
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Level, corner, edge};
+use bricks::tree::Tree;
+use ranks::{Comm, MessageBuffer};
 
 /// Refines the octants that this rank owns around its facets, which must be all that [reach](route) them.
 pub fn refine(facets: &BinnedFacets, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
@@ -44,12 +44,11 @@ pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Fa
         });
     }
     let mut local = std::mem::take(&mut to_rank[comm.rank()]);
-    let mut messages =
-        MessageBuffer::with_capacity(5 * to_rank.iter().map(Vec::len).sum::<usize>());
+    let mut messages = MessageBuffer::default();
     for (owner, facets) in to_rank.into_iter().enumerate() {
-        messages.write(owner, facets.iter().flat_map(pack));
+        messages.write_values(owner, &facets);
     }
-    local.extend(comm.sparse_all_to_all(messages).words().as_chunks().0.iter().map(unpack));
+    local.extend(comm.sparse_all_to_all(messages).values::<Facet>());
     local
 }
 
@@ -73,19 +72,6 @@ pub(crate) fn owners_reached(
             owners_reached(ownership, extent, l + 1, code << 3 | child as u64, found);
         }
     }
-}
-
-/// Nine coordinates in five words.
-fn pack(f: &Facet) -> [u64; 5] {
-    let c = f.v.as_flattened();
-    std::array::from_fn(|i| {
-        u64::from(c[2 * i] as u32) | u64::from(c.get(2 * i + 1).map_or(0, |v| *v as u32)) << 32
-    })
-}
-
-fn unpack(words: &[u64; 5]) -> Facet {
-    let coordinate = |i: usize| (words[i / 2] >> (32 * (i % 2))) as u32 as i32;
-    Facet { v: std::array::from_fn(|v| std::array::from_fn(|a| coordinate(3 * v + a))) }
 }
 
 #[cfg(test)]
@@ -126,11 +112,5 @@ mod tests {
             let want = leaves.iter().filter(|b| reached(b)).map(|b| b.owner);
             prop_assert!(found.into_iter().eq(want));
         }
-    }
-
-    #[test]
-    fn facets_are_unpacked_as_they_were_packed() {
-        let f = Facet { v: [[-5, 1 << 28, 0], [7, -(1 << 27), 3], [i32::MAX, i32::MIN, -1]] };
-        assert_eq!(unpack(&pack(&f)), f);
     }
 }

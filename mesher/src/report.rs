@@ -9,18 +9,19 @@
 mod text;
 pub(crate) mod warnings;
 
-pub(crate) use text::grouped;
+pub use text::grouped;
 
-use crate::comm::{Comm, Traffic, matrix};
-use crate::digest::hex;
+use crate::job::Job;
 use crate::leaves::Totals;
 use crate::manifest::{Geometry, LeakEntry};
 use crate::mesh::Mesh;
-use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::Partitioner;
-use crate::record::{Phase, Recorder, peak_rss_bytes};
+use crate::record::{Phase, peak_rss_bytes};
 use crate::sides::Summary;
 use crate::{grade, voxelise};
+use bricks::digest::hex;
+use bricks::octant::{LEVEL_MAX, Level};
+use ranks::{Comm, Traffic, matrix};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -174,13 +175,8 @@ pub struct Report {
 
 impl Report {
     /// Gathers the counters and times of all ranks. Collective.
-    pub(crate) fn gather(
-        mesh: &Mesh,
-        totals: &Totals,
-        counters: &Counters,
-        record: &Recorder,
-        comm: &dyn Comm,
-    ) -> Self {
+    pub(crate) fn gather(mesh: &Mesh, totals: &Totals, job: &Job) -> Self {
+        let Job { comm, record, counters, .. } = job;
         let Mesh { rules, sides, .. } = mesh;
         let Totals { counts, digests, .. } = totals;
         let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
@@ -309,11 +305,11 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::{Comm, sim};
+    use ranks::{Comm, sim};
 
     fn report() -> Report {
         let of_rank = |comm: &dyn Comm| {
-            let mut record = Recorder::default();
+            let mut record = crate::record::Recorder::default();
             crate::mesh(&crate::tests::case(), &crate::tests::options(), comm, &mut record)
         };
         sim::run(2, 1, |comm| of_rank(comm)).swap_remove(0).expect("a good case")

@@ -8,13 +8,13 @@
 //! - it is *complete*: the leaves emitted and the leaves left out (deleted, or
 //!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
-use crate::brick;
-use crate::brickset::{BrickSet, Cursor, ones};
 use crate::lattice::{Keep, Rules};
-use crate::octant::{Level, Side, start57};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
-use crate::tree::LEVELS;
+use bricks::brick;
+use bricks::brickset::{BrickSet, Cursor, ones};
+use bricks::octant::{Level, Side, start57};
+use bricks::tree::LEVELS;
 
 /// Number of words that are buffered before they are passed to the sink.
 const CHUNK: usize = 4096;
@@ -28,7 +28,7 @@ pub struct Counts {
 
 impl Counts {
     /// The sums over all ranks. Collective.
-    pub fn gather(&self, comm: &dyn crate::comm::Comm) -> Self {
+    pub fn gather(&self, comm: &dyn ranks::Comm) -> Self {
         let mut sum = Self::default();
         let sums = comm.sums(self.by_level.as_flattened());
         sum.by_level.as_flattened_mut().copy_from_slice(&sums);

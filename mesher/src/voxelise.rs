@@ -16,12 +16,12 @@
 #[cfg(test)]
 mod tests;
 
-use crate::brick;
-use crate::brickset::ones;
-use crate::facet::{Facet, crossed};
 use crate::lattice::{ExtentBox, box_mask};
-use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
-use crate::tree::Tree;
+use bricks::brick;
+use bricks::brickset::ones;
+use bricks::facet::{Facet, crossed};
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
+use bricks::tree::Tree;
 use std::ops::Range;
 
 /// The smallest octant that contains all closed level-19 cells that a facet's extent meets, and so the facet:

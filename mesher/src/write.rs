@@ -6,10 +6,10 @@
 //! - the manifest is written last, so all files that it names exist;
 //! - after an error or an interrupt, none of the mesh's files remains.
 
-use crate::comm::{Comm, agree};
-use crate::digest::Digests;
 use crate::error::Error;
+use bricks::digest::Digests;
 use files::{Claim, ClaimError, Draft};
+use ranks::{Comm, agree};
 use serde::Serialize;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -230,7 +230,7 @@ fn header(leaves: u64) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::Solo;
+    use ranks::Solo;
 
     #[test]
     fn parts_of_any_length_are_read_back() {

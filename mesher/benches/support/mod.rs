@@ -1,23 +1,24 @@
 //! Fixed work for the benches: the mesher's kernels, each on the results of the preceding phases for an aircraft.
 #![allow(dead_code, missing_docs)]
 
-use mesher::brick::{flood, valid};
-use mesher::brickset::BrickSet;
+use bricks::brick::{flood, valid};
+use bricks::brickset::BrickSet;
+use bricks::digest;
+use bricks::dilate::{Reach, Tile};
+use bricks::facet::{Facet, crossed};
+use bricks::kept::Kept;
+use bricks::octant::ROOT_BITS;
+use bricks::tree::{PerLevel, Tree};
 use mesher::case::{Case, RootSpec};
-use mesher::comm::Solo;
-use mesher::dilate::{Reach, Tile};
-use mesher::facet::{Facet, crossed};
 use mesher::ingest::{Slice, Source, read};
-use mesher::kept::Kept;
 use mesher::lattice::{Bounds, Enclosed, Keep, Rules};
-use mesher::octant::ROOT_BITS;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Sides, decide};
 use mesher::stream::Leaves;
-use mesher::tree::{PerLevel, Tree};
 use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
-use mesher::{Options, digest, grade, stl};
+use mesher::{Options, grade, stl};
+use ranks::Solo;
 use std::convert::Infallible;
 use std::hint::black_box;
 
@@ -52,7 +53,7 @@ pub fn case(shape: &str, facets: usize, finer: i32, layer_cells_min: u32) -> Cas
 pub fn options() -> Options {
     let (partitioner, weights) = (Partitioner::Morton, Weights::Area);
     let division = Division { partitioner, weights, level_base: None };
-    Options { division, force: true, ..Options::default() }
+    Options { division, ..Options::default() }
 }
 
 /// Results of all phases for the aircraft.

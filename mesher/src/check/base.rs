@@ -1,13 +1,13 @@
 //! T0 by its definition, octant by octant from the root. The test of facets against octants and the descent share no code with
 //! refinement, routing and extent boxes.
 
-use crate::comm::Comm;
-use crate::facet::Facet;
 use crate::lattice::Rules;
-use crate::octant::{Level, corner, edge, path, start57};
 use crate::partition::ownership::Ownership;
-use crate::tree::Tree;
+use bricks::facet::Facet;
+use bricks::octant::{Level, corner, edge, path, start57};
+use bricks::tree::Tree;
 use bytemuck::allocation::pod_collect_to_vec;
+use ranks::Comm;
 use std::ops::Range;
 
 /// The facets of all ranks, in their order. Collective.
@@ -74,7 +74,7 @@ impl Definition<'_> {
         });
         let is_split = is_boxed || l < self.rules.level_surface && !facets.is_empty();
         let is_crossing = !is_split && !facets.is_empty();
-        let of = |set: &[crate::brickset::BrickSet]| set[l as usize].contains(code);
+        let of = |set: &[bricks::brickset::BrickSet]| set[l as usize].contains(code);
         assert_eq!(
             (of(&self.tree.split), of(&self.tree.crossing)),
             (is_split, is_crossing),
@@ -130,7 +130,7 @@ fn touches(f: &Facet, min: [i64; 3], h: i64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facet::crossed;
+    use bricks::facet::crossed;
     use proptest::prelude::*;
 
     proptest! {

@@ -2,12 +2,12 @@
 //! from one octant to the next, and messages go to owners alone: nothing is shared with tiles, whole groups and redistribution.
 
 use super::{face_neighbours, is_in_leaf, to_owners};
-use crate::brick::Brick;
-use crate::brickset::BrickSet;
-use crate::comm::Comm;
 use crate::mesh::Mesh;
-use crate::octant::{Level, path};
-use crate::tree::{PerLevel, Tree};
+use bricks::brick::Brick;
+use bricks::brickset::BrickSet;
+use bricks::octant::{Level, path};
+use bricks::tree::{PerLevel, Tree};
+use ranks::Comm;
 
 /// The splits of the mesh follow from those of T0, `base`: layers of every level are thick enough, kept leaves that touch differ by one
 /// level at most, and no octant is split without need. Collective.

@@ -2,18 +2,18 @@
 //! with the phase.
 
 use super::{face_neighbours, is_in_leaf, to_owners};
-use crate::brick::Brick;
-use crate::brickset::BrickSet;
-use crate::comm::Comm;
-use crate::facet::Facet;
 use crate::lattice::{Keep, Rules};
-use crate::octant::{Level, corner, edge, path};
 use crate::partition::ownership::Ownership;
 use crate::sides::enclosed::Region;
 use crate::sides::nodes::open_bricks;
 use crate::sides::vote::FirstLeaf;
 use crate::sides::{Sides, Verdict};
-use crate::tree::{LEVELS, PerLevel, Tree, per_level};
+use bricks::brick::Brick;
+use bricks::brickset::BrickSet;
+use bricks::facet::Facet;
+use bricks::octant::{Level, corner, edge, path};
+use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
+use ranks::Comm;
 
 /// Components whose rays are cast: enough to find a fault, on any geometry.
 const COMPONENTS_MAX: usize = 64;

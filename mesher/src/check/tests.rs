@@ -1,18 +1,18 @@
 use super::*;
 use crate::case::{BoxSpec, Case, RootSpec};
-use crate::comm::{Solo, sim};
 use crate::ingest::{self, Source};
 use crate::lattice::{Bounds, Enclosed, ExtentBox, Keep, Seed};
-use crate::octant::Side;
 use crate::partition::ownership::Placement;
 use crate::record::Recorder;
-use crate::report::Counters;
-use crate::{leaves as finished, octant, refine};
+use crate::{leaves as finished, refine};
+use bricks::octant::Side;
+use geometries::{Generator, Shape};
+use ranks::{Solo, sim};
 
 const RANKS: usize = 4;
 
 fn case() -> Case {
-    let torus = toml::from_str("shape = \"torus\"\nfacets = 640").expect("a generator");
+    let torus = Generator::new(Shape::Torus, 640);
     Case {
         source: Source::Generated(torus),
         spacing_min: 0.05,
@@ -27,12 +27,14 @@ fn case() -> Case {
 }
 
 fn options(ungraded: bool) -> Options {
-    Options { ungraded, force: true, ..Options::default() }
+    Options { ungraded, ..Options::default() }
 }
 
 fn mesh(ungraded: bool, comm: &dyn Comm) -> Mesh {
-    let (mut record, mut counters) = (Recorder::default(), Counters::default());
-    crate::make(&case(), &options(ungraded), comm, &mut record, &mut counters).expect("a good case")
+    let (mut record, options) = (Recorder::default(), options(ungraded));
+    let job = &mut crate::Job::new(&options, comm, &mut record);
+    let quantised = crate::quantised(&case(), job).expect("a good case");
+    crate::grow(quantised, job, |_, _| {}).expect("a good case")
 }
 
 /// Makes T0, or the graded tree, and runs a check on it after rank 1 has run `corrupt`.
@@ -208,7 +210,7 @@ fn a_crossing_leaf_that_no_facet_crosses_is_found() {
 fn an_octant_that_an_extent_box_does_not_split_is_found() {
     let mesh = mesh(true, &Solo);
     let facets = local_facets(&mesh, &Solo);
-    let far = octant::ROOT_EDGE;
+    let far = bricks::octant::ROOT_EDGE;
     let extent = ExtentBox { min: [far - 5; 3], max: [far; 3], level: 4 };
     let rules = Rules { boxes: vec![extent], ..mesh.rules };
     let tree = Tree { split: mesh.split, crossing: mesh.crossing };
@@ -238,7 +240,7 @@ fn a_split_octant_without_a_parent_is_found() {
 
 /// Corrupts a replica of a brick of T0 on rank 1, and leaves its tree valid.
 fn corrupt_replica(m: &mut Mesh, change: impl Fn(&mut BrickSet, u64)) {
-    for l in (2..crate::tree::LEVELS as Level).rev() {
+    for l in (2..bricks::tree::LEVELS as Level).rev() {
         let is_replica = |b: &Brick| m.ownership.placement(l, b.key) != Placement::Local;
         if let Some(b) = m.crossing[l as usize].bricks().find(is_replica) {
             return change(&mut m.crossing[l as usize], b.key);
@@ -271,7 +273,7 @@ fn a_brick_of_another_rank_is_found() {
         let rank = if comm.rank() == 1 { 2 } else { comm.rank() };
         let crossing = if comm.rank() == 1 {
             let l = deepest(&m.crossing);
-            let mut other = crate::tree::per_level();
+            let mut other = bricks::tree::per_level();
             let (start, _) = boundaries[2];
             add(&mut other[l], start >> (3 * (LEVEL_MAX - l as Level)) | 0o777);
             other
@@ -456,7 +458,13 @@ fn a_fingerprint_depends_on_the_mesh_alone() {
 #[test]
 #[should_panic(expected = "leaves must be in order and must not overlap")]
 fn overlapping_leaves_are_found() {
-    is_linear(0, &[octant::word(1, 2, Side::Outside), octant::word(2, 2 << 3 | 7, Side::Outside)]);
+    is_linear(
+        0,
+        &[
+            bricks::octant::word(1, 2, Side::Outside),
+            bricks::octant::word(2, 2 << 3 | 7, Side::Outside),
+        ],
+    );
 }
 
 /// Checks the leaves after rank 1 has changed the mesh.

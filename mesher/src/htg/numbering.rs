@@ -1,10 +1,10 @@
 //! Numbers of siblings in the order of the file: level by level, and in Morton order within a level.
 
-use crate::comm::Comm;
 use crate::mesh::Mesh;
-use crate::octant::Level;
 use crate::partition::ownership::{Ownership, brick_start};
-use crate::tree::{LEVELS, Tree};
+use bricks::octant::Level;
+use bricks::tree::{LEVELS, Tree};
+use ranks::Comm;
 use std::ops::Range;
 
 /// Where the siblings of this rank are in the file. Siblings are numbered from the root's children, which have number 0.

@@ -1,12 +1,12 @@
 //! The nodes that a rank owns, eight siblings at a time, in the order of the file.
 
 use super::numbering::{Interval, Numbering};
-use crate::brick::{byte, children};
-use crate::brickset::{BrickSet, ChildBricks};
 use crate::mesh::Mesh;
-use crate::octant::Level;
 use crate::stream::{LevelCursors, Octants};
-use crate::tree::LEVELS;
+use bricks::brick::{byte, children};
+use bricks::brickset::{BrickSet, ChildBricks};
+use bricks::octant::Level;
+use bricks::tree::LEVELS;
 use vtkhdf::tree::Siblings;
 
 /// Siblings with their numbers, in ascending order: those of the bricks that this rank owns.
@@ -76,7 +76,7 @@ impl<'a> OwnSiblings<'a> {
                 (self.interval, self.next) = (Some(interval), first);
             }
             self.brick = self.path.load(self.level, b.key);
-            self.left = crate::brick::parents(b.bits);
+            self.left = bricks::brick::parents(b.bits);
         }
         Some(())
     }

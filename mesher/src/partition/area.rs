@@ -4,11 +4,11 @@
 //! the components of its unit normal, as cells are cubes. So area is measured in that norm, in units of a face of a finest
 //! cell. A facet larger than the octants of interest is split in four until it is not.
 
-use crate::comm::{Comm, Entry, all_gather_reduced};
-use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use crate::partition::curve::Bin;
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
+use ranks::{Comm, Entry, all_gather_reduced};
 use std::ops::Range;
 
 /// Fractions of a finest cell's face that areas are counted in: sums of integers do not depend on their order.
@@ -189,10 +189,10 @@ fn centre(f: &Facet) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::Solo;
     use crate::lattice::Keep;
     use crate::partition::curve;
-    use crate::tree::tests::rules as plain_rules;
+    use crate::tests::rules as plain_rules;
+    use ranks::Solo;
 
     fn rules(level_surface: Level) -> Rules {
         Rules { level_surface, layer_cells_min: 4, keep: Keep::Outside, ..plain_rules() }

@@ -7,19 +7,19 @@ mod heaviest;
 
 pub use heaviest::Heaviest;
 
-use crate::brick::{self, Brick};
-use crate::comm::{Comm, agree, all_gather_reduced};
 use crate::error::Error;
-use crate::facet::Facet;
 use crate::lattice::Rules;
-use crate::octant::{Level, start57};
 use crate::partition::curve::assign_morton;
 #[cfg(feature = "metis")]
 use crate::partition::metis;
 use crate::partition::ownership::{BaseLeaf, KEY_BITS};
 use crate::partition::{Division, Partitioner, Weights, area};
-use crate::tree::{PerLevel, per_level};
 use area::Areas;
+use bricks::brick::{self, Brick};
+use bricks::facet::Facet;
+use bricks::octant::{Level, start57};
+use bricks::tree::{PerLevel, per_level};
+use ranks::{Comm, agree, all_gather_reduced};
 use std::ops::Range;
 
 /// Base leaves with children per rank, at least, where all base leaves have one level.
@@ -217,10 +217,10 @@ fn assign_metis(_: &[Subtree], _: &[u64], _: usize) -> Result<Vec<usize>, Error>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::Solo;
-    use crate::octant::ROOT_EDGE;
     use crate::refine::refine_top;
-    use crate::tree::tests::rules as plain_rules;
+    use crate::tests::rules as plain_rules;
+    use bricks::octant::ROOT_EDGE;
+    use ranks::Solo;
 
     const LEVEL: Level = 5;
 

@@ -4,10 +4,10 @@
 //! brick; rough ones leave components of a single octant, which branch predictors handle badly. `mesher/cost-model/README.md` has
 //! the program that fits the times, the data, and the prediction errors.
 
-use crate::brick;
-use crate::octant::Level;
 use crate::partition::ownership::Ownership;
-use crate::tree::Tree;
+use bricks::brick;
+use bricks::octant::Level;
+use bricks::tree::Tree;
 use std::ops::AddAssign;
 
 /// CPU times on one rank, in nanoseconds.

@@ -4,8 +4,8 @@
 //! its *boundaries*: positions in ascending order, the first of which is 0, each with the rank that owns the curve
 //! from there to the next. Functions that return boundaries return none if all weights are zero.
 
-use crate::comm::Comm;
-use crate::octant::LEVEL_MAX;
+use bricks::octant::LEVEL_MAX;
+use ranks::{Comm, gather};
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
@@ -58,21 +58,16 @@ fn partition_at(
     comm: &dyn Comm,
     begins: impl Fn(&[u128]) -> Vec<u128>,
 ) -> Option<Vec<Boundary>> {
-    let loads: Vec<u128> = {
-        let load = bins.iter().map(|b| b.1).sum();
-        comm.all_gather(&[load]).words().iter().map(|&w| u128::from(w)).collect()
-    };
+    let load: u64 = bins.iter().map(|b| b.1).sum();
+    let loads: Vec<u128> = gather(comm, &[load]).into_iter().map(u128::from).collect();
     if loads.iter().all(|&load| load == 0) {
         return None;
     }
     let before = loads[..comm.rank()].iter().sum();
-    let local: Vec<u64> = boundaries(bins, before, &begins(&loads))
-        .into_iter()
-        .flat_map(|(start, owner)| [start, owner as u64])
-        .collect();
-    let all = comm.all_gather(&local);
-    let pairs = all.words().as_chunks().0.iter();
-    Some(without_repeats(pairs.map(|&[start, owner]| (start, owner as usize))))
+    let local = boundaries(bins, before, &begins(&loads));
+    let local: Vec<[u64; 2]> = local.into_iter().map(|(at, owner)| [at, owner as u64]).collect();
+    let all = gather(comm, &local).into_iter();
+    Some(without_repeats(all.map(|[start, owner]| (start, owner as usize))))
 }
 
 /// The same as [`partition`] for bins that are the same on all ranks. Not collective.

@@ -7,16 +7,16 @@
 //!
 //! METIS, weights of 1 and a given `level_base` need base leaves: see [`base_leaves`].
 
-use crate::comm::{Comm, MessageBuffer, all_gather_reduced};
 use crate::error::Error;
-use crate::facet::Facet;
 use crate::lattice::{ExtentBox, Rules};
-use crate::octant::{LEVEL_MAX, Level, edge, start57};
 use crate::partition::area::{self, FRACTIONS};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner, base_leaves};
-use crate::tree::PerLevel;
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Level, edge, start57};
+use bricks::tree::PerLevel;
+use ranks::{Comm, MessageBuffer, all_gather_reduced};
 
 /// Fine octants per rank, about: boundaries of the curve lie between them.
 const FINE_PER_RANK: u64 = 16;
@@ -162,9 +162,9 @@ fn coarse_bins(local: &[Bin], rules: &Rules, level: Level, comm: &dyn Comm) -> (
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::sim;
-    use crate::octant::{ROOT_EDGE, start57};
-    use crate::tree::tests::rules as plain_rules;
+    use crate::tests::rules as plain_rules;
+    use bricks::octant::{ROOT_EDGE, start57};
+    use ranks::sim;
 
     const RANKS: usize = 9;
     const FINE: Level = 7;

@@ -1,7 +1,7 @@
 //! METIS: parts of equal weight with few faces between them.
 
 use crate::error::Error;
-use crate::octant::{Level, neighbour, start57};
+use bricks::octant::{Level, neighbour, start57};
 use std::sync::{Mutex, PoisonError};
 
 /// METIS keeps its random state per process: threads that share it would change each other's parts.
@@ -83,7 +83,7 @@ fn adjacency(vertices: usize, pairs: &[(usize, usize)]) -> (Vec<metis::Idx>, Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::octant::{LEVEL_MAX, position};
+    use bricks::octant::{LEVEL_MAX, position};
 
     #[test]
     fn parts_are_equal_whatever_the_sum_of_weights() {

@@ -13,8 +13,9 @@
 mod neighbours;
 mod redistribute;
 
-use crate::octant::{LEVEL_MAX, Level, start57};
 use crate::partition::curve::Boundary;
+use bricks::octant::{LEVEL_MAX, Level, start57};
+use bricks::tree::Tree;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -188,13 +189,21 @@ impl Ownership {
             .then(|| self.intervals.owners[interval])
     }
 
-    /// Deepest level with a fully replicated brick.
-    pub fn level_fully_replicated(&self) -> Level {
-        self.level_fully_replicated
+    /// The fully replicated bricks of a tree: the same on all ranks.
+    pub fn fully_replicated(&self, tree: &Tree) -> Tree {
+        let mut top = Tree::default();
+        for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
+            for l in 0..=self.level_fully_replicated {
+                let bricks = from[l as usize].bricks();
+                let bricks = bricks.filter(|b| self.is_fully_replicated(l, b.key));
+                bricks.for_each(|b| to[l as usize].push(b.key, b.bits));
+            }
+        }
+        top
     }
 
     /// Whether all ranks hold brick `key` of level `l`.
-    pub fn is_fully_replicated(&self, l: Level, key: u64) -> bool {
+    fn is_fully_replicated(&self, l: Level, key: u64) -> bool {
         l < 2
             || l <= self.level_fully_replicated
                 && self.intervals.of_brick(l, key).len() >= OWNERS_MANY

@@ -5,14 +5,14 @@
 //! gradation by the number of leaves. They move no further than the tolerated imbalance requires, and bricks are redistributed
 //! to the ranks that hold them then. The paper names this as an idea in section V.
 
-use crate::brick::{self, Brick};
-use crate::brickset::{BrickSet, ones};
-use crate::comm::Comm;
-use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::cost::{WEIGHT_OF_NEIGHBOUR, weight_of_brick};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, brick_start};
-use crate::tree::{LEVELS, PerLevel, Tree};
+use bricks::brick::{self, Brick};
+use bricks::brickset::{BrickSet, ones};
+use bricks::octant::{LEVEL_MAX, Level};
+use bricks::tree::{LEVELS, PerLevel, Tree};
+use ranks::Comm;
 use std::ops::Range;
 
 /// Minimum number of groups of bricks sampled on the most populated level; the same fraction of the other levels.
@@ -209,8 +209,8 @@ impl Weighted {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::octant::start57;
-    use crate::tree::per_level;
+    use bricks::octant::start57;
+    use bricks::tree::per_level;
 
     const LEVEL: Level = 5;
 

@@ -6,10 +6,10 @@
 //! ascends the path until it finds the leaf that covers the octant across the face.
 
 use super::nodes::{Component, Family, Node, Nodes};
-use crate::brick;
-use crate::brickset::ones;
-use crate::octant::{Level, neighbour};
 use crate::partition::ownership::{Ownership, Placement};
+use bricks::brick;
+use bricks::brickset::ones;
+use bricks::octant::{Level, neighbour};
 
 /// A union-find over local components, and the faces whose other side only another rank sees.
 pub struct LocalMerge {

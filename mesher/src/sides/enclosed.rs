@@ -7,8 +7,8 @@
 use super::global::Label;
 use super::vote::FirstLeaf;
 use super::{EnclosedComponents, Verdict};
-use crate::comm::{Comm, all_gather_reduced};
 use crate::lattice::{Enclosed, Keep, Rules};
+use ranks::{Comm, all_gather_reduced};
 use std::collections::HashSet;
 
 /// What the kept region owes to the root's boundary. The same on all ranks.

@@ -7,10 +7,10 @@
 
 use super::components::{self, FacedOctants, MergedComponents};
 use super::nodes::{Component, Nodes};
-use crate::comm::{Comm, MessageBuffer};
-use crate::octant::Level;
 use crate::partition::ownership::{Ownership, Placement};
-use crate::tree::{LEVELS, Tree};
+use bricks::octant::Level;
+use bricks::tree::{LEVELS, Tree};
+use ranks::{Comm, MessageBuffer};
 use std::collections::HashMap;
 
 /// Label of a component of the tree, the same on all ranks.
@@ -62,7 +62,7 @@ fn label_replicated(
     merged: &MergedComponents,
 ) -> Vec<[Label; 2]> {
     let non_owning_view = ownership.non_owning_view();
-    let replicated = Nodes::new(&tree.fully_replicated(ownership), &non_owning_view);
+    let replicated = Nodes::new(&ownership.fully_replicated(tree), &non_owning_view);
     let of_replicated = components::merge(&replicated, &non_owning_view).numbered().of;
     let of_nodes = replicated_components(nodes);
     assert_eq!(

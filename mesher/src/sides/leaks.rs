@@ -16,14 +16,14 @@ use super::global::Label;
 use super::nodes::{Component, Nodes};
 use super::vote::{self, Candidate};
 use super::{Components, seeds};
-use crate::brick::{self, Brick};
-use crate::brickset::BrickSet;
-use crate::comm::{Comm, all_gather_reduced, uncounted};
-use crate::facet::Facet;
 use crate::lattice::{Keep, Rules};
-use crate::octant::{LEVEL_MAX, Level};
 use crate::partition::ownership::Ownership;
-use crate::tree::{LEVELS, PerLevel, Tree, per_level};
+use bricks::brick::{self, Brick};
+use bricks::brickset::BrickSet;
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Level};
+use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
+use ranks::{Comm, all_gather_reduced, uncounted};
 use std::collections::HashSet;
 
 /// Number of coarser spacings that are compared with that of the mesh.
@@ -220,7 +220,7 @@ impl Leaks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tree::tests::rules;
+    use crate::tests::rules;
 
     /// A leak between level 2 and the surface level, 3: two octants of level 2.
     fn leak() -> Leak {

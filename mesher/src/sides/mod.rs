@@ -24,19 +24,19 @@ pub mod rays;
 pub mod seeds;
 pub mod vote;
 
-use crate::brick::Brick;
-use crate::check::{self, debug_check};
-use crate::comm::Comm;
+use crate::check;
 use crate::error::Error;
-use crate::facet::Facet;
 use crate::lattice::{Keep, Rules};
 use crate::mesh::Options;
-use crate::octant::Level;
 use crate::partition::ownership::Ownership;
-use crate::tree::{LEVELS, PerLevel, Tree, assert_none, per_level};
+use bricks::brick::Brick;
+use bricks::facet::Facet;
+use bricks::octant::Level;
+use bricks::tree::{LEVELS, PerLevel, Tree, assert_none, per_level};
 use enclosed::Region;
 use global::Label;
 use nodes::{Component, Nodes};
+use ranks::{Comm, uncounted};
 use std::collections::HashSet;
 use vote::{FirstLeaf, FirstLeaves};
 
@@ -163,7 +163,7 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Result<(Sides, Vec<leaks::Region>), Error> {
     let mut components = Components::new(tree, ownership, comm);
-    if check::is_on(options) {
+    if options.checks() {
         components.nodes.check_invariants();
     }
     let verdict = if rules.seeds.is_empty() {
@@ -204,10 +204,13 @@ pub fn decide(
     };
     let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership);
     sides.summary.enclosed = region.summary(&all, leaves_enclosed, comm);
-    debug_check(options, comm, || {
+    if options.checks() {
         let decided = (&verdict, &region);
-        check::sides::components(&all, decided, &sides, (rules, facets), ownership, comm);
-    });
+        let check = || {
+            check::sides::components(&all, decided, &sides, (rules, facets), ownership, comm);
+        };
+        uncounted(comm, check);
+    }
     let is_inside = |c: Component| of_local[c as usize] == Class::Inside;
     let regions =
         if is_closed { Vec::new() } else { leaks::Region::of(tree, &nodes, rules, is_inside) };
@@ -288,9 +291,9 @@ impl Sides {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brickset::tests::set;
-    use crate::comm::Solo;
-    use crate::tree::tests::{rules, small};
+    use crate::tests::set;
+    use crate::tests::{rules, small};
+    use ranks::Solo;
 
     /// Sides of a tree without facets: all leaves that do not cross are outside.
     fn decided(keep: Keep) -> (Tree, Sides) {

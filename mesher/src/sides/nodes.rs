@@ -6,10 +6,10 @@
 //! - components are numbered through all levels in order, and each is a non-empty set of octants that
 //!   are connected over faces within the brick.
 
-use crate::brick;
-use crate::octant::Level;
 use crate::partition::ownership::{Ownership, Placement};
-use crate::tree::{LEVELS, Tree};
+use bricks::brick;
+use bricks::octant::Level;
+use bricks::tree::{LEVELS, Tree};
 use std::ops::Range;
 
 /// Number of a local component: leaves of one brick that are connected over faces.
@@ -275,8 +275,8 @@ fn brick_above(l: Level, key: u64, m: Level) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brickset::ones;
-    use crate::brickset::tests::set;
+    use crate::tests::set;
+    use bricks::brickset::ones;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 

@@ -9,10 +9,10 @@
 //!
 //! Both are sums over the facets, to which each rank contributes those of its slice.
 
-use crate::comm::{Comm, uncounted};
-use crate::digest::{chained, mix};
-use crate::facet::Facet;
-use crate::wide::widest;
+use bricks::digest::{chained, mix};
+use bricks::facet::Facet;
+use bricks::widest;
+use ranks::{Comm, uncounted};
 
 /// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
 const SHEET: f64 = 0.25;
@@ -78,7 +78,7 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::{Solo, sim};
+    use ranks::{Solo, sim};
 
     /// Two facets of a parallelogram, whose normal is the cross product of `a` and `b`.
     fn pair(at: [i32; 3], a: [i32; 3], b: [i32; 3]) -> [Facet; 2] {
@@ -107,7 +107,7 @@ mod tests {
         let slice = |rank: usize| &facets[facets.len() * rank / 3..facets.len() * (rank + 1) / 3];
         let among = sim::run(3, 1, |comm| of(slice(comm.rank()), comm));
         assert_eq!(among, [alone; 3]);
-        let widths = crate::wide::tests::widths(|| boundary(facets));
+        let widths = bricks::wide::widths(|| boundary(facets));
         assert!(widths.iter().all(|(_, found)| *found == widths[0].1));
         alone
     }

@@ -4,10 +4,10 @@
 //! point, displaced by +eps along `a + 1` and by +eps^2 along `a + 2` (symbolic perturbation). The displaced
 //! ray meets no edge and no vertex, and facets whose projection has no area never count.
 //!
-//! Exactness: as in [`crate::facet`]; edge functions are below 2^60 in magnitude, plane values are i128.
+//! Exactness: as in [`bricks::facet`]; edge functions are below 2^60 in magnitude, plane values are i128.
 
-use crate::facet::Facet;
-use crate::octant::{ROOT_BITS, ROOT_EDGE};
+use bricks::facet::Facet;
+use bricks::octant::{ROOT_BITS, ROOT_EDGE};
 
 /// For each point the parities of its six rays: bit `2 a + 1` is set if the ray in the positive direction of
 /// axis `a` meets an odd number of the facets, bit `2 a` if the one in the negative direction does. The

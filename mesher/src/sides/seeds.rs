@@ -5,13 +5,13 @@ use super::Verdict;
 use super::global::Label;
 use super::nodes::{Component, Nodes, open_bricks};
 use super::vote::{Candidate, FirstLeaf};
-use crate::brickset::ones;
-use crate::comm::Comm;
 use crate::error::Error;
 use crate::lattice::{Keep, Rules, Seed};
-use crate::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
 use crate::partition::ownership::Ownership;
-use crate::tree::{LEVELS, Tree};
+use bricks::brickset::ones;
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
+use bricks::tree::{LEVELS, Tree};
+use ranks::{Comm, gather};
 use std::collections::{HashMap, HashSet};
 
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
@@ -36,11 +36,10 @@ pub fn find(
         }
         let mut found = CROSSING;
         nodes.finder().find(l, key, 1 << bit, |c| found = label(c));
-        mine.extend([number, found]);
+        mine.push([number, found]);
     }
-    let all = comm.all_gather(&mine);
-    let found = all.words().as_chunks().0.iter();
-    found.map(|&[number, label]| (number, (label != CROSSING).then_some(label))).collect()
+    let found = gather(comm, &mine).into_iter();
+    found.map(|[number, label]| (number, (label != CROSSING).then_some(label))).collect()
 }
 
 /// The components that have a seed, of seeds that were [found](find). Collective; the same on all ranks.
@@ -98,11 +97,10 @@ fn unusable(
     comm: &dyn Comm,
 ) -> Error {
     let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
-    let mine: Vec<u64> = nearest(tree, ownership, near).into_iter().flatten().collect();
-    let all = comm.all_gather(&mine);
+    let all = gather(comm, nearest(tree, ownership, near).as_slice());
     let [x, y, z] = seed.given;
-    let advice = match all.words().as_chunks().0.iter().min() {
-        Some(&[_, first]) => {
+    let advice = match all.into_iter().min() {
+        Some([_, first]) => {
             let [x, y, z] = rules.root.locate(Candidate(first).centroid());
             format!("the nearest centroid of a leaf that it does not cross is ({x}, {y}, {z})")
         }

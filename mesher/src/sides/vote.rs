@@ -5,13 +5,13 @@ use super::global::Label;
 use super::nodes::Nodes;
 use super::rays::parities;
 use super::{Ambiguous, Verdict};
-use crate::brick::Brick;
-use crate::brickset::ones;
-use crate::comm::{Comm, all_gather_reduced};
-use crate::facet::Facet;
-use crate::octant::{Level, corner, edge};
 use crate::partition::ownership::Ownership;
-use crate::tree::{LEVELS, Tree};
+use bricks::brick::Brick;
+use bricks::brickset::ones;
+use bricks::facet::Facet;
+use bricks::octant::{Level, corner, edge};
+use bricks::tree::{LEVELS, Tree};
+use ranks::{Comm, all_gather_reduced, gather};
 use std::collections::BTreeMap;
 
 /// Maximum number of leaves of a component whose rays are cast before the majority decides.
@@ -166,11 +166,10 @@ pub fn decide(
 /// The candidates of some components, from all ranks. Collective; the result is the same on all ranks.
 fn gather_candidates(mine: &FirstLeaves, open: &[Open], comm: &dyn Comm) -> FirstLeaves {
     let lists = open.iter().filter_map(|c| Some((c.label, mine.get(&c.label)?)));
-    let flat: Vec<u64> =
-        lists.flat_map(|(label, list)| list.iter().flat_map(move |c| [label, c.0])).collect();
-    let all = comm.all_gather(&flat);
-    let pairs = all.words().as_chunks().0.iter();
-    first_of_all(pairs.map(|&[label, candidate]| (label, vec![Candidate(candidate)])))
+    let pairs: Vec<[u64; 2]> =
+        lists.flat_map(|(label, list)| list.iter().map(move |c| [label, c.0])).collect();
+    let all = gather(comm, &pairs).into_iter();
+    first_of_all(all.map(|[label, candidate]| (label, vec![Candidate(candidate)])))
 }
 
 /// Parities over the facets of all ranks, from those over each rank's facets. Collective.

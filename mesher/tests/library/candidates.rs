@@ -2,13 +2,13 @@
 //! components independently, leaf by leaf.
 
 use crate::support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
-use mesher::comm::Solo;
+use bricks::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::lattice::{Bounds, Enclosed, Keep, Root};
-use mesher::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::partition::ownership::Ownership;
 use mesher::sides::{components, global, nodes::Nodes, vote};
 use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use proptest::prelude::*;
+use ranks::Solo;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Centroids of the first leaves of each component.

@@ -1,11 +1,11 @@
 //! The test vectors shared by all programs: digests, leaf words, levels, roots, lattice points, boxes.
 
+use bricks::digest::{Digests, digest, hex, mix, of_facets};
+use bricks::facet::Facet;
+use bricks::octant::{LEVEL_MAX, Side, corner, morton, position, start57, word};
 use mesher::case::{BoxSpec, Case, RootSpec};
-use mesher::digest::{Digests, digest, hex, mix, of_facets};
-use mesher::facet::Facet;
 use mesher::ingest::Source;
 use mesher::lattice::{Bounds, Enclosed, Keep, Root};
-use mesher::octant::{LEVEL_MAX, Side, corner, morton, position, start57, word};
 use serde_json::Value;
 
 fn vectors(name: &str) -> Vec<Value> {

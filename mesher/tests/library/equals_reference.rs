@@ -1,9 +1,9 @@
 //! The mesher's leaves equal the reference's, for any facets and any number of ranks.
 
 use crate::support::{Run, Small, config, cuboid, division, leaky_on_rays, run, small, soup, thin};
+use bricks::octant::position;
 use mesher::case::BoxSpec;
 use mesher::lattice::{Enclosed, Keep, Root};
-use mesher::octant::position;
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
 

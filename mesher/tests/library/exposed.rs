@@ -1,11 +1,11 @@
 //! The exposed faces that the mesher counts by bit operations, compared with a search for the neighbours of every leaf.
 
 use crate::support::{Run, Small, config, options, run, small, soup, thin};
-use mesher::comm::{Comm, sim};
-use mesher::octant::{LEVEL_MAX, Level, neighbour, start57};
+use bricks::octant::{LEVEL_MAX, Level, neighbour, start57};
 use mesher::record::Recorder;
 use mesher::{Options, mesh, words};
 use proptest::prelude::*;
+use ranks::{Comm, sim};
 use std::collections::BTreeMap;
 
 /// The leaves on a side: their level by the start of their interval of the curve.

@@ -1,11 +1,11 @@
 //! Unusual STL files are read completely, malformed ones are refused, and none makes the mesher crash.
 
 use crate::support::{Facet, config, cuboid};
-use mesher::comm::{Solo, sim};
 use mesher::error::Error;
 use mesher::ingest::{self, Source};
 use mesher::{case::Case, lattice::Bounds, stl};
 use proptest::prelude::*;
+use ranks::{Solo, sim};
 use std::io::Write;
 use std::path::Path;
 
@@ -166,7 +166,7 @@ proptest! {
             keep_crossing = true\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n[[box]]\nmin = [0.0, -1.0, -1.0]\n
             max = [4.0, 1.0, 1.0]\nspacing = 0.05\n";
         let file = file(&damaged(GOOD.into(), &by));
-        match Case::read(file.path()) {
+        match program::case_file::read(file.path()) {
             Err(Error::Input(message)) => prop_assert!(!message.contains('\n'), "{}", message),
             Err(other) => prop_assert!(false, "not an input error: {:?}", other),
             Ok(case) => {

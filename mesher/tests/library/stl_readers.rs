@@ -5,8 +5,8 @@
 
 use crate::stl_inputs::{Random, input};
 use geometries::Facet;
-use mesher::comm::Solo;
 use mesher::ingest::{self, Source};
+use ranks::Solo;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;

@@ -13,7 +13,7 @@ fn committed_drawings_are_those_of_this_mesher() {
         let committed = std::fs::read_to_string(&path).unwrap_or_default();
         assert!(
             committed == drawn,
-            "{} is out of date: run cargo run -p mesher --example walkthrough, and look at the drawing",
+            "{} is out of date: run cargo run -p mesher-library --example walkthrough, and look at the drawing",
             path.display()
         );
     }

@@ -3,7 +3,7 @@
 
 use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
-use mesher::comm::sim::{Next, Schedule, Sim, Token, World};
+use ranks::sim::{Next, Schedule, Sim, Token, World};
 use std::rc::Rc;
 
 /// Bytes of a coroutine's stack; only pages that are used take memory.

@@ -1,16 +1,16 @@
 //! Test support: small cases, meshed by the mesher and by the reference.
 #![allow(dead_code, missing_docs)]
 
+use bricks::octant::position;
 use mesher::case::{BoxSpec, Case, RootSpec};
-use mesher::comm::{Solo, sim};
 use mesher::error::Error;
 use mesher::ingest::Source;
 use mesher::lattice::{Enclosed, Keep, Root};
 use mesher::manifest::LeakEntry;
-use mesher::octant::position;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};
+use ranks::{Solo, sim};
 
 pub mod draw;
 pub mod fibres;
@@ -223,7 +223,7 @@ pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {
 }
 
 pub fn options(division: Division, ungraded: bool) -> Options {
-    Options { division, ungraded, force: true, ..Options::default() }
+    Options { division, ungraded, ..Options::default() }
 }
 
 /// Describes the first leaf that differs.
@@ -233,7 +233,7 @@ pub fn first_difference(a: &[u64], b: &[u64]) -> String {
             let l = (w >> 2 & 31) as u32;
             format!(
                 "{} (level {l}, side {})",
-                mesher::octant::path(l, w >> 7 >> (3 * (19 - l))),
+                bricks::octant::path(l, w >> 7 >> (3 * (19 - l))),
                 w & 3
             )
         })

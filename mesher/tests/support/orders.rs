@@ -1,7 +1,7 @@
 //! Enumerates every order in which messages can arrive, and orders of ranks.
 #![allow(dead_code, missing_docs)]
 
-use mesher::comm::sim::{Arrival, Schedule};
+use ranks::sim::{Arrival, Schedule};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 /// A depth-first walk over the orders of arrival: the choices of one run, in the order in which they are made.

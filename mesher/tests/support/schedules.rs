@@ -5,8 +5,6 @@ use super::draw::{leaky_on_rays, soup, thin};
 use super::fibres::Fibres;
 use super::{Outcome, Run, Small, options, small};
 use mesher::case::Case;
-use mesher::comm::sim::{Adversary, Schedule, Sim};
-use mesher::comm::{Comm, Solo};
 use mesher::error::Error;
 use mesher::manifest::LeakEntry;
 use mesher::record::Recorder;
@@ -15,6 +13,8 @@ use mesher::{Options, mesh, words};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use ranks::sim::{Adversary, Schedule, Sim};
+use ranks::{Comm, Solo};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 

@@ -1,7 +1,7 @@
 //! The 48 symmetries of the root cube, of points and of leaf words.
 
 use super::{Facet, Small};
-use mesher::octant::{LEVEL_MAX, morton, position};
+use bricks::octant::{LEVEL_MAX, morton, position};
 
 /// A permutation of the axes, then mirror images.
 #[derive(Clone, Copy, Debug)]

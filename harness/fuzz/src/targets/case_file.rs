@@ -3,9 +3,9 @@
 //! The file is in a directory with `body.stl`, a tetrahedron.
 
 use crate::Scratch;
-use mesher::comm::Solo;
 use mesher::ingest::{self, Source};
 use mesher::lattice::Bounds;
+use ranks::Solo;
 
 const BODY: &[u8] = b"solid
 facet normal 0 0 0 outer loop vertex 0 0 0 vertex 0 1 0 vertex 1 0 0 endloop endfacet
@@ -43,7 +43,7 @@ pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     scratch.file("body.stl", BODY);
     let path = scratch.file("case.toml", bytes).to_owned();
     // The path of another file, which might be a large one.
-    if let Ok(case) = mesher::case::Case::read(&path)
+    if let Ok(case) = program::case_file::read(&path)
         && let Source::Stl(body) = case.source
         && body != path.with_file_name("body.stl")
     {
@@ -68,7 +68,7 @@ fn bits([x, y, z]: [f64; 3], edge: f64) -> [u64; 4] {
 
 fn by_mesher(path: &std::path::Path) -> Result<Meaning, String> {
     let meaning = || {
-        let case = mesher::case::Case::read(path)?;
+        let case = program::case_file::read(path)?;
         let slice = ingest::read(&case.source, &Solo)?;
         let bounds = Bounds::of(&slice.facets);
         let rules = case.rules(&bounds)?;

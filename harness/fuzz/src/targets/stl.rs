@@ -5,8 +5,8 @@ mod inputs;
 
 use crate::Scratch;
 use geometries::Facet;
-use mesher::comm::Solo;
 use mesher::ingest::{self, Source};
+use ranks::Solo;
 
 /// Any bytes.
 pub(super) fn bytes(scratch: &mut Scratch, bytes: &[u8]) -> bool {

@@ -5,11 +5,11 @@
 mod support;
 
 use crate::Scratch;
-use mesher::comm::sim::{Adversary, Sim};
-use mesher::comm::{Comm, Solo};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use ranks::sim::{Adversary, Sim};
+use ranks::{Comm, Solo};
 use std::cell::RefCell;
 use std::rc::Rc;
 use support::fibres::Fibres;

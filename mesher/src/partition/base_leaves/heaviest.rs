@@ -1,6 +1,6 @@
 //! The number of leaves in the heaviest base leaf, which bounds the load balance of any partition.
 
-use crate::octant::{LEVEL_MAX, Level};
+use bricks::octant::{LEVEL_MAX, Level};
 
 /// Counts this rank's leaves by base leaf, as they are streamed in Morton order.
 pub struct Heaviest<'a> {
@@ -49,7 +49,7 @@ impl<'a> Heaviest<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::octant::{Side, start57, word};
+    use bricks::octant::{Side, start57, word};
 
     #[test]
     fn leaves_are_counted_by_base_leaf_whatever_the_pieces() {

@@ -1,7 +1,7 @@
 use super::*;
-use crate::comm::sim;
-use crate::octant::start57;
+use bricks::octant::start57;
 use proptest::prelude::*;
+use ranks::sim;
 use std::collections::BTreeMap;
 
 /// Bins of level 3, in order, some without weight.

@@ -1,7 +1,7 @@
 //! The neighbours of a rank: the owners of octants that touch its own.
 
 use super::Ownership;
-use crate::octant::{Level, morton, position, start57};
+use bricks::octant::{Level, morton, position, start57};
 
 /// A step to an octant or one that touches it: -1, 0 or 1 along each axis.
 type Step = [i8; 3];

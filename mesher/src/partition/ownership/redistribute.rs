@@ -2,11 +2,11 @@
 //! whichever rank computed them.
 
 use super::{KEY_BITS, Ownership, Placement, brick_start};
-use crate::brick::Brick;
-use crate::brickset::BrickSet;
-use crate::comm::{Comm, Entry, MessageBuffer, all_gather_from_reducers, split_by_reducer};
-use crate::octant::{LEVEL_MAX, Level};
-use crate::tree::PerLevel;
+use bricks::brick::Brick;
+use bricks::brickset::BrickSet;
+use bricks::octant::{LEVEL_MAX, Level};
+use bricks::tree::PerLevel;
+use ranks::{Comm, Entry, MessageBuffer, all_gather_from_reducers, split_by_reducer};
 use std::ops::Range;
 
 impl Ownership {
@@ -33,7 +33,7 @@ impl Ownership {
             self.redistribute_all(sets.iter_mut().flat_map(take_levels).collect(), comm);
         let mut synchronised = synchronised.into_iter();
         for set in sets {
-            **set = synchronised.by_ref().take(crate::tree::LEVELS).collect();
+            **set = synchronised.by_ref().take(bricks::tree::LEVELS).collect();
         }
     }
 

@@ -1,6 +1,6 @@
 use super::*;
-use crate::comm::{Comm, sim};
 use proptest::prelude::*;
+use ranks::{Comm, sim};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Level of the octants that have owners here; bricks are tested down to one level below those that fill such an octant.
@@ -107,7 +107,7 @@ proptest! {
             *sums.entry((set, l, key(l, draw))).or_default() |= bits;
         }
         let got = sim::run(RANKS, 7, |comm| {
-            let mut sets = [crate::tree::per_level(), crate::tree::per_level()];
+            let mut sets = [bricks::tree::per_level(), bricks::tree::per_level()];
             let mut mine: Vec<_> = sent.iter().filter(|t| t.0 == comm.rank()).collect();
             mine.sort_by_key(|t| key(t.2, t.3));
             for &&(_, set, l, draw, bits) in &mine {

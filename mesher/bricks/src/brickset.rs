@@ -1,0 +1,255 @@
+//! Sets of octants of one level: sorted sequences of bricks.
+//!
+//! The memory that these sets take limits the size of a mesh. Consecutive keys mostly agree in their upper
+//! halves; so an upper half is stored once per *run* of bricks, and a brick takes 12 bytes.
+//!
+//! Invariants:
+//! - keys ascend strictly, and no brick is empty;
+//! - the first run starts at the first brick, and each run has at least one brick;
+//! - runs have strictly ascending upper halves of keys.
+
+mod ranges;
+mod read;
+#[cfg(test)]
+pub(crate) mod tests;
+mod union;
+
+pub use read::{Bricks, ChildBricks, Cursor, Groups};
+
+use crate::brick::{self, Brick};
+use crate::widest;
+use std::ops::Range;
+
+/// Bits of a key that are stored per brick.
+const LOW_BITS: u32 = 32;
+
+/// A set of octants of one level.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BrickSet {
+    /// Lower halves of the keys.
+    low: Vec<u32>,
+    bits: Vec<u64>,
+    runs: Vec<Run>,
+}
+
+/// Number of bricks for which a set allocates at its first brick: most sets grow beyond a vector's usual four.
+const CAPACITY_FIRST: usize = 16;
+
+/// A run of bricks whose keys agree in their upper half.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Run {
+    /// The common upper half; its lower half is zero.
+    high: u64,
+    /// Position of the first brick.
+    start: usize,
+}
+
+/// A key with its lower half set to zero.
+#[inline]
+const fn high_of(key: u64) -> u64 {
+    key >> LOW_BITS << LOW_BITS
+}
+
+impl BrickSet {
+    /// The empty set.
+    pub const EMPTY: Self = Self { low: Vec::new(), bits: Vec::new(), runs: Vec::new() };
+
+    /// The set of all octants of some bricks, which may be in any order and repeat keys.
+    pub fn from_unsorted(mut bricks: Vec<Brick>) -> Self {
+        bricks.sort_unstable_by_key(|b| b.key);
+        let mut set = Self::default();
+        set.reserve_exact(bricks.len());
+        for b in bricks {
+            set.push(b.key, b.bits);
+        }
+        set
+    }
+
+    fn reserve_exact(&mut self, more: usize) {
+        self.low.reserve_exact(more);
+        self.bits.reserve_exact(more);
+    }
+
+    /// Adds octants to the last brick or after it.
+    ///
+    /// # Panics
+    /// If `key` precedes the last brick's key.
+    #[inline]
+    pub fn push(&mut self, key: u64, bits: u64) {
+        if bits == 0 {
+            return;
+        }
+        let high = high_of(key);
+        let last = self.runs.last().map_or(0, |run| run.high);
+        if let Some(&low) = self.low.last() {
+            let before = last | u64::from(low);
+            if before == key {
+                let end = self.bits.len() - 1;
+                self.bits[end] |= bits;
+                return;
+            }
+            assert!(before < key, "bricks must be added in Morton order");
+        }
+        if high != last || self.runs.is_empty() {
+            if self.runs.is_empty() {
+                self.low.reserve(CAPACITY_FIRST);
+                self.bits.reserve(CAPACITY_FIRST);
+            }
+            self.runs.push(Run { high, start: self.low.len() });
+        }
+        self.low.push(key as u32);
+        self.bits.push(bits);
+    }
+
+    /// The bricks in order.
+    #[inline]
+    pub fn bricks(&self) -> Bricks<'_> {
+        Bricks::new(self)
+    }
+
+    /// The groups of bricks whose keys agree in all but their lowest `low_bits` bits, at most the lower half, in
+    /// order: the key of the first brick and the positions of all.
+    #[inline]
+    pub fn groups(&self, low_bits: u32) -> Groups<'_> {
+        Groups::new(self, low_bits)
+    }
+
+    /// Number of bricks.
+    pub fn len(&self) -> usize {
+        self.low.len()
+    }
+
+    /// Whether the set is empty.
+    pub fn is_empty(&self) -> bool {
+        self.low.is_empty()
+    }
+
+    /// Number of octants.
+    pub fn count(&self) -> u64 {
+        count_ones(&self.bits)
+    }
+
+    /// Number of octants in the bricks at a range of positions.
+    pub fn count_in(&self, range: Range<usize>) -> u64 {
+        count_ones(&self.bits[range])
+    }
+
+    /// The bits of brick `key`; 0 if the set has no octant in it.
+    pub fn get(&self, key: u64) -> u64 {
+        let Ok(run) = self.runs.binary_search_by_key(&high_of(key), |r| r.high) else {
+            return 0;
+        };
+        let range = self.runs[run].start..self.runs.get(run + 1).map_or(self.len(), |r| r.start);
+        let found = self.low[range.clone()].binary_search(&(key as u32));
+        found.map_or(0, |i| self.bits[range.start + i])
+    }
+
+    /// Whether the octant with this Morton code is in the set.
+    pub fn contains(&self, code: u64) -> bool {
+        self.get(code >> 6) >> (code & 63) & 1 == 1
+    }
+
+    /// A reader for queries with ascending keys.
+    pub fn cursor(&self) -> Cursor<'_> {
+        Cursor::new(self)
+    }
+
+    /// Replaces the bits of every brick, in order, by what `keep` returns for it.
+    pub fn retain(&mut self, mut keep: impl FnMut(Brick) -> u64) {
+        let runs = std::mem::take(&mut self.runs);
+        let mut kept = 0;
+        for (i, run) in runs.iter().enumerate() {
+            let first = kept;
+            for at in run.start..runs.get(i + 1).map_or(self.low.len(), |r| r.start) {
+                let low = self.low[at];
+                let bits = keep(Brick { key: run.high | u64::from(low), bits: self.bits[at] });
+                if bits != 0 {
+                    (self.low[kept], self.bits[kept]) = (low, bits);
+                    kept += 1;
+                }
+            }
+            if kept > first {
+                self.runs.push(Run { high: run.high, start: first });
+            }
+        }
+        self.low.truncate(kept);
+        self.bits.truncate(kept);
+    }
+
+    /// The octants that are not in `other`.
+    pub fn without(mut self, other: &Self) -> Self {
+        let mut other = other.cursor();
+        self.retain(|b| b.bits & !other.get(b.key));
+        self
+    }
+
+    /// The parents of the set's octants.
+    pub fn coarsen(&self) -> Self {
+        let mut set = Self::default();
+        for b in self.bricks() {
+            set.push(b.key >> 3, u64::from(brick::parents(b.bits)) << (8 * (b.key & 7)));
+        }
+        set
+    }
+
+    /// The children of the set's octants, brick by brick in Morton order.
+    #[inline]
+    pub fn child_bricks(&self) -> ChildBricks<'_> {
+        ChildBricks::new(self)
+    }
+
+    /// The codes of the set's octants in Morton order.
+    pub fn codes(&self) -> impl Iterator<Item = u64> + '_ {
+        self.bricks().flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)))
+    }
+
+    /// Checks the invariants.
+    ///
+    /// # Panics
+    /// If one is violated; the message names it and a key.
+    pub fn check_invariants(&self) {
+        assert_eq!(self.low.len(), self.bits.len(), "each key must have bits");
+        let first = self.runs.first().map_or(self.len(), |r| r.start);
+        assert_eq!(first, 0, "the first run must start at the first brick");
+        for pair in self.runs.windows(2) {
+            let [before, run] = [pair[0], pair[1]];
+            assert!(
+                before.high < run.high,
+                "run {:#x} must follow run {:#x}",
+                run.high,
+                before.high
+            );
+            assert!(before.start < run.start, "run {:#x} must have a brick", before.high);
+        }
+        let last = self.runs.last().map_or(0, |r| r.start + 1);
+        assert!(last <= self.len(), "the last run must have a brick");
+        for b in self.bricks() {
+            assert!(b.bits != 0, "brick {:#x} must not be empty", b.key);
+        }
+        for (a, b) in self.bricks().zip(self.bricks().skip(1)) {
+            assert!(a.key < b.key, "brick {:#x} must precede brick {:#x}", b.key, a.key);
+        }
+    }
+}
+
+widest! {
+    /// Number of bits that are set.
+    fn count_ones(words: &[u64]) -> u64 = count_ones_lanes;
+}
+
+#[inline(always)]
+fn count_ones_lanes(words: &[u64]) -> u64 {
+    words.iter().map(|w| u64::from(w.count_ones())).sum()
+}
+
+/// Positions of the set bits of `bits`, ascending.
+#[inline]
+pub fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        (bits != 0).then(|| {
+            let bit = bits.trailing_zeros();
+            bits &= bits - 1;
+            bit
+        })
+    })
+}

@@ -1,0 +1,146 @@
+//! Tests of brick sets: against maps, and of the check of their invariants.
+
+use super::*;
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+/// The set of octants with these codes.
+pub fn set<'a>(codes: impl IntoIterator<Item = &'a u64>) -> BrickSet {
+    let brick = |c: &u64| Brick { key: c >> 6, bits: 1 << (c & 63) };
+    BrickSet::from_unsorted(codes.into_iter().map(brick).collect())
+}
+
+#[test]
+fn codes_are_sorted_and_unique() {
+    let s = set(&[900, 3, 64, 3, 5, 65]);
+    s.check_invariants();
+    assert_eq!(s.codes().collect::<Vec<_>>(), [3, 5, 64, 65, 900]);
+    assert_eq!(s.count(), 5);
+    assert!(s.contains(900) && !s.contains(4));
+}
+
+#[test]
+fn coarsening_the_children_of_a_set_gives_the_set() {
+    let s = set(&[3, 5, 64, 900, 70_000]);
+    assert_eq!(s.coarsen().codes().collect::<Vec<_>>(), [0, 8, 112, 8_750]);
+    let mut kids = BrickSet::default();
+    s.child_bricks().for_each(|b| kids.push(b.key, b.bits));
+    assert_eq!(kids.coarsen(), s);
+    assert_eq!(kids.count(), 8 * s.count());
+}
+
+#[test]
+fn unions_and_cursors_agree_with_lookups() {
+    let (a, b) = (set(&[1, 70, 200, 5000]), set(&[2, 70, 300]));
+    let u = a.clone().union(b);
+    assert_eq!(u.codes().collect::<Vec<_>>(), [1, 2, 70, 200, 300, 5000]);
+    let many = set(&(0..100_000).step_by(77).collect::<Vec<_>>());
+    for stride in [1, 3, 50, 400] {
+        let mut c = many.cursor();
+        for key in (0..1600).step_by(stride) {
+            assert_eq!(c.get(key), many.get(key), "key {key} stride {stride}");
+            assert_eq!(c.get(key), many.get(key), "repeated query");
+        }
+    }
+}
+
+/// Bricks of a few runs, with keys at both ends of the runs.
+fn bricks() -> impl Strategy<Value = BTreeMap<u64, u64>> {
+    let key = (0u64..4, prop_oneof![0u64..6, (1u64 << LOW_BITS) - 3..1 << LOW_BITS])
+        .prop_map(|(high, low)| high << LOW_BITS | low);
+    prop::collection::btree_map(key, 1u64..8, 0..24)
+}
+
+fn of(bricks: &BTreeMap<u64, u64>) -> BrickSet {
+    BrickSet::from_unsorted(bricks.iter().map(|(&key, &bits)| Brick { key, bits }).collect())
+}
+
+proptest! {
+    #[test]
+    fn sets_of_several_runs_behave_like_maps(a in bricks(), b in bricks(), mask in 0u64..8) {
+        let (x, y) = (of(&a), of(&b));
+        x.check_invariants();
+        let (mut both, mut without, mut kept) = (a.clone(), a.clone(), a.clone());
+        b.iter().for_each(|(k, v)| *both.entry(*k).or_default() |= v);
+        without.iter_mut().for_each(|(k, v)| *v &= !b.get(k).unwrap_or(&0));
+        without.retain(|_, v| *v != 0);
+        kept.retain(|k, v| (*v & mask != 0) && k % 3 != 0);
+        prop_assert_eq!(x.clone().union(y.clone()), of(&both));
+        prop_assert_eq!(x.clone().without(&y), of(&without));
+        let mut some = x.clone();
+        some.retain(|b| if b.key % 3 != 0 && b.bits & mask != 0 { b.bits } else { 0 });
+        prop_assert_eq!(some, of(&kept));
+        prop_assert!(x.bricks().map(|b| (b.key, b.bits)).eq(a.iter().map(|(k, v)| (*k, *v))));
+        let key = b.keys().nth(b.len() / 2).copied().unwrap_or(3);
+        let (i, j) = (x.position(key), x.position(2 * key));
+        prop_assert_eq!((i, j), (a.range(..key).count(), a.range(..2 * key).count()));
+        prop_assert!((0..x.len()).map(|i| x.brick(i)).eq(x.bricks()));
+        let octants: u32 = a.values().take(j).skip(i).map(|bits| bits.count_ones()).sum();
+        for (_, counted) in crate::wide::widths(|| x.count_in(i..j)) {
+            prop_assert_eq!(counted, u64::from(octants));
+        }
+        for low_bits in [0, 1, 2, 31, 32, 40] {
+            let low = |key: u64| (key as u32).checked_shr(low_bits).unwrap_or(0);
+            let group = |b: &Brick| (high_of(b.key), low(b.key));
+            let (mut end, mut last) = (0, None);
+            for (key, range) in x.groups(low_bits) {
+                prop_assert_eq!((range.start, key), (end, x.key_at(end)));
+                let all = group(&x.brick(end));
+                prop_assert!(last < Some(all));
+                prop_assert!(range.clone().all(|at| group(&x.brick(at)) == all));
+                (end, last) = (range.end, Some(all));
+            }
+            prop_assert_eq!(end, x.len());
+        }
+        let ranges = [0..i, i..j, j..x.len()];
+        let intervals = ranges.clone().map(|range| {
+            let mut interval = x.clone();
+            interval.keep(range);
+            interval.check_invariants();
+            interval
+        });
+        let mut words = vec![7];
+        ranges.into_iter().for_each(|range| x.pack(range, &mut words));
+        let mut rest = &words[1..];
+        for interval in &intervals {
+            let (set, after) = BrickSet::unpack(rest);
+            prop_assert_eq!(&set, interval);
+            rest = after;
+        }
+        prop_assert!(rest.is_empty());
+        let [before, middle, after] = intervals;
+        let around = before.clone().union(after.clone());
+        prop_assert_eq!(BrickSet::union_of(vec![around, middle.clone()]), x.clone());
+        prop_assert_eq!(BrickSet::union_of(vec![after, middle, before]), x.clone());
+        prop_assert_eq!(BrickSet::union_of(vec![y, x.clone()]), of(&both));
+        let mut cursor = x.cursor();
+        for key in both.keys() {
+            let want = a.get(key).copied().unwrap_or(0);
+            prop_assert_eq!((cursor.get(*key), x.get(*key)), (want, want));
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "brick 0x1 must precede brick 0x3")]
+fn keys_out_of_order_are_found() {
+    let mut s = set(&[64, 3 * 64]);
+    s.low.swap(0, 1);
+    s.check_invariants();
+}
+
+#[test]
+#[should_panic(expected = "brick 0x1 must not be empty")]
+fn an_empty_brick_is_found() {
+    let mut s = set(&[64, 3 * 64]);
+    s.bits[0] = 0;
+    s.check_invariants();
+}
+
+#[test]
+#[should_panic(expected = "run 0x0 must have a brick")]
+fn an_empty_run_is_found() {
+    let mut s = set(&[64, 64 << LOW_BITS]);
+    s.runs[1].start = 0;
+    s.check_invariants();
+}

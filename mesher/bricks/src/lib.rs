@@ -1,0 +1,13 @@
+//! Octants of an oct-tree as bits of bricks, 64 to a word. This crate knows no ranks.
+
+#![deny(missing_docs)]
+
+pub mod brick;
+pub mod brickset;
+pub mod digest;
+pub mod dilate;
+pub mod facet;
+pub mod kept;
+pub mod octant;
+pub mod tree;
+pub mod wide;

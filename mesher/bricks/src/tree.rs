@@ -1,0 +1,165 @@
+//! The base tree T0, stored as one brick set per level.
+//!
+//! Invariants (with `exists(l)` the children of `split[l - 1]`, and the root alone for `l = 0`):
+//! - `split[l]` is a subset of `exists(l)`: every octant that exists has a split parent;
+//! - `crossing[l]` is a subset of `exists(l)` without `split[l]`: only leaves are marked;
+//! - an octant that exists is split if and only if a facet crosses it and it is shallower than the surface level, or its interior meets
+//!   that of an extent box of a deeper level; it is crossing if and only if a facet crosses it and it is not split.
+//!
+//! On several ranks, each rank stores the bricks that it holds. A rank that holds a brick holds all
+//! its ancestors, so [`Tree::check_structure`] needs no communication; the checks of the mesher execute the last invariant.
+
+use crate::brick::{self, Brick};
+use crate::brickset::{BrickSet, ones};
+use crate::octant::{LEVEL_MAX, Level, path};
+
+/// Number of levels that sets are stored for: voxelisation looks one level below the deepest leaf.
+pub const LEVELS: usize = LEVEL_MAX as usize + 2;
+
+/// One set for each level.
+pub type PerLevel = Vec<BrickSet>;
+
+/// Empty sets for all levels.
+pub fn per_level() -> PerLevel {
+    vec![BrickSet::default(); LEVELS]
+}
+
+/// An oct-tree whose crossing leaves are marked. The leaves of level `l` are the children of
+/// `split[l - 1]` that are not in `split[l]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tree {
+    /// Octants that have children.
+    pub split: PerLevel,
+    /// Leaves that a facet crosses.
+    pub crossing: PerLevel,
+}
+
+impl Default for Tree {
+    fn default() -> Self {
+        Self { split: per_level(), crossing: per_level() }
+    }
+}
+
+impl Tree {
+    /// The octants of level `l` that exist, brick by brick in Morton order.
+    pub fn exists(split: &[BrickSet], l: Level) -> impl Iterator<Item = Brick> + '_ {
+        static NONE: BrickSet = BrickSet::EMPTY;
+        let root = (l == 0).then_some(Brick { key: 0, bits: 1 });
+        let above = if l == 0 { &NONE } else { &split[l as usize - 1] };
+        root.into_iter().chain(above.child_bricks())
+    }
+
+    /// The deepest level at which an octant is split, plus one; 0 for a root that is a leaf.
+    pub fn depth(&self) -> Level {
+        (0..LEVELS).rev().find(|&l| !self.split[l].is_empty()).map_or(0, |l| l as Level + 1)
+    }
+
+    /// Checks the first two invariants on the bricks that this rank holds.
+    ///
+    /// # Panics
+    /// If one is violated; the message names it, the level and an octant.
+    pub fn check_structure(&self) {
+        check_split(&self.split);
+        self.check_leaves(&self.crossing, "is crossing, but no leaf");
+    }
+
+    /// Checks that some sets hold leaves of this tree that do not cross.
+    ///
+    /// # Panics
+    /// If an octant of `sets` is no such leaf; `violation` completes the sentence that names it.
+    pub fn check_open_leaves(&self, sets: &PerLevel, violation: &str) {
+        self.check_leaves(sets, violation);
+        for (l, (set, crossing)) in (0..).zip(sets.iter().zip(&self.crossing)) {
+            let mut crossing = crossing.cursor();
+            for b in set.bricks() {
+                assert_none(l, b.key, b.bits & crossing.get(b.key), violation);
+            }
+        }
+    }
+
+    fn check_leaves(&self, sets: &PerLevel, violation: &str) {
+        check_existing(&self.split, sets, violation);
+        for (l, (set, split)) in (0..).zip(sets.iter().zip(&self.split)) {
+            let mut split = split.cursor();
+            for b in set.bricks() {
+                assert_none(l, b.key, b.bits & split.get(b.key), violation);
+            }
+        }
+    }
+}
+
+/// Checks that `split` are the split octants of a tree: the parent of each is split, too.
+///
+/// # Panics
+/// If one is not.
+pub fn check_split(split: &PerLevel) {
+    check_existing(split, split, "is split, but its parent is not");
+}
+
+/// Checks the sets themselves, and that all their octants have split parents.
+///
+/// # Panics
+/// If one has not; `violation` completes the sentence that names it.
+pub fn check_existing(split: &PerLevel, sets: &PerLevel, violation: &str) {
+    assert_eq!((split.len(), sets.len()), (LEVELS, LEVELS), "one set for each level");
+    for (l, set) in (0..).zip(sets) {
+        set.check_invariants();
+        let mut above = split[(l as usize).saturating_sub(1)].cursor();
+        for b in set.bricks() {
+            let exists = match l {
+                0 => u64::from(b.key == 0),
+                _ => brick::children(brick::byte(above.get(b.key >> 3), b.key & 7)),
+            };
+            assert_none(l, b.key, b.bits & !exists, violation);
+        }
+    }
+}
+
+/// Panics if a brick has an octant that violates an invariant, with the octant's level and path.
+#[track_caller]
+pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
+    if let Some(bit) = ones(wrong).next() {
+        panic!("octant {} of level {l} {violation}", path(l, key << 6 | u64::from(bit)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brickset::tests::set;
+
+    /// A tree of level 3 around a facet at the root's minimum corner.
+    fn small() -> Tree {
+        let mut tree = Tree::default();
+        for l in 0..3 {
+            tree.split[l] = set(&[0]);
+        }
+        tree.crossing[3] = set(&[0, 1]);
+        tree.check_structure();
+        tree
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 1.0 of level 2 is split, but its parent is not")]
+    fn a_split_octant_without_a_split_parent_is_found() {
+        let mut tree = small();
+        tree.split[2] = set(&[0, 0o10]);
+        tree.check_structure();
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.0 of level 2 is crossing, but no leaf")]
+    fn a_crossing_octant_that_is_split_is_found() {
+        let mut tree = small();
+        tree.crossing[2] = set(&[0]);
+        tree.check_structure();
+    }
+
+    #[test]
+    #[should_panic(expected = "octant 0.0.1 of level 3 is deleted")]
+    fn a_deleted_leaf_that_crosses_is_found() {
+        let mut deleted = per_level();
+        deleted[3] = set(&[1, 2]);
+        small().check_open_leaves(&deleted, "is deleted");
+    }
+}

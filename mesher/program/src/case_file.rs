@@ -1,0 +1,195 @@
+//! The case file: all programs of this workspace read the same files.
+
+use geometries::Generator;
+use mesher::case::{BoxSpec, Case, RootSpec};
+use mesher::error::Error;
+use mesher::ingest::Source;
+use mesher::lattice::{Enclosed, Keep, Root};
+use serde::Deserialize;
+use std::path::Path;
+
+/// Default of `layer_cells_min`.
+pub const LAYER_CELLS_MIN: u32 = 4;
+/// Default of `root_scale`.
+pub const ROOT_SCALE: f64 = 10.0;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    geometry: Option<String>,
+    generator: Option<Generator>,
+    spacing_min: f64,
+    layer_cells_min: Option<i64>,
+    keep: Option<Keep>,
+    keep_crossing: Option<bool>,
+    #[serde(default)]
+    seeds: Vec<[f64; 3]>,
+    #[serde(default)]
+    enclosed: Enclosed,
+    root_scale: Option<f64>,
+    root: Option<RootTable>,
+    #[serde(default, rename = "box")]
+    boxes: Vec<BoxSpec>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RootTable {
+    origin: [f64; 3],
+    edge: f64,
+}
+
+/// Reads a case file. The path of the geometry is relative to the file's directory.
+///
+/// # Errors
+/// If the file cannot be read or is malformed.
+pub fn read(path: &Path) -> Result<Case, Error> {
+    let fail = |e: &dyn std::fmt::Display| Error::input(format!("{}: {e}", path.display()));
+    let unreadable = |e| fail(&format!("{e}: give a readable case file"));
+    let text = files::read_text(path).map_err(unreadable)?;
+    let file: File = toml::from_str(&text).map_err(|e| fail(&explain(&text, &e)))?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    file.into_case(folder).map_err(|e| fail(&e))
+}
+
+impl File {
+    fn into_case(self, folder: &Path) -> Result<Case, Error> {
+        let source = match (self.geometry, self.generator) {
+            (Some(path), None) => Source::Stl(folder.join(path)),
+            (None, Some(g)) => Source::Generated(g),
+            (Some(_), Some(_)) => {
+                return Err(Error::input("give geometry or [generator], not both"));
+            }
+            (None, None) => {
+                return Err(Error::input(
+                    "no geometry: give geometry = \"file.stl\" or a [generator] table",
+                ));
+            }
+        };
+        let root = match (self.root_scale, self.root) {
+            (Some(_), Some(_)) => return Err(Error::input("give root_scale or [root], not both")),
+            (_, Some(r)) => RootSpec::Exact(Root { origin: r.origin, edge: r.edge }),
+            (scale, None) => RootSpec::Scale(scale.unwrap_or(ROOT_SCALE)),
+        };
+        let n = self.layer_cells_min.unwrap_or(i64::from(LAYER_CELLS_MIN));
+        let layer_cells_min = u32::try_from(n).map_err(|_| {
+            Error::input(format!(
+                "layer_cells_min is {n}: give a whole number from 1 to {}",
+                u32::MAX
+            ))
+        })?;
+        Ok(Case {
+            source,
+            spacing_min: self.spacing_min,
+            layer_cells_min,
+            keep: self.keep.unwrap_or(Keep::Outside),
+            keep_crossing: self.keep_crossing.unwrap_or(true),
+            root,
+            boxes: self.boxes,
+            seeds: self.seeds,
+            enclosed: self.enclosed,
+        })
+    }
+}
+
+/// One sentence about a malformed case file. Suggests the nearest known key for an unknown one.
+fn explain(text: &str, e: &toml::de::Error) -> String {
+    let begin = e.span().map_or(0, |s| text[..s.start].rfind('\n').map_or(0, |at| at + 1));
+    let line = format!("line {}", text[..begin].matches('\n').count() + 1);
+    let message = e.message().replace('\n', " ").replace("expected f64", "expected a number");
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let nearest = message.starts_with("unknown field").then(|| {
+        let wrong = quoted.next().unwrap_or_default();
+        quoted
+            .max_by(|a, b| {
+                strsim::jaro_winkler(a, wrong).total_cmp(&strsim::jaro_winkler(b, wrong))
+            })
+            .map(|known| (wrong, known))
+    });
+    match nearest.flatten() {
+        Some((wrong, known)) => {
+            format!("{line}: unknown key \"{wrong}\": did you mean \"{known}\"?")
+        }
+        // Of the file as a whole.
+        None if begin == 0 && message.starts_with("missing") => message,
+        None => format!("{line}{}: {message}{}", key(&text[begin..]), advice(&text[begin..])),
+    }
+}
+
+/// The way to write the path if a text begins with the key of one, as part of a message: double quotes make a backslash special.
+fn advice(text: &str) -> &'static str {
+    match text.lines().next().and_then(|line| line.split_once('=')) {
+        Some((key, value)) if key.trim() == "geometry" && !value.trim().starts_with('\'') => {
+            ": put the path in single quotes, geometry = 'DIRECTORY/FILE.stl'"
+        }
+        _ => "",
+    }
+}
+
+/// The key or table at the beginning of a text, as part of a message; nothing if there is none.
+fn key(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    let key = line.split('=').next().unwrap_or_default().trim();
+    let is_part = |c: char| c.is_alphanumeric() || "_-.[]\"".contains(c);
+    let is_key = !key.is_empty() && key.chars().all(is_part);
+    if is_key { format!(", {key}") } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Case, String> {
+        let mut f = tempfile::NamedTempFile::new().unwrap();
+        std::io::Write::write_all(&mut f, text.as_bytes()).unwrap();
+        read(f.path()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn defaults_are_the_documented_ones() {
+        let c = parse("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
+        assert_eq!(
+            (c.layer_cells_min, c.keep, c.keep_crossing, c.root),
+            (4, Keep::Outside, true, RootSpec::Scale(10.0))
+        );
+    }
+
+    #[test]
+    fn errors_name_the_mistake() {
+        for (text, expected) in [
+            (
+                "geometry = \"a.stl\"\nspacing_mim = 0.5\n",
+                "line 2: unknown key \"spacing_mim\": did you mean \"spacing_min\"?",
+            ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 1\n[[box]]\nmin = [0,0,0]\nmax = [1,1,1]\nspacing = 1\nlevel = 3\n",
+                "unknown key \"level\"",
+            ),
+            ("spacing_min = 0.5\n", "no geometry"),
+            ("geometry = \"a.stl\"\n", "spacing_min"),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\nlayer_cells_min = -1\n",
+                "layer_cells_min is -1",
+            ),
+            ("geometry = \"a.stl\"\nspacing_min = 0.5\nkeep = \"none\"\n", "none"),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\nroot_scale = 2.0\n[root]\norigin = [0,0,0]\nedge = 1\n",
+                "not both",
+            ),
+            (
+                "geometry = \"a.stl\"\nspacing_min = 0.5\n[root]\norigin = [0,0,0]\n",
+                "line 3, [root]: missing field `edge`",
+            ),
+            ("geometry = ", "line 1"),
+            ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1, geometry: invalid type: map"),
+            (r#"geometry = "C:\Users\me\a.stl""#, "put the path in single quotes"),
+            ("geometry = a/b.stl", "put the path in single quotes"),
+            ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2, [spacing_min]: "),
+        ] {
+            let e = parse(text).unwrap_err();
+            assert!(e.contains(expected), "{e}");
+        }
+        let whole = parse("geometry = \"a.stl\"\n").unwrap_err();
+        assert!(whole.contains("missing field") && !whole.contains("line"), "{whole}");
+    }
+}

@@ -1,0 +1,311 @@
+//! The command line, and the case that it describes.
+
+use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, value_parser};
+use clap_complete::Shell;
+use mesher::case::{BoxSpec, Case, RootSpec};
+use mesher::error::Error;
+use mesher::ingest::Source;
+use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::partition::{Partitioner, Weights};
+use mesher::write::Output;
+use program::case_file::{self, LAYER_CELLS_MIN, ROOT_SCALE};
+use ranks::launch;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::exit;
+use std::time::Duration;
+
+/// Exit code of a run whose text could not be printed.
+pub const UNPRINTED: i32 = 4;
+
+/// Makes an off-body hexahedral oct-tree mesh around a geometry.
+///
+/// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
+/// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
+/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
+#[derive(Parser)]
+#[command(version = env!("MESHER_VERSION"))]
+pub struct Args {
+    /// Case file (.toml), or STL file together with --spacing-min
+    input: PathBuf,
+    /// Write the mesh to this directory, which must be empty or not exist; default: write nothing
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Files to write, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "words", requires = "out")]
+    write: Vec<Files>,
+    /// Add the rank that owns each cell to the tree, as cell data
+    #[arg(long, requires = "out")]
+    cell_ranks: bool,
+    /// Also write the report to this file, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Include the message matrix in the JSON report: messages and bytes for every pair of ranks
+    #[arg(long, requires = "json")]
+    pub message_matrix: bool,
+    /// Stop at the base tree T0: all leaves with their sides, none deleted, none graded
+    #[arg(long)]
+    pub ungraded: bool,
+    /// Method that assigns base leaves to ranks
+    #[arg(long, value_enum, default_value = "morton")]
+    pub partitioner: Partitioner,
+    /// Weights of the partition
+    #[arg(long, value_enum, default_value = "rebalance")]
+    pub weights: Weights,
+    /// Count the faces exposed to crossing leaves, deleted or not, and weigh each like W leaves in the last repartition: 0 counts them only
+    #[arg(long, value_name = "W", conflicts_with = "ungraded", value_parser = value_parser!(u32).range(0..=1000))]
+    pub weight_exposed: Option<u32>,
+    /// Level of the base leaves: 0 to 19, or auto
+    #[arg(long, default_value = "auto", value_parser = level_base)]
+    pub level_base: LevelBase,
+    /// Communication between ranks: auto, solo (one rank), mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
+    #[arg(long, default_value = "auto", value_parser = comm_choice)]
+    pub comm: CommChoice,
+    /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated
+    #[arg(long)]
+    pub check: bool,
+    /// Make no mesh: print what the run would take, in cells, time, memory and files, from pilot runs at coarser spacings
+    #[arg(long, conflicts_with_all = ["message_matrix", "weight_exposed"])]
+    pub plan: bool,
+    /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
+    #[arg(long)]
+    pub force: bool,
+    /// Make no mesh of a geometry that leaks between spacings, which is a warning otherwise, but end with exit code 1
+    #[arg(long, conflicts_with = "plan")]
+    pub strict: bool,
+    /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted
+    #[arg(long, value_name = "DIR")]
+    pub status: Option<PathBuf>,
+    /// End the job if ranks of MPI wait for another one for longer than this, and name it; greater than the time of the longest phase
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub stall_limit: Option<Duration>,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    body: Body,
+}
+
+/// Files of a mesh, besides the manifest.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Files {
+    /// Leaf words: a NumPy array per rank, 8 bytes per cell
+    Words,
+    /// The tree with sides, for VTK and ParaView: mesh.vtkhdf, a hyper-tree grid of about 0.05 bytes per cell
+    Htg,
+}
+
+/// The case, if the input is an STL file.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Options for an STL file")]
+struct Body {
+    /// Greatest edge of cells at the surface
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    spacing_min: Option<f64>,
+    /// Least number of cells across a layer [default: 4]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    layer_cells_min: Option<u32>,
+    /// Side of the surface to keep [default: outside]
+    #[arg(long, value_enum)]
+    keep: Option<Keep>,
+    /// Remove crossing leaves from the mesh
+    #[arg(long)]
+    drop_crossing: bool,
+    /// Edge of the root, in longest edges of the bounding box, on which it is centred [default: 10]
+    #[arg(long, value_name = "X", conflicts_with = "root", allow_negative_numbers = true)]
+    root_scale: Option<f64>,
+    /// Root cube: minimum corner and edge
+    #[arg(long, value_name = "X,Y,Z,EDGE", allow_hyphen_values = true, value_parser = numbers::<4>)]
+    root: Option<[f64; 4]>,
+    /// Extent box: minimum corner, maximum corner, spacing; may be repeated
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1,SPACING", allow_hyphen_values = true, value_parser = numbers::<7>)]
+    boxes: Vec<[f64; 7]>,
+    /// Point in the flow, which then consists of the components with a seed, whatever the rays say; may be repeated
+    #[arg(long = "seed", value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
+    seeds: Vec<[f64; 3]>,
+    /// Treatment of outside components that do not reach the root's boundary, such as sealed cavities and
+    /// overlaps of solids [default: delete]
+    #[arg(long, value_enum)]
+    enclosed: Option<Enclosed>,
+}
+
+/// The level of the base leaves; chosen automatically if none.
+#[derive(Clone, Copy)]
+pub struct LevelBase(pub Option<u32>);
+
+/// Communication between ranks.
+#[derive(Clone, Copy)]
+pub enum CommChoice {
+    /// MPI under a launcher of MPI jobs, else a single rank.
+    Auto,
+    /// A single rank.
+    Solo,
+    /// MPI.
+    Mpi,
+    /// Ranks simulated in this process.
+    Sim {
+        /// Number of ranks.
+        ranks: usize,
+        /// Seed of their schedule.
+        seed: u64,
+    },
+}
+
+fn level_base(s: &str) -> Result<LevelBase, String> {
+    if s == "auto" {
+        return Ok(LevelBase(None));
+    }
+    match s.parse() {
+        Ok(l) if l <= bricks::octant::LEVEL_MAX => Ok(LevelBase(Some(l))),
+        _ => Err("give auto or a level from 0 to 19".into()),
+    }
+}
+
+fn seconds(s: &str) -> Result<Duration, String> {
+    let limit = s.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
+    limit.filter(|l| !l.is_zero()).ok_or_else(|| "give a positive number of seconds".into())
+}
+
+fn comm_choice(s: &str) -> Result<CommChoice, String> {
+    let mut words = s.split(':');
+    let choice = match (words.next(), words.next(), words.next()) {
+        (Some("auto"), None, None) => Some(CommChoice::Auto),
+        (Some("solo"), None, None) => Some(CommChoice::Solo),
+        (Some("mpi"), None, None) => Some(CommChoice::Mpi),
+        (Some("sim"), Some(ranks), seed) => (|| {
+            let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
+            Some(CommChoice::Sim { ranks, seed: seed.unwrap_or("1").parse().ok()? })
+        })(),
+        _ => None,
+    };
+    choice
+        .filter(|_| words.next().is_none())
+        .ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
+}
+
+fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
+    let values: Result<Vec<f64>, _> = s.split(',').map(|w| w.trim().parse::<f64>()).collect();
+    values
+        .ok()
+        .and_then(|v| v.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
+/// The definition of the command line, with the options that print something and exit.
+fn command() -> Command {
+    let prints = |name| {
+        Arg::new(name).long(name).exclusive(true).help_heading("Options that print and exit")
+    };
+    Args::command()
+        .arg(
+            prints("completions")
+                .value_name("SHELL")
+                .value_parser(value_parser!(Shell))
+                .help("Print the completion script for a shell"),
+        )
+        .arg(prints("man").action(ArgAction::SetTrue).help("Print the man page, in roff"))
+}
+
+/// The command line. Help, version, completions and the man page are printed here, on the first rank of a job, and end the
+/// process.
+///
+/// # Errors
+/// In one sentence, as all other errors.
+pub fn parse() -> Result<Args, Error> {
+    let parsed = command().try_get_matches().and_then(|mut m| {
+        if let Some(&shell) = m.get_one::<Shell>("completions") {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut command(), "mesher", &mut script);
+            print_and_exit(|| io::stdout().write_all(&script));
+        }
+        if m.get_flag("man") {
+            let mut page = Vec::new();
+            let rendered = clap_mangen::Man::new(command()).render(&mut page);
+            rendered.expect("memory can be written to");
+            print_and_exit(|| io::stdout().write_all(&page));
+        }
+        Args::from_arg_matches_mut(&mut m)
+    });
+    parsed.map_err(|e| {
+        if !e.use_stderr() {
+            print_and_exit(|| e.print());
+        }
+        let text = e.to_string();
+        let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
+        let sentence: Vec<&str> = lines
+            .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
+            .collect();
+        let sentence = sentence.join(" ");
+        let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
+        Error::input(format!("{sentence}; see --help"))
+    })
+}
+
+fn print_and_exit(print: impl FnOnce() -> io::Result<()>) -> ! {
+    let print = || print().and_then(|()| io::stdout().flush());
+    match launch::is_first().then(print).transpose() {
+        // A closed pipe is no reason to fail.
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
+        _ => exit(0),
+    }
+}
+
+/// The files to write; none without --out.
+pub fn output(args: &Args) -> Option<Output> {
+    let has = |files| args.write.contains(&files);
+    let (words, tree) = (has(Files::Words), has(Files::Htg));
+    let out = args.out.clone();
+    out.map(|directory| Output { directory, words, tree, cell_ranks: args.cell_ranks })
+}
+
+/// The case in advice to the user: only case files have a name.
+pub fn case_name(args: &Args) -> String {
+    if is_case_file(args) { args.input.display().to_string() } else { "CASE".to_owned() }
+}
+
+fn is_case_file(args: &Args) -> bool {
+    args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+/// The case that the command line describes.
+pub fn case(args: &Args) -> Result<Case, Error> {
+    let b = &args.body;
+    if is_case_file(args) {
+        let given = b.spacing_min.is_some()
+            || b.layer_cells_min.is_some()
+            || b.keep.is_some()
+            || b.drop_crossing;
+        let given = given || b.root_scale.is_some() || b.root.is_some() || !b.boxes.is_empty();
+        if given || !b.seeds.is_empty() || b.enclosed.is_some() {
+            return Err(Error::input(format!(
+                "{} is a case file: set the spacing, layers, sides, root, boxes and seeds there, not on the command line",
+                args.input.display()
+            )));
+        }
+        return case_file::read(&args.input);
+    }
+    let spacing_min = b.spacing_min.ok_or_else(|| {
+        Error::input(format!(
+            "{} is read as an STL file: give --spacing-min, or a case file (.toml)",
+            args.input.display()
+        ))
+    })?;
+    Ok(Case {
+        source: Source::Stl(args.input.clone()),
+        spacing_min,
+        layer_cells_min: b.layer_cells_min.unwrap_or(LAYER_CELLS_MIN),
+        keep: b.keep.unwrap_or(Keep::Outside),
+        keep_crossing: !b.drop_crossing,
+        root: match b.root {
+            Some([x, y, z, edge]) => RootSpec::Exact(Root { origin: [x, y, z], edge }),
+            None => RootSpec::Scale(b.root_scale.unwrap_or(ROOT_SCALE)),
+        },
+        boxes: b
+            .boxes
+            .iter()
+            .map(|v| BoxSpec { min: [v[0], v[1], v[2]], max: [v[3], v[4], v[5]], spacing: v[6] })
+            .collect(),
+        seeds: b.seeds.clone(),
+        enclosed: b.enclosed.unwrap_or_default(),
+    })
+}

@@ -1,0 +1,291 @@
+//! The program: chooses the communication between ranks, meshes, reports. Only this file prints.
+
+#![deny(missing_docs)]
+
+mod cli;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod heap;
+
+use cli::{Args, CommChoice, UNPRINTED, case, parse};
+use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
+use mesher::Options;
+use mesher::agreement;
+use mesher::case::Case;
+use mesher::error::Error;
+use mesher::ingest::Source;
+use mesher::partition::Division;
+use mesher::record::Recorder;
+use mesher::report::Report;
+use mesher::write::write_json;
+use planner::Plan;
+use ranks::{Comm, STALLED, Solo, agree, launch, sim};
+use serde::Serialize;
+use std::fmt::Display;
+use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
+use std::path::Path;
+use std::process::exit;
+use std::sync::Once;
+use std::thread::sleep;
+use std::time::Duration;
+
+#[global_allocator]
+static HEAP: Heap = Heap {
+    program: "mesher",
+    advice: "choose a larger spacing (--plan estimates what fits) or use more machines",
+};
+
+/// Time that an interrupted rank of a job lives on. When one rank has ended, launchers kill the others at once, which must have removed
+/// their files by then.
+const LINGER: Duration = Duration::from_millis(300);
+
+fn main() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    heap::fix_thresholds();
+    let args = parse();
+    let message = match (launch::is_first(), stderr().is_terminal()) {
+        (false, _) => "",
+        (true, false) => "mesher: interrupted\n",
+        // The name of the current phase is on the line.
+        (true, true) => "\r\x1b[Kmesher: interrupted\n",
+    };
+    // Without handlers, signals end the process the default way.
+    let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
+    let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
+    match choose(args.as_ref().map_or(CommChoice::Auto, |a| a.comm)) {
+        Ok(CommChoice::Mpi) => run_mpi(&args),
+        Ok(CommChoice::Sim { ranks, seed }) => {
+            abort_on_panic(|| exit(BUG));
+            let codes = sim::run(ranks, seed, |comm| run(&args, comm));
+            exit(codes.into_iter().max().unwrap_or(0));
+        }
+        Ok(_) => {
+            abort_on_panic(|| exit(BUG));
+            exit(run(&args, &Solo));
+        }
+        Err(e) => exit(fail(&e, launch::is_first())),
+    }
+}
+
+/// Resolves `auto` by the launcher's environment.
+fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
+    match asked {
+        CommChoice::Auto if !launch::is_mpi_job() => Ok(CommChoice::Solo),
+        CommChoice::Auto | CommChoice::Mpi if launch::HAS_MPI => Ok(CommChoice::Mpi),
+        CommChoice::Auto | CommChoice::Mpi => match launch::ranks() {
+            Some(1) => Ok(CommChoice::Solo),
+            _ => Err(Error::input(
+                "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
+            )),
+        },
+        _ if launch::ranks().is_some_and(|ranks| ranks > 1) => Err(Error::input(
+            "each rank of this job would mesh on its own: leave out --comm, or start the mesher without mpirun",
+        )),
+        _ => Ok(asked),
+    }
+}
+
+/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
+const ADDRESS_SPACE_MPI: f64 = 384e6;
+
+fn run_mpi(args: &Result<Args, Error>) {
+    let left = planner::address_space_left();
+    if left < ADDRESS_SPACE_MPI {
+        let e = Error::memory(format!(
+            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
+            left / 1e6,
+            (ADDRESS_SPACE_MPI - left) / 1e6
+        ));
+        exit(fail(&e, launch::is_first()));
+    }
+    // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
+    let comm = interrupt::uninterrupted(launch::join);
+    // A panic that unwinds would leave the other ranks waiting forever.
+    abort_on_panic(|| launch::abort(BUG));
+    files::ends_with(launch::abort);
+    let code = match launch::check_size(&*comm) {
+        Ok(()) => run(args, &*comm),
+        Err(e) => fail(&Error::Input(e), launch::is_first()),
+    };
+    drop(comm);
+    exit(code);
+}
+
+/// Makes a panic on any thread end the whole job, with one notice per process. Every rank that panics prints where.
+fn abort_on_panic(end: fn() -> !) {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        report(info);
+        static NOTICE: Once = Once::new();
+        NOTICE.call_once(|| {
+            complain(&"this is a bug in the mesher: please report it with the case");
+        });
+        interrupt::abandon();
+        end();
+    }));
+}
+
+/// Prints an error, on one rank of a job; returns the exit code.
+fn fail(e: &Error, prints: bool) -> i32 {
+    if prints {
+        complain(&format_args!("mesher: {e}"));
+    }
+    e.exit_code()
+}
+
+/// Prints a line on the standard error; returns whether that was possible.
+fn complain(line: &dyn Display) -> bool {
+    // A launcher puts lines of its own between two writes.
+    stderr().write_all(format!("{}\n", message(line)).as_bytes()).is_ok()
+}
+
+/// The result of a run.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Outcome {
+    Meshed(Box<Report>),
+    Planned(Plan),
+}
+
+impl Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Meshed(report) => report.fmt(f),
+            Self::Planned(plan) => plan.fmt(f),
+        }
+    }
+}
+
+/// Prints warnings and the outcome; returns the exit code. A closed pipe is no reason to fail.
+fn print(outcome: &Outcome) -> i32 {
+    let warns = |w| complain(&format_args!("mesher: warning: {w}"));
+    let is_warned = match outcome {
+        Outcome::Meshed(report) => report.warnings.iter().all(warns),
+        Outcome::Planned(_) => true,
+    };
+    match writeln!(stdout(), "{outcome}").and_then(|()| stdout().flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            fail(&Error::output(format!("standard output: {e}: free disk space")), true)
+        }
+        _ if is_warned => 0,
+        _ => UNPRINTED,
+    }
+}
+
+/// One rank's run; returns the exit code, the same on all ranks.
+fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
+    let first = comm.rank() == 0;
+    let understood = args.as_ref().map(drop).map_err(Error::clone);
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
+    let words = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
+    let agreed = agreement::on_options(understood, &words, comm);
+    let args = match agreed.and_then(|()| args.as_ref().map_err(Error::clone)) {
+        Ok(args) => args,
+        Err(e) => {
+            interrupt::decided();
+            return fail(&e, first);
+        }
+    };
+    if let Some(limit) = args.stall_limit {
+        comm.limit_calls(limit);
+    }
+    let progress = first && !args.quiet && std::io::stderr().is_terminal();
+    let mut record = Recorder::new(progress);
+    let result = work(args, comm, &mut record);
+    // Launchers send a signal to the other ranks when the first one ends with an error.
+    interrupt::decided();
+    record.report_status("done");
+    if let Some(limit) = args.stall_limit {
+        comm.enter("done");
+        interrupt::stop_at(format_args!("done:{}", comm.rank()));
+        comm.barrier();
+        end_within(limit);
+    }
+    interrupt::stop_at(format_args!("end:{}", comm.rank()));
+    if progress {
+        let _ = write!(stderr(), "\r\x1b[K");
+    }
+    let outcome = match result {
+        Ok(outcome) => outcome,
+        Err(e) => return fail(&e, first),
+    };
+    match (if first && !args.quiet { print(&outcome) } else { 0 }, outcome) {
+        (0, Outcome::Planned(plan)) if !plan.fits && !args.force => fail(&plan.refusal(), first),
+        (code, _) => code,
+    }
+}
+
+/// Ends the process if it has not ended within the limit: MPI's own end waits for all ranks, without limit.
+fn end_within(limit: Duration) {
+    let end = move || {
+        sleep(limit);
+        complain(&format_args!(
+            "mesher: the run is complete, but another rank has not ended for {} s: look at it with a debugger",
+            limit.as_secs_f64()
+        ));
+        // What the process runs at its exit may wait for that rank as well.
+        interrupt::exit_at_once(STALLED);
+    };
+    let _ = std::thread::Builder::new().spawn(end);
+}
+
+/// A case whose geometry is known to be an input: no output of the run may be that file.
+fn registered(case: Case) -> Result<Case, Error> {
+    if let Source::Stl(path) = &case.source {
+        files::register_input(path)
+            .map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
+    }
+    Ok(case)
+}
+
+fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
+    // Checked before meshing, so that a path that cannot be written to ends the run at once.
+    let json = args.json.as_deref().filter(|_| comm.rank() == 0);
+    let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
+        let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
+        agree(comm, json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
+    };
+    on_json("choose another --json", &check_writable)?;
+    let case = agree(comm, case(args).and_then(registered))?;
+    agreement::on_case(&case, comm)?;
+    if let Some(dir) = &args.status {
+        // Not before the inputs are known, which these files must not replace.
+        let path = dir.join(format!("rank-{:05}.txt", comm.rank()));
+        let begin = std::fs::create_dir_all(dir).and_then(|()| record.keep_status(path));
+        agree(
+            comm,
+            begin.map_err(|e| match e.kind() {
+                ErrorKind::InvalidInput => Error::input(format!("{}: {e}", dir.display())),
+                _ => Error::output(format!("{}: {e}: choose another --status", dir.display())),
+            }),
+        )?;
+    }
+    let options = Options {
+        division: Division {
+            partitioner: args.partitioner,
+            weights: args.weights,
+            level_base: args.level_base.0,
+        },
+        ungraded: args.ungraded,
+        out: cli::output(args),
+        check: args.check,
+        weight_exposed: args.weight_exposed,
+        strict: args.strict,
+        case_name: cli::case_name(args),
+    };
+    let outcome = if args.plan {
+        Outcome::Planned(planner::plan(&case, &options, comm, record)?)
+    } else {
+        let report = planner::mesh(&case, &options, args.force, comm, record)?;
+        let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
+        Outcome::Meshed(Box::new(report))
+    };
+    interrupt::stop_at(format_args!("report:{}", comm.rank()));
+    let advice = match options.out {
+        Some(_) if !args.plan => {
+            "the mesh is complete, only its report is missing; free disk space"
+        }
+        _ => "free disk space",
+    };
+    on_json(advice, &|path| write_atomically(path, |to| write_json(to, &outcome)))?;
+    Ok(outcome)
+}

@@ -1,0 +1,20 @@
+//! Tests of the program, each run in a directory of its own.
+#![allow(missing_docs)]
+
+#[macro_use]
+#[path = "../../../tests/support/mod.rs"]
+mod support;
+
+mod bad_input;
+mod bad_output;
+mod balance;
+mod command_line;
+mod htg;
+mod interrupts;
+mod leaf_set;
+mod leaks;
+mod memory;
+mod message_matrix;
+#[path = "../support/process.rs"]
+mod process;
+mod regions;

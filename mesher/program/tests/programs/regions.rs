@@ -1,0 +1,249 @@
+//! The kept region: seeds, enclosed components, what is reported about them, and warnings.
+
+use crate::process::{Workspace, run};
+use crate::support::{Facet, Run, Small, config, cuboid, small, soup};
+use bricks::octant::position;
+use mesher::lattice::{Enclosed, Keep, Root};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+fn case(facets: Vec<Facet>, keep: Keep) -> Small {
+    Small {
+        facets,
+        root: Root { origin: [0.0; 3], edge: 64.0 },
+        spacing_min: 2.0,
+        layer_cells_min: 2,
+        keep,
+        keep_crossing: true,
+        boxes: Vec::new(),
+        seeds: Vec::new(),
+        enclosed: Enclosed::Delete,
+    }
+}
+
+/// A sealed box in a box: the cavity is outside by the parity of rays.
+fn box_in_box() -> Vec<Facet> {
+    let mut facets = cuboid([9.0; 3], [55.0; 3]);
+    facets.extend(cuboid([23.0; 3], [41.0; 3]));
+    facets
+}
+
+/// Without its facets at x = 9, so that the flow can leave it.
+fn open_box() -> Vec<Facet> {
+    let is_wall = |f: &Facet| f.iter().any(|v| v[0] != 9.0);
+    cuboid([9.0; 3], [55.0; 3]).into_iter().filter(is_wall).collect()
+}
+
+/// Minimum corner and edge of the leaf of a word, in cells of edge 64 / 2^19.
+fn cube(word: u64) -> ([u32; 3], u32) {
+    (position(word >> 7), 1 << (19 - (word >> 2 & 31)))
+}
+
+/// Whether all leaves of a mesh on a root of edge 64 that meet the cavity of [`box_in_box`] cross.
+fn cavity_is_empty(words: &[u64]) -> bool {
+    let within = |word: &&u64| {
+        let (min, edge) = cube(**word);
+        let middle = min.map(|c| (f64::from(c) + f64::from(edge) / 2.0) * 64.0 / 524_288.0);
+        middle.iter().all(|c| (23.0..41.0).contains(c))
+    };
+    words.iter().filter(within).all(|w| w & 3 == 2)
+}
+
+#[test]
+fn a_sealed_cavity_is_deleted_unless_it_is_to_be_kept() {
+    for ranks in [1, 3, 8] {
+        let run = Run { ranks, seed: 5, ..Run::SOLO };
+        let deleted = case(box_in_box(), Keep::Outside).outcome(&run, false);
+        assert!(cavity_is_empty(&deleted.words), "{ranks} ranks");
+        let summary = deleted.summary;
+        assert_eq!((summary.outside, summary.inside), (2, 1));
+        // The cavity is 18 long; 16 of it are free of the crossing leaves at its walls: 4096 / 8 leaves of edge 2,
+        // of which most are siblings that were never split.
+        let enclosed = summary.enclosed.expect("the cavity is enclosed");
+        let base = case(box_in_box(), Keep::Outside).outcome(&run, true);
+        let in_cavity = |w: &&u64| cavity_is_empty(&[**w & !3]) != cavity_is_empty(&[**w | 2]);
+        let leaves = base.words.iter().filter(|w| *w & 3 == 0).filter(in_cavity).count() as u64;
+        assert_eq!((enclosed.count, enclosed.leaves), (1, leaves));
+        let place = Root { origin: [0.0; 3], edge: 64.0 }.locate(enclosed.example);
+        assert!(place.iter().all(|c| (23.0..41.0).contains(c)), "{place:?}");
+        assert_eq!(base.summary, summary, "the base tree's manifest reports the same");
+
+        let kept = Small { enclosed: Enclosed::Keep, ..case(box_in_box(), Keep::Outside) };
+        let kept = kept.outcome(&run, false);
+        assert!(!cavity_is_empty(&kept.words));
+        assert_eq!((kept.summary.outside, kept.summary.enclosed), (2, None));
+    }
+}
+
+/// If the root's boundary is inside or crossing, no outside component has a face on it.
+#[test]
+fn without_a_far_field_nothing_is_enclosed() {
+    let mut facets = cuboid([-1.0; 3], [65.0; 3]);
+    facets.extend(cuboid([9.0; 3], [20.0; 3]));
+    facets.extend(cuboid([30.0; 3], [50.0; 3]));
+    let outcome = case(facets, Keep::Outside).outcome(&Run::SOLO, false);
+    assert_eq!((outcome.summary.outside, outcome.summary.enclosed), (2, None));
+    assert!(outcome.words.iter().any(|w| w & 3 == 0));
+}
+
+proptest! {
+    #![proptest_config(config(200))]
+
+    #[test]
+    fn flow_from_seeds_equals_the_reference(
+        case in small(soup()),
+        picks in prop::collection::vec((any::<prop::sample::Index>(), [0i64..256, 0i64..256, 0i64..256]), 1..4),
+        run in crate::support::run(),
+    ) {
+        let mut free = case.solo(true);
+        free.retain(|w| w & 3 != 2);
+        prop_assume!(!free.is_empty());
+        let seed = |(pick, part): &(prop::sample::Index, [i64; 3])| {
+            let (min, edge) = cube(*pick.get(&free));
+            // On the minimum faces, which belong to the leaf, or anywhere in it.
+            let q = std::array::from_fn(|a| i64::from(min[a]) * 256 + part[a] * i64::from(edge));
+            case.root.locate(q)
+        };
+        let seeds: Vec<[f64; 3]> = picks.iter().map(seed).collect();
+        let case = Small { seeds, ..case.clone() };
+        for ungraded in [true, false] {
+            let (got, want) = (case.outcome(&run, ungraded), case.reference_outcome(ungraded));
+            assert_same!(got.words, want.words, "ungraded {ungraded}");
+            prop_assert_eq!(got.summary, want.summary);
+            prop_assert_eq!(got.summary.ambiguous, None);
+        }
+    }
+
+    /// Which seed is refused, and the point that is offered instead.
+    #[test]
+    fn unusable_seeds_are_refused_as_by_the_reference(
+        case in small(soup()),
+        seeds in prop::collection::vec([-9.0f64..73.0, -9.0f64..73.0, -9.0f64..73.0], 1..3),
+        run in crate::support::run(),
+    ) {
+        let case = Small { seeds, ..case };
+        // The error's numbers: the seed's and the coordinates.
+        let numbers = |message: String| -> Vec<f64> {
+            let is_part = |c: char| c.is_ascii_digit() || "-.e".contains(c);
+            message.split(|c| !is_part(c)).filter_map(|n| n.trim_end_matches('.').parse().ok()).collect()
+        };
+        let got = case.try_outcome(&run, false).map_err(|e| numbers(e.to_string()));
+        match (got, reference::mesh(&case.reference_case())) {
+            (Ok(got), Ok(want)) => prop_assert_eq!(got.words, want.words),
+            (Err(got), Err(want)) => {
+                let want = numbers(want.to_string());
+                let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
+                let agree = got.len() == want.len() && got.iter().zip(&want).all(near);
+                prop_assert!(agree, "{got:?} instead of {want:?}");
+            }
+            (got, want) => prop_assert!(false, "{got:?} instead of {want:?}"),
+        }
+    }
+}
+
+/// An ASCII STL file.
+fn stl(facets: &[Facet]) -> String {
+    let vertex = |v: &[f32; 3]| format!("vertex {} {} {}\n", v[0], v[1], v[2]);
+    let facet = |f: &Facet| {
+        let vertices: String = f.iter().map(vertex).collect();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    };
+    format!("solid body\n{}endsolid body\n", facets.iter().map(facet).collect::<String>())
+}
+
+/// The JSON report and the error output of the mesher on these facets.
+fn meshed(facets: &[Facet], options: &[&str]) -> (Value, String) {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", stl(facets));
+    let args = ["body.stl", "--spacing-min", "2", "--root", "0,0,0,64", "--json", "report.json"];
+    let finished = run(workspace.mesher(&[&args[..], options].concat()));
+    assert_eq!(finished.code, Some(0), "{finished:?}");
+    (crate::process::read_json(&workspace.path().join("report.json")), finished.stderr)
+}
+
+#[test]
+fn the_report_counts_components_by_side_and_those_that_are_enclosed() {
+    let (report, stderr) = meshed(&box_in_box(), &[]);
+    for (key, value) in [
+        ("components", json!(3)),
+        ("components_outside", json!(2)),
+        ("components_inside", json!(1)),
+        ("components_enclosed", json!(1)),
+        ("warnings", json!([])),
+    ] {
+        assert_eq!(report[key], value, "{key}");
+    }
+    assert!(report["enclosed_leaves"].as_u64().is_some_and(|n| n > 0));
+    assert_eq!(report["enclosed_example"].as_array().map(Vec::len), Some(3));
+    assert_eq!(stderr, "");
+    let (kept, _) = meshed(&box_in_box(), &["--enclosed", "keep"]);
+    assert_eq!(
+        (&kept["components_enclosed"], &kept["enclosed_example"]),
+        (&json!(0), &json!(null))
+    );
+    assert!(kept["cells"].as_u64() > report["cells"].as_u64());
+}
+
+#[test]
+fn a_seed_in_the_solid_makes_it_the_flow() {
+    let (report, _) = meshed(&box_in_box(), &["--keep", "inside", "--seed", "16,32,32"]);
+    assert_eq!(
+        (&report["components_inside"], &report["components_outside"]),
+        (&json!(1), &json!(2))
+    );
+    let seeds = ["--keep", "inside", "--seed", "32,32,32", "--seed", "16,32,32"];
+    let (report, _) = meshed(&box_in_box(), &seeds);
+    assert_eq!(report["components_inside"], 2);
+}
+
+#[test]
+fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
+    for (facets, options, expected) in [
+        (open_box(), &["--keep", "inside"][..], "nothing is inside the geometry"),
+        (
+            open_box(),
+            &["--keep", "inside", "--seed", "32,32,32"],
+            "reaches the root's boundary from its seeds: right if the root cuts an open end",
+        ),
+        (cuboid([-1.0; 3], [65.0; 3]), &["--keep", "outside"], "nothing is outside the geometry"),
+        (
+            cuboid([-1.0; 3], [65.0; 3]),
+            &["--keep", "inside"],
+            "inside by its rays reaches the root's boundary: right if the root cuts the geometry",
+        ),
+        (box_in_box(), &["--seed", "16,32,32"], "the flow of no seed reaches the root's boundary"),
+        (cuboid([-8.0, 8.0, 8.0], [56.0; 3]), &[], "10 of 12 facets lie wholly or partly beyond"),
+    ] {
+        let (report, stderr) = meshed(&facets, options);
+        let warnings = report["warnings"].as_array().expect("a list");
+        assert_eq!(warnings.len(), 1, "{options:?}: {warnings:?}");
+        let warning = warnings[0].as_str().expect("a sentence");
+        assert!(warning.contains(expected), "{warning}");
+        assert_eq!(stderr.trim_end(), format!("mesher: warning: {warning}"));
+    }
+}
+
+#[test]
+fn a_seed_in_the_far_field_and_a_body_that_ends_at_the_root_produce_no_warnings() {
+    for (facets, options) in [
+        (box_in_box(), &["--seed", "2,2,2", "--seed", "16,32,32"][..]),
+        (cuboid([32.0; 3], [64.0; 3]), &[]),
+    ] {
+        assert_eq!(meshed(&facets, options).0["warnings"], json!([]), "{options:?}");
+    }
+}
+
+#[test]
+fn an_unusable_seed_is_refused_with_a_point_that_can_be_used() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", stl(&box_in_box()));
+    let args = ["body.stl", "--spacing-min", "2", "--root", "0,0,0,64", "--seed"];
+    for (seed, expected) in [
+        ("9,32,32", ["seed 0 at (9, 32, 32)", "crosses", "(11, 31, 31)"]),
+        ("64,32,32", ["seed 0 at (64, 32, 32)", "outside the root", "(60, 28, 28)"]),
+        ("1e300,0,0", ["seed 0", "outside the root", "nearest"]),
+        ("nan,0,0", ["seed 0", "not finite", "three numbers"]),
+    ] {
+        run(workspace.mesher(&[&args[..], &[seed]].concat())).refuses(2, &expected);
+    }
+}

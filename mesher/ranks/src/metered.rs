@@ -1,0 +1,181 @@
+//! Counts and times the calls of a rank.
+
+use crate::{Comm, Gathered, MessageBuffer, matrix};
+use cpu_time::ThreadTime;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// The messages that a rank has sent to other ranks so far, and the time in its calls.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Traffic {
+    /// Messages: one per receiver, and those of collective calls as MPI libraries implement them (see [`Metered`]).
+    pub messages: u64,
+    /// Payload, in bytes.
+    pub bytes: u64,
+    /// Wall time in calls, waiting included, in seconds.
+    pub time_wall_s: f64,
+    /// CPU time in calls, in seconds.
+    pub time_cpu_s: f64,
+}
+
+/// A rank whose calls are counted and timed.
+///
+/// - A sparse all-to-all takes a message for each other receiver, an acknowledgement, and a barrier by doublings.
+/// - An allgather takes one message per doubling of the number of ranks (recursive doubling, Bruck), and so does that of the lengths
+///   before it; a rank sends as many words as all other ranks have on average.
+/// - A sum takes one message with all words per doubling.
+#[derive(Debug)]
+pub struct Metered<C> {
+    comm: C,
+    total: Cell<Traffic>,
+    is_paused: Cell<bool>,
+    /// Messages and bytes of sparse all-to-alls by receiver.
+    row: RefCell<BTreeMap<usize, (u64, u64)>>,
+}
+
+impl<C: Comm> Metered<C> {
+    /// Meters the calls of a rank.
+    pub fn new(comm: C) -> Self {
+        let (total, is_paused, row) = Default::default();
+        Self { comm, total, is_paused, row }
+    }
+
+    fn count(&self, messages: u64, words: u64) {
+        if !self.is_paused.get() {
+            let t = self.total.get();
+            let (messages, bytes) = (t.messages + messages, t.bytes + 8 * words);
+            self.total.set(Traffic { messages, bytes, ..t });
+        }
+    }
+
+    /// Doublings from one rank to all ranks.
+    fn doublings(&self) -> u64 {
+        u64::from(self.size().next_power_of_two().ilog2())
+    }
+
+    fn timed<T>(&self, call: impl FnOnce(&C) -> T) -> T {
+        let (wall, cpu) = (Instant::now(), ThreadTime::now());
+        let result = call(&self.comm);
+        if !self.is_paused.get() {
+            let t = self.total.get();
+            let time_wall_s = t.time_wall_s + wall.elapsed().as_secs_f64();
+            let time_cpu_s = t.time_cpu_s + cpu.elapsed().as_secs_f64();
+            self.total.set(Traffic { time_wall_s, time_cpu_s, ..t });
+        }
+        result
+    }
+}
+
+impl<C: Comm> Comm for Metered<C> {
+    fn rank(&self) -> usize {
+        self.comm.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.comm.size()
+    }
+
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
+        let gathered = self.timed(|comm| comm.all_gather(mine));
+        let ranks = self.size() as u64;
+        let all = gathered.words().len() as u64 + ranks;
+        self.count(2 * self.doublings(), all - all / ranks);
+        gathered
+    }
+
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        self.count(self.doublings(), self.doublings() * mine.len() as u64);
+        self.timed(|comm| comm.sums(mine))
+    }
+
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
+        for (receiver, words) in to.messages().filter(|m| m.0 != self.rank()) {
+            self.count(1, words.len() as u64);
+            if !self.is_paused.get() {
+                let mut row = self.row.borrow_mut();
+                let (messages, bytes) = row.entry(receiver).or_default();
+                (*messages, *bytes) = (*messages + 1, *bytes + 8 * words.len() as u64);
+            }
+        }
+        self.count(1 + self.doublings(), 0);
+        self.timed(|comm| comm.sparse_all_to_all(to))
+    }
+
+    fn ranks_in_process(&self) -> usize {
+        self.comm.ranks_in_process()
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.total.get()
+    }
+
+    fn sent(&self) -> Vec<matrix::Entry> {
+        let row = self.row.borrow();
+        let from = self.rank() as u64;
+        row.iter().map(|(&to, &(messages, bytes))| [from, to as u64, messages, bytes]).collect()
+    }
+
+    fn uncounted(&self, body: &mut dyn FnMut()) {
+        let before = self.is_paused.replace(true);
+        body();
+        self.is_paused.set(before);
+    }
+
+    fn limit_calls(&self, limit: Duration) {
+        self.comm.limit_calls(limit);
+    }
+
+    fn enter(&self, phase: &'static str) {
+        self.comm.enter(phase);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim;
+
+    #[test]
+    fn uncounted_calls_change_neither_counters_nor_times() {
+        let calls = |c: &dyn Comm| {
+            c.sums(&[1]);
+            c.all_gather(&[1]);
+            c.sparse_all_to_all([(0, [1])].into_iter().collect());
+        };
+        sim::run(3, 1, |c| {
+            calls(c);
+            let counted = (c.traffic(), c.sent());
+            c.uncounted(&mut || calls(c));
+            assert_eq!((c.traffic(), c.sent()), counted);
+            calls(c);
+            assert_eq!(c.traffic().messages, 2 * counted.0.messages);
+        });
+    }
+
+    #[test]
+    fn collective_calls_are_counted_as_libraries_implement_them() {
+        let counts = sim::run(5, 1, |c| {
+            c.sums(&[1, 2, 3]);
+            let summed = c.traffic();
+            c.all_gather(&[1, 2]);
+            let gathered = c.traffic();
+            let next = (c.rank() + 1) % 5;
+            c.sparse_all_to_all(
+                [(next, vec![0; 10]), (c.rank(), vec![0; 99])].into_iter().collect(),
+            );
+            let t = c.traffic();
+            [
+                summed.messages,
+                summed.bytes,
+                gathered.messages - summed.messages,
+                gathered.bytes - summed.bytes,
+                t.messages - gathered.messages,
+                t.bytes - gathered.bytes,
+            ]
+        });
+        // Sums: three doublings for five ranks, three words in each. Allgather: the same twice, with one and two words of each of the
+        // four other ranks. Sparse all-to-all: one message, one acknowledgement, and a barrier.
+        assert!(counts.iter().all(|c| *c == [3, 8 * 9, 6, 8 * 3 * 4, 3 + 2, 8 * 10]), "{counts:?}");
+    }
+}

@@ -1,0 +1,231 @@
+//! Ranks of a real MPI job, through `rsmpi`.
+//!
+//! A sparse all-to-all sends point-to-point messages only to the ranks that need one: of a thousand ranks each sends to dozens. A
+//! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. Messages
+//! are sent in chunks, as MPI counts in i32.
+//!
+//! With a limit for calls, collective calls are non-blocking: a rank that waits looks for questions of others (`stall`).
+
+mod stall;
+
+use crate::{Comm, Gathered, MessageBuffer};
+use mpi::collective::SystemOperation;
+use mpi::environment::Universe;
+use mpi::point_to_point::{Message, Status};
+use mpi::request::{Request, Scope};
+use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
+use stall::Watch;
+use std::cell::{Cell, OnceCell};
+use std::time::Duration;
+
+/// Greatest number of words in a chunk: 1 GiB; few in debug builds, so that tests send several chunks.
+const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
+/// Greatest number of words in one allgather, summed over the ranks.
+const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
+
+/// One rank of an MPI job.
+pub struct Mpi {
+    /// Present if calls have a limit.
+    watch: OnceCell<Watch>,
+    world: mpi::topology::SimpleCommunicator,
+    /// Whether the number of sparse all-to-alls so far is odd.
+    odd: Cell<bool>,
+    /// Finalises MPI when dropped; must outlive `world`, so it comes last.
+    _universe: Universe,
+}
+
+impl Mpi {
+    /// Joins the job that the launcher started. Once per process.
+    ///
+    /// # Panics
+    /// If MPI was initialised before.
+    pub fn start() -> Self {
+        let universe = mpi::initialize().expect("MPI is initialised once");
+        Self {
+            watch: OnceCell::new(),
+            world: universe.world(),
+            odd: Cell::new(false),
+            _universe: universe,
+        }
+    }
+}
+
+/// Name and version of the MPI library, in the library's own words.
+pub fn library() -> String {
+    mpi::environment::library_version().unwrap_or_else(|_| "of unknown version".to_owned())
+}
+
+/// Ends all ranks of the job at once.
+pub fn abort(code: i32) -> ! {
+    // SAFETY: MPI_Abort may be called at any time between initialisation and finalisation; panics
+    // outside of that time end this process below.
+    unsafe {
+        let (mut up, mut down) = (0, 0);
+        mpi::ffi::MPI_Initialized(&mut up);
+        mpi::ffi::MPI_Finalized(&mut down);
+        if up != 0 && down == 0 {
+            mpi::ffi::MPI_Abort(mpi::ffi::RSMPI_COMM_WORLD, code);
+        }
+    }
+    std::process::exit(code)
+}
+
+impl Comm for Mpi {
+    fn rank(&self) -> usize {
+        self.world.rank() as usize
+    }
+
+    fn size(&self) -> usize {
+        self.world.size() as usize
+    }
+
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
+        self.gather(mine).into()
+    }
+
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        let mut sums = vec![0; mine.len()];
+        match self.watch.get() {
+            None => self.world.all_reduce_into(mine, &mut sums[..], SystemOperation::sum()),
+            Some(watch) => mpi::request::scope(|scope| {
+                let (to, sum) = (&mut sums[..], SystemOperation::sum());
+                complete(watch, self.world.immediate_all_reduce_into(scope, mine, to, sum));
+            }),
+        }
+        sums
+    }
+
+    /// Sends the messages and receives until all ranks know that their messages have arrived. A synchronous send completes when its
+    /// receiver has started to receive; a rank whose sends are complete enters a non-blocking barrier (NBX: Hoefler,
+    /// Siebert, Lumsdaine 2010, "Scalable communication protocols for dynamic sparse data exchange").
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
+        let me = self.rank();
+        // A rank that has passed the barrier may start the next sparse all-to-all while others still receive in this one. No rank can be
+        // two calls ahead, so two tags suffice.
+        let tag = i32::from(self.odd.replace(!self.odd.get()));
+        let mut received = MessageBuffer::default();
+        mpi::request::scope(|scope| {
+            let mut sends = Vec::new();
+            for (to, words) in to.messages() {
+                if to == me {
+                    received.write(me, words.iter().copied());
+                    continue;
+                }
+                let process = self.world.process_at_rank(to as i32);
+                sends.extend(
+                    chunks(words).map(|chunk| {
+                        process.immediate_synchronous_send_with_tag(scope, chunk, tag)
+                    }),
+                );
+            }
+            let mut barrier = None;
+            self.watch.get().into_iter().for_each(Watch::start);
+            loop {
+                self.watch.get().into_iter().for_each(Watch::poll);
+                while let Some(first) =
+                    self.world.any_process().immediate_matched_probe_with_tag(tag)
+                {
+                    self.receive(first, tag, &mut received);
+                }
+                sends = sends.into_iter().filter_map(|send| send.test().err()).collect();
+                barrier = match barrier {
+                    None if sends.is_empty() => Some(self.world.immediate_barrier()),
+                    None => None,
+                    Some(barrier) => match barrier.test() {
+                        Ok(_) => break,
+                        Err(barrier) => Some(barrier),
+                    },
+                };
+            }
+        });
+        received
+    }
+
+    fn limit_calls(&self, limit: Duration) {
+        self.watch.get_or_init(|| Watch::new(&self.world, limit));
+    }
+
+    fn enter(&self, phase: &'static str) {
+        if let Some(watch) = self.watch.get() {
+            watch.enter(phase);
+        }
+    }
+}
+
+/// Waits for a collective call under a limit.
+fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, request: Request<'a, D, S>) {
+    let mut pending = Some(request);
+    watch.wait(|| {
+        pending = pending.take().and_then(|request| request.test().err());
+        pending.is_none()
+    });
+}
+
+impl Mpi {
+    fn gather(&self, mine: &[u64]) -> MessageBuffer {
+        let mut counts = vec![0u64; self.size()];
+        let length = mine.len() as u64;
+        match self.watch.get() {
+            None => self.world.all_gather_into(&length, &mut counts[..]),
+            Some(watch) => mpi::request::scope(|scope| {
+                let all = &mut counts[..];
+                complete(watch, self.world.immediate_all_gather_into(scope, &length, all));
+            }),
+        }
+        let longest = counts.iter().copied().max().unwrap_or(0) as usize;
+        // MPI counts the sum over the ranks in i32.
+        let step = (GATHERED / self.size()).max(1);
+        let parts: Vec<MessageBuffer> = (0..longest)
+            .step_by(step)
+            .map(|at| {
+                let part = |len: usize| len.saturating_sub(at).min(step);
+                let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
+                self.all_gather_part(&mine[at.min(mine.len())..][..part(mine.len())], &lengths)
+            })
+            .collect();
+        match <[MessageBuffer; 1]>::try_from(parts) {
+            Ok([all]) => all,
+            Err(parts) => {
+                let words = |rank: usize| parts.iter().flat_map(move |p| p.of(rank));
+                (0..self.size()).map(|rank| (rank, words(rank).copied())).collect()
+            }
+        }
+    }
+
+    /// Gathers the given numbers of words from the ranks.
+    fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> MessageBuffer {
+        let starts: Vec<i32> =
+            lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
+        let lengths_all = lengths.iter().map(|&n| n as usize);
+        let mut all = MessageBuffer::with_lengths(lengths_all);
+        let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
+        match self.watch.get() {
+            None => self.world.all_gather_varcount_into(mine, &mut target),
+            Some(watch) => mpi::request::scope(|scope| {
+                let to = &mut target;
+                complete(watch, self.world.immediate_all_gather_varcount_into(scope, mine, to));
+            }),
+        }
+        all
+    }
+
+    /// Receives the message whose first chunk has been matched.
+    fn receive(&self, first: (Message, Status), tag: i32, received: &mut MessageBuffer) {
+        let from = first.1.source_rank();
+        let mut chunk = first;
+        loop {
+            let words = chunk.1.count(u64::equivalent_datatype()) as usize;
+            chunk.0.matched_receive_into(received.room(from as usize, words));
+            if words < CHUNK {
+                return;
+            }
+            chunk = self.world.process_at_rank(from).matched_probe_with_tag(tag);
+        }
+    }
+}
+
+/// A message in full chunks, and a last one that is shorter and may be empty: it marks the end of the message.
+fn chunks(words: &[u64]) -> impl Iterator<Item = &[u64]> {
+    let (full, last) = words.as_chunks::<CHUNK>();
+    full.iter().map(|chunk| &chunk[..]).chain([last])
+}

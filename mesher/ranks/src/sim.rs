@@ -1,0 +1,174 @@
+//! Simulated ranks in one process, for tests and projections.
+//!
+//! Only one rank runs at a time. It passes the token on when it has to wait for others. The next rank and the order in which messages
+//! arrive are a [`Schedule`]'s choices; [`run`] draws one from a seed, so a failure can be replayed from its seed. In [`run`] each rank is a
+//! thread, so that the CPU time of a rank is not disturbed by the others. Other executors implement [`Token`]: tests of
+//! many schedules run ranks as coroutines, which takes a fifth of the time.
+
+mod schedule;
+mod world;
+
+pub use schedule::{Adversary, Arrival, Schedule};
+pub use world::{Next, World};
+
+use super::{Comm, Gathered, MessageBuffer, Metered};
+use std::any::Any;
+use std::cell::Cell;
+use std::sync::{Condvar, Mutex, MutexGuard};
+use world::{Delivery, UNEQUAL, Words};
+
+/// One rank of a simulated group.
+pub struct Sim<'a> {
+    rank: usize,
+    world: &'a World,
+    token: &'a dyn Token,
+    /// Number of collective calls so far, to detect ranks that do not make the same calls.
+    calls: Cell<u64>,
+}
+
+/// The right to run, as a rank sees it.
+pub trait Token {
+    /// Passes the token on; returns when the world has chosen this rank again.
+    fn pass(&self, rank: usize);
+}
+
+/// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
+///
+/// # Panics
+/// With the panic of the lowest rank that panicked; the other ranks are stopped.
+pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + Sync) -> Vec<T> {
+    let world = World::new(size, Adversary::new(seed, size));
+    let turns = (0..size).map(|_| Condvar::new()).collect();
+    let threads = Threads { next: Mutex::new(world.next()), turns, world };
+    let results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
+        let spawn = |rank| {
+            let (threads, body) = (&threads, &body);
+            let run = move || {
+                threads.wait(rank);
+                let leaving = Leaving { threads, rank };
+                let result = body(&Metered::new(Sim::new(rank, &threads.world, threads)));
+                drop(leaving);
+                result
+            };
+            let builder = std::thread::Builder::new().stack_size(16 << 20);
+            builder.spawn_scoped(scope, run).expect("a thread per simulated rank")
+        };
+        let handles: Vec<_> = (0..size).map(spawn).collect();
+        handles.into_iter().map(|t| t.join()).collect()
+    });
+    let is_stopped =
+        |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == STOPPED);
+    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !is_stopped(p))) {
+        let panic = results.into_iter().nth(at).and_then(Result::err);
+        std::panic::resume_unwind(panic.expect("position found an error"));
+    }
+    results.into_iter().map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
+}
+
+const STOPPED: &str = "stopped because another simulated rank panicked";
+
+/// Ranks as threads.
+struct Threads {
+    world: World,
+    next: Mutex<Next>,
+    /// One per rank, so that passing the token wakes one thread only.
+    turns: Vec<Condvar>,
+}
+
+impl Threads {
+    fn pass_on(&self) {
+        let next = self.world.next();
+        *self.lock() = next;
+        match next {
+            Next::Run(rank) => self.turns[rank].notify_one(),
+            Next::End | Next::Stop => self.turns.iter().for_each(Condvar::notify_one),
+        }
+    }
+
+    fn wait(&self, rank: usize) {
+        let mut next = self.lock();
+        while *next != Next::Run(rank) {
+            if *next == Next::Stop {
+                drop(next);
+                std::panic::panic_any(STOPPED);
+            }
+            next = self.turns[rank].wait(next).unwrap_or_else(|p| p.into_inner());
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Next> {
+        self.next.lock().unwrap_or_else(|p| p.into_inner())
+    }
+}
+
+impl Token for Threads {
+    fn pass(&self, rank: usize) {
+        self.pass_on();
+        self.wait(rank);
+    }
+}
+
+/// Passes the token on when a rank ends, normally or by a panic.
+struct Leaving<'a> {
+    threads: &'a Threads,
+    rank: usize,
+}
+
+impl Drop for Leaving<'_> {
+    fn drop(&mut self) {
+        self.threads.world.end(self.rank, std::thread::panicking());
+        self.threads.pass_on();
+    }
+}
+
+impl<'a> Sim<'a> {
+    /// A rank of a world, which has been chosen to run.
+    pub fn new(rank: usize, world: &'a World, token: &'a dyn Token) -> Self {
+        Self { rank, world, token, calls: Cell::new(0) }
+    }
+
+    fn call(&self, words: Words) -> Delivery {
+        let call = self.calls.replace(self.calls.get() + 1);
+        self.world.post(self.rank, call, words);
+        self.token.pass(self.rank);
+        self.world.result(self.rank)
+    }
+}
+
+impl Comm for Sim<'_> {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.world.size()
+    }
+
+    fn all_gather(&self, mine: &[u64]) -> Gathered {
+        match self.call(Words::Gather(mine.to_vec())) {
+            Delivery::Gathered(all) => all,
+            _ => unreachable!("{UNEQUAL}"),
+        }
+    }
+
+    fn sums(&self, mine: &[u64]) -> Vec<u64> {
+        match self.call(Words::Sum(mine.to_vec())) {
+            Delivery::Summed(sums) => sums,
+            _ => unreachable!("{UNEQUAL}"),
+        }
+    }
+
+    fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
+        match self.call(Words::Send(to)) {
+            Delivery::Received(messages) => messages,
+            _ => unreachable!("{UNEQUAL}"),
+        }
+    }
+
+    fn ranks_in_process(&self) -> usize {
+        self.size()
+    }
+}
+
+#[cfg(test)]
+mod tests;
