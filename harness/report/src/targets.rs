@@ -2,16 +2,16 @@
 
 use crate::markdown::{self, escaped};
 use bench::experiments::entry::{Judged, Verdict};
-use bench::targets::declare::Targets;
-use bench::targets::row::fields;
+use bench::study::Study;
+use bench::study::row::fields;
 use std::fmt::Write;
 
 /// Headings of the columns.
 const TITLES: [&str; 5] = ["row", "target", "measured", "how", "verdict"];
 
 /// The table as text, followed by the counts of the verdicts.
-pub fn text(targets: &Targets, rows: &[Judged]) -> String {
-    let cells: Vec<[String; 5]> = rows.iter().map(|row| fields(targets, row)).collect();
+pub fn text(study: &Study, rows: &[Judged]) -> String {
+    let cells: Vec<[String; 5]> = rows.iter().map(|row| fields(study, row)).collect();
     let titles = TITLES.map(str::to_owned);
     let width = |column: usize| {
         let length = |row: &[String; 5]| row[column].chars().count();
@@ -28,9 +28,9 @@ pub fn text(targets: &Targets, rows: &[Judged]) -> String {
 }
 
 /// The table as Markdown, below a line about the machine and the counts of the verdicts.
-pub fn markdown(targets: &Targets, rows: &[Judged], machine: &str) -> String {
+pub fn markdown(study: &Study, rows: &[Judged], machine: &str) -> String {
     let head = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
-    head + &markdown::table(&TITLES, |_| "---", rows.iter().map(|row| fields(targets, row)))
+    head + &markdown::table(&TITLES, |_| "---", rows.iter().map(|row| fields(study, row)))
 }
 
 fn count(rows: &[Judged]) -> String {
@@ -48,8 +48,8 @@ fn count(rows: &[Judged]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::targets::judge::unjudged;
-    use bench::testing::targets as read;
+    use bench::study::judge::unjudged;
+    use bench::testing::study as read;
 
     #[test]
     fn every_verdict_is_shown_with_its_reason() {

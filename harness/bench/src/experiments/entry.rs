@@ -197,6 +197,24 @@ pub struct Setup {
     pub weight_exposed: Option<u32>,
 }
 
+impl Setup {
+    /// A serial run of the mesher outside of all experiments.
+    pub fn serial(case: &str, spacing_min: f64, layer_cells_min: u32) -> Self {
+        Self {
+            experiment: String::new(),
+            engine: "mesher".to_owned(),
+            case: case.to_owned(),
+            spacing_min,
+            layer_cells_min,
+            ranks: 1,
+            comm: Comm::Solo,
+            partitioner: String::new(),
+            weights: String::new(),
+            weight_exposed: None,
+        }
+    }
+}
+
 /// A run and its measurements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
