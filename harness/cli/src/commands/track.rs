@@ -60,9 +60,6 @@ pub struct Arguments {
     /// Ignore smaller changes; percent
     #[arg(long, default_value_t = 0.1, value_parser = percentage)]
     effect_min: f64,
-    /// Seed of the permutation test
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
 
 fn named_number(text: &str) -> Result<(String, f64), String> {
@@ -101,8 +98,7 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
         eprintln!("harness: {}: {warning}", arguments.history.display());
     }
     let effect_min = arguments.effect_min / 100.0;
-    let rules =
-        Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
+    let rules = Rules { alpha: arguments.alpha, effect_min };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
     print!("{}", summary(&all));
