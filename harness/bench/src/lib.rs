@@ -6,6 +6,8 @@
 
 pub mod experiments;
 pub mod gate;
+pub mod jsonl;
+pub mod order;
 pub mod origin;
 pub mod shrink;
 pub mod statistics;

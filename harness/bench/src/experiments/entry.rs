@@ -213,6 +213,18 @@ impl Setup {
             weight_exposed: None,
         }
     }
+
+    /// Returns partitioner and weights, or `default`, and the weight W of exposed faces if they have one.
+    pub fn division(&self) -> String {
+        let chosen = match (self.partitioner.as_str(), self.weights.as_str()) {
+            ("", "") => "default".to_owned(),
+            (partitioner, weights) => format!("{partitioner} {weights}").trim().to_owned(),
+        };
+        match self.weight_exposed {
+            None | Some(0) => chosen,
+            Some(weight) => format!("{chosen} W={weight}"),
+        }
+    }
 }
 
 /// A run and its measurements.

@@ -1,7 +1,7 @@
 //! Measured runs: their execution, their record, and what follows from it.
 //!
 //! Every result is appended to a [`record`] immediately. All tables and figures are computed from the record alone, by
-//! [`group`], [`pop`], [`cause`] and [`table`] here and by the crate `report`. They can therefore be reproduced at any time on any
+//! [`group`], [`pop`] and [`cause`] here and by the crate `report`. They can therefore be reproduced at any time on any
 //! machine. A [study](crate::study) declares what is run.
 
 pub mod cause;
@@ -19,5 +19,4 @@ pub mod programs;
 pub mod record;
 pub mod session;
 pub mod sizing;
-pub mod table;
 pub mod variant;

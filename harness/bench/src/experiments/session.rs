@@ -3,7 +3,7 @@
 use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup};
 use super::execute::{Failed, Runner};
 use super::record::Record;
-use super::{machine, network, table};
+use super::{machine, network};
 use check::promises::Independence;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
@@ -86,8 +86,7 @@ impl<'a> Bench<'a> {
         place: &'a Path,
         progress: &'a mut dyn FnMut(&str),
     ) -> Result<Self, BenchError> {
-        let record = Record::open(&options.record)
-            .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
+        let record = Record::new(&options.record);
         let (launcher, limit) = (&options.launcher, options.limit);
         let runner = Runner { programs, launcher, limit, place };
         let (lines, digests) = (Vec::new(), HashMap::new());
@@ -161,7 +160,7 @@ impl Bench<'_> {
             if warm_up {
                 ", warm-up".to_owned()
             } else {
-                format!(", {}, repeat {}", table::division(s), repeat + 1)
+                format!(", {}, repeat {}", s.division(), repeat + 1)
             }
         ));
         let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {

@@ -4,11 +4,12 @@ use super::files::{prepare, put};
 use super::programs::ProgramArguments;
 use bench::experiments::entry::{Entry, Judged, Line, Machine, Network, Verdict};
 use bench::experiments::group::Groups;
+use bench::experiments::network;
 use bench::experiments::record::{self, Content};
 use bench::experiments::session::{BenchError, Options};
-use bench::experiments::{network, table};
 use bench::study::{self, Overrides, Study};
 use clap::Args;
+use report::benchmark::tables;
 use report::targets as page;
 use run::engine::description::is_own;
 use run::engine::launcher::Launcher;
@@ -207,7 +208,7 @@ fn publish(
     report: Option<&Path>,
 ) -> Result<(), u8> {
     if !study.series.is_empty() {
-        print!("{}", table::tables(&Groups::of(lines)));
+        print!("{}", tables::text(&Groups::of(lines)));
         for line in lines {
             if let Entry::Failure(f) = &line.entry {
                 println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);

@@ -2,6 +2,7 @@
 
 use super::files::{prepare, put};
 use super::values::{Input, Output, percentage, probability};
+use bench::jsonl;
 use bench::statistics::change_points::Rules;
 use bench::track::history::{self, History, Record};
 use bench::track::{Series, analyse, link, summary};
@@ -125,7 +126,7 @@ fn append(arguments: &Arguments) -> Result<(), String> {
         record.add(&text).map_err(wrong)?;
     }
     record.metrics.extend(arguments.value.iter().cloned());
-    history::append(&arguments.history, &record)
+    jsonl::append(&arguments.history, &record)
         .map_err(|error| format!("{}: {error}", arguments.history.display()))
 }
 
