@@ -1,16 +1,17 @@
 //! Measurements of meshers and their analysis.
 //!
-//! - [`experiments`]: scaling, spacing, layers, weights; every result is appended to a record;
-//! - [`targets`]: a table of targets, met or missed;
+//! - [`study`]: series of runs and targets, declared in a file; [`experiments`]: the runs, their record and its analysis;
 //! - [`gate`](mod@gate): candidate against baseline; [`track`]: metrics by commit; [`statistics`] for all of them;
 //! - [`shrink`](mod@shrink): the smallest case that still fails;
 
 pub mod experiments;
 pub mod gate;
+pub mod jsonl;
+pub mod order;
 pub mod origin;
 pub mod shrink;
 pub mod statistics;
-pub mod targets;
+pub mod study;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 pub mod track;

@@ -1,7 +1,7 @@
 //! Data for tests, here and in the crates that build on this one.
 
 use crate::experiments::entry::{Comm, Entry, Line, Phase, Run, SCHEMA, Setup, Spread};
-use crate::targets::Targets;
+use crate::study::Study;
 use crate::track::history::Record;
 use std::collections::BTreeMap;
 
@@ -74,13 +74,13 @@ pub fn history() -> Vec<Record> {
     (0..30).map(record).collect()
 }
 
-/// Returns the targets declared by a file with this text.
+/// Returns the study declared by a file with this text.
 ///
 /// # Errors
-/// As [`Targets::read`], with `FILE` instead of the path.
-pub fn targets(text: &str) -> Result<Targets, String> {
+/// As [`Study::read`], with `FILE` instead of the path.
+pub fn study(text: &str) -> Result<Study, String> {
     let place = tempfile::tempdir().unwrap();
-    let path = place.path().join("targets.toml");
+    let path = place.path().join("study.toml");
     std::fs::write(&path, text).unwrap();
-    Targets::read(&path).map_err(|why| why.replace(&path.display().to_string(), "FILE"))
+    Study::read(&path).map_err(|why| why.replace(&path.display().to_string(), "FILE"))
 }

@@ -24,10 +24,9 @@ pub enum Command {
     Selftest(commands::selftest::Arguments),
     /// Compare a candidate with a baseline: correctness, exact counters, instructions, time
     Gate(Box<commands::gate::Arguments>),
-    /// Measure strong and weak scaling, spacing, layers and weights; append every result to a record
+    /// Execute a study: series of runs, and targets that are met or missed; append every result to a record
+    #[command(visible_alias = "targets")]
     Bench(Box<commands::bench::Arguments>),
-    /// Make the runs that a table of targets needs, and report which targets are met
-    Targets(Box<commands::targets::Arguments>),
     /// Make figures, a web page, a LaTeX fragment and an artifact description from benchmark records
     Report(commands::report::Arguments),
     /// Keep a history of metrics by commit and detect where they changed
@@ -87,37 +86,14 @@ mod tests {
     }
 
     #[test]
-    fn ranks_launcher_and_cells_are_parsed() {
-        let words = [
-            "harness",
-            "bench",
-            "uav-small",
-            "--ranks",
-            "1..8",
-            "--cells",
-            "1e6,2e6",
-            "--launcher",
-            "srun -n {ranks}",
-        ];
-        let Command::Bench(bench) = Arguments::try_parse_from(words).unwrap().command else {
-            panic!()
-        };
-        assert_eq!(bench.ranks.unwrap().0, [1, 2, 4, 8]);
-        assert_eq!(bench.cells, [1_000_000, 2_000_000]);
-        assert!(Arguments::try_parse_from(["harness", "bench", "--launcher", "mpirun"]).is_err());
-        assert!(Arguments::try_parse_from(["harness", "bench", "--cells", "5"]).is_err());
-    }
-
-    #[test]
-    fn targets_accepts_the_options_of_a_session() {
-        let words = ["harness", "targets", "t.toml", "--only", "a,b", "--repeat", "2", "--show"];
-        let Command::Targets(targets) = Arguments::try_parse_from(words).unwrap().command else {
-            panic!()
-        };
-        assert_eq!(targets.only, ["a", "b"]);
-        assert!(targets.show && targets.session.repeat == Some(2));
-        assert!(Arguments::try_parse_from(["harness", "targets"]).is_err());
-        let old = ["harness", "bench", "--targets", "t.toml"];
-        assert!(Arguments::try_parse_from(old).is_err());
+    fn a_study_and_the_options_of_its_session_are_parsed() {
+        for name in ["bench", "targets"] {
+            let words =
+                ["harness", name, "t.toml", "--only", "a,b", "--launcher", "srun -n {ranks}"];
+            let parsed = Arguments::try_parse_from(words).unwrap().command;
+            assert!(matches!(parsed, Command::Bench(_)));
+            assert!(Arguments::try_parse_from(["harness", name, "--launcher", "mpirun"]).is_err());
+            assert!(Arguments::try_parse_from(["harness", name, "--repeat", "0"]).is_err());
+        }
     }
 }

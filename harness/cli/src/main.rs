@@ -79,7 +79,6 @@ fn dispatch(arguments: Arguments) -> u8 {
         Command::Selftest(arguments) => commands::selftest::run(&arguments),
         Command::Gate(arguments) => commands::gate::run(*arguments),
         Command::Bench(arguments) => commands::bench::run(*arguments),
-        Command::Targets(arguments) => commands::targets::run(*arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Track(arguments) => commands::track::run(&arguments),
         Command::Shrink(arguments) => commands::shrink::run(&arguments),

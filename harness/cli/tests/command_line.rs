@@ -5,12 +5,11 @@ use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 17] = [
     "verify",
     "selftest",
     "gate",
     "bench",
-    "targets",
     "report",
     "track",
     "shrink",

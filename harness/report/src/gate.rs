@@ -1,6 +1,7 @@
 //! The report of a gate as text, Markdown, JUnit XML and JSON.
 
-use crate::markdown::{escaped, table};
+use crate::markdown::escaped;
+use crate::table::Table;
 use crate::verification::junit::to_text;
 use bench::gate::report::{End, Finding, Layer, Report, Verdict};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
@@ -21,20 +22,16 @@ pub fn text(report: &Report) -> String {
     text
 }
 
-/// The columns of the Markdown table.
-const COLUMNS: [&str; 8] =
-    ["layer", "verdict", "case", "metric", "baseline", "candidate", "change", "note"];
-
 /// The report as Markdown, for the summary page of a CI system.
 pub fn markdown(report: &Report) -> String {
-    let mut rows: Vec<[String; 8]> = Vec::new();
+    let mut rows: Vec<Vec<String>> = Vec::new();
     for layer in &report.layers {
-        let mut head = [const { String::new() }; 8];
-        (head[0], head[1]) = (layer.name.to_string(), summary(layer));
+        let mut head = vec![layer.name.to_string(), summary(layer)];
+        head.resize(8, String::new());
         rows.push(head);
         rows.extend(layer.findings.iter().filter(|f| is_shown(layer, f)).map(|finding| {
             let number = |value: Option<f64>| value.map(number).unwrap_or_default();
-            [
+            vec![
                 String::new(),
                 finding.verdict.to_string(),
                 finding.case.clone(),
@@ -46,10 +43,11 @@ pub fn markdown(report: &Report) -> String {
             ]
         }));
     }
-    let align = |column: usize| if (4..7).contains(&column) { "---:" } else { "---" };
+    let columns =
+        vec!["layer", "verdict", "case", "metric", "baseline", "candidate", "change", "note"];
     let head =
         format!("## harness gate\n\n{}: **{}**\n\n", escaped(&heading(report)), verdict(report));
-    head + &table(&COLUMNS, align, rows)
+    head + &Table { columns, rows, ..Table::default() }.markdown(4..7)
 }
 
 /// The report as JUnit XML: a suite per layer, a test per metric. Inconclusive metrics are skipped tests with a reason.

@@ -1,7 +1,7 @@
 //! The forms in which the harness presents its findings.
 //!
 //! - [`figure`]: the model of a figure, and SVG, PGF/TikZ and CSV from it;
-//! - [`page`](mod@page), [`markdown`], [`json`]: what all reports share;
+//! - [`page`](mod@page), [`table`], [`markdown`], [`json`]: what all reports share;
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
@@ -17,6 +17,7 @@ pub mod markdown;
 pub mod page;
 pub mod picture;
 mod section;
+pub mod table;
 pub mod targets;
 pub mod track;
 pub mod verification;

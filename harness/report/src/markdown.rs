@@ -1,20 +1,4 @@
-//! Tables in Markdown.
-
-/// A table with its head. Every row has as many fields as the head; `align` gives the rule below each column, `---` or
-/// `---:`.
-pub fn table<F: AsRef<str>>(
-    columns: &[&str],
-    align: impl Fn(usize) -> &'static str,
-    rows: impl IntoIterator<Item = impl AsRef<[F]>>,
-) -> String {
-    let line = |fields: Vec<String>| format!("| {} |\n", fields.join(" | "));
-    let mut text = line(columns.iter().map(|title| escaped(title)).collect());
-    text += &line((0..columns.len()).map(|i| align(i).to_owned()).collect());
-    for row in rows {
-        text += &line(row.as_ref().iter().map(|field| escaped(field.as_ref())).collect());
-    }
-    text
-}
+//! Text for Markdown.
 
 /// Text on one line in which Markdown and HTML find no markup.
 pub fn escaped(text: &str) -> String {
@@ -30,15 +14,4 @@ pub fn escaped(text: &str) -> String {
         }
     }
     out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn fields_cannot_become_markup() {
-        let text = table(&["a|b", "c"], |_| "---", [["<x>", "_y_"]]);
-        assert_eq!(text, "| a\\|b | c |\n| --- | --- |\n| &lt;x&gt; | \\_y\\_ |\n");
-    }
 }

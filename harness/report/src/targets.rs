@@ -1,36 +1,28 @@
 //! The table of targets as text and as Markdown.
 
-use crate::markdown::{self, escaped};
+use crate::markdown::escaped;
+use crate::table::Table;
 use bench::experiments::entry::{Judged, Verdict};
-use bench::targets::declare::Targets;
-use bench::targets::row::fields;
-use std::fmt::Write;
+use bench::study::Study;
+use bench::study::row::fields;
 
-/// Headings of the columns.
-const TITLES: [&str; 5] = ["row", "target", "measured", "how", "verdict"];
+fn table(study: &Study, rows: &[Judged]) -> Table {
+    Table {
+        columns: vec!["row", "target", "measured", "how", "verdict"],
+        rows: rows.iter().map(|row| fields(study, row).to_vec()).collect(),
+        ..Table::default()
+    }
+}
 
 /// The table as text, followed by the counts of the verdicts.
-pub fn text(targets: &Targets, rows: &[Judged]) -> String {
-    let cells: Vec<[String; 5]> = rows.iter().map(|row| fields(targets, row)).collect();
-    let titles = TITLES.map(str::to_owned);
-    let width = |column: usize| {
-        let length = |row: &[String; 5]| row[column].chars().count();
-        cells.iter().chain([&titles]).map(length).max().unwrap_or(0)
-    };
-    let [a, b, c, d] = [0, 1, 2, 3].map(width);
-    let mut out = String::new();
-    for [name, target, measured, how, verdict] in [&titles].into_iter().chain(&cells) {
-        // Writing into a string cannot fail.
-        let _ = writeln!(out, "{name:a$}  {target:>b$}  {measured:>c$}  {how:d$}  {verdict}");
-    }
-    let _ = writeln!(out, "{}", count(rows));
-    out
+pub fn text(study: &Study, rows: &[Judged]) -> String {
+    Table { notes: vec![count(rows)], ..table(study, rows) }.text()
 }
 
 /// The table as Markdown, below a line about the machine and the counts of the verdicts.
-pub fn markdown(targets: &Targets, rows: &[Judged], machine: &str) -> String {
+pub fn markdown(study: &Study, rows: &[Judged], machine: &str) -> String {
     let head = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
-    head + &markdown::table(&TITLES, |_| "---", rows.iter().map(|row| fields(targets, row)))
+    head + &table(study, rows).markdown(0..0)
 }
 
 fn count(rows: &[Judged]) -> String {
@@ -48,8 +40,8 @@ fn count(rows: &[Judged]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::targets::judge::unjudged;
-    use bench::testing::targets as read;
+    use bench::study::judge::unjudged;
+    use bench::testing::study as read;
 
     #[test]
     fn every_verdict_is_shown_with_its_reason() {

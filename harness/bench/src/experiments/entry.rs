@@ -197,6 +197,36 @@ pub struct Setup {
     pub weight_exposed: Option<u32>,
 }
 
+impl Setup {
+    /// A serial run of the mesher outside of all experiments.
+    pub fn serial(case: &str, spacing_min: f64, layer_cells_min: u32) -> Self {
+        Self {
+            experiment: String::new(),
+            engine: "mesher".to_owned(),
+            case: case.to_owned(),
+            spacing_min,
+            layer_cells_min,
+            ranks: 1,
+            comm: Comm::Solo,
+            partitioner: String::new(),
+            weights: String::new(),
+            weight_exposed: None,
+        }
+    }
+
+    /// Returns partitioner and weights, or `default`, and the weight W of exposed faces if they have one.
+    pub fn division(&self) -> String {
+        let chosen = match (self.partitioner.as_str(), self.weights.as_str()) {
+            ("", "") => "default".to_owned(),
+            (partitioner, weights) => format!("{partitioner} {weights}").trim().to_owned(),
+        };
+        match self.weight_exposed {
+            None | Some(0) => chosen,
+            Some(weight) => format!("{chosen} W={weight}"),
+        }
+    }
+}
+
 /// A run and its measurements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {

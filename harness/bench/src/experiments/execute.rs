@@ -2,6 +2,7 @@
 
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
+use super::variant::Base;
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
@@ -115,6 +116,21 @@ impl Runner<'_> {
             time_cpu_s: time_process_cpu_s,
             ..measurements(setup.clone(), report)
         })
+    }
+
+    /// Returns the number of cells of a mesh, generated on one rank.
+    ///
+    /// # Errors
+    /// If the case cannot be written or the run gives no result.
+    pub fn count(
+        &self,
+        base: &Base,
+        spacing_min: f64,
+        layer_cells_min: u32,
+    ) -> Result<u64, Failed> {
+        let case = base.variant(spacing_min, layer_cells_min).map_err(Failed::Reason)?;
+        let setup = Setup::serial(&base.name, spacing_min, layer_cells_min);
+        self.run(&setup, &case, 0, true).map(|run| run.cells)
     }
 
     fn engine(&self, setup: &Setup) -> Engine {

@@ -10,6 +10,7 @@
 use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Phase, Run, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
+use crate::order::by_key;
 use crate::origin::Origins;
 use crate::statistics::{Median, median};
 use std::collections::BTreeMap;
@@ -158,8 +159,6 @@ impl Groups {
     pub fn of(lines: &[Line]) -> Self {
         let (lines, origins) = apart(lines);
         let mut network = ASSUMED;
-        let mut by_setup: Vec<(Setup, Vec<Run>)> = Vec::new();
-        let mut matrices: Vec<Run> = Vec::new();
         let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
         for line in &lines {
             match &line.entry {
@@ -170,25 +169,22 @@ impl Groups {
                     let why = format!("{} failed: {why}", setup.engine);
                     left_out.push(LeftOut { setup: setup.clone(), why });
                 }
-                Entry::Run(run) if !run.warm_up => {
-                    match by_setup.iter_mut().find(|(setup, _)| *setup == run.setup) {
-                        Some((_, runs)) => runs.push((**run).clone()),
-                        None => by_setup.push((run.setup.clone(), vec![(**run).clone()])),
-                    }
-                }
                 _ => {}
             }
         }
-        let with_matrix = lines.iter().filter_map(|line| match &line.entry {
-            Entry::Run(run) if !run.message_matrix.is_empty() => Some(&**run),
+        let runs = lines.iter().filter_map(|line| match &line.entry {
+            Entry::Run(run) => Some(&**run),
             _ => None,
         });
-        for run in with_matrix {
-            matrices.retain(|other| other.setup != run.setup);
-            matrices.push(run.clone());
-        }
-        let group = |(setup, runs): (Setup, Vec<Run>)| Group::of(setup, runs, &network);
-        let all = by_setup.into_iter().filter_map(group).collect();
+        let measured = by_key(runs.clone().filter(|run| !run.warm_up), |run| run.setup.clone());
+        let group = |(setup, runs): (Setup, Vec<&Run>)| {
+            Group::of(setup, runs.into_iter().cloned().collect(), &network)
+        };
+        let all = measured.into_iter().filter_map(group).collect();
+        let with_matrix = runs.filter(|run| !run.message_matrix.is_empty());
+        let matrices = by_key(with_matrix, |run| run.setup.clone()).into_iter();
+        let matrices =
+            matrices.filter_map(|(_, runs)| runs.last().map(|run| (*run).clone())).collect();
         let groups = Self { all, matrices, left_out, lacks, network, origins };
         groups.check_invariants();
         groups

@@ -144,14 +144,16 @@ pub fn phase_efficiency(
     let before = reference.phases.iter().find(|p| p.name == phase.name);
     let per_cell = |p: &Phase, r: &Run| p.useful_s.sum / r.cells.max(1) as f64;
     let scaling = before.map_or(0.0, |b| ratio(per_cell(b, reference), per_cell(phase, run)));
-    Efficiency {
+    let efficiency = Efficiency {
         load_balance: 1.0 / lambda,
         serialisation: 1.0,
         transfer: ratio(phase.useful_s.max, time_s),
         computation_scaling: scaling,
         lambda,
         time_s,
-    }
+    };
+    efficiency.check_invariants();
+    efficiency
 }
 
 /// Returns a / b, or 1 for b = 0: nothing was lost.

@@ -6,9 +6,8 @@
 
 use super::entry::{Comm, LeftOut, Run};
 use super::group::{Group, Groups};
-use super::number::grouped;
+use crate::order::by_key;
 use crate::statistics::{Median, median};
-use std::fmt::Write;
 
 /// The name of the phase that searches the geometry.
 const SEARCH: &str = "search";
@@ -43,31 +42,21 @@ pub struct Comparison<'a> {
 
 impl Groups {
     /// Returns the comparisons of programs, in the order of the record.
-    pub fn comparisons(&self) -> Vec<Comparison<'_>> {
+    pub fn comparisons<'a>(&'a self) -> Vec<Comparison<'a>> {
         let is_compared = |g: &&Group| {
             let s = &g.setup;
             let by_size = ["strong", "spacing"].contains(&s.experiment.as_str());
             by_size && s.ranks == 1 && s.comm != Comm::Sim && g.cpu_s().is_some()
         };
-        let mut all: Vec<Comparison> = Vec::new();
-        for group in self.all.iter().filter(is_compared) {
-            let (case, n) = (group.setup.case.as_str(), group.setup.layer_cells_min);
-            let known = all.iter().position(|c| (c.case, c.layer_cells_min) == (case, n));
-            let at = known.unwrap_or_else(|| {
-                all.push(Comparison { case, layer_cells_min: n, programs: Vec::new() });
-                all.len() - 1
-            });
-            let (programs, engine) = (&mut all[at].programs, group.setup.engine.as_str());
-            match programs.iter_mut().find(|(name, _)| *name == engine) {
-                Some((_, groups)) => groups.push(group),
-                None => programs.push((engine, vec![group])),
-            }
-        }
-        all.retain(|comparison| comparison.programs.len() > 1);
-        for (_, groups) in all.iter_mut().flat_map(|c| &mut c.programs) {
-            groups.sort_by_key(|group| group.cells());
-        }
-        all
+        let of_case = |g: &'a Group| (g.setup.case.as_str(), g.setup.layer_cells_min);
+        let by_case = by_key(self.all.iter().filter(is_compared), of_case);
+        let comparison = |((case, layer_cells_min), groups): ((&'a str, u32), Vec<&'a Group>)| {
+            let mut programs = by_key(groups, |g| g.setup.engine.as_str());
+            programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
+            Comparison { case, layer_cells_min, programs }
+        };
+        let all = by_case.into_iter().map(comparison);
+        all.filter(|comparison| comparison.programs.len() > 1).collect()
     }
 }
 
@@ -87,88 +76,5 @@ impl Comparison<'_> {
             Some((*name, lacks.join(", ")))
         };
         self.programs.iter().filter_map(of)
-    }
-}
-
-/// The texts of a row of the table: program, cells, CPU time, search, rate and memory.
-pub fn row(group: &Group) -> [String; 6] {
-    let cpu_s = group.cpu_s().map_or(f64::NAN, |time| time.value);
-    [
-        group.setup.engine.clone(),
-        grouped(group.cells()),
-        format!("{cpu_s:.2}"),
-        group.search_s().map_or("not separate".to_owned(), |time| format!("{:.2}", time.value)),
-        format!("{:.3}", group.cells() as f64 / cpu_s / 1e6),
-        format!("{:.1}", group.bytes_per_cell().value),
-    ]
-}
-
-/// Returns the table of every comparison.
-pub fn tables(groups: &Groups) -> String {
-    let mut out = String::new();
-    let line = |cells: [&str; 6]| {
-        let [engine, cells, cpu, search, rate, bytes] = cells;
-        format!("  {engine:<10} {cells:>13} {cpu:>10} {search:>12} {rate:>11} {bytes:>9}\n")
-    };
-    for comparison in groups.comparisons() {
-        let (case, n) = (comparison.case, comparison.layer_cells_min);
-        let _ = writeln!(out, "\nprograms: {case}, n = {n}, one core");
-        out += &line(["engine", "cells", "CPU s", "of it search", "Mc/CPU s", "B/cell"]);
-        for group in comparison.programs.iter().flat_map(|(_, groups)| groups) {
-            out += &line(row(group).each_ref().map(String::as_str));
-        }
-        for left in comparison.left_out(groups) {
-            let _ =
-                writeln!(out, "  no mesh at spacing {:.2e}: {}", left.setup.spacing_min, left.why);
-        }
-        for (engine, lacks) in comparison.lacks(groups) {
-            let _ = writeln!(out, "  {engine} does not provide: {lacks}");
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::entry::{Entry, Line, Machine, Session, Setup};
-    use super::*;
-    use crate::testing::{line, run};
-
-    fn by(engine: &str, cells: u64, phase: &str) -> Line {
-        let mut run = run(Comm::Solo, cells, &[(phase, &[0.5]), ("rest", &[1.5])]);
-        run.setup.engine = engine.into();
-        line(Entry::Run(Box::new(run)))
-    }
-
-    #[test]
-    fn programs_are_compared_and_what_they_cannot_do_is_stated() {
-        let lacks = [("slow".to_owned(), vec!["layers".to_owned(), "MPI".to_owned()])];
-        let session = Session {
-            command: Vec::new(),
-            machine: Machine::default(),
-            load_average: 0.0,
-            lacks: lacks.into(),
-        };
-        let setup = run(Comm::Solo, 1, &[("a", &[0.0])]).setup;
-        let left = LeftOut {
-            setup: Setup { engine: "slow".into(), ..setup },
-            why: "slow would take 9 s".into(),
-        };
-        let lines = [
-            line(Entry::Session(Box::new(session))),
-            by("mesher", 2_000_000, "refine"),
-            by("slow", 1_000_000, "search"),
-            line(Entry::LeftOut(left)),
-        ];
-        let text = tables(&Groups::of(&lines));
-        for part in [
-            "mesher         2,000,000       2.00 not separate       1.000       0.5",
-            "slow           1,000,000       2.00         0.50       0.500       1.0",
-            "no mesh at spacing 1.00e-1: slow would take 9 s",
-            "slow does not provide: layers, MPI",
-        ] {
-            assert!(text.contains(part), "{part} is missing in\n{text}");
-        }
-        assert_eq!(tables(&Groups::of(&lines[..2])), "", "one program is no comparison");
     }
 }

@@ -2,21 +2,18 @@
 
 use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup};
 use super::execute::{Failed, Runner};
-use super::plan::Study;
 use super::record::Record;
-use super::{machine, network, table};
+use super::{machine, network};
 use check::promises::Independence;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// The options of a session.
 #[derive(Debug)]
 pub struct Options {
-    /// The studies, in order.
-    pub studies: Vec<Study>,
     /// How ranks are started.
     pub launcher: Launcher,
     /// Latency and bandwidth; measured by default if the launcher exists.
@@ -35,9 +32,6 @@ pub enum BenchError {
     /// Invalid input.
     #[error("{0}")]
     Input(String),
-    /// A required program or file is missing.
-    #[error("{0}")]
-    Missing(String),
     /// Ctrl-C; the record contains all results so far.
     #[error("interrupted: the record contains all results so far")]
     Interrupted,
@@ -47,8 +41,20 @@ pub enum BenchError {
 pub(crate) struct Point {
     pub setup: Setup,
     pub case: PathBuf,
+    pub repeats: usize,
+    /// Whether an uncounted run of its mesh comes first.
+    pub warm_up: bool,
+    /// Whether the mesh is written and audited, instead of timing the program.
+    pub audit: bool,
     /// Whether a run failed, or none is possible.
     pub failed: bool,
+}
+
+impl Point {
+    /// The program and the case.
+    pub fn mesh(&self) -> (String, PathBuf) {
+        (self.setup.engine.clone(), self.case.clone())
+    }
 }
 
 /// Creates a directory for the files of runs.
@@ -75,17 +81,17 @@ impl<'a> Bench<'a> {
     /// Opens the record and begins a session; runs leave their files in `place`.
     pub(crate) fn open(
         options: &'a Options,
+        engines: Vec<String>,
         programs: &'a Programs,
         place: &'a Path,
         progress: &'a mut dyn FnMut(&str),
     ) -> Result<Self, BenchError> {
-        let record = Record::open(&options.record)
-            .map_err(|error| BenchError::Input(format!("{}: {error}", options.record.display())))?;
+        let record = Record::new(&options.record);
         let (launcher, limit) = (&options.launcher, options.limit);
         let runner = Runner { programs, launcher, limit, place };
         let (lines, digests) = (Vec::new(), HashMap::new());
         let mut bench = Self { options, runner, record, progress, lines, digests };
-        bench.begin()?;
+        bench.begin(engines)?;
         Ok(bench)
     }
 }
@@ -99,13 +105,12 @@ impl Bench<'_> {
         Ok(())
     }
 
-    fn begin(&mut self) -> Result<(), BenchError> {
+    fn begin(&mut self, engines: Vec<String>) -> Result<(), BenchError> {
         let catalogue = &self.runner.programs.paths.catalogue;
         let repository = catalogue.path().parent().and_then(Path::parent).unwrap_or(Path::new("."));
-        let engines: BTreeSet<&String> = self.options.studies.iter().map(|s| &s.engine).collect();
-        let lacks = |engine: &String| {
-            let lacks = self.runner.programs.labelled(engine).description().lacks();
-            (engine.clone(), lacks)
+        let lacks = |engine: String| {
+            let lacks = self.runner.programs.labelled(&engine).description().lacks();
+            (engine, lacks)
         };
         let session = Session {
             command: self.options.command.clone(),
@@ -155,7 +160,7 @@ impl Bench<'_> {
             if warm_up {
                 ", warm-up".to_owned()
             } else {
-                format!(", {}, repeat {}", table::division(s), repeat + 1)
+                format!(", {}, repeat {}", s.division(), repeat + 1)
             }
         ));
         let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
@@ -201,15 +206,8 @@ impl Bench<'_> {
         if !run.warm_up || engine.name() == "mesher" || !engine.description().promises.definition {
             return Ok(());
         }
-        let setup = Setup {
-            engine: "mesher".to_owned(),
-            comm: Comm::Solo,
-            ranks: 1,
-            partitioner: String::new(),
-            weights: String::new(),
-            weight_exposed: None,
-            ..point.setup.clone()
-        };
+        let s = &point.setup;
+        let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
         let expected = match self.runner.run(&setup, &point.case, 0, true) {
             Ok(run) => run.digest,
             // Whether the mesher can be run is not a property of this engine.

@@ -6,7 +6,7 @@
 //!
 //! Invariant: a directory that contains the file `built` has the result of the build command in that file.
 
-use super::{GateError, Options};
+use super::{GateError, GateOptions};
 use run::engine::description::Build;
 use run::engine::failure::{End, Failure};
 use run::engine::placeholders::{Values, fill};
@@ -23,8 +23,8 @@ const LIMIT: Duration = Duration::from_secs(3600);
 ///
 /// # Errors
 /// If it does not build.
-pub(super) fn working_tree(build: &Build, options: &Options) -> Result<PathBuf, GateError> {
-    let place = absolute(&options.cache.join("working-tree"))?;
+pub(super) fn working_tree(build: &Build, options: &GateOptions) -> Result<PathBuf, GateError> {
+    let place = absolute(&options.cache().join("working-tree"))?;
     let tree = absolute(&options.repository)?;
     make(build, &Places { tree, place, label: "the working tree" }, options)
 }
@@ -36,9 +36,9 @@ pub(super) fn working_tree(build: &Build, options: &Options) -> Result<PathBuf, 
 pub(super) fn revision(
     build: &Build,
     revision: &str,
-    options: &Options,
+    options: &GateOptions,
 ) -> Result<PathBuf, GateError> {
-    let place = absolute(&options.cache.join(revision))?;
+    let place = absolute(&options.cache().join(revision))?;
     let label = &revision[..12.min(revision.len())];
     let places = Places { tree: place.join("tree"), place, label };
     let (program, done) = (places.program(build, options)?, places.place.join("built"));
@@ -63,17 +63,17 @@ struct Places<'a> {
 }
 
 impl Places<'_> {
-    fn values(&self, options: &Options) -> Result<Values<'static>, GateError> {
+    fn values(&self, options: &GateOptions) -> Result<Values<'static>, GateError> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         Ok(Values::from([
             ("target", text(&absolute(&self.place.join("build"))?)),
-            ("shared", text(&absolute(&options.cache.join("shared"))?)),
+            ("shared", text(&absolute(&options.cache().join("shared"))?)),
             ("root", text(&self.tree)),
         ]))
     }
 
     /// Returns the path of the program, which need not exist yet.
-    fn program(&self, build: &Build, options: &Options) -> Result<PathBuf, GateError> {
+    fn program(&self, build: &Build, options: &GateOptions) -> Result<PathBuf, GateError> {
         Ok(PathBuf::from(fill(&build.program, &self.values(options)?)))
     }
 }
@@ -89,7 +89,7 @@ fn wrong(path: &Path, error: &std::io::Error) -> GateError {
 }
 
 /// Builds and returns the program.
-fn make(build: &Build, places: &Places, options: &Options) -> Result<PathBuf, GateError> {
+fn make(build: &Build, places: &Places, options: &GateOptions) -> Result<PathBuf, GateError> {
     let (values, label) = (places.values(options)?, places.label);
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
     crate::announce(&format!("harness gate: building {label}"));

@@ -66,7 +66,7 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
     let path = case.path.clone().map_err(GateError::Input)?;
     let ranks = bench.ranks_on_mpi(case);
     let options = Options {
-        timeout: bench.options.limit.as_secs(),
+        timeout: bench.options.timeout,
         // The files of a case that fails end with the gate.
         out: Some(bench.place.join("correctness")),
         no_mpi: ranks.is_empty(),

@@ -20,6 +20,9 @@ pub mod subject;
 pub mod time;
 
 use crate::experiments::machine;
+use build::top_level;
+use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use measures::Measures;
 use numbers::Measurement;
 use report::{Finding, Layer, LayerName, Report, Verdict};
@@ -30,6 +33,7 @@ use run::engine::launcher::Launcher;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
+use run::verify::options::whole_seconds;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -39,31 +43,65 @@ use subject::{Baseline, Subject};
 /// Seed of the schedule of simulated ranks: counters must not depend on it.
 const SEED: u64 = 1;
 
-/// The options of a gate.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// A revision, a program or a record; `None` to record the candidate only.
+/// The options of a gate, as on the command line.
+#[derive(Args, Clone, Debug)]
+pub struct GateOptions {
+    /// A revision (built and kept), a program, or a record of --record [default: none; the candidate is only measured]
+    #[arg(long, value_name = "REVISION|FILE")]
     pub baseline: Option<String>,
-    /// A revision, a program, or `.` for the working tree.
+    /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]
+    #[arg(long, value_name = "REVISION|FILE")]
     pub candidate: Option<String>,
-    /// The rules' file.
+    /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(input))]
     pub rules: Option<PathBuf>,
-    /// Only these cases of the rules.
-    pub cases: Vec<String>,
-    /// Only these layers.
+    /// Only these cases of the rules
+    #[arg(long, value_delimiter = ',')]
+    pub case: Vec<String>,
+    /// Only these layers [default: those for which the rules have a case]
+    #[arg(long, value_delimiter = ',')]
     pub layers: Vec<LayerName>,
-    /// Whether layers and cases must not be left out.
+    /// Exit code 3 if a layer or a case of it was left out
+    #[arg(long)]
     pub require_layers: bool,
-    /// Seed of the order of runs and of the permutations.
+    /// Seed of the order of runs and of the permutation tests
+    #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Time limit of every single run.
-    pub limit: Duration,
-    /// Seconds for timing one case, instead of the rules'.
-    pub budget_s: Option<f64>,
-    /// The root directory of the repository with the revisions and the working tree.
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
+    pub timeout: u64,
+    /// Time for one case in the layer of time [default: from the rules]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub budget: Option<f64>,
+    /// The repository of the revisions and of the working tree [default: that of the current directory]
+    #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true, value_parser = PathBufValueParser::new().map(|path| top_level(&path)))]
     pub repository: PathBuf,
+    /// Where revisions are built and kept [default: target/gate in the repository]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+impl GateOptions {
     /// Where revisions are built and kept.
-    pub cache: PathBuf,
+    fn cache(&self) -> PathBuf {
+        self.cache.clone().unwrap_or_else(|| self.repository.join("target/gate"))
+    }
+
+    /// Time limit of every single run.
+    fn limit(&self) -> Duration {
+        Duration::from_secs(self.timeout)
+    }
+}
+
+/// Parses a time in seconds: more than 0, and at most a week.
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= 604_800.0);
+    number.ok_or_else(|| "give a number greater than 0 and at most 604800".to_owned())
+}
+
+/// A file that is read, and must not be written.
+fn input(path: PathBuf) -> std::io::Result<PathBuf> {
+    files::register_input(&path).map(|()| path)
 }
 
 /// Why a gate could not start.
@@ -80,7 +118,7 @@ pub enum GateError {
 /// The input of every layer.
 #[derive(Debug)]
 pub struct Bench<'a> {
-    options: &'a Options,
+    options: &'a GateOptions,
     rules: &'a Rules,
     cases: Vec<Selected>,
     programs: &'a Programs,
@@ -97,11 +135,11 @@ pub struct Bench<'a> {
 ///
 /// # Errors
 /// If the gate cannot start; later failures are in the report.
-pub fn gate(options: &Options, programs: &Programs) -> Result<Report, GateError> {
+pub fn gate(options: &GateOptions, programs: &Programs) -> Result<Report, GateError> {
     let start = Instant::now();
     let rules =
         Rules::read(options.rules.as_deref().unwrap_or(&programs.paths.engines.join("gate.toml")))?;
-    let cases = rules.select(&options.cases, programs)?;
+    let cases = rules.select(&options.case, programs)?;
     let baseline = Baseline::find(options, &programs.engine)?;
     let candidate = Subject::candidate(options, &programs.engine, &baseline)?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();

@@ -237,7 +237,7 @@ pub fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Measurem
     for ranks in bench.layouts(case) {
         let place = bench.enter("counters/run").map_err(unusable)?;
         let options =
-            RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit) };
+            RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit()) };
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
         let independent = engine.description().promises.is_independent_of(Independence::Ranks);
         let serial = measures.digest.get_or_insert(report.digest.clone());
@@ -287,7 +287,7 @@ pub fn instructions(
     let place = bench.enter("instructions").map_err(unusable)?;
     let path = engine.prepare(&path, &place.join("case")).map_err(unusable)?;
     // Without output files, the count is that of meshing alone.
-    let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit) };
+    let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit()) };
     let plain = engine.command(&path, &SERIAL, &options)?;
     let mut command = Command::new(VALGRIND);
     // The program may be started by a script, and may start others.
@@ -295,7 +295,7 @@ pub fn instructions(
     command.arg(format!("--callgrind-out-file={}.%p", place.join(PROFILE).display()));
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
-    process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit, &place))?;
+    process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place))?;
     let profile = profile_of_all(&place).map_err(unusable)?;
     let counted = [(INSTRUCTIONS, profile.instructions), ("allocations", profile.allocations())];
     let counted = counted.map(|(name, count)| (name.to_owned(), count)).into();

@@ -2,7 +2,7 @@
 
 use super::build::{self, revision_of};
 use super::measures::{Measured, Measures};
-use super::{GateError, Options};
+use super::{GateError, GateOptions};
 use crate::experiments::machine::digest_of_file;
 use run::engine::runner::Engine;
 use std::fs;
@@ -34,7 +34,7 @@ impl Baseline {
     ///
     /// # Errors
     /// If it is neither, or does not build.
-    pub fn find(options: &Options, engine: &Engine) -> Result<Self, GateError> {
+    pub fn find(options: &GateOptions, engine: &Engine) -> Result<Self, GateError> {
         let Some(named) = &options.baseline else { return Ok(Self::None) };
         let path = Path::new(named);
         if path.is_file() {
@@ -72,7 +72,7 @@ impl Subject {
     /// # Errors
     /// If the program is missing or does not build.
     pub fn candidate(
-        options: &Options,
+        options: &GateOptions,
         engine: &Engine,
         baseline: &Baseline,
     ) -> Result<Self, GateError> {
@@ -95,7 +95,7 @@ impl Subject {
         }
     }
 
-    fn find(named: &str, options: &Options, engine: &Engine) -> Result<Self, GateError> {
+    fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, GateError> {
         if Path::new(named).is_file() {
             let mode = fs::metadata(named).map_or(0, |metadata| metadata.permissions().mode());
             if mode & 0o111 == 0 {

@@ -86,7 +86,7 @@ fn rounds(
     let first = run(bench, baseline, &path, ranks)?;
     let also = run(bench, &bench.candidate, &path, ranks)?;
     let rules = &bench.rules.time;
-    let budget_s = bench.options.budget_s.unwrap_or(rules.budget_s);
+    let budget_s = bench.options.budget.unwrap_or(rules.budget_s);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let mut random = Random(bench.options.seed);
@@ -116,7 +116,7 @@ fn rounds(
 
 fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
     let place = bench.enter("time/run").map_err(|why| engine.unusable(why))?;
-    engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit))
+    engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit()))
 }
 
 /// A quantity of one run, in seconds.

@@ -1,24 +1,20 @@
-//! Statistics of the whole harness, free of any assumption about how noise is distributed.
+//! Statistics of the whole harness.
 //!
-//! - [`mod@median`]: medians with intervals between order statistics;
+//! - [`mod@median`]: medians with intervals that assume no distribution;
 //! - [`comparison`]: candidate against baseline by a permutation test, for the gate;
-//! - [`mod@change_points`]: steps and drifts in a history, for `harness track`, from a [`model`] of [`segments`] that begin at
-//!   [`candidates`], confirmed by [`permutations`];
+//! - [`mod@change_points`]: steps and drifts in a history, for `harness track`, from the segments of least cost;
 //! - [`false_discovery`]: the rate of false alarms among many tests;
 //! - [`mod@trimmed_mean`]: the location estimate of the comparison;
-//! - [`random`]: the generator from which permutations are drawn.
+//! - [`random`]: the generator of permutations and samples.
 //!
 //! No crate offers these tests, and general statistics crates would add dependencies for a sort and a sum.
 
-pub mod candidates;
 pub mod change_points;
 pub mod comparison;
 pub mod false_discovery;
 pub mod median;
-pub mod model;
-pub mod permutations;
 pub mod random;
-pub mod segments;
+mod segments;
 pub mod trimmed_mean;
 
 pub use median::{Median, median, median_of};

@@ -1,7 +1,6 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
-//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. An
-//! unfinished last line, which an interruption leaves, costs that line: readers report it, and the next record ends it.
+//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts.
 //!
 //! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`.
 //!
@@ -16,11 +15,11 @@ use crate::gate::measures::{CaseMeasures, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::phases::{CPU, WALL};
 use crate::gate::report::{LayerName, Report};
+use crate::jsonl::{self, Line};
 use crate::origin::Origins;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 use std::process::Command;
 
@@ -137,11 +136,11 @@ pub struct History {
 /// One sentence with the number of the invalid line.
 pub fn read(path: &Path) -> Result<History, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let bytes = match contract::files::read_log(path) {
+    let lines = match jsonl::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         other => other.map_err(|error| wrong(error.to_string()))?,
     };
-    parse(&bytes).map_err(wrong)
+    merged(lines).map_err(wrong)
 }
 
 /// Whether a metric depends on the machine, besides the program and the case.
@@ -150,24 +149,20 @@ fn is_of_machine(name: &str) -> bool {
     unit(name) == "s" || [MEMORY, "instructions", "allocations"].contains(&plain)
 }
 
-fn parse(bytes: &[u8]) -> Result<History, String> {
+/// Returns one record for every commit.
+fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
     let mut index: HashMap<String, usize> = HashMap::new();
     let mut machines = Origins::default();
-    // A line is written with its end, so a line without one is unfinished, if it cannot be read.
-    let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').enumerate().peekable();
-    while let Some((i, line)) = lines.next() {
-        if line.trim_ascii().is_empty() {
-            continue;
-        }
-        let wrong = |why: String| format!("line {}: {why}", i + 1);
-        let mut record: Record = match serde_json::from_slice(line) {
+    for Line { number, is_finished, content } in lines {
+        let wrong = |why: String| format!("line {number}: {why}");
+        let mut record = match content {
             Ok(record) => record,
-            Err(error) if lines.peek().is_none() && !line.ends_with(b"\n") => {
-                history.warnings.push(wrong(format!("unfinished, and left out: {error}")));
+            Err(why) if !is_finished => {
+                history.warnings.push(wrong(format!("unfinished, and left out: {why}")));
                 continue;
             }
-            Err(error) => return Err(wrong(error.to_string())),
+            Err(why) => return Err(wrong(why)),
         };
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
@@ -212,45 +207,15 @@ pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
         return Err(wrong(&why));
     };
     let record = Record { metrics: BTreeMap::new(), accepted: true, ..record.clone() };
-    append(path, &record).map_err(|error| wrong(&error.to_string()))
-}
-
-/// Appends a record on a line of its own, under a lock that other processes respect. An unfinished last line is removed. If
-/// the record cannot be written as a whole, the file is left as it was.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn append(path: &Path, record: &Record) -> io::Result<()> {
-    if let Some(directory) = path.parent() {
-        fs::create_dir_all(directory)?;
-    }
-    // Strings and finite numbers only.
-    let mut line = serde_json::to_string(record).expect("a record is representable in JSON");
-    line.push('\n');
-    let mut file = contract::files::append_log(path)?;
-    file.lock()?;
-    let bytes = fs::read(path)?;
-    let mut length = bytes.len() as u64;
-    let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
-    if !last.is_empty() {
-        match serde_json::from_slice::<Record>(last) {
-            Ok(_) => line.insert(0, '\n'),
-            Err(_) => {
-                length -= last.len() as u64;
-                file.set_len(length)?;
-            }
-        }
-    }
-    file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).inspect_err(|_| {
-        // Nobody else has appended since, because of the lock.
-        let _ = file.set_len(length);
-    })
+    jsonl::append(path, &record).map_err(|error| wrong(&error.to_string()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gate::measures::Measured;
+    use crate::jsonl::append;
+    use std::fs;
 
     fn record(commit: &str, metrics: &[(&str, f64)]) -> Record {
         let metrics = metrics.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
@@ -363,9 +328,15 @@ mod tests {
     #[test]
     fn an_invalid_line_is_reported_by_number() {
         let line = serde_json::to_string(&record("a", &[])).unwrap();
-        assert!(parse(format!("{line}\n\nx\n").as_bytes()).unwrap_err().starts_with("line 3"));
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        let parse = |text: &str| {
+            fs::write(&path, text).unwrap();
+            read(&path).unwrap_err()
+        };
+        assert!(parse(&format!("{line}\n\nx\n")).contains(": line 3"));
         let other = line.replace("track/1", "track/2");
-        assert!(parse(other.as_bytes()).unwrap_err().contains("track/2"));
+        assert!(parse(&other).contains("track/2"));
     }
 
     #[test]

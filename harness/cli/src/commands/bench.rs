@@ -1,198 +1,258 @@
-//! `harness bench`: runs experiments, appends to the record and prints tables.
+//! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
-use super::session::{SessionArguments, progress, refuse, require};
-use super::values::cell_count;
-use bench::experiments::entry::Entry;
+use super::files::{prepare, put};
+use super::programs::ProgramArguments;
+use bench::experiments::entry::{Entry, Judged, Line, Machine, Network, Verdict};
 use bench::experiments::group::Groups;
-use bench::experiments::plan::{self, Experiment, Overrides, Preset, comparison};
-use bench::experiments::session::Options;
-use bench::experiments::{bench, table};
+use bench::experiments::network;
+use bench::experiments::record::{self, Content};
+use bench::experiments::session::{BenchError, Options};
+use bench::study::{self, Overrides, Study};
 use clap::Args;
+use report::benchmark::tables;
+use report::targets as page;
 use run::engine::description::is_own;
+use run::engine::launcher::Launcher;
+use run::engine::paths::Paths;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use run::verify::report::{
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
+};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Name of the table of targets in a report's directory.
+const PAGE: &str = "targets.md";
 
 /// `harness bench`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// Names in geometries/catalogue.toml or paths of case files [default: those of the preset]
-    pub cases: Vec<String>,
-    /// Sizes and rank counts
-    #[arg(long, value_enum, default_value = "small")]
-    pub preset: Preset,
-    /// Experiments to run [default: all]
-    #[arg(long, value_enum, value_delimiter = ',')]
-    pub experiment: Vec<Experiment>,
-    /// Ranks of simulated runs, or on MPI if several programs are compared or the program does not simulate ranks; as in 1,2,7 or 1..64 for powers of two [default: those of the preset]
-    #[arg(long, value_parser = rank_list)]
-    pub ranks: Option<RankList>,
-    /// Ranks of runs on MPI
-    #[arg(long, value_parser = rank_list, conflicts_with = "no_mpi")]
-    pub ranks_mpi: Option<RankList>,
-    /// Cells of the mesh (strong, weights), per rank (weak), of the largest mesh (spacing), at the case's n (layers)
-    #[arg(long, value_delimiter = ',', value_parser = cell_count)]
-    pub cells: Vec<u64>,
-    /// Values of n in the experiment `layers`
-    #[arg(long, value_delimiter = ',')]
-    pub layers: Vec<u32>,
-    /// Weights of base leaves: unit, area, rebalance
-    #[arg(long, value_delimiter = ',')]
-    pub weights: Vec<String>,
-    /// Partitioners: metis, morton
-    #[arg(long, value_delimiter = ',')]
-    pub partitioners: Vec<String>,
-    /// Programs to measure: mesher, reference, or engine descriptions (names in harness/engines or TOML files). Several
-    /// programs mesh the same cases in turn and are compared
-    #[arg(long, value_name = "NAME|FILE", value_delimiter = ',', default_value = "mesher")]
-    pub engine: Vec<String>,
+    /// The study, TOML: series of runs, and targets [default: reports/small.toml of the repository]
+    file: Option<PathBuf>,
+    /// Only these rows and experiments
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Programs of every series instead of the study's: mesher, reference, names in harness/engines or engine files
+    #[arg(long, value_name = "NAME|FILE", value_delimiter = ',')]
+    engine: Vec<String>,
     /// Print the tables of an existing record without measuring
     #[arg(long)]
-    pub show: bool,
-    /// Options of the session.
+    show: bool,
+    /// No runs on MPI
+    #[arg(long)]
+    no_mpi: bool,
+    /// Repetitions of every run; 95 % intervals of a median need six
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    repeat: Option<u16>,
+    /// Command that starts ranks; {ranks} is replaced by their number
+    #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
+    launcher: Launcher,
+    /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
+    #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
+    network: Option<Network>,
+    /// File of JSON lines to append to [default: reports/out/bench.jsonl]
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = super::values::whole_seconds)]
+    timeout: u64,
+    /// Also write a report; the record is then DIR/record.jsonl unless --record is given
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     #[command(flatten)]
-    pub session: SessionArguments,
+    programs: ProgramArguments,
 }
 
-/// A list of rank counts, as one argument.
-#[derive(Clone, Debug)]
-pub struct RankList(pub Vec<usize>);
-
-fn rank_list(text: &str) -> Result<RankList, String> {
-    plan::ranks(text).map(RankList)
-}
-
-/// Measures and prints; returns the exit code.
+/// Measures, or reads an existing record with `--show`, and prints; returns the exit code.
 pub fn run(arguments: Arguments) -> u8 {
     let code = match arguments.show {
         true => show(&arguments),
-        false => measure(&arguments).unwrap_or_else(|code| code),
+        false => measure(&arguments),
     };
-    arguments.session.write_report(code)
+    let code = code.unwrap_or_else(|code| code);
+    let Some(directory) = &arguments.report else { return code };
+    match super::report::write(directory, &[], None) {
+        Ok(()) => code,
+        Err(why) => exit_first(code, refuse(why)),
+    }
+}
+
+fn refuse(why: String) -> u8 {
+    eprintln!("harness: {why}");
+    EXIT_INPUT
+}
+
+/// Reads the study, restricted to the names of `--only`.
+fn read(arguments: &Arguments) -> Result<Study, u8> {
+    let default = || Paths::find().root.join("reports/small.toml");
+    let file = arguments.file.clone().unwrap_or_else(default);
+    let mut study = Study::read(&file).map_err(refuse)?;
+    study.only(&arguments.only).map_err(|why| refuse(format!("{}: {why}", file.display())))?;
+    for series in study.series.iter_mut().filter(|_| !arguments.engine.is_empty()) {
+        series.engines.clone_from(&arguments.engine);
+    }
+    Ok(study)
 }
 
 fn measure(arguments: &Arguments) -> Result<u8, u8> {
-    arguments.session.prepare()?;
-    let programs = programs(arguments)?;
-    let options = options(arguments, &programs);
-    let outcome = bench(&options, &programs, &mut progress()).map_err(|error| refuse(&error))?;
-    print!("{}", table::tables(&Groups::of(&outcome.lines)));
-    for line in &outcome.lines {
-        if let Entry::Failure(f) = &line.entry {
-            println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);
-        }
-    }
+    let page = arguments.report.as_ref().map(|directory| directory.join("index.html"));
+    page.iter().try_for_each(|page| prepare(page)).map_err(|error| refuse(error.to_string()))?;
+    let mut study = read(arguments)?;
+    let programs = programs(arguments, &mut study)?;
+    let overrides = Overrides {
+        repeats: arguments.repeat.map(usize::from),
+        no_mpi: arguments.no_mpi,
+        no_launcher: !arguments.launcher.is_found(),
+    };
+    let options = Options {
+        launcher: arguments.launcher.clone(),
+        network: arguments.network,
+        record: record_path(arguments),
+        limit: Duration::from_secs(arguments.timeout),
+        command: std::env::args().collect(),
+    };
+    let start = Instant::now();
+    let mut progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
+    let outcome = study::measure(&options, &study, &overrides, &programs, &mut progress);
+    let outcome = outcome.map_err(|error| refuse(error.to_string()))?;
+    let written = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
     println!("record: {}", options.record.display());
-    let measured = outcome.lines.iter().any(|line| matches!(line.entry, Entry::Run(_)));
-    Ok(match (outcome.failures, measured) {
-        (0, true) => EXIT_HOLDS,
-        (0, false) => {
-            eprintln!("harness: nothing was measured: request fewer cells or another experiment");
-            EXIT_MISSING
+    if outcome.interrupted {
+        eprintln!("harness: {}", BenchError::Interrupted);
+        return Ok(EXIT_INTERRUPTED);
+    }
+    let code = exit_first(
+        code(&study, &outcome.rows, &outcome.lines),
+        written.err().unwrap_or(EXIT_HOLDS),
+    );
+    match &outcome.missing {
+        Some(missing) => {
+            eprintln!("harness: {missing}");
+            Ok(exit_first(code, EXIT_MISSING))
         }
-        _ => EXIT_FAILED,
-    })
+        None => Ok(code),
+    }
 }
 
-/// Finds the programs.
-///
-/// # Errors
-/// The exit code, if the options contradict each other or the program to be measured is missing.
-fn programs(arguments: &Arguments) -> Result<Programs, u8> {
-    let wrong = |why: String| {
-        eprintln!("harness: {why}");
-        EXIT_INPUT
-    };
-    let foreign: Vec<&String> = arguments.engine.iter().filter(|name| !is_own(name)).collect();
-    let chooses = !arguments.weights.is_empty() || !arguments.partitioners.is_empty();
-    if chooses && !foreign.is_empty() {
-        let why = "--weights and --partitioners apply to the mesher only: remove them or --engine";
-        return Err(wrong(why.to_owned()));
+/// Finds the programs, and replaces the names in the series by those of the results.
+fn programs(arguments: &Arguments, study: &mut Study) -> Result<Programs, u8> {
+    let given = arguments.programs.given();
+    let names = study.engines();
+    let mut foreign = names.iter().filter(|name| !is_own(name));
+    if names.len() > 1 && given.mesher.is_some() {
+        return Err(refuse("--mesher replaces the program of one engine: name one".to_owned()));
     }
-    let given = arguments.session.programs.given();
-    if arguments.engine.len() > 1 && given.mesher.is_some() {
-        return Err(wrong("--mesher replaces the program of one engine: name one".to_owned()));
+    let first = foreign.next().map_or("mesher", String::as_str);
+    let mut programs = Programs::find_with_engine(first, given).map_err(refuse)?;
+    for name in foreign {
+        programs.others.push(Engine::find(name, None, &programs.paths).map_err(refuse)?);
     }
-    let first = foreign.first().map_or("mesher", |name| name.as_str());
-    let mut programs = Programs::find_with_engine(first, given).map_err(wrong)?;
-    for name in foreign.iter().skip(1) {
-        let engine = Engine::find(name, None, &programs.paths).map_err(wrong)?;
-        programs.others.push(engine);
+    let mut found: BTreeMap<&str, &Engine> = BTreeMap::new();
+    for name in &names {
+        let known = [&programs.mesher, &programs.reference, &programs.engine];
+        let engine = known.into_iter().chain(&programs.others).find(|engine| engine.name() == name);
+        let engine = engine.expect("every engine was found");
+        let label = engine.label();
+        if found.values().any(|other| other.label() == label) {
+            return Err(refuse(format!("two programs of one name, {label}: rename a file")));
+        }
+        found.insert(name, engine);
     }
-    let engines = engines(arguments, &programs);
-    if engines.len() < arguments.engine.len() {
-        return Err(wrong("--engine has two programs of one name: rename a file".to_owned()));
-    }
+    found.values().try_for_each(|engine| require(engine.program()))?;
     // Our mesher chooses the spacings, also for other engines.
-    if arguments.engine.iter().any(|name| name != "reference") {
+    if names.iter().any(|name| name != "reference") {
         require(programs.mesher.program())?;
     }
-    for engine in engines {
-        require(engine.program())?;
+    for engine in study.series.iter_mut().flat_map(|series| &mut series.engines) {
+        *engine = found[engine.as_str()].label();
     }
     Ok(programs)
 }
 
-/// The engines that are measured, each once, in the order of the command line.
-fn engines<'a>(arguments: &Arguments, programs: &'a Programs) -> Vec<&'a Engine> {
-    let known = [&programs.mesher, &programs.reference, &programs.engine];
-    let named = |name: &String| {
-        let mut known = known.into_iter().chain(&programs.others);
-        known.find(|engine| engine.name() == name)
-    };
-    let mut engines: Vec<&Engine> = Vec::new();
-    for engine in arguments.engine.iter().filter_map(named) {
-        if engines.iter().all(|other| other.label() != engine.label()) {
-            engines.push(engine);
-        }
+/// Checks that a program to be measured exists.
+fn require(program: &Path) -> Result<(), u8> {
+    if program.is_file() {
+        return Ok(());
     }
-    engines
+    eprintln!("harness: {} is missing: build it or give its path", program.display());
+    Err(EXIT_MISSING)
 }
 
-fn show(arguments: &Arguments) -> u8 {
-    match arguments.session.read_record() {
-        Ok(content) => {
-            let groups = Groups::of(&content.lines);
-            print!("{}", table::tables(&groups));
-            if groups.all.is_empty() {
-                eprintln!("harness: the record has no runs");
-                return EXIT_MISSING;
+/// Returns the record to append to.
+fn record_path(arguments: &Arguments) -> PathBuf {
+    let in_report = arguments.report.as_ref().map(|directory| directory.join("record.jsonl"));
+    let given = arguments.record.clone().or(in_report);
+    given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
+}
+
+fn show(arguments: &Arguments) -> Result<u8, u8> {
+    let study = read(arguments)?;
+    let path = record_path(arguments);
+    let Content { lines, broken } =
+        record::read(&path).map_err(|error| refuse(format!("{}: {error}", path.display())))?;
+    for (line, why) in &broken {
+        eprintln!("harness: line {line} is skipped: {why}");
+    }
+    let rows = study::judged(&study, &lines);
+    let written = publish(&study, &rows, &lines, arguments.report.as_deref());
+    Ok(exit_first(code(&study, &rows, &lines), written.err().unwrap_or(EXIT_HOLDS)))
+}
+
+/// Prints the tables of runs and targets, and writes that of the targets into the report's directory if one is given.
+fn publish(
+    study: &Study,
+    rows: &[Judged],
+    lines: &[Line],
+    report: Option<&Path>,
+) -> Result<(), u8> {
+    if !study.series.is_empty() {
+        print!("{}", tables::text(&Groups::of(lines)));
+        for line in lines {
+            if let Entry::Failure(f) = &line.entry {
+                println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);
             }
-            EXIT_HOLDS
         }
-        Err(code) => code,
     }
+    if study.row.is_empty() {
+        return Ok(());
+    }
+    print!("{}", page::text(study, rows));
+    let Some(directory) = report else { return Ok(()) };
+    let path = directory.join(PAGE);
+    put(&path, &page::markdown(study, rows, &machine(lines)))
+        .map_err(|error| refuse(error.to_string()))?;
+    println!("table: {}", path.display());
+    Ok(())
 }
 
-/// Returns the options of the library.
-fn options(arguments: &Arguments, programs: &Programs) -> Options {
-    let all = engines(arguments, programs);
-    let overrides: Vec<Overrides> =
-        all.iter().map(|engine| overrides(arguments, engine, all.len() > 1)).collect();
-    arguments.session.options(comparison(arguments.preset, &overrides))
+/// Describes the machine of the last session.
+fn machine(lines: &[Line]) -> String {
+    let session = lines.iter().rev().find_map(|line| match &line.entry {
+        Entry::Session(session) => Some(&session.machine),
+        _ => None,
+    });
+    let Some(Machine { cpu, cores, kernel, mpi, compiler, commit, memory_bytes }) = session else {
+        return "a machine that the record does not describe".to_owned();
+    };
+    let gib = memory_bytes >> 30;
+    format!("{cpu}, {cores} cores, {gib} GiB, {kernel}, {mpi}, {compiler}, commit {commit}")
 }
 
-/// Returns the changes of the preset for one engine.
-fn overrides(arguments: &Arguments, engine: &Engine, compared: bool) -> Overrides {
-    let session = &arguments.session;
-    let templates = &engine.description().run;
-    let (sim, mpi) = (templates.simulated.is_some(), templates.parallel.is_some());
-    let list = |ranks: &Option<RankList>| ranks.as_ref().map_or(Vec::new(), |r| r.0.clone());
-    Overrides {
-        engine: engine.label(),
-        cases: arguments.cases.clone(),
-        experiments: arguments.experiment.clone(),
-        ranks: list(&arguments.ranks),
-        ranks_mpi: list(&arguments.ranks_mpi),
-        cells: arguments.cells.clone(),
-        layers: arguments.layers.clone(),
-        weights: arguments.weights.clone(),
-        partitioners: arguments.partitioners.clone(),
-        repeats: session.repeat.map(usize::from),
-        no_mpi: session.no_mpi || !session.launcher.is_found() || !mpi,
-        // Only some programs have simulated ranks.
-        no_sim: !sim || compared,
-        serial: !sim && !mpi,
-        no_choice: !is_own(engine.name()),
+/// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.
+fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
+    let bad = |row: &Judged| matches!(row.verdict, Verdict::Missed | Verdict::Failed);
+    let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
+    let measured = |line: &Line| matches!(&line.entry, Entry::Run(run) if !run.warm_up);
+    if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
+        return EXIT_FAILED;
     }
+    let why = match study.series.is_empty() {
+        true if rows.iter().all(|row| row.measured.is_none()) => "no row was measured",
+        false if !lines.iter().any(measured) => "nothing was measured: request fewer cells",
+        _ => return EXIT_HOLDS,
+    };
+    eprintln!("harness: {why}");
+    EXIT_MISSING
 }

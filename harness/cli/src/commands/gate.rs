@@ -2,50 +2,25 @@
 
 use super::files::{prepare, put};
 use super::programs::ProgramArguments;
-use super::values::{Input, Output, seconds};
-use bench::gate::build::top_level;
-use bench::gate::report::{End, LayerName, Report};
-use bench::gate::{GateError, Options, gate};
+use super::values::Output;
+use bench::gate::report::{End, Report};
+use bench::gate::{GateError, GateOptions, gate};
 use clap::Args;
 use report::gate::{json, junit, markdown, text};
 use run::engine::programs::Programs;
 use run::verify::report::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
 };
-use std::path::{Path, PathBuf};
-use std::time::Duration;
 use std::{env, fs, io};
 
 /// `harness gate`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// A revision (built and kept), a program, or a record of --record [default: none; the candidate is only measured]
-    #[arg(long, value_name = "REVISION|FILE")]
-    baseline: Option<String>,
-    /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]
-    #[arg(long, value_name = "REVISION|FILE")]
-    candidate: Option<String>,
+    #[command(flatten)]
+    options: GateOptions,
     /// Name in harness/engines or path of an engine description
     #[arg(long, default_value = "mesher")]
     engine: String,
-    /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
-    #[arg(long, value_name = "FILE")]
-    rules: Option<Input>,
-    /// Only these cases of the rules
-    #[arg(long, value_delimiter = ',')]
-    case: Vec<String>,
-    /// Only these layers [default: those for which the rules have a case]
-    #[arg(long, value_delimiter = ',')]
-    layers: Vec<LayerName>,
-    /// Time for one case in the layer of time [default: from the rules]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    budget: Option<f64>,
-    /// Seed of the order of runs and of the permutation tests
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
-    timeout: u64,
     /// Write the exact measures of the candidate: a baseline for later and input of `harness track`
     #[arg(long, value_name = "FILE")]
     record: Option<Output>,
@@ -58,15 +33,6 @@ pub struct Arguments {
     /// Write the report as Markdown
     #[arg(long, value_name = "FILE")]
     markdown: Option<Output>,
-    /// Exit code 3 if a layer or a case of it was left out
-    #[arg(long)]
-    require_layers: bool,
-    /// The repository of the revisions and of the working tree [default: that of the current directory]
-    #[arg(long, value_name = "DIR")]
-    repository: Option<PathBuf>,
-    /// Where revisions are built and kept [default: target/gate in the repository]
-    #[arg(long, value_name = "DIR")]
-    cache: Option<PathBuf>,
     #[command(flatten)]
     programs: ProgramArguments,
 }
@@ -88,21 +54,7 @@ pub fn run(arguments: Arguments) -> u8 {
             return EXIT_INPUT;
         }
     }
-    let repository = top_level(arguments.repository.as_deref().unwrap_or(Path::new(".")));
-    let options = Options {
-        baseline: arguments.baseline.clone(),
-        candidate: arguments.candidate.clone(),
-        rules: arguments.rules.as_deref().map(Path::to_owned),
-        cases: arguments.case.clone(),
-        layers: arguments.layers.clone(),
-        require_layers: arguments.require_layers,
-        seed: arguments.seed,
-        limit: Duration::from_secs(arguments.timeout),
-        budget_s: arguments.budget,
-        cache: arguments.cache.clone().unwrap_or_else(|| repository.join("target/gate")),
-        repository,
-    };
-    let report = match gate(&options, &programs) {
+    let report = match gate(&arguments.options, &programs) {
         Ok(report) => report,
         Err(error) => return refuse(&error),
     };

@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `session`, `values` and `view` are shared.
+//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `values` and `view` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -21,9 +21,7 @@ mod programs;
 pub mod report;
 mod selection;
 pub mod selftest;
-mod session;
 pub mod shrink;
-pub mod targets;
 pub mod track;
 mod values;
 pub mod verify;

@@ -2,6 +2,7 @@
 
 use super::files::{prepare, put};
 use super::values::{Input, Output, percentage, probability};
+use bench::jsonl;
 use bench::statistics::change_points::Rules;
 use bench::track::history::{self, History, Record};
 use bench::track::{Series, analyse, link, summary};
@@ -60,9 +61,6 @@ pub struct Arguments {
     /// Ignore smaller changes; percent
     #[arg(long, default_value_t = 0.1, value_parser = percentage)]
     effect_min: f64,
-    /// Seed of the permutation test
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
 
 fn named_number(text: &str) -> Result<(String, f64), String> {
@@ -101,8 +99,7 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
         eprintln!("harness: {}: {warning}", arguments.history.display());
     }
     let effect_min = arguments.effect_min / 100.0;
-    let rules =
-        Rules { alpha: arguments.alpha, effect_min, seed: arguments.seed, ..Rules::default() };
+    let rules = Rules { alpha: arguments.alpha, effect_min };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
     print!("{}", summary(&all));
@@ -129,7 +126,7 @@ fn append(arguments: &Arguments) -> Result<(), String> {
         record.add(&text).map_err(wrong)?;
     }
     record.metrics.extend(arguments.value.iter().cloned());
-    history::append(&arguments.history, &record)
+    jsonl::append(&arguments.history, &record)
         .map_err(|error| format!("{}: {error}", arguments.history.display()))
 }
 

@@ -69,20 +69,10 @@ pub fn cell_count(text: &str) -> Result<u64, String> {
     cells.map(|c| c as u64).ok_or_else(|| "give a number of cells from 1e3 to 1e12".to_owned())
 }
 
-/// Parses a number that is greater than 0, and at most `max`.
-fn positive(text: &str, max: f64) -> Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= max);
-    number.ok_or_else(|| format!("give a number greater than 0 and at most {max}"))
-}
-
 /// Parses a probability that is not 0.
 pub fn probability(text: &str) -> Result<f64, String> {
-    positive(text, 1.0)
-}
-
-/// Parses a time in seconds: more than 0, and at most a week.
-pub fn seconds(text: &str) -> Result<f64, String> {
-    positive(text, 7.0 * 86_400.0)
+    let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= 1.0);
+    number.ok_or_else(|| "give a number greater than 0 and at most 1".to_owned())
 }
 
 /// Parses a percentage from 0 to 1000.

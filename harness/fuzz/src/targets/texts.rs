@@ -29,9 +29,9 @@ pub(super) fn rules(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     Rules::read(scratch.file("rules.toml", bytes)).is_ok()
 }
 
-/// The file of `harness targets`.
+/// The file of `harness bench`.
 pub(super) fn targets(scratch: &mut Scratch, bytes: &[u8]) -> bool {
-    bench::targets::Targets::read(scratch.file("targets.toml", bytes)).is_ok()
+    bench::study::Study::read(scratch.file("targets.toml", bytes)).is_ok()
 }
 
 /// A catalogue of cases.

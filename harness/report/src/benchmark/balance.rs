@@ -7,7 +7,7 @@ use bench::experiments::cause::heaviest_base_leaf;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
-use bench::experiments::table::division;
+use bench::order::by_key;
 
 /// Rank counts of the paper's Figures 21 to 23.
 const SHOWN: [usize; 3] = [16, 32, 64];
@@ -25,21 +25,9 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
         }
     }
     for (subject, all) in by_subject(groups, "weights") {
-        for (mesh, of) in by_mesh(&all) {
+        for (mesh, of) in by_key(all, |g| (g.cells(), g.setup.ranks)) {
             let both = [CELLS, EXPOSED];
             out.extend(both.iter().filter_map(|what| imbalance(subject, mesh, &of, what)));
-        }
-    }
-    out
-}
-
-fn by_mesh<'a>(all: &[&'a Group]) -> Vec<((u64, usize), Vec<&'a Group>)> {
-    let mut out: Vec<((u64, usize), Vec<&Group>)> = Vec::new();
-    for group in all {
-        let mesh = (group.cells(), group.setup.ranks);
-        match out.iter_mut().find(|(m, _)| *m == mesh) {
-            Some((_, of)) => of.push(group),
-            None => out.push((mesh, vec![group])),
         }
     }
     out
@@ -136,7 +124,7 @@ fn imbalance(
         x: Axis::linear("partitioner and weights"),
         y: Axis::linear("λ = max/mean over ranks"),
         body: Body::Bars(Bars {
-            categories: of.iter().map(|g| division(&g.setup)).collect(),
+            categories: of.iter().map(|g| g.setup.division()).collect(),
             segments: vec![(format!("{}: {legend}", subject.engine), lambdas?)],
             references,
             provenance: Provenance::Measured,

@@ -6,6 +6,7 @@ use super::{balance, matrix, programs, scaling};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
+use bench::order::{by_key, distinct};
 use bench::statistics::Median;
 
 /// All figures for which the record has runs.
@@ -27,15 +28,11 @@ type Line<'a> = (&'a str, &'a str, usize, Comm);
 
 /// The groups of every line, by cells.
 fn by_line<'a>(all: &[&'a Group]) -> Vec<(Line<'a>, Vec<&'a Group>)> {
-    let mut out: Vec<(Line, Vec<&Group>)> = Vec::new();
-    for group in all {
+    let line = |group: &'a Group| -> Line<'a> {
         let s = &group.setup;
-        let line = (s.case.as_str(), s.engine.as_str(), s.ranks, s.comm);
-        match out.iter_mut().find(|(l, _)| *l == line) {
-            Some((_, groups)) => groups.push(group),
-            None => out.push((line, vec![group])),
-        }
-    }
+        (&s.case, &s.engine, s.ranks, s.comm)
+    };
+    let mut out = by_key(all.iter().copied(), line);
     // Programs and cases stay in the order of the record.
     let first = |line: &Line| {
         all.iter()
@@ -131,13 +128,7 @@ fn measured(groups: &Groups, predicate: impl Fn(&Setup) -> bool) -> Vec<&Group> 
 
 /// The cases of some groups without repetitions, as text.
 fn cases(all: &[&Group]) -> String {
-    let mut names: Vec<&str> = Vec::new();
-    for group in all {
-        if !names.contains(&group.setup.case.as_str()) {
-            names.push(&group.setup.case);
-        }
-    }
-    names.join(", ")
+    distinct(all.iter().map(|group| group.setup.case.as_str())).join(", ")
 }
 
 fn rate(groups: &Groups) -> Option<Figure> {

@@ -3,6 +3,7 @@
 use crate::figure::{Point, Provenance};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
+use bench::order::{by_key, distinct};
 use bench::statistics::Median;
 use std::fmt;
 
@@ -40,28 +41,16 @@ pub fn repetitions(groups: &[&Group]) -> String {
 
 /// The groups of an experiment by case, in the order of the record.
 pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(&'a str, Vec<&'a Group>)> {
-    partition(groups, experiment, |group| group.setup.case.as_str())
+    by_key(of(groups, experiment), |group| group.setup.case.as_str())
 }
 
 /// The groups of an experiment by engine and case, in the order of the record.
 pub fn by_subject<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
-    partition(groups, experiment, |group| Subject::of(&group.setup))
+    by_key(of(groups, experiment), |group| Subject::of(&group.setup))
 }
 
-fn partition<'a, K: PartialEq>(
-    groups: &'a Groups,
-    experiment: &str,
-    key: impl Fn(&'a Group) -> K,
-) -> Vec<(K, Vec<&'a Group>)> {
-    let mut out: Vec<(K, Vec<&Group>)> = Vec::new();
-    for group in groups.all.iter().filter(|g| g.setup.experiment == experiment) {
-        let key = key(group);
-        match out.iter_mut().find(|(other, _)| *other == key) {
-            Some((_, all)) => all.push(group),
-            None => out.push((key, vec![group])),
-        }
-    }
-    out
+fn of<'a>(groups: &'a Groups, experiment: &str) -> impl Iterator<Item = &'a Group> {
+    groups.all.iter().filter(move |g| g.setup.experiment == experiment)
 }
 
 /// The program and the case of a figure that shows only one of each.
@@ -99,13 +88,7 @@ const OWN: &str = "mesher";
 
 /// The programs of some groups without repetitions, as text.
 pub fn engines(groups: &[&Group]) -> String {
-    let mut names: Vec<&str> = Vec::new();
-    for group in groups {
-        if !names.contains(&group.setup.engine.as_str()) {
-            names.push(&group.setup.engine);
-        }
-    }
-    names.join(", ")
+    distinct(groups.iter().map(|group| group.setup.engine.as_str())).join(", ")
 }
 
 /// Whether a group is in the summary and in the tables of phases: scaling on at least 16 simulated ranks.

@@ -4,13 +4,14 @@ use super::above_one::reasons;
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
 use super::lint::{Finding, RULES, Verdict};
-use super::{programs, tables};
+use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
 use bench::experiments::cause::sentence;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::experiments::number::grouped;
+use bench::order::by_key;
 use maud::{Markup, html};
 
 /// A figure with its drawing and its values.
@@ -41,10 +42,8 @@ pub fn page(
         }
         @for one in drawn { (figure(one)) }
         h2 id="tables" { "Tables" }
-        (tables::experiments(groups))
-        (tables::projections(groups))
-        (tables::phases(groups))
-        (programs::tables(groups))
+        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions. Exposed faces are those that the mesh shows to the body; W is the number of cells that each weighs." }
+        @for table in tables::tables(groups) { (table.html()) }
         @if let Some(trend) = trend {
             h2 id="trend" { "Changes over commits" }
             pre { (trend) }
@@ -99,14 +98,8 @@ fn rules(findings: &[Finding]) -> Markup {
     for (i, rule) in RULES.iter().enumerate() {
         for verdict in [Verdict::Broken, Verdict::Kept] {
             let of_rule = findings.iter().filter(|f| f.rule == i + 1 && f.verdict == verdict);
-            let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-            for f in of_rule {
-                match reasons.iter_mut().find(|(why, _)| *why == f.why) {
-                    Some((_, places)) => places.push(&f.about),
-                    None => reasons.push((&f.why, vec![&f.about])),
-                }
-            }
-            let row = |(why, places): (&str, Vec<&str>)| {
+            let row = |(why, findings): (&str, Vec<&Finding>)| {
+                let places: Vec<&str> = findings.iter().map(|f| f.about.as_str()).collect();
                 let places = match places.len() {
                     n if n > 3 => format!("{n} figures"),
                     _ => places.join(", "),
@@ -118,7 +111,7 @@ fn rules(findings: &[Finding]) -> Markup {
                     html! { (why) },
                 ]
             };
-            rows.extend(reasons.into_iter().map(row));
+            rows.extend(by_key(of_rule, |f| f.why.as_str()).into_iter().map(row));
         }
     }
     table(Some("words"), &["rule", "verdict", "figures", "reason"], &rows)

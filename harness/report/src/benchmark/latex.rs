@@ -2,7 +2,8 @@
 
 use crate::figure::Figure;
 use crate::figure::tex::{PREAMBLE, escape};
-use bench::experiments::entry::{Entry, Line, Machine};
+use bench::experiments::entry::{Entry, Line, Machine, Session};
+use bench::order::distinct;
 use std::fmt::Write;
 
 /// The figures with captions and labels, for `\input` in a document.
@@ -25,35 +26,27 @@ pub fn fragment(figures: &[Figure]) -> String {
 
 /// The machines of a record, without repetitions.
 pub fn machines(lines: &[Line]) -> Vec<Machine> {
-    let mut out: Vec<Machine> = Vec::new();
-    for line in lines {
-        if let Entry::Session(s) = &line.entry
-            && !out.contains(&s.machine)
-        {
-            out.push(s.machine.clone());
-        }
-    }
-    out
+    distinct(sessions(lines).map(|session| session.machine.clone()))
 }
 
 /// The command lines of the sessions, without repetitions and without absolute directories.
-pub fn commands(lines: &[Line]) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for line in lines {
-        if let Entry::Session(s) = &line.entry {
-            let without_directory = |w: &'_ String| match w.starts_with('/') {
-                true => w.rsplit('/').next().unwrap_or(w).to_owned(),
-                false => w.clone(),
-            };
-            let words: Vec<String> = s.command.iter().map(without_directory).collect();
-            let command = shlex::try_join(words.iter().map(String::as_str))
-                .expect("an argument of a process has no zero bytes");
-            if !out.contains(&command) {
-                out.push(command);
-            }
-        }
-    }
-    out
+pub fn commands<'a>(lines: &'a [Line]) -> Vec<String> {
+    let without_directory = |word: &'a String| match word.starts_with('/') {
+        true => word.rsplit('/').next().unwrap_or(word),
+        false => word,
+    };
+    let command = |session: &'a Session| {
+        let words = session.command.iter().map(without_directory);
+        shlex::try_join(words).expect("an argument of a process has no zero bytes")
+    };
+    distinct(sessions(lines).map(command))
+}
+
+fn sessions(lines: &[Line]) -> impl Iterator<Item = &Session> {
+    lines.iter().filter_map(|line| match &line.entry {
+        Entry::Session(session) => Some(&**session),
+        _ => None,
+    })
 }
 
 /// A draft of the artifact description and evaluation that the conference SC requires, in Markdown.

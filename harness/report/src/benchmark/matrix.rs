@@ -5,7 +5,6 @@ use crate::figure::{Axis, Body, Claims, Figure, HeatMap, Layer, svg};
 use bench::experiments::entry::Run;
 use bench::experiments::group::Groups;
 use bench::experiments::number::grouped;
-use bench::experiments::table::division;
 
 /// A figure per recorded message matrix.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -35,7 +34,7 @@ fn figure(run: &Run) -> Figure {
             grouped(run.cells),
             s.layer_cells_min,
             s.ranks,
-            division(s),
+            s.division(),
             grouped(total(2)),
             total(3) as f64 / 1e6,
             grouped(run.message_matrix.len() as u64),

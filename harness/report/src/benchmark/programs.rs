@@ -1,12 +1,10 @@
-//! Figures and tables of several programs on the same cases, on one core.
+//! Figures of several programs on the same cases, on one core.
 
 use super::groups::{point, repetitions};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
-use crate::page::table;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::programs::{Comparison, row};
+use bench::experiments::programs::Comparison;
 use bench::statistics::Median;
-use maud::{Markup, html};
 
 /// CPU time, rate and memory over cells of every comparison.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -74,33 +72,5 @@ fn figure(comparison: &Comparison, id: &str, what: &str, y: Axis, all: Vec<Serie
         body: Body::points(all),
         height: svg::HEIGHT,
         claims: Claims::default(),
-    }
-}
-
-/// The table of every comparison, the meshes that it lacks, and what the programs do not provide.
-pub fn tables(groups: &Groups) -> Markup {
-    let columns = [
-        "engine",
-        "cells",
-        "CPU time / s",
-        "of it search / s",
-        "10⁶ cells / (s core)",
-        "bytes / cell",
-    ];
-    let rows = |comparison: &Comparison| -> Vec<Vec<Markup>> {
-        let runs = comparison.programs.iter().flat_map(|(_, groups)| groups);
-        runs.map(|group| row(group).iter().map(|text| html! { (text) }).collect()).collect()
-    };
-    html! {
-        @for comparison in groups.comparisons() {
-            h3 { "programs on one core: " (comparison.case) ", n = " (comparison.layer_cells_min) }
-            (table(None, &columns, &rows(&comparison)))
-            ul {
-                @for left in comparison.left_out(groups) {
-                    li { "No mesh at spacing " (format!("{:.2e}", left.setup.spacing_min)) ": " (left.why) }
-                }
-                @for (engine, lacks) in comparison.lacks(groups) { li { (engine) " does not provide: " (lacks) } }
-            }
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! Figures over ranks: speedup, efficiency and its factors, time by phase.
 
-use super::above_one::{check_invariants, reasons, reasons_of_speedups};
+use super::above_one::{reasons, reasons_of_speedups};
 use super::groups::{Subject, by_subject, cells_label, point, provenance, repetitions};
 use super::paper::{self, cited};
 use crate::figure::{Axis, Bars, Body, Claims, Figure, Point, Provenance, Series, svg};
@@ -8,6 +8,7 @@ use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, messages_s};
+use bench::order::{by_key, distinct};
 use bench::statistics::Median;
 
 /// Maximum number of phases that have a segment of their own.
@@ -34,15 +35,9 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
 
 /// The groups of each mesh, smaller meshes first.
 fn meshes<'a>(all: &[&'a Group]) -> Vec<Vec<&'a Group>> {
-    let mut out: Vec<Vec<&Group>> = Vec::new();
-    for group in all {
-        match out.iter_mut().find(|m| m[0].cells() == group.cells()) {
-            Some(mesh) => mesh.push(group),
-            None => out.push(vec![group]),
-        }
-    }
-    out.sort_by_key(|mesh| mesh[0].cells());
-    out
+    let mut meshes = by_key(all.iter().copied(), |group| group.cells());
+    meshes.sort_by_key(|(cells, _)| *cells);
+    meshes.into_iter().map(|(_, groups)| groups).collect()
 }
 
 /// The groups of one provenance, by ranks.
@@ -130,8 +125,7 @@ fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
 
 /// The base cases of a mesh's efficiencies with their run times, without repetitions.
 fn base_cases(groups: &Groups, mesh: &[&Group]) -> String {
-    let mut out: Vec<String> = Vec::new();
-    for group in mesh {
+    let text = |group: &&Group| {
         let base = groups.reference(group);
         let s = if base.setup.ranks == 1 { "" } else { "s" };
         let how = match base.setup.comm {
@@ -139,12 +133,9 @@ fn base_cases(groups: &Groups, mesh: &[&Group]) -> String {
             Comm::Mpi => format!("{} rank{s} on MPI", base.setup.ranks),
             Comm::Sim => format!("{} simulated rank{s}", base.setup.ranks),
         };
-        let text = format!("{how}, {:.3} s", base.time_s.value);
-        if !out.contains(&text) {
-            out.push(text);
-        }
-    }
-    out.join("; ")
+        format!("{how}, {:.3} s", base.time_s.value)
+    };
+    distinct(mesh.iter().map(text)).join("; ")
 }
 
 /// One factor of an efficiency.
@@ -170,7 +161,6 @@ fn efficiency(
     ];
     let efficiencies: Vec<Efficiency> =
         simulated.iter().map(|g| g.efficiency(groups.reference(g), &groups.network)).collect();
-    efficiencies.iter().for_each(check_invariants);
     let mut series = vec![ideal(&simulated, |_| 1.0)];
     for (style, (name, value)) in factors.into_iter().enumerate() {
         let factor = |(g, e): (&&Group, &Efficiency)| Point {

@@ -1,15 +1,14 @@
 //! A verification as Markdown, for the summary page of a CI system and for the report of the demo.
 
 use super::remarks::remarks;
-use super::table::{COLUMN_PAPER, COLUMNS, rows_of};
-use crate::markdown::{escaped, table};
+use super::table::table_of;
+use crate::markdown::escaped;
 use run::verify::report::Report;
 
 /// The report as Markdown: verdict, table, remarks.
 pub fn markdown(report: &Report) -> String {
-    let columns: Vec<&str> = COLUMNS.iter().chain([&COLUMN_PAPER]).copied().collect();
     let mut text = format!("## harness verify\n\n{}\n\n", report.verdict());
-    text += &table(&columns, |_| "---", report.cases.iter().flat_map(rows_of));
+    text += &table_of(report).markdown(0..0);
     let remarks = remarks(report);
     if !remarks.is_empty() {
         text.push('\n');
@@ -30,7 +29,7 @@ mod tests {
         let text = markdown(&sample());
         let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
         assert_eq!(rows.len(), 4);
-        assert!(rows.iter().all(|row| row.matches(" |").count() == COLUMNS.len() + 1), "{text}");
+        assert!(rows.iter().all(|row| row.matches(" |").count() == 13), "{text}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The lines below the table: failures, omissions and notes.
 
+use bench::order::by_key;
 use run::verify::report::{CaseReport, Check, Outcome, Report};
 
 /// Missing programs, then failures, omissions and notes of each case, one line each.
@@ -25,19 +26,11 @@ pub fn remarks(report: &Report) -> Vec<String> {
 /// The checks of a case that did not pass. Those with the same reason share a line, because a fault with one layout of ranks
 /// is often a fault with all.
 fn outcomes(case: &CaseReport, report: &Report) -> Vec<String> {
-    let mut groups: Vec<(&Check, Vec<&str>)> = Vec::new();
-    for check in &case.checks {
-        let same = |(other, _): &&mut (&Check, Vec<&str>)| {
-            other.name == check.name && other.outcome == check.outcome
-        };
-        match groups.iter_mut().find(same) {
-            Some((_, subjects)) => subjects.push(&check.subject),
-            None => groups.push((check, vec![&check.subject])),
-        }
-    }
-    let lines = groups.into_iter().filter_map(|(check, subjects)| {
-        let what = format!("{}: {}: {}", case.name, subjects.join("; "), check.name);
-        match &check.outcome {
+    let groups = by_key(&case.checks, |check| (&check.name, &check.outcome));
+    let lines = groups.into_iter().filter_map(|((name, outcome), checks)| {
+        let subjects: Vec<&str> = checks.iter().map(|check| check.subject.as_str()).collect();
+        let what = format!("{}: {}: {name}", case.name, subjects.join("; "));
+        match outcome {
             Outcome::Pass { .. } => None,
             Outcome::Fail { why } => Some(format!("FAILED: {what}: {why}")),
             // The line about the missing program covers it.

@@ -1,45 +1,39 @@
 //! A verification as a text table: a line for the serial run of each case and one per rank count, then the remarks.
 
 use super::remarks::remarks;
+use crate::table::Table;
 use run::verify::report::{CaseReport, Check, Outcome, Report, Run, Tally};
-use std::fmt::Write;
 
-/// Headings of the table's columns.
-pub const COLUMNS: [&str; 12] = [
-    "case",
-    "facets",
-    "base",
-    "cells",
-    "ranks",
-    "hold",
-    "fail",
-    "left out",
-    "time s",
-    "process s",
-    "M cells/s",
-    "B/cell",
-];
-
-/// Heading of the speedup over the 38,000 cells per second that the paper reports on one core.
-pub const COLUMN_PAPER: &str = "x paper";
+/// The table, with the speedup over the 38,000 cells per second that the paper reports on one core.
+pub(super) fn table_of(report: &Report) -> Table {
+    let columns = vec![
+        "case",
+        "facets",
+        "base",
+        "cells",
+        "ranks",
+        "hold",
+        "fail",
+        "left out",
+        "time s",
+        "process s",
+        "M cells/s",
+        "B/cell",
+        "x paper",
+    ];
+    let rows: Vec<Vec<String>> = report.cases.iter().flat_map(rows_of).collect();
+    check_invariants(&rows, report);
+    Table { columns, rows, ..Table::default() }
+}
 
 /// The report as plain text.
 pub fn table(report: &Report) -> String {
-    let mut rows =
-        vec![COLUMNS.iter().chain([&COLUMN_PAPER]).map(|title| (*title).to_owned()).collect()];
-    rows.extend(report.cases.iter().flat_map(rows_of));
-    check_invariants(&rows[1..], report);
-    let mut text = aligned(&rows);
-    for line in remarks(report) {
-        // Writing into a string cannot fail.
-        let _ = writeln!(text, "{line}");
-    }
-    let _ = writeln!(text, "{}", report.verdict());
-    text
+    let notes = remarks(report).into_iter().chain([report.verdict()]).collect();
+    Table { notes, ..table_of(report) }.text()
 }
 
 /// The rows of one case, each with one field per column.
-pub fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
+fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let serial = case.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
     let counts = rank_counts(case);
     let of_case = |check: &&Check| check.ranks.is_none_or(|ranks| !counts.contains(&ranks));
@@ -96,26 +90,6 @@ fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
     fields
 }
 
-/// Columns as wide as their widest field, all but the first right-aligned.
-fn aligned(rows: &[Vec<String>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width =
-        |row: &Vec<String>, column: usize| row.get(column).map_or(0, |field| field.chars().count());
-    let widest = |column| rows.iter().map(|row| width(row, column)).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(widest).collect();
-    let mut text = String::new();
-    for row in rows {
-        let fields =
-            row.iter().zip(&widths).enumerate().map(|(column, (field, &width))| match column {
-                0 => format!("{field:<width$}"),
-                _ => format!("{field:>width$}"),
-            });
-        let line = fields.collect::<Vec<_>>().join("  ");
-        let _ = writeln!(text, "{}", line.trim_end());
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,10 +101,10 @@ mod tests {
         let lines: Vec<Vec<&str>> =
             text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(
-            lines[1][..9],
+            lines[2][..9],
             ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100"]
         );
-        assert_eq!(lines[2], ["4", "1", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
+        assert_eq!(lines[3], ["4", "1", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
     }
 
     #[test]

@@ -4,16 +4,16 @@
 //! met, missed or for comparison, and then states how that was measured; met is within the bounds, missed is not, and for comparison
 //! has none; a row without a value, and an efficiency above 1, states the reason.
 
-use super::declare::{OneOrMany, Row, Targets};
+use super::file::{OneOrMany, Row, Study};
 use super::measure::{Kind, Measure, Sample};
 use crate::experiments::cause::above_one;
 use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
 use crate::experiments::group::{Group, Groups};
 
 /// Judges every row by the runs in these lines: those of the last machine and program, if there are several.
-pub fn judged(targets: &Targets, lines: &[Line]) -> Vec<Judged> {
+pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
     let lines = of_last_origin(lines);
-    targets.row.iter().map(|row| judge(targets, row, &lines)).collect()
+    study.row.iter().map(|row| judge(study, row, &lines)).collect()
 }
 
 /// Returns the lines without the runs, audits and failures of sessions on other machines or commits than the last one, and
@@ -40,8 +40,8 @@ fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 }
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
-pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
-    let judged = match measured(targets, row, lines) {
+pub fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
+    let judged = match measured(study, row, lines) {
         Ok((value, how, why)) => Judged {
             measured: Some(value),
             how,
@@ -49,7 +49,7 @@ pub fn judge(targets: &Targets, row: &Row, lines: &[Line]) -> Judged {
             ..unjudged(row, Verdict::ForComparison, why)
         },
         Err(why) => {
-            let failed = targets.runs_of(row).into_iter().find_map(|n| failure(targets, n, lines));
+            let failed = study.runs_of(row).into_iter().find_map(|n| failure(study, n, lines));
             match failed {
                 Some(why) => unjudged(row, Verdict::Failed, why),
                 None => unjudged(row, Verdict::LeftOut, why),
@@ -113,11 +113,11 @@ fn verdict(row: &Row, value: f64) -> Verdict {
 }
 
 /// Returns the row's value, how it was measured, and the reason for an efficiency above 1.
-fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String, String), String> {
+fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<(f64, String, String), String> {
     if row.measure.kind() == Kind::Audit {
         let name = &row.run.all()[0];
         let audits: Vec<&Audited> =
-            lines.iter().filter_map(|line| audit_of(targets, name, line)).collect();
+            lines.iter().filter_map(|line| audit_of(study, name, line)).collect();
         if audits.is_empty() {
             return Err(absent(name));
         }
@@ -125,7 +125,7 @@ fn measured(targets: &Targets, row: &Row, lines: &[Line]) -> Result<(f64, String
     }
     let groups = Groups::of(lines);
     let find = |name: &String| {
-        let found = groups.all.iter().find(|g| targets.is_run(name, &g.setup));
+        let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
         found.ok_or_else(|| absent(name))
     };
     let runs = row.run.all().iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
@@ -152,17 +152,17 @@ fn worst_how(runs: &[&Group]) -> &'static str {
     runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured")
 }
 
-fn audit_of<'a>(targets: &Targets, name: &str, line: &'a Line) -> Option<&'a Audited> {
+fn audit_of<'a>(study: &Study, name: &str, line: &'a Line) -> Option<&'a Audited> {
     match &line.entry {
-        Entry::Audit(audited) if targets.is_run(name, &audited.setup) => Some(audited),
+        Entry::Audit(audited) if study.is_run(name, &audited.setup) => Some(audited),
         _ => None,
     }
 }
 
 /// Returns the reason for which a run failed, if it did.
-fn failure(targets: &Targets, name: &str, lines: &[Line]) -> Option<String> {
+fn failure(study: &Study, name: &str, lines: &[Line]) -> Option<String> {
     lines.iter().find_map(|line| match &line.entry {
-        Entry::Failure(f) if targets.is_run(name, &f.setup) => {
+        Entry::Failure(f) if study.is_run(name, &f.setup) => {
             Some(format!("run {name} failed: {}", f.why))
         }
         _ => None,
@@ -171,12 +171,12 @@ fn failure(targets: &Targets, name: &str, lines: &[Line]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::declare::EXPERIMENT;
+    use super::super::file::EXPERIMENT;
     use super::*;
     use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
     use crate::testing::line;
     use crate::testing::run;
-    use crate::testing::targets as read;
+    use crate::testing::study as read;
     use proptest::prelude::*;
 
     const FILE: &str = r#"

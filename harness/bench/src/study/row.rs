@@ -1,12 +1,12 @@
 //! A judged row as text.
 
-use super::declare::Targets;
+use super::file::Study;
 use super::measure::Measure;
 use crate::experiments::entry::{Judged, Verdict};
 
 /// Returns a row as one line, for progress.
-pub fn line(targets: &Targets, row: &Judged) -> String {
-    let [name, target, measured, how, verdict] = fields(targets, row);
+pub fn line(study: &Study, row: &Judged) -> String {
+    let [name, target, measured, how, verdict] = fields(study, row);
     match row.measured {
         Some(_) => format!("{name}: {measured} ({how}), target {target}: {verdict}"),
         None => format!("{name}: {verdict}"),
@@ -14,8 +14,8 @@ pub fn line(targets: &Targets, row: &Judged) -> String {
 }
 
 /// Returns name, target, measured value, how it was measured, and verdict.
-pub fn fields(targets: &Targets, row: &Judged) -> [String; 5] {
-    let measure = targets.row.iter().find(|r| r.name == row.name).map(|r| r.measure);
+pub fn fields(study: &Study, row: &Judged) -> [String; 5] {
+    let measure = study.row.iter().find(|r| r.name == row.name).map(|r| r.measure);
     let show = |value: f64| measure.map_or_else(|| value.to_string(), |m: Measure| m.show(value));
     let bounds = [("at least ", row.at_least), ("at most ", row.at_most)];
     let bounds = bounds.into_iter().filter_map(|(word, b)| Some(format!("{word}{}", show(b?))));

@@ -1,12 +1,14 @@
-//! Reads a targets file: meshes, runs and rows by name. reports/README.md describes the format.
+//! Reads a study file: series of runs, and meshes, runs and rows by name. reports/README.md describes the format.
 //!
-//! Invariants of the [`Targets`] that [`Targets::read`] returns: every name that is used is declared; a row has exactly
-//! the runs, the other run and the phase that its measure requires.
+//! Invariants of the [`Study`] that [`Study::read`] returns: it has a series or a row; every name that is used is declared; a row
+//! has exactly the runs, the other run and the phase that its measure requires.
 
 use super::measure::{Kind, Measure};
 use crate::experiments::entry::{Comm, Setup};
+use run::engine::description::{Description, is_own};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// The [`Setup::experiment`] of runs for targets.
@@ -16,10 +18,10 @@ const CELLS: std::ops::RangeInclusive<f64> = 1e3..=1e12;
 /// Maximum number of ranks.
 const RANKS_MAX: usize = 65_536;
 
-/// A targets file.
+/// A study file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Targets {
+pub struct Study {
     /// Meshes by name.
     #[serde(default)]
     pub mesh: BTreeMap<String, Mesh>,
@@ -29,6 +31,9 @@ pub struct Targets {
     /// The rows, in order.
     #[serde(default)]
     pub row: Vec<Row>,
+    /// The series, in order.
+    #[serde(default)]
+    pub series: Vec<Series>,
     /// Directory of the file; paths are relative to it.
     #[serde(skip)]
     pub directory: PathBuf,
@@ -82,6 +87,151 @@ pub struct RunSpec {
     pub audit: bool,
 }
 
+/// A kind of experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Experiment {
+    /// The same mesh on increasingly many ranks.
+    Strong,
+    /// The same number of cells per rank on increasingly many ranks; the spacing is chosen accordingly.
+    Weak,
+    /// Spacings that differ by factors of two.
+    Spacing,
+    /// The same spacing with increasing minimum layer thickness n.
+    Layers,
+    /// Weights of base leaves and partitioners.
+    Weights,
+}
+
+impl fmt::Display for Experiment {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Strong => "strong",
+            Self::Weak => "weak",
+            Self::Spacing => "spacing",
+            Self::Layers => "layers",
+            Self::Weights => "weights",
+        })
+    }
+}
+
+/// A series of runs on one case.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Series {
+    /// The kind of experiment.
+    pub experiment: Experiment,
+    /// A name in geometries/catalogue.toml, or the path of a case file.
+    pub case: String,
+    /// Cells, each a series: of the mesh (strong, weights), per rank (weak), of the largest mesh (spacing), at the case's n (layers).
+    /// If empty, the case's own spacing.
+    #[serde(default)]
+    pub cells: Vec<f64>,
+    /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files.
+    #[serde(default = "mesher")]
+    pub engines: Vec<String>,
+    /// Values of n; if empty, that of the case.
+    #[serde(default)]
+    pub layers: Vec<u32>,
+    /// Numbers of simulated ranks.
+    #[serde(default)]
+    pub sim: Vec<usize>,
+    /// Numbers of ranks on MPI. Without any ranks, the program is run serially.
+    #[serde(default)]
+    pub mpi: Vec<usize>,
+    /// Number of repetitions, after a warm-up.
+    #[serde(default = "one")]
+    pub repeats: usize,
+}
+
+/// What determines the partition of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choice {
+    /// `unit`, `area` or `rebalance`; empty to leave the choice to the program.
+    pub weights: String,
+    /// `metis` or `morton`; empty to leave the choice to the program.
+    pub partitioner: String,
+    /// Cells that an exposed face weighs; `None`: they are not counted.
+    pub weight_exposed: Option<u32>,
+}
+
+/// Weights and partitioners of the experiment on them, which counts exposed faces. `rebalance` with METIS is identical to `area`;
+/// in the last row an exposed face weighs as much as ten cells.
+const CHOICES: [(&str, &str, u32); 6] = [
+    ("unit", "metis", 0),
+    ("unit", "morton", 0),
+    ("area", "metis", 0),
+    ("area", "morton", 0),
+    ("rebalance", "morton", 0),
+    ("rebalance", "morton", 10),
+];
+
+impl Series {
+    /// Returns the numbers of cells, or that of the case.
+    pub fn sizes(&self) -> Vec<Option<f64>> {
+        match self.cells.is_empty() {
+            true => vec![None],
+            false => self.cells.iter().copied().map(Some).collect(),
+        }
+    }
+
+    /// Returns the partitions that are compared.
+    pub fn choices(&self) -> Vec<Choice> {
+        if self.experiment != Experiment::Weights {
+            return vec![Choice::default()];
+        }
+        let choice = |&(weights, partitioner, exposed): &(&str, &str, u32)| Choice {
+            weights: weights.to_owned(),
+            partitioner: partitioner.to_owned(),
+            weight_exposed: Some(exposed),
+        };
+        CHOICES.iter().map(choice).collect()
+    }
+
+    /// Returns the ranks on which an engine is run: those of the series that it offers. A serial run replaces ranks on MPI that
+    /// are missing; nothing can replace the ranks of experiments about ranks.
+    pub fn layouts(&self, engine: &Description, no_mpi: bool) -> Vec<(Comm, usize)> {
+        let has_mpi = engine.run.parallel.is_some() && !no_mpi;
+        let sim = self.sim.iter().filter(|_| engine.run.simulated.is_some());
+        let mpi = self.mpi.iter().filter(|_| has_mpi);
+        let mut all: Vec<(Comm, usize)> =
+            sim.map(|r| (Comm::Sim, *r)).chain(mpi.map(|r| (Comm::Mpi, *r))).collect();
+        let is_about_ranks = matches!(self.experiment, Experiment::Weak | Experiment::Weights);
+        if self.experiment == Experiment::Weights && !is_own(&engine.name) {
+            return Vec::new();
+        }
+        if !is_about_ranks && (all.is_empty() || !self.mpi.is_empty() && !has_mpi) {
+            all.push((Comm::Solo, 1));
+        }
+        all
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let wrong = |why: &str| Err(format!("series {} of {}: {why}", self.experiment, self.case));
+        let ranks = || self.sim.iter().chain(&self.mpi);
+        match self.experiment {
+            _ if !ranks().all(|ranks| (1..=RANKS_MAX).contains(ranks)) => {
+                wrong("ranks are from 1 to 65536")
+            }
+            _ if self.repeats == 0 => wrong("repeats is at least 1"),
+            _ if self.engines.is_empty() => wrong("it has no engines"),
+            _ if !self.cells.iter().all(|cells| CELLS.contains(cells)) => {
+                wrong("cells is from 1e3 to 1e12")
+            }
+            Experiment::Weak if self.cells.is_empty() => wrong("give the cells of a rank"),
+            Experiment::Weak | Experiment::Weights if ranks().next().is_none() => {
+                wrong("give ranks")
+            }
+            Experiment::Layers if self.layers.is_empty() => wrong("give layers"),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn mesher() -> Vec<String> {
+    vec!["mesher".to_owned()]
+}
+
 fn one() -> usize {
     1
 }
@@ -130,7 +280,7 @@ impl OneOrMany {
     }
 }
 
-impl Targets {
+impl Study {
     /// Reads a file.
     ///
     /// # Errors
@@ -138,24 +288,42 @@ impl Targets {
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("{}: {why}", path.display());
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
-        let mut targets: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-        targets.directory = path.parent().unwrap_or(Path::new(".")).to_owned();
-        targets.check().map_err(wrong)?;
-        targets.row = targets.row.iter().flat_map(each_run).collect();
-        Ok(targets)
+        let mut study: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        study.directory = path.parent().unwrap_or(Path::new(".")).to_owned();
+        study.check().map_err(wrong)?;
+        study.row = study.row.iter().flat_map(each_run).collect();
+        Ok(study)
     }
 
-    /// Keeps only the rows with these names, or all rows if no name is given.
+    /// Keeps only the rows and the experiments with these names, or all if no name is given.
     ///
     /// # Errors
-    /// If no row has one of the names.
+    /// If no row and no experiment has one of the names.
     pub fn only(&mut self, names: &[String]) -> Result<(), String> {
-        let named = |row: &Row, name: &String| row.name == *name || row.family() == name;
-        if let Some(name) = names.iter().find(|name| !self.row.iter().any(|row| named(row, name))) {
-            return Err(format!("no row is called {name:?}"));
+        let is_row = |row: &Row, name: &String| row.name == *name || row.family() == name;
+        let is_series = |series: &Series, name: &String| series.experiment.to_string() == *name;
+        let is_known = |name: &&String| {
+            self.row.iter().any(|row| is_row(row, name))
+                || self.series.iter().any(|series| is_series(series, name))
+        };
+        if let Some(name) = names.iter().find(|name| !is_known(name)) {
+            return Err(format!("no row and no experiment is called {name:?}"));
         }
-        self.row.retain(|row| names.is_empty() || names.iter().any(|name| named(row, name)));
+        self.row.retain(|row| names.is_empty() || names.iter().any(|name| is_row(row, name)));
+        self.series.retain(|one| names.is_empty() || names.iter().any(|name| is_series(one, name)));
         Ok(())
+    }
+
+    /// Returns the programs of all series, and the mesher if a row needs it, each once.
+    pub fn engines(&self) -> Vec<String> {
+        let mut engines: Vec<String> = Vec::new();
+        let of_rows = (!self.row.is_empty()).then(mesher).unwrap_or_default();
+        for engine in self.series.iter().flat_map(|series| series.engines.clone()).chain(of_rows) {
+            if !engines.contains(&engine) {
+                engines.push(engine);
+            }
+        }
+        engines
     }
 
     /// Returns the runs that a row needs: its own and the one with which it is compared.
@@ -176,9 +344,10 @@ impl Targets {
     }
 
     fn check(&self) -> Result<(), String> {
-        if self.row.is_empty() {
-            return Err("it has no [[row]]".to_owned());
+        if self.row.is_empty() && self.series.is_empty() {
+            return Err("it has no [[series]] and no [[row]]".to_owned());
         }
+        self.series.iter().try_for_each(Series::check)?;
         self.mesh.iter().try_for_each(|(name, mesh)| mesh.check(name))?;
         self.run.iter().try_for_each(|(name, run)| self.check_run(name, run))?;
         self.row.iter().try_for_each(|row| self.check_row(row))?;
@@ -282,7 +451,7 @@ fn each_run(row: &Row) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::targets as read;
+    use crate::testing::study as read;
 
     const FILE: &str = r#"
         [mesh.cube]
@@ -315,26 +484,78 @@ mod tests {
 
     #[test]
     fn several_runs_are_several_rows_except_for_a_series() {
-        let mut targets = read(FILE).unwrap();
-        let names = |t: &Targets| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(&targets), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
-        assert!(targets.only(&["rat".to_owned()]).unwrap_err().contains("\"rat\""));
-        targets.only(&["rate".to_owned(), "growth".to_owned()]).unwrap();
-        assert_eq!(names(&targets), ["rate: one", "rate: two", "growth"]);
+        let mut study = read(FILE).unwrap();
+        let names = |t: &Study| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&study), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
+        assert!(study.only(&["rat".to_owned()]).unwrap_err().contains("\"rat\""));
+        study.only(&["rate".to_owned(), "growth".to_owned()]).unwrap();
+        assert_eq!(names(&study), ["rate: one", "rate: two", "growth"]);
+    }
+
+    fn of_repository(name: &str) -> Study {
+        let reports = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports");
+        Study::read(&reports.join(name)).unwrap()
     }
 
     #[test]
     fn the_targets_of_this_repository_are_consistent() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/targets.toml");
-        let targets = Targets::read(&path).unwrap();
-        // A run that no row needs and two rows of the same name are mistakes.
-        let used = |name| targets.row.iter().any(|r| targets.runs_of(r).contains(&name));
-        let unused: Vec<&String> = targets.run.keys().filter(|name| !used(name)).collect();
+        let study = of_repository("targets.toml");
+        // A run that no row needs is a mistake.
+        let used = |name| study.row.iter().any(|r| study.runs_of(r).contains(&name));
+        let unused: Vec<&String> = study.run.keys().filter(|name| !used(name)).collect();
         assert!(unused.is_empty(), "{unused:?}");
-        let mut names: Vec<&String> = targets.row.iter().map(|r| &r.name).collect();
-        names.sort();
-        names.dedup();
-        assert_eq!(names.len(), targets.row.len());
+    }
+
+    #[test]
+    fn the_series_of_this_repository_have_every_experiment() {
+        use Experiment::{Layers, Spacing, Strong, Weak, Weights};
+        for name in ["small.toml", "full.toml"] {
+            let study = of_repository(name);
+            let has = |experiment| study.series.iter().any(|s| s.experiment == experiment);
+            assert!([Strong, Weak, Spacing, Layers, Weights].into_iter().all(has), "{name}");
+        }
+    }
+
+    #[test]
+    fn ranks_that_an_engine_does_not_offer_are_replaced_by_a_serial_run_or_left_out() {
+        let paths = run::engine::paths::Paths::find();
+        let find = |name| Description::find(name, &paths).unwrap();
+        let [own, parallel, serial] = ["mesher", "p4est", "discretize"].map(find);
+        let mut study = of_repository("small.toml");
+        let of = |series: &Series, engine, no_mpi| series.layouts(engine, no_mpi);
+        let (sim, solo) = ((Comm::Sim, 64), (Comm::Solo, 1));
+        study.series.retain(|series| series.experiment == Experiment::Strong);
+        let strong = &study.series[0];
+        assert_eq!(of(strong, &own, false).len(), strong.sim.len() + strong.mpi.len());
+        assert!(of(strong, &own, true).ends_with(&[sim, solo]));
+        assert_eq!(of(strong, &parallel, false).len(), strong.mpi.len());
+        assert_eq!(of(strong, &serial, false), [solo]);
+        let weak = Series { experiment: Experiment::Weak, ..strong.clone() };
+        assert!(of(&weak, &serial, false).is_empty());
+        let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
+        assert!(of(&weights, &parallel, false).is_empty());
+        assert_eq!((weights.choices().len(), strong.choices()), (6, vec![Choice::default()]));
+    }
+
+    #[test]
+    fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
+        let text = "[[series]]\nexperiment = 'strong'\ncase = 'cube'\nsim = [1, 2]\n\
+                    [[series]]\nexperiment = 'weak'\ncase = 'cube'\ncells = [1e4]\nmpi = [1]\n";
+        let mut study = read(text).unwrap();
+        study.only(&["weak".to_owned()]).unwrap();
+        assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
+        for (from, to, why) in [
+            ("[1, 2]", "[0]", "ranks are from 1"),
+            ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
+            ("cells = [1e4]", "", "give the cells of a rank"),
+            ("mpi = [1]", "", "give ranks"),
+            ("'strong'", "'layers'", "give layers"),
+            ("'strong'", "'luck'", "unknown variant"),
+            ("sim", "repeats = 0\nsim", "repeats is at least 1"),
+        ] {
+            let found = read(&text.replacen(from, to, 1)).unwrap_err();
+            assert!(found.contains(why), "{why} is not in: {found}");
+        }
     }
 
     #[test]
@@ -368,6 +589,6 @@ mod tests {
             let found = read(&FILE.replacen(from, to, 1)).unwrap_err();
             assert!(found.starts_with("FILE: ") && found.contains(why), "{why} is not in: {found}");
         }
-        assert!(read("").unwrap_err().contains("no [[row]]"));
+        assert!(read("").unwrap_err().contains("no [[series]] and no [[row]]"));
     }
 }
